@@ -1,0 +1,3 @@
+//! Adaptive generalized interpolation material point method on a distributed octree.
+pub mod material;
+pub mod particle;

@@ -1,0 +1,2 @@
+//! The `agimp` program.
+fn main() {}

@@ -1,0 +1,2 @@
+//! Constitutive models.
+pub mod parameters;

@@ -1,0 +1,281 @@
+//! The particles of one leaf, one contiguous column per component.
+//!
+//! Order inside a chunk is part of the result: sums over particles run in this order, so it is
+//! changed only by rules that depend on tree and particles (see `ARCHITECTURE.md`, "Canonical
+//! order"), never by ranks or threads.
+//!
+//! Positions are relative to the lower corner of the domain, so that an origin far from zero costs
+//! no digits.
+
+/// Column numbers of the real-valued components of a particle in `D` dimensions.
+///
+/// In plane strain (`D == 2`) symmetric tensors keep their out-of-plane `zz` component, so they
+/// have 4 components (`xx, yy, zz, xy`); in 3D they have 6 (`xx, yy, zz, xy, xz, yz`).
+#[derive(Clone, Copy, Debug)]
+pub struct Layout<const D: usize>;
+
+impl<const D: usize> Layout<D> {
+    /// Independent components of a symmetric tensor (4 in plane strain, 6 in 3D).
+    pub const SYMMETRIC: usize = if D == 2 { 4 } else { 6 };
+    /// Position relative to the domain's lower corner, m. `D` columns.
+    pub const POSITION: usize = 0;
+    /// Velocity, m/s. `D` columns.
+    pub const VELOCITY: usize = D;
+    /// Affine velocity matrix C of APIC, 1/s, row-major: column `AFFINE + D*i + j` is ∂v_i/∂x_j.
+    pub const AFFINE: usize = 2 * D;
+    /// Elastic left Cauchy-Green tensor b = F_e F_eᵀ. `SYMMETRIC` columns.
+    pub const LEFT_CAUCHY_GREEN: usize = 2 * D + D * D;
+    /// Kirchhoff stress τ, Pa. `SYMMETRIC` columns.
+    pub const STRESS: usize = Self::LEFT_CAUCHY_GREEN + Self::SYMMETRIC;
+    /// Mass, kg (per metre of thickness in plane strain).
+    pub const MASS: usize = Self::STRESS + Self::SYMMETRIC;
+    /// Half width of the undeformed box, m; the reference volume is `(2 half)^D`.
+    pub const HALF: usize = Self::MASS + 1;
+    /// First history variable; its meaning belongs to the material (plastic strain, as a rule).
+    pub const HISTORY: usize = Self::HALF + 1;
+    /// Number of history variables.
+    pub const HISTORIES: usize = 2;
+    /// Plastic work dissipated so far per reference volume, J/m³.
+    pub const WORK: usize = Self::HISTORY + Self::HISTORIES;
+    /// Number of real-valued columns (32 in 3D, 23 in 2D).
+    pub const REALS: usize = Self::WORK + 1;
+}
+
+/// Identity of a particle beside its real-valued state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tag {
+    /// Index of the material in the job.
+    pub material: u16,
+    /// Index of the body in the job.
+    pub body: u16,
+    /// Tree level the particle was made for.
+    pub level: u8,
+}
+
+impl Tag {
+    /// Packs the tag into the 64-bit column.
+    pub fn pack(self) -> u64 {
+        u64::from(self.material) | u64::from(self.body) << 16 | u64::from(self.level) << 32
+    }
+
+    /// Reads the tag back from the 64-bit column.
+    pub fn unpack(bits: u64) -> Self {
+        Self { material: bits as u16, body: (bits >> 16) as u16, level: (bits >> 32) as u8 }
+    }
+}
+
+/// Particles of one leaf: `Layout::<D>::REALS` columns of `f64` and two of `u64` (id and tag).
+///
+/// All columns live in one allocation per type with a common capacity.
+#[derive(Clone, Debug, Default)]
+pub struct Chunk<const D: usize> {
+    len: usize,
+    capacity: usize,
+    reals: Vec<f64>,
+    ids: Vec<u64>,
+    tags: Vec<u64>,
+}
+
+/// Capacities are multiples of this, so that a batch of lanes never reads past a column.
+const CAPACITY_STEP: usize = 8;
+
+impl<const D: usize> Chunk<D> {
+    /// An empty chunk.
+    pub fn new() -> Self {
+        Self { len: 0, capacity: 0, reals: Vec::new(), ids: Vec::new(), tags: Vec::new() }
+    }
+
+    /// An empty chunk with room for `capacity` particles.
+    pub fn with_capacity(capacity: usize) -> Self {
+        let mut chunk = Self::new();
+        chunk.reserve_exact(capacity);
+        chunk
+    }
+
+    /// Number of particles.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True when the chunk has no particles.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Room for particles before the next allocation; a multiple of 8.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Heap bytes held.
+    pub fn heap_bytes(&self) -> usize {
+        8 * (self.reals.capacity() + self.ids.capacity() + self.tags.capacity())
+    }
+
+    /// Column `column` (see [`Layout`]), `len` values.
+    pub fn column(&self, column: usize) -> &[f64] {
+        &self.reals[column * self.capacity..][..self.len]
+    }
+
+    /// Column `column`, mutable.
+    pub fn column_mut(&mut self, column: usize) -> &mut [f64] {
+        &mut self.reals[column * self.capacity..][..self.len]
+    }
+
+    /// All columns at once: `(reals, stride)`; column `c` of particle `p` is `reals[c * stride + p]`.
+    pub fn reals(&self) -> (&[f64], usize) {
+        (&self.reals, self.capacity)
+    }
+
+    /// All columns at once, mutable.
+    pub fn reals_mut(&mut self) -> (&mut [f64], usize) {
+        (&mut self.reals, self.capacity)
+    }
+
+    /// Real columns (with their stride) and tags at once, for kernels that write the former and read
+    /// the latter.
+    pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
+        (&mut self.reals, self.capacity, &self.tags[..self.len])
+    }
+
+    /// Identifiers, unique over the run.
+    pub fn ids(&self) -> &[u64] {
+        &self.ids[..self.len]
+    }
+
+    /// Identifiers, mutable.
+    pub fn ids_mut(&mut self) -> &mut [u64] {
+        &mut self.ids[..self.len]
+    }
+
+    /// Packed tags (see [`Tag`]).
+    pub fn tags(&self) -> &[u64] {
+        &self.tags[..self.len]
+    }
+
+    /// Packed tags, mutable.
+    pub fn tags_mut(&mut self) -> &mut [u64] {
+        &mut self.tags[..self.len]
+    }
+
+    /// Position of particle `p` relative to the domain's lower corner, m.
+    pub fn position(&self, p: usize) -> [f64; D] {
+        std::array::from_fn(|axis| self.reals[(Layout::<D>::POSITION + axis) * self.capacity + p])
+    }
+
+    /// Appends a particle with all columns zero and returns its index.
+    pub fn push_zeroed(&mut self, id: u64, tag: Tag) -> usize {
+        self.grow_for(1);
+        let p = self.len;
+        self.len += 1;
+        for column in 0..Layout::<D>::REALS {
+            self.reals[column * self.capacity + p] = 0.0;
+        }
+        self.ids[p] = id;
+        self.tags[p] = tag.pack();
+        p
+    }
+
+    /// Appends particle `p` of `source`.
+    pub fn push_from(&mut self, source: &Self, p: usize) {
+        self.grow_for(1);
+        let q = self.len;
+        self.len += 1;
+        for column in 0..Layout::<D>::REALS {
+            self.reals[column * self.capacity + q] = source.reals[column * source.capacity + p];
+        }
+        self.ids[q] = source.ids[p];
+        self.tags[q] = source.tags[p];
+    }
+
+    /// Appends `n` zeroed particles (id and tag zero) and returns the index of the first.
+    pub fn extend_zeroed(&mut self, n: usize) -> usize {
+        self.grow_for(n);
+        let first = self.len;
+        self.len += n;
+        for column in 0..Layout::<D>::REALS {
+            self.reals[column * self.capacity + first..][..n].fill(0.0);
+        }
+        self.ids[first..][..n].fill(0);
+        self.tags[first..][..n].fill(0);
+        first
+    }
+
+    /// Keeps the particles for which `keep(p)` holds, in their order.
+    pub fn retain(&mut self, mut keep: impl FnMut(usize) -> bool) {
+        let kept: Vec<u32> = (0..self.len).filter(|&p| keep(p)).map(|p| p as u32).collect();
+        if kept.len() == self.len {
+            return;
+        }
+        let first_gap = kept.iter().enumerate().take_while(|&(to, &from)| to == from as usize).count();
+        for column in 0..Layout::<D>::REALS {
+            let values = &mut self.reals[column * self.capacity..][..self.len];
+            for (to, &from) in kept.iter().enumerate().skip(first_gap) {
+                values[to] = values[from as usize];
+            }
+        }
+        for (to, &from) in kept.iter().enumerate().skip(first_gap) {
+            self.ids[to] = self.ids[from as usize];
+            self.tags[to] = self.tags[from as usize];
+        }
+        self.len = kept.len();
+    }
+
+    /// Makes room for exactly `capacity` particles (rounded up to a multiple of 8) if there is less.
+    pub fn reserve_exact(&mut self, capacity: usize) {
+        if capacity <= self.capacity {
+            return;
+        }
+        let capacity = capacity.next_multiple_of(CAPACITY_STEP);
+        let mut reals = vec![0.0; capacity * Layout::<D>::REALS];
+        for column in 0..Layout::<D>::REALS {
+            reals[column * capacity..][..self.len].copy_from_slice(self.column(column));
+        }
+        self.reals = reals;
+        self.ids.reserve_exact(capacity - self.ids.len());
+        self.ids.resize(capacity, 0);
+        self.tags.reserve_exact(capacity - self.tags.len());
+        self.tags.resize(capacity, 0);
+        self.capacity = capacity;
+    }
+
+    /// Room for `extra` more; grows by a sixteenth at least, since memory per particle is the limit.
+    fn grow_for(&mut self, extra: usize) {
+        let needed = self.len + extra;
+        if needed > self.capacity {
+            self.reserve_exact(needed.max(self.capacity + self.capacity / 16 + CAPACITY_STEP));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_fit_the_memory_budget() {
+        assert_eq!(Layout::<3>::REALS, 32);
+        assert_eq!(Layout::<2>::REALS, 23);
+        assert!(8 * (Layout::<3>::REALS + 2) <= 280);
+    }
+
+    #[test]
+    fn tag_round_trip() {
+        let tag = Tag { material: 513, body: 7, level: 9 };
+        assert_eq!(Tag::unpack(tag.pack()), tag);
+    }
+
+    #[test]
+    fn retain_keeps_order_and_columns() {
+        let mut chunk = Chunk::<2>::new();
+        for id in 0..20 {
+            let p = chunk.push_zeroed(id, Tag { material: id as u16, body: 0, level: 0 });
+            chunk.column_mut(Layout::<2>::MASS)[p] = id as f64;
+        }
+        chunk.retain(|p| p % 3 != 1);
+        let expected: Vec<u64> = (0..20).filter(|p| p % 3 != 1).collect();
+        assert_eq!(chunk.ids(), expected);
+        assert!(chunk.column(Layout::<2>::MASS).iter().zip(&expected).all(|(m, id)| *m == *id as f64));
+        assert!(chunk.tags().iter().zip(&expected).all(|(t, id)| u64::from(Tag::unpack(*t).material) == *id));
+    }
+}

@@ -1,0 +1,4 @@
+//! Particles: structure-of-arrays chunks, one per leaf, in a canonical order.
+pub mod chunk;
+
+pub use chunk::{Chunk, Layout};
