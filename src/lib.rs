@@ -1,3 +1,7 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
+pub mod boundary;
+pub mod grid;
+pub mod kernel;
 pub mod material;
 pub mod particle;
+pub mod solver;

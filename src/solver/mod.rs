@@ -1,0 +1,4 @@
+//! The time integration.
+pub mod bins;
+pub mod migrate;
+pub mod update;
