@@ -1,5 +1,6 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
 pub mod boundary;
+pub mod exact_sum;
 pub mod grid;
 pub mod kernel;
 pub mod material;

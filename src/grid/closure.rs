@@ -10,7 +10,7 @@
 //! contributions in the same order; one exchange of arenas per step is then enough.
 use std::collections::{BTreeMap, HashMap};
 
-use partition::Octant;
+use partition::{MAX_LEVEL, Octant};
 
 use super::constraint::{self, children_mask, parents_of};
 use super::known::{Cover, KnownTree};
@@ -38,16 +38,12 @@ pub struct Closure<const D: usize> {
     pub missing: Vec<Octant<D>>,
 }
 
-/// Bins that particles of known leaf `leaf` can scatter to: the leaf's own block first, then every block
-/// inside the leaf, on the level of a finer leaf that it touches, by level and curve position.
-pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
+/// Bins of known leaf `leaf` inside itself: its own block first, then every block inside it, on the level of
+/// a finer leaf that it touches, by level and curve position.
+pub fn inner_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
     let here = tree.leaves()[leaf];
     let mut finer = Vec::new();
-    for index in 0..offset_count(D) {
-        let Some(beside) = shifted(here.coord, offset::<D>(index)) else { continue };
-        if beside == here.coord || !matches!(tree.cover(here.level, beside), Cover::Finer(_)) {
-            continue;
-        }
+    for beside in finer_neighbours(tree, here) {
         for other in tree.leaves_within(here.level, beside) {
             finer.extend(blocks_beside(here, tree.leaves()[other]));
         }
@@ -56,6 +52,42 @@ pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<O
     finer.dedup();
     finer.insert(0, here);
     finer
+}
+
+/// Bins that particles of known leaf `leaf` can scatter to: first those inside it, then those of other leaves
+/// that parts of its boxes can reach, by level and curve position.
+pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
+    let mut bins = inner_bins(tree, leaf);
+    let Some(reach) = Reach::of(tree, leaf) else { return bins };
+    let here = tree.leaves()[leaf];
+    let mut outer = Vec::new();
+    for index in 0..offset_count(D) {
+        let Some(beside) = shifted(here.coord, offset::<D>(index)) else { continue };
+        let others = match tree.cover(here.level, beside) {
+            Cover::Leaf(other) if other != leaf => other..other + 1,
+            Cover::Finer(_) => tree.leaves_within(here.level, beside),
+            _ => continue,
+        };
+        for other in others.filter(|&other| reach.region.overlaps(&tree.leaves()[other])) {
+            outer.extend(inner_bins(tree, other).into_iter().filter(|bin| reach.includes(tree, bin)));
+        }
+    }
+    outer.sort_unstable_by_key(|bin: &Octant<D>| (bin.level, bin.key()));
+    outer.dedup();
+    bins.extend(outer);
+    bins
+}
+
+/// The same-size neighbours of an octant that are subdivided.
+fn finer_neighbours<const D: usize>(
+    tree: &KnownTree<D>,
+    here: Octant<D>,
+) -> impl Iterator<Item = [u32; D]> {
+    (0..offset_count(D))
+        .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
+        .filter(move |&beside| {
+            beside != here.coord && matches!(tree.cover(here.level, beside), Cover::Finer(_))
+        })
 }
 
 /// The blocks of `other`'s level that lie in `leaf` and touch `other`.
@@ -67,8 +99,78 @@ fn blocks_beside<const D: usize>(leaf: Octant<D>, other: Octant<D>) -> impl Iter
     })
 }
 
-/// The known leaf whose particles can scatter to the bin of `level` at `coord`, if there is such a bin.
-pub fn bin_source<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; D]) -> Option<usize> {
+/// An open box in units of an eighth of the finest lattice.
+#[derive(Clone, Copy)]
+struct Extent<const D: usize> {
+    lower: [i64; D],
+    upper: [i64; D],
+}
+
+/// Bits of an eighth of the finest lattice.
+const EIGHTH: u8 = 3;
+
+impl<const D: usize> Extent<D> {
+    /// The box of an octant, grown by `half_cells` half cells of `level`.
+    fn grown(octant: &Octant<D>, half_cells: u32, level: u8) -> Self {
+        let shift = MAX_LEVEL - octant.level + EIGHTH;
+        let growth = i64::from(half_cells) << (MAX_LEVEL - level);
+        Self {
+            lower: octant.coord.map(|c| (i64::from(c) << shift) - growth),
+            upper: octant.coord.map(|c| (i64::from(c + 1) << shift) + growth),
+        }
+    }
+
+    fn overlaps(&self, octant: &Octant<D>) -> bool {
+        let shift = MAX_LEVEL - octant.level + EIGHTH;
+        (0..D).all(|axis| {
+            let lower = i64::from(octant.coord[axis]) << shift;
+            lower < self.upper[axis] && lower + (1i64 << shift) > self.lower[axis]
+        })
+    }
+}
+
+/// Where parts of the boxes of a leaf's particles can lie outside the leaf.
+///
+/// A box at most one own cell wide is cut into parts only if it overlaps a finer leaf; its parts then lie
+/// within half a cell of its leaf and within a cell of the finer leaf. If boxes wider than a cell occur anywhere,
+/// every leaf may have them, up to [`KnownTree::reach`] cells.
+struct Reach<const D: usize> {
+    leaf: Octant<D>,
+    region: Extent<D>,
+    any_box: bool,
+}
+
+impl<const D: usize> Reach<D> {
+    /// `None` if all boxes of the leaf are transferred whole.
+    fn of(tree: &KnownTree<D>, leaf: usize) -> Option<Self> {
+        let leaf = tree.leaves()[leaf];
+        let any_box = tree.reach() > 0;
+        if !any_box && finer_neighbours(tree, leaf).next().is_none() {
+            return None;
+        }
+        let half_cells = if any_box { 2 * tree.reach() } else { 1 };
+        Some(Self { leaf, region: Extent::grown(&leaf, half_cells, leaf.level), any_box })
+    }
+
+    /// Whether a part can lie in the bin. Decided from leaves near both, so that every rank that needs the
+    /// bin's sums decides alike.
+    fn includes(&self, tree: &KnownTree<D>, bin: &Octant<D>) -> bool {
+        if !self.region.overlaps(bin) {
+            return false;
+        }
+        let near_bin = Extent::grown(bin, 2, self.leaf.level);
+        self.any_box
+            || finer_neighbours(tree, self.leaf).any(|beside| {
+                tree.leaves_within(self.leaf.level, beside).any(|finer| {
+                    let finer = &tree.leaves()[finer];
+                    self.region.overlaps(finer) && near_bin.overlaps(finer)
+                })
+            })
+    }
+}
+
+/// The known leaf that contains the bin of `level` at `coord`, if there is such a bin.
+fn bin_container<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; D]) -> Option<usize> {
     let Cover::Leaf(leaf) = tree.cover(level, coord) else { return None };
     if tree.leaves()[leaf].level == level {
         return Some(leaf);
@@ -80,6 +182,41 @@ pub fn bin_source<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; D
         })
     });
     touches_leaf_of_level.then_some(leaf)
+}
+
+/// Known leaves whose particles can scatter to the bin of `level` at `coord`, along the curve.
+pub fn bin_sources<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; D]) -> Vec<usize> {
+    let Some(container) = bin_container(tree, level, coord) else { return Vec::new() };
+    let bin = Octant { level, coord };
+    let mut sources = vec![container];
+    let mut consider = |leaf: usize| {
+        if leaf != container && Reach::of(tree, leaf).is_some_and(|reach| reach.includes(tree, &bin)) {
+            sources.push(leaf);
+        }
+    };
+    for index in 0..offset_count(D) {
+        let Some(beside) = shifted(coord, offset::<D>(index)) else { continue };
+        match tree.cover(level, beside) {
+            Cover::Leaf(leaf) => consider(leaf),
+            Cover::Finer(_) => tree.leaves_within(level, beside).for_each(&mut consider),
+            _ => {}
+        }
+    }
+    // Leaves that are coarser than the bin reach further than to the blocks beside it.
+    for coarse in tree.coarsest_reaching(level)..level {
+        let up = level - coarse;
+        for index in 0..offset_count(D) {
+            if let Some(beside) = shifted(coord.map(|c| c >> up), offset::<D>(index))
+                && let Cover::Leaf(leaf) = tree.cover(coarse, beside)
+                && tree.leaves()[leaf].level == coarse
+            {
+                consider(leaf);
+            }
+        }
+    }
+    sources.sort_unstable();
+    sources.dedup();
+    sources
 }
 
 /// Nodes of the block of `level` at `coord` that lie in the domain; blocks one past the upper faces hold
@@ -228,7 +365,7 @@ impl<const D: usize> Builder<'_, D> {
         let mut mask = 0;
         for index in 0..offset_count(D) {
             if let Some(bin) = shifted(coord, offset::<D>(index))
-                && bin_source(self.tree, level, bin).is_some()
+                && bin_container(self.tree, level, bin).is_some()
             {
                 mask |= self.overlaps[opposite(D, index)];
             }

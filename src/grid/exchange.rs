@@ -9,7 +9,7 @@ use super::plan::{GridPlan, ReceivedBin, arena_index};
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
-const TAG: i32 = 11;
+const TAG: u16 = 11;
 
 /// An own bin and the nodes of it that one neighbour needs.
 struct SentBin {
@@ -51,7 +51,7 @@ impl<const D: usize> ArenaExchange<D> {
                 requests.push((bin.rank, Vec::new()));
             }
             if let Some((_, words)) = requests.last_mut() {
-                push_request(words, bin);
+                push_request(words, bin, &plan.tree.leaves()[bin.leaf as usize]);
             }
         }
         let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
@@ -62,8 +62,7 @@ impl<const D: usize> ArenaExchange<D> {
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();
         ranks.dedup();
-        let own: std::collections::HashMap<Octant<D>, u32> =
-            plan.bins.iter().enumerate().map(|(i, bin)| (bin.block, i as u32)).collect();
+        let own = plan.own_bins();
         let mut sent: Vec<Vec<SentBin>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
@@ -84,6 +83,13 @@ impl<const D: usize> ArenaExchange<D> {
     /// Ranks with which arenas are exchanged.
     pub fn neighbours(&self) -> &[usize] {
         self.exchange.neighbours()
+    }
+
+    /// Per bin of `bins` in all, whether some neighbour needs it.
+    pub fn sent_bins(&self, bins: usize) -> Vec<bool> {
+        let mut sent = vec![false; bins];
+        self.sent.iter().flatten().for_each(|bin| sent[bin.bin as usize] = true);
+        sent
     }
 
     /// Messages and bytes so far.
@@ -206,7 +212,8 @@ fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
     bitmap
 }
 
-fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>) {
+fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>, leaf: &Octant<D>) {
+    words.push(leaf.key());
     words.push(u64::from(bin.block.level) << 32 | bin.parts.len() as u64);
     words.extend(bin.block.coord.map(u64::from));
     for &(offset, nodes, constrained) in &bin.parts {
@@ -217,19 +224,18 @@ fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>) {
 fn read_requests<const D: usize>(
     words: &[u64],
     plan: &GridPlan<D>,
-    own: &std::collections::HashMap<Octant<D>, u32>,
+    own: &std::collections::HashMap<(u32, Octant<D>), u32>,
 ) -> Vec<SentBin> {
     let mut sent = Vec::new();
     let mut at = 0;
     while at < words.len() {
-        let (level, count) = ((words[at] >> 32) as u8, words[at] as u32 as usize);
-        let coord = std::array::from_fn(|axis| words[at + 1 + axis] as u32);
+        let leaf = plan.tree.locate(words[at]).unwrap_or_default() as u32;
+        let (level, count) = ((words[at + 1] >> 32) as u8, words[at + 1] as u32 as usize);
+        let coord = std::array::from_fn(|axis| words[at + 2 + axis] as u32);
         let parts =
-            words[at + 1 + D..][..3 * count].chunks_exact(3).map(|p| (p[0] as u8, p[1], p[2])).collect();
-        at += 1 + D + 3 * count;
-        let bin = own[&Octant { level, coord }];
-        debug_assert_eq!(plan.bins[bin as usize].block.level, level);
-        sent.push(SentBin { bin, parts });
+            words[at + 2 + D..][..3 * count].chunks_exact(3).map(|p| (p[0] as u8, p[1], p[2])).collect();
+        at += 2 + D + 3 * count;
+        sent.push(SentBin { bin: own[&(leaf, Octant { level, coord })], parts });
     }
     sent
 }

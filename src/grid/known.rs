@@ -24,11 +24,26 @@ pub struct KnownTree<const D: usize> {
     owners: Vec<u32>,
     first_own: usize,
     own_len: usize,
+    reach: u32,
+    graded: bool,
 }
+
+/// What the ghost layer has to allow for, the same on every rank.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Allowance {
+    /// Half width of the widest boxes in cells of the leaf that holds them, rounded up, if any is wider
+    /// than a cell; 0 otherwise. At most [`MAX_REACH`].
+    pub reach: u32,
+    /// Whether neighbouring leaves differ by one level at most.
+    pub graded: bool,
+}
+
+/// Greatest half width of a box, in cells of the leaf that holds the particle: one edge of the leaf.
+pub const MAX_REACH: u32 = 4;
 
 impl<const D: usize> KnownTree<D> {
     /// Not collective. The own leaves of a rank, without a ghost layer.
-    pub fn own(forest: &Forest<D>, rank: usize) -> Self {
+    pub fn own(forest: &Forest<D>, rank: usize, allowance: Allowance) -> Self {
         let leaves = forest.leaves().to_vec();
         let mut tree = Self {
             brick: *forest.brick(),
@@ -37,6 +52,8 @@ impl<const D: usize> KnownTree<D> {
             keys: Vec::new(),
             first_own: 0,
             own_len: leaves.len(),
+            reach: allowance.reach,
+            graded: allowance.graded,
             leaves,
         };
         tree.index();
@@ -83,6 +100,22 @@ impl<const D: usize> KnownTree<D> {
     pub fn local(&self, known: usize) -> Option<usize> {
         let local = known.wrapping_sub(self.first_own);
         (local < self.own_len).then_some(local)
+    }
+
+    /// See [`Allowance::reach`].
+    pub fn reach(&self) -> u32 {
+        self.reach
+    }
+
+    /// Coarsest level of leaves whose boxes can have parts in a bin of `level`.
+    ///
+    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf, so that parts
+    /// of that leaf's boxes cannot reach the bin.
+    pub fn coarsest_reaching(&self, level: u8) -> u8 {
+        if !self.graded {
+            return 0;
+        }
+        level.saturating_sub(if self.reach > 1 { 3 } else { 2 })
     }
 
     /// Number of leaves of other ranks that are known.

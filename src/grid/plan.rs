@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant, Region};
 
-use super::closure::{Closure, NeededBlocks, bin_source, nodes_in_domain, potential_bins};
+use super::closure::{Closure, NeededBlocks, bin_sources, nodes_in_domain, potential_bins};
 use super::constraint::{block_and_bit, node_coord, parents_of};
-use super::known::KnownTree;
+use super::known::{Allowance, KnownTree};
 use super::mask::{
     arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, opposite, shifted,
 };
@@ -38,7 +38,8 @@ pub struct Block<const D: usize> {
     pub moments: Option<u32>,
 }
 
-/// A bin: the particles of one leaf that scatter on one level into the arena of one block.
+/// A bin: the particles of one leaf, or parts of their boxes, that scatter on one level into the arena of one
+/// block. Blocks inside the leaf come first; parts of boxes may also reach blocks of other leaves.
 #[derive(Clone, Debug)]
 pub struct Bin<const D: usize> {
     /// Own leaf whose particles it takes.
@@ -166,8 +167,8 @@ pub struct GridPlan<const D: usize> {
 
 impl<const D: usize> GridPlan<D> {
     /// Collective. Builds the ghost layer and the grid of each rank.
-    pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64) -> Self {
-        let mut tree = KnownTree::own(forest, comm.rank());
+    pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
+        let mut tree = KnownTree::own(forest, comm.rank(), allowance);
         let mut rounds = 0;
         let needed = loop {
             let closure = Closure::compute(&tree);
@@ -284,7 +285,7 @@ impl<const D: usize> GridPlan<D> {
         bits(real)
             .filter(|&bit| {
                 let node = node_coord(coord, bit);
-                let position = std::array::from_fn(|axis| {
+                let position: [u32; D] = std::array::from_fn(|axis| {
                     let end = self.tree.brick().roots[axis] << MAX_LEVEL;
                     // Node coordinates count cells, of which an octant of the level has four per edge.
                     let lattice = (u64::from(node[axis]) << MAX_LEVEL >> (level + 2)) as u32;
@@ -351,19 +352,19 @@ impl<const D: usize> GridPlan<D> {
 
     /// Lists the arenas that make up each block's sum, own and received, in canonical order.
     fn list_contributions(&mut self, rank: usize) {
-        let own_bins: HashMap<Octant<D>, u32> =
-            self.bins.iter().enumerate().map(|(i, bin)| (bin.block, i as u32)).collect();
-        // (block, source leaf, bin, offset, nodes): bins of one leaf sort by level and curve position.
+        let own_bins = self.own_bins();
+        // (block, source leaf, bin, offset, nodes)
         let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
                 let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
                 let seen_from_bin = opposite(D, towards);
                 let nodes = block.sum & arena_overlap::<D>(offset(seen_from_bin));
-                if nodes != 0
-                    && let Some(leaf) = bin_source(&self.tree, block.level, coord)
-                {
-                    let bin = Octant { level: block.level, coord };
+                if nodes == 0 {
+                    continue;
+                }
+                let bin = Octant { level: block.level, coord };
+                for leaf in bin_sources(&self.tree, block.level, coord) {
                     sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
                 }
             }
@@ -374,35 +375,41 @@ impl<const D: usize> GridPlan<D> {
             .map(|&(block, leaf, bin, offset, nodes)| (leaf, bin, offset, nodes, block))
             .collect();
         remote.sort_unstable_by_key(|&(leaf, bin, offset, ..)| (leaf, bin.level, bin.key(), offset));
-        let mut part_of: HashMap<(Octant<D>, u8), (u32, u32)> = HashMap::new();
+        let mut part_of: HashMap<(u32, Octant<D>, u8), (u32, u32)> = HashMap::new();
         for (leaf, bin, offset, nodes, block) in remote {
             let constrained = nodes & self.blocks[block as usize].constrained;
-            if self.received.last().is_none_or(|last| last.block != bin) {
+            if self.received.last().is_none_or(|last| (last.leaf, last.block) != (leaf, bin)) {
                 let rank = self.tree.owner(leaf as usize);
                 self.received.push(ReceivedBin { rank, leaf, block: bin, parts: Vec::new() });
             }
             let number = self.received.len() as u32 - 1;
             let parts = &mut self.received[number as usize].parts;
-            part_of.insert((bin, offset), (number, parts.len() as u32));
+            part_of.insert((leaf, bin, offset), (number, parts.len() as u32));
             parts.push((offset, nodes, constrained));
         }
         sources.sort_unstable_by_key(|&(block, leaf, bin, offset, _)| (block, leaf, bin.key(), offset));
         let mut next = 0;
-        for (block, _, bin, offset, _) in sources {
+        for (block, leaf, bin, offset, _) in sources {
             while next <= block {
                 self.contribution_start.push(self.contributions.len() as u32);
                 next += 1;
             }
-            let source = match own_bins.get(&bin) {
+            let source = match own_bins.get(&(leaf, bin)) {
                 Some(&own) => Source::Own(BinId(own)),
                 None => {
-                    let (number, part) = part_of[&(bin, offset)];
+                    let (number, part) = part_of[&(leaf, bin, offset)];
                     Source::Received(number, part)
                 }
             };
             self.contributions.push(Contribution { source, offset });
         }
         self.contribution_start.resize(self.blocks.len() + 1, self.contributions.len() as u32);
+    }
+
+    /// Own bins by known source leaf and block.
+    pub(super) fn own_bins(&self) -> HashMap<(u32, Octant<D>), u32> {
+        let first = self.tree.first_own() as u32;
+        self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
     }
 
     fn link_levels(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {

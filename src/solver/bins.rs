@@ -73,7 +73,8 @@ impl<const D: usize> BinLists<D> {
         lists
     }
 
-    /// Not collective. Sorts all particles; `half_widths(chunk, p)` gives the half widths of a box.
+    /// Not collective. Sorts all particles; `half_widths(chunk, cell, out)` lists the half widths of the boxes
+    /// of a chunk in a leaf with cells of edge `cell`.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan; the caller makes it collective.
@@ -81,15 +82,16 @@ impl<const D: usize> BinLists<D> {
         &mut self,
         plan: &GridPlan<D>,
         chunks: &[Chunk<D>],
-        half_widths: impl Fn(&Chunk<D>, usize) -> [f64; D] + Sync,
+        half_widths: impl Fn(&Chunk<D>, f64, &mut Vec<[f64; D]>) + Sync,
     ) -> Result<(), BinMissing> {
-        self.sorted.par_iter_mut().try_for_each(|sorted| {
+        self.sorted.par_iter_mut().try_for_each_init(Vec::new, |halves, sorted| {
             let bins = &plan.bins[plan.leaf_bins(sorted.leaf)];
             let own_level = bins[0].block.level;
             let chunk = &chunks[sorted.leaf];
             sorted.lists.iter_mut().for_each(Vec::clear);
-            for p in 0..chunk.len() {
-                let (centre, half) = (chunk.position(p), half_widths(chunk, p));
+            half_widths(chunk, plan.cell(own_level), halves);
+            for (p, &half) in halves.iter().enumerate() {
+                let centre = chunk.position(p);
                 let level = sorted.finest_level(own_level, centre, half);
                 let bin = if level == own_level {
                     Some(0)

@@ -58,9 +58,15 @@ enum Destination {
 /// Moves particles to the leaves that contain them.
 pub struct Migration<const D: usize> {
     exchange: NeighbourExchange,
+    boxes: Vec<([f64; D], [f64; D])>,
+    rule: Rule,
+}
+
+/// How the destination of a particle is found.
+#[derive(Clone, Copy)]
+struct Rule {
     leaving: Leaving,
     root_edge: f64,
-    boxes: Vec<([f64; D], [f64; D])>,
 }
 
 /// Particles that left their leaf in one step.
@@ -80,7 +86,7 @@ impl<const D: usize> Migration<D> {
         let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
         let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
         let exchange = NeighbourExchange::new(comm, neighbours, TAG);
-        Self { exchange, leaving, root_edge: plan.root_edge, boxes }
+        Self { exchange, boxes, rule: Rule { leaving, root_edge: plan.root_edge } }
     }
 
     /// Messages and bytes so far.
@@ -98,13 +104,13 @@ impl<const D: usize> Migration<D> {
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],
     ) -> Result<Moved, MigrateError> {
-        let first = tree.first_own();
+        let (first, rule) = (tree.first_own(), self.rule);
         let found: Vec<Result<Vec<(u32, Destination)>, MigrateError>> = chunks
             .par_iter_mut()
             .zip(&self.boxes)
             .enumerate()
             .with_min_len(4)
-            .map(|(leaf, (chunk, bounds))| self.leavers(tree, first + leaf, chunk, bounds))
+            .map(|(leaf, (chunk, bounds))| rule.leavers(tree, first + leaf, chunk, bounds))
             .collect();
         let mut error = None;
         let mut moved = Moved::default();
@@ -155,10 +161,12 @@ impl<const D: usize> Migration<D> {
         }
         error.map_or(Ok(moved), Err)
     }
+}
 
+impl Rule {
     /// Particles of one leaf that are outside it, with their destinations, in order.
-    fn leavers(
-        &self,
+    fn leavers<const D: usize>(
+        self,
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
@@ -179,8 +187,8 @@ impl<const D: usize> Migration<D> {
         Ok(leavers)
     }
 
-    fn destination(
-        &self,
+    fn destination<const D: usize>(
+        self,
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
@@ -219,7 +227,7 @@ impl<const D: usize> Migration<D> {
 /// is defined by this function alone.
 pub fn position_key<const D: usize>(position: [f64; D], roots: [u32; D], root_edge: f64) -> u64 {
     let scale = f64::from(1u32 << MAX_LEVEL) / root_edge;
-    let coord = std::array::from_fn(|axis| {
+    let coord: [u32; D] = std::array::from_fn(|axis| {
         let last = (roots[axis] << MAX_LEVEL) - 1;
         ((position[axis] * scale) as u32).min(last)
     });
