@@ -33,9 +33,9 @@ fn pair<const D: usize>(brick: Brick<D>) -> impl Strategy<Value = (Octant<D>, Oc
 /// One bit at a time.
 fn slow_key<const D: usize>(octant: &Octant<D>) -> u64 {
     let low = octant.lower();
-    (0..21).flat_map(|bit| (0..D).map(move |a| (bit, a))).fold(0, |key, (bit, a)| {
-        key | u64::from(low[a] >> bit & 1) << (bit * D + a)
-    })
+    (0..21)
+        .flat_map(|bit| (0..D).map(move |a| (bit, a)))
+        .fold(0, |key, (bit, a)| key | u64::from(low[a] >> bit & 1) << (bit * D + a))
 }
 
 fn check_octant<const D: usize>(octant: Octant<D>, brick: &Brick<D>) -> Result<(), TestCaseError> {
