@@ -14,8 +14,15 @@ pub enum Shape {
         /// Upper corner, m.
         max: Vector,
     },
-    /// A ball; a disc in 2D.
-    #[serde(alias = "circle")]
+    /// A disc; 2D only.
+    Circle {
+        /// Centre, m.
+        centre: Vector,
+        /// Radius, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        radius: f64,
+    },
+    /// A ball; 3D only.
     Sphere {
         /// Centre, m.
         centre: Vector,
