@@ -16,6 +16,8 @@ pub mod math;
 pub mod p2g;
 pub mod simd;
 pub mod stencil;
+#[cfg(test)]
+mod tests;
 
 /// Cells of a block along one axis.
 pub const BLOCK: usize = 4;

@@ -57,3 +57,80 @@ impl Axis {
         std::array::from_fn(|i| (first + Lanes::splat(i as f64)) * cell)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::simd::LANES;
+
+    /// Centres over a block and half widths from tiny to half a cell, aligned ones among them.
+    fn boxes() -> Vec<(f64, f64)> {
+        let halves = [0.5, 0.25, 0.125, 0.1, 1.0 / 3.0, 0.499_999, 1e-3, 1e-6];
+        let mut all = Vec::new();
+        for half in halves {
+            for i in 0..4000 {
+                all.push((i as f64 / 1000.0 + 1e-9, half));
+            }
+            all.extend((0..32).map(|i| (i as f64 / 8.0, half)));
+        }
+        all
+    }
+
+    #[test]
+    fn unity_linear_reproduction_and_sign() {
+        for chunk in boxes().chunks_exact(LANES) {
+            let centre = Lanes::new(std::array::from_fn(|lane| chunk[lane].0));
+            let half = Lanes::new(std::array::from_fn(|lane| chunk[lane].1));
+            let axis = Axis::new(centre, half, 8.0);
+            let offset = axis.offsets(centre, 0.125);
+            for lane in 0..LANES {
+                let (x, l) = chunk[lane];
+                let at = |lanes: &[Lanes; 3]| lanes.map(|v| v.to_array()[lane]);
+                let (w, dw, d) = (at(&axis.weight), at(&axis.slope), at(&offset));
+                let base = axis.base.to_array()[lane];
+                assert!((-1.0..=3.0).contains(&base) && base == base.floor());
+                assert!(w.iter().all(|w| *w >= 0.0));
+                assert!((w.iter().sum::<f64>() - 1.0).abs() <= 4.0 * f64::EPSILON);
+                assert!((0..3).map(|i| w[i] * d[i]).sum::<f64>().abs() <= 8.0 * f64::EPSILON);
+                let slope = f64::EPSILON * 32.0 / l;
+                assert!(dw.iter().sum::<f64>().abs() <= slope);
+                assert!(((0..3).map(|i| dw[i] * d[i]).sum::<f64>() - 1.0).abs() <= slope, "{x} {l}");
+            }
+        }
+    }
+
+    #[test]
+    fn half_cell_boxes_are_quadratic_splines() {
+        for i in 0..400 {
+            let x = f64::from(i) / 100.0;
+            let axis = Axis::new(Lanes::splat(x), Lanes::splat(0.5), 1.0);
+            for node in 0..3 {
+                let distance = (axis.base.to_array()[0] + node as f64 - x).abs();
+                let spline = if distance <= 0.5 {
+                    0.75 - distance * distance
+                } else {
+                    0.5 * (1.5 - distance) * (1.5 - distance)
+                };
+                assert!((axis.weight[node].to_array()[0] - spline).abs() <= 8.0 * f64::EPSILON);
+            }
+        }
+    }
+
+    #[test]
+    fn slope_is_the_derivative_of_the_weight() {
+        let (cell, step) = (0.5, 1e-6);
+        for i in 0..390 {
+            let x = 0.05 + f64::from(i) / 100.0;
+            let at = |x: f64| Axis::new(Lanes::splat(x), Lanes::splat(0.2), 1.0 / cell);
+            let (axis, left, right) = (at(x), at(x - step), at(x + step));
+            if left.base.to_array()[0] != right.base.to_array()[0] {
+                continue;
+            }
+            for node in 0..3 {
+                let difference = right.weight[node] - left.weight[node];
+                let slope = difference.to_array()[0] / (2.0 * step * cell);
+                assert!((slope - axis.slope[node].to_array()[0]).abs() <= 1e-5);
+            }
+        }
+    }
+}
