@@ -4,3 +4,4 @@ pub mod exact_sum;
 pub mod hdf5_file;
 pub mod history;
 pub mod series;
+pub mod snapshot;
