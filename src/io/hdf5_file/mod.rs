@@ -19,7 +19,7 @@ use hdf5_sys::h5g::{H5Gclose, H5Gcreate2};
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5l::{H5Lcreate_hard, H5Lexists};
 use hdf5_sys::h5p::{
-    H5FD_mpio_xfer_t, H5P_CLS_DATASET_CREATE, H5P_CLS_DATASET_XFER, H5P_CLS_FILE_ACCESS,
+    H5FD_mpio_xfer_t, H5P_CLS_DATASET_CREATE, H5P_CLS_DATASET_XFER, H5P_CLS_FILE_ACCESS, H5P_CLS_FILE_CREATE,
     H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_alignment, H5Pset_coll_metadata_write,
     H5Pset_dxpl_mpio, H5Pset_fill_time, H5Pset_libver_bounds, H5Pset_obj_track_times,
 };
@@ -144,17 +144,21 @@ impl ParallelFile {
             }
         }
         let name = c_text(&path.to_string_lossy());
-        // SAFETY: `name` is a terminated string that outlives the calls; results are checked by `wrap`.
+        // SAFETY: `name` is a terminated string that outlives the calls; the new identifiers are checked
+        // by `wrap`. The root group keeps no timestamps, like all other objects.
         let (transfer, create, file) = unsafe {
-            (
-                H5Pcreate(*H5P_CLS_DATASET_XFER),
-                H5Pcreate(*H5P_CLS_DATASET_CREATE),
-                if new {
-                    H5Fcreate(name.as_ptr(), H5F_ACC_TRUNC, H5P_DEFAULT, access)
-                } else {
-                    H5Fopen(name.as_ptr(), H5F_ACC_RDONLY, access)
-                },
-            )
+            let transfer = H5Pcreate(*H5P_CLS_DATASET_XFER);
+            let create = H5Pcreate(*H5P_CLS_DATASET_CREATE);
+            let file = if new {
+                let root = H5Pcreate(*H5P_CLS_FILE_CREATE);
+                H5Pset_obj_track_times(root, 0);
+                let file = H5Fcreate(name.as_ptr(), H5F_ACC_TRUNC, root, access);
+                H5Pclose(root);
+                file
+            } else {
+                H5Fopen(name.as_ptr(), H5F_ACC_RDONLY, access)
+            };
+            (transfer, create, file)
         };
         let transfer = wrap(transfer, H5Pclose).map_err(|e| fail("prepare", e))?;
         let create = wrap(create, H5Pclose).map_err(|e| fail("prepare", e))?;
