@@ -1,19 +1,15 @@
 //! Conditions on the faces of the domain.
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 /// What happens to material at one face of the domain.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FaceCondition {
     /// No motion.
     Sticky,
     /// No motion through the face, free motion along it.
+    #[default]
     Slip,
     /// No motion into the face, free motion away from it; Coulomb friction along it while it is pressed.
     Separating {
         /// Coefficient of friction, tan of the friction angle; 0 is frictionless.
-        #[serde(default)]
         friction: f64,
     },
     /// Mirror plane; for velocities the same as `slip`.

@@ -7,22 +7,11 @@ use partition::comm::{Comm, NeighbourExchange, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 const TAG: u16 = 12;
-
-/// What happens to particles that leave the domain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Leaving {
-    /// The run ends with an error that names them.
-    #[default]
-    Error,
-    /// They are removed and counted.
-    Delete,
-    /// They are put back on the face they crossed.
-    Clamp,
-}
 
 /// Why particles could not be migrated.
 #[derive(Debug, thiserror::Error)]

@@ -16,11 +16,11 @@ use partition::comm::{Comm, Disagreement};
 
 use self::bins::BinMissing;
 use self::grid::Grid;
-use self::migrate::{Leaving, MigrateError, Moved};
+use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
 use self::time_step::StepControl;
 use self::transfer::Reach;
-use crate::boundary::FaceCondition;
+use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::fields::Part;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
