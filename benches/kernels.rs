@@ -49,7 +49,8 @@ struct Setting<const D: usize> {
 
 impl<const D: usize> Setting<D> {
     fn new(model: &str) -> Self {
-        let mut chunk = Chunk::new();
+        // An odd number of cache lines per column: columns do not fall into the same cache set.
+        let mut chunk = Chunk::with_capacity(8usize.pow(D as u32) + 8);
         for i in 0..8usize.pow(D as u32) {
             let p = chunk.push_zeroed(i as u64, Tag { material: 0, body: 0, level: 0 });
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
