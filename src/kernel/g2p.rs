@@ -4,7 +4,7 @@
 //! ```text
 //! v = Σ w v_j,  ∇v = Σ v_j ⊗ ∇w,  B = Σ w (v_j ⊗ d + V_j),  D_k = Σ w (d_k² + S_j,k)
 //! ```
-//! axis by axis, where V and S are the first and second moments that constrained nodes inherit (zero
+//! where V and S are the first and second moments that constrained nodes inherit (zero
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::Batch;
@@ -230,63 +230,43 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// Velocity, gradient and affine sums: x first, then y, then z.
+    /// Velocity, gradient and affine sums.
+    ///
+    /// Each needs the nodes averaged over all axes but one: the pencil along x is
+    /// `X_a = Σ_bc wy_b wz_c v_abc`, and so on. All three come from one pass over the nodes.
     #[inline(always)]
     fn contract(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
         let nodes = &nodes[..super::stencil_span(D)];
         let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
-        let mut factor = [[zero; 3]; 3];
-        for a in 0..3 {
-            factor[0][a] = of(&x.weight[a]);
-            factor[1][a] = of(&x.arm[a]);
-            factor[2][a] = of(&x.slope[a]);
-        }
-        // Mean; arms along x, y, z; slopes along x, y, z.
-        let mut total = [zero; 7];
+        let weight_x = [of(&x.weight[0]), of(&x.weight[1]), of(&x.weight[2])];
+        let mut pencil = [[zero; 3]; D];
         for c in 0..if D == 3 { 3 } else { 1 } {
-            // Of one plane z: mean; arms along x and y; slopes along x and y.
-            let mut plane = [zero; 5];
             for b in 0..3 {
-                let mut line = [zero; 3];
+                let product = of(if D == 3 { &weights.product[b][c] } else { &y.weight[b] });
+                let mut across = zero;
                 for a in 0..3 {
                     let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
-                    for q in 0..3 {
-                        line[q] =
-                            if a == 0 { factor[q][a] * row } else { factor[q][a].mul_add(row, line[q]) };
-                    }
+                    pencil[0][a] = product.mul_add(row, pencil[0][a]);
+                    across = weight_x[a].mul_add(row, across);
                 }
-                let (weight, arm, slope) = (of(&y.weight[b]), of(&y.arm[b]), of(&y.slope[b]));
-                let add = |factor: F64x4, line: F64x4, sum: F64x4| {
-                    if b == 0 { factor * line } else { factor.mul_add(line, sum) }
-                };
-                plane[0] = add(weight, line[0], plane[0]);
-                plane[1] = add(weight, line[1], plane[1]);
-                plane[2] = add(arm, line[0], plane[2]);
-                plane[3] = add(weight, line[2], plane[3]);
-                plane[4] = add(slope, line[0], plane[4]);
+                if D == 3 {
+                    pencil[1][b] = of(&z.weight[c]).mul_add(across, pencil[1][b]);
+                    pencil[D - 1][c] = of(&y.weight[b]).mul_add(across, pencil[D - 1][c]);
+                } else {
+                    pencil[1][b] = across;
+                }
             }
-            if D == 2 {
-                [total[0], total[1], total[2], total[4], total[5]] = plane;
-                continue;
-            }
-            let (weight, arm, slope) = (of(&z.weight[c]), of(&z.arm[c]), of(&z.slope[c]));
-            let add = |factor: F64x4, plane: F64x4, sum: F64x4| {
-                if c == 0 { factor * plane } else { factor.mul_add(plane, sum) }
-            };
-            total[0] = add(weight, plane[0], total[0]);
-            total[1] = add(weight, plane[1], total[1]);
-            total[2] = add(weight, plane[2], total[2]);
-            total[3] = add(arm, plane[0], total[3]);
-            total[4] = add(weight, plane[3], total[4]);
-            total[5] = add(weight, plane[4], total[5]);
-            total[6] = add(slope, plane[0], total[6]);
         }
-        self.velocity[lane] = total[0];
+        let dot = |factor: &[[f64; LANES]; 3], pencil: &[F64x4; 3]| {
+            let sum = of(&factor[1]).mul_add(pencil[1], of(&factor[0]) * pencil[0]);
+            of(&factor[2]).mul_add(pencil[2], sum)
+        };
+        self.velocity[lane] = dot(&x.weight, &pencil[0]);
         for k in 0..D {
-            self.affine[k][lane] = total[1 + k];
-            self.gradient[k][lane] = total[4 + k];
+            self.affine[k][lane] = dot(&weights.axis[k].arm, &pencil[k]);
+            self.gradient[k][lane] = dot(&weights.axis[k].slope, &pencil[k]);
         }
     }
 }

@@ -47,7 +47,6 @@ impl<const D: usize> Weights<D> {
         let inverse = 1.0 / frame.cell;
         let mut first = Lanes::splat(0.0);
         let mut base = first;
-        let mut weight = [[first; 3]; D];
         for k in (0..D).rev() {
             let corner = Lanes::splat(frame.corner[k]);
             let axis = Axis::new((centre[k] - corner) * inverse, half[k] * inverse, inverse);
@@ -65,12 +64,12 @@ impl<const D: usize> Weights<D> {
                 axis.slope[i].store(&mut to.slope[i]);
             }
             self.spread[k] = spread;
-            weight[k] = axis.weight;
         }
         if D == 3 {
+            let (y, z) = (&self.axis[1].weight, &self.axis[D - 1].weight);
             for b in 0..3 {
                 for c in 0..3 {
-                    (weight[1][b] * weight[D - 1][c]).store(&mut self.product[b][c]);
+                    (Lanes::load(&y[b]) * Lanes::load(&z[c])).store(&mut self.product[b][c]);
                 }
             }
         }
