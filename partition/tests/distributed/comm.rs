@@ -117,7 +117,8 @@ pub fn neighbours(comm: &Comm) {
     assert_eq!(exchange.neighbours(), ring);
     let message = |round: u64, from: usize, to: usize| {
         let mut random = Random::new(hash(round, (from * size + to) as u64));
-        let len = if random.one_in(30) { 300_000 } else { random.below(40) };
+        let long = if round % 1000 < 30 { 300_000 } else { 3_000 }; // the latter in many pieces
+        let len = if random.one_in(30) { long } else { random.below(40) };
         (0..len).map(|_| random.next() as u8).collect::<Vec<u8>>()
     };
     let outgoing = |round| ring.iter().map(|&to| message(round, rank, to)).collect::<Vec<_>>();
