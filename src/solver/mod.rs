@@ -126,7 +126,7 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
-        let grid = Grid::build(comm, &forest, &physics);
+        let grid = Grid::build(comm, &forest, &physics, 0);
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -138,6 +138,10 @@ impl<const D: usize> Solver<D> {
             grid,
             deleted: 0,
         };
+        let reach = solver.agreed_reach();
+        if reach > 0 {
+            solver.rebuild_grid(reach);
+        }
         if clock == Clock::default() {
             solver.signal = solver.chunks.iter().map(|chunk| solver.signal_at_rest(chunk)).collect();
             solver.clock.bound = comm.min_f64(solver.local_bound());
@@ -165,11 +169,24 @@ impl<const D: usize> Solver<D> {
         self.prolong();
         self.gather(dt);
         let moved = self.migrate();
+        let reach = self.local_reach();
 
         self.clock.step += 1;
         self.clock.time = if dt < left { self.clock.time + dt } else { end };
         self.clock.dt = dt;
-        self.close_step(sorted, moved, requests)
+        self.close_step(sorted, moved, reach, requests)
+    }
+
+    /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
+    pub(super) fn rebuild_grid(&mut self, reach: u32) {
+        self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
+    }
+
+    /// Collective. Reach that the boxes of all ranks need.
+    fn agreed_reach(&self) -> u32 {
+        let mut reach = [u64::from(self.local_reach())];
+        self.comm.max_u64(&mut reach);
+        reach[0] as u32
     }
 
     /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.
@@ -177,6 +194,7 @@ impl<const D: usize> Solver<D> {
         &mut self,
         sorted: Result<(), BinMissing>,
         moved: Result<Moved, MigrateError>,
+        reach: u32,
         requests: Requests,
     ) -> Result<StepReport, Disagreement> {
         let bound = self.local_bound();
@@ -189,12 +207,20 @@ impl<const D: usize> Solver<D> {
         };
         let flag = |set: bool| if set { -1.0 } else { 0.0 };
         let bound = if outcome.is_ok() { bound } else { 0.0 };
-        let mut least =
-            [bound, flag(outcome.is_err()), flag(requests.stop), flag(requests.checkpoint)];
+        let mut least = [
+            bound,
+            flag(outcome.is_err()),
+            flag(requests.stop),
+            flag(requests.checkpoint),
+            -f64::from(reach),
+        ];
         self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
-        let [bound, failed, stop, checkpoint] = least;
+        let [bound, failed, stop, checkpoint, reach] = least;
         let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
         self.clock.bound = bound;
+        if -reach > f64::from(self.grid.plan.tree.reach()) {
+            self.rebuild_grid(-reach as u32);
+        }
         let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
         Ok(StepReport { moved, granted })
     }
