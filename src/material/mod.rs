@@ -1,2 +1,148 @@
-//! Constitutive models.
+//! Constitutive models: one trait over batches of particles, one file per model.
+//!
+//! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
+//! elastic state. Plastic models map a trial `b` back to their yield surface in principal Hencky
+//! strains.
+use crate::kernel::simd::{LANES, Lanes, Mask};
+
+pub mod driver;
+pub mod drucker_prager;
+pub mod eigen;
+pub mod fixed_corotated;
+pub mod hencky;
+pub mod neo_hookean;
 pub mod parameters;
+pub mod von_mises;
+
+pub use eigen::Symmetric;
+pub use parameters::Parameters;
+
+/// Number of history variables that a particle has.
+pub const HISTORIES: usize = 2;
+
+/// State of a batch of particles. Symmetric tensors have components `xx, yy, zz, xy, xz, yz`.
+#[derive(Clone, Copy, Debug)]
+pub struct State {
+    /// Elastic left Cauchy-Green tensor: the trial value before, the final one after an update.
+    pub elastic: Symmetric,
+    /// Kirchhoff stress after an update, Pa.
+    pub stress: Symmetric,
+    /// History variables (see [`Material::history_names`]); the second is the logarithm of the
+    /// plastic volume ratio, or zero.
+    pub history: [Lanes; HISTORIES],
+    /// Plastic work of the update per reference volume, J/m³; not negative.
+    pub work: Lanes,
+    /// Upper bound of the wave speeds after an update, m/s.
+    pub wave_speed: Lanes,
+}
+
+impl State {
+    /// A batch at rest with `elastic` as trial value and no history.
+    pub fn new(elastic: Symmetric) -> Self {
+        let zero = Lanes::splat(0.0);
+        Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+    }
+}
+
+/// A constitutive model with its parameters.
+///
+/// Updates compute each lane from that lane alone, so the bits of a particle do not depend on its
+/// neighbours in the batch.
+pub trait Material: std::fmt::Debug + Send + Sync {
+    /// From the trial elastic tensor to the final one, stress, history, work and wave speed. `plane`
+    /// says that the components xz and yz of all tensors are zero.
+    fn update(&self, state: &mut State, plane: bool);
+
+    /// Elastic energy per reference volume, J/m³.
+    fn energy(&self, elastic: &Symmetric, plane: bool) -> Lanes;
+
+    /// Density of the undeformed material, kg/m³.
+    fn density(&self) -> f64;
+
+    /// Greatest wave speed of the undeformed material, m/s.
+    fn wave_speed(&self) -> f64;
+
+    /// True for models that flow: they have history, do plastic work, and their stretch since the
+    /// start is unbounded.
+    fn is_plastic(&self) -> bool {
+        false
+    }
+
+    /// Names of the history variables in use, at most [`HISTORIES`].
+    fn history_names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// History variables of an undeformed particle.
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        [0.0; HISTORIES]
+    }
+}
+
+/// The model with these parameters and the density of the undeformed material, kg/m³.
+pub fn build(parameters: &Parameters, density: f64) -> Box<dyn Material> {
+    match *parameters {
+        Parameters::NeoHookean(p) => {
+            Box::new(neo_hookean::NeoHookean::new(Lame::new(p.young, p.poisson), density))
+        }
+        Parameters::FixedCorotated(p) => {
+            Box::new(fixed_corotated::FixedCorotated::new(Lame::new(p.young, p.poisson), density))
+        }
+        Parameters::Hencky(p) => Box::new(hencky::Hencky::new(Lame::new(p.young, p.poisson), density)),
+        Parameters::VonMises(ref p) => Box::new(von_mises::VonMises::new(p, density)),
+        Parameters::DruckerPrager(ref p) => Box::new(drucker_prager::DruckerPrager::new(p, density)),
+    }
+}
+
+/// Lamé's constants, Pa.
+#[derive(Clone, Copy, Debug)]
+pub struct Lame {
+    /// First constant.
+    pub lambda: f64,
+    /// Shear modulus.
+    pub mu: f64,
+}
+
+impl Lame {
+    /// From Young's modulus (Pa) and Poisson's ratio.
+    pub fn new(young: f64, poisson: f64) -> Self {
+        Self {
+            lambda: young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
+            mu: young / (2.0 * (1.0 + poisson)),
+        }
+    }
+
+    /// Modulus of pressure waves, `λ + 2μ`.
+    pub fn pressure_wave(&self) -> f64 {
+        self.lambda + 2.0 * self.mu
+    }
+}
+
+/// Updates a batch whose lane `i` is of material `index[i]`; the bits are those of each material
+/// alone.
+#[inline]
+pub fn update(materials: &[Box<dyn Material>], index: &[u16; LANES], state: &mut State, plane: bool) {
+    if index.iter().all(|&i| i == index[0]) {
+        materials[usize::from(index[0])].update(state, plane);
+        return;
+    }
+    let trial = *state;
+    let mut pending = (1u32 << LANES) - 1;
+    while pending != 0 {
+        let first = index[pending.trailing_zeros() as usize];
+        let bits = (0..LANES).filter(|&i| index[i] == first).fold(0, |bits, i| bits | 1 << i);
+        let mut part = trial;
+        materials[usize::from(first)].update(&mut part, plane);
+        let mask = Mask::from_bits(bits);
+        for c in 0..6 {
+            state.elastic[c] = mask.select(part.elastic[c], state.elastic[c]);
+            state.stress[c] = mask.select(part.stress[c], state.stress[c]);
+        }
+        for h in 0..HISTORIES {
+            state.history[h] = mask.select(part.history[h], state.history[h]);
+        }
+        state.work = mask.select(part.work, state.work);
+        state.wave_speed = mask.select(part.wave_speed, state.wave_speed);
+        pending &= !bits;
+    }
+}

@@ -19,7 +19,7 @@ pub struct Scalars {
     pub reals: Vec<(String, f64)>,
     /// Counters by name.
     pub counts: Vec<(String, u64)>,
-    /// Words of exact sums (see [`crate::io::exact_sum`]) by name.
+    /// Words of exact sums (see [`crate::exact_sum`]) by name.
     pub exact: Vec<(String, Vec<i64>)>,
 }
 

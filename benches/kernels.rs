@@ -1,0 +1,138 @@
+//! Scatter and gather per particle: `cargo bench --bench kernels`.
+//!
+//! A million particles in blocks of their own, so that columns come from memory as in a run; eight
+//! per cell in 3D, four in 2D. Plastic materials flow in every step.
+use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
+use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
+use agimp::material::{Material, Parameters, build};
+use agimp::particle::chunk::{Chunk, Layout, Tag};
+use divan::Bencher;
+use divan::counter::ItemsCount;
+
+const CELL: f64 = 0.01;
+const PARTICLES: usize = 1 << 20;
+const DT: f64 = 1e-6;
+
+const MODELS: [&str; 5] = ["neo_hookean", "fixed_corotated", "hencky", "von_mises", "drucker_prager"];
+
+fn main() {
+    divan::main();
+}
+
+fn material(model: &str) -> Box<dyn Material> {
+    let elastic = Elastic { young: 1e6, poisson: 0.3 };
+    let parameters = match model {
+        "neo_hookean" => Parameters::NeoHookean(elastic),
+        "fixed_corotated" => Parameters::FixedCorotated(elastic),
+        "hencky" => Parameters::Hencky(elastic),
+        "von_mises" => {
+            Parameters::VonMises(VonMises { young: 1e6, poisson: 0.3, yield_stress: 1e3, hardening: 0.0 })
+        }
+        _ => Parameters::DruckerPrager(DruckerPrager {
+            young: 1e6,
+            poisson: 0.3,
+            friction_angle: 30.0,
+            matching: FrictionMatch::TriaxialCompression,
+            volume_correction: true,
+        }),
+    };
+    build(&parameters, 1000.0)
+}
+
+/// Blocks full of particles, sheared and slightly compressed, with their nodes' velocities.
+struct Setting<const D: usize> {
+    chunks: Vec<Chunk<D>>,
+    materials: Vec<Box<dyn Material>>,
+    velocity: Vec<Row>,
+    frame: Frame<D>,
+}
+
+impl<const D: usize> Setting<D> {
+    fn new(model: &str) -> Self {
+        let mut chunk = Chunk::new();
+        for i in 0..8usize.pow(D as u32) {
+            let p = chunk.push_zeroed(i as u64, Tag { material: 0, body: 0, level: 0 });
+            let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
+            for k in 0..D {
+                let place = (i / 8usize.pow(k as u32) % 8) as f64;
+                set(Layout::<D>::POSITION + k, CELL * (4.25 + 0.5 * place + 0.01 * (p % 7) as f64));
+                set(Layout::<D>::VELOCITY + k, 0.1 * place);
+            }
+            for c in 0..3 {
+                set(Layout::<D>::LEFT_CAUCHY_GREEN + c, 0.99 - 0.01 * c as f64);
+            }
+            for c in 3..Layout::<D>::SYMMETRIC {
+                set(Layout::<D>::LEFT_CAUCHY_GREEN + c, 0.02 + 0.005 * c as f64);
+            }
+            set(Layout::<D>::MASS, 1.0);
+            set(Layout::<D>::HALF, 0.25 * CELL);
+        }
+        let blocks = PARTICLES / chunk.len();
+        let velocity = (0..arena_nodes(D))
+            .map(|node| {
+                let [x, y, z] = std::array::from_fn(|k| (node / 7usize.pow(k as u32) % 7) as f64);
+                Row([0.3 * y - 0.01 * x, 0.2 * z - 0.01 * y, 0.1 * x - 0.01 * z, 1.0])
+            })
+            .collect();
+        Self {
+            chunks: vec![chunk; blocks],
+            materials: vec![material(model)],
+            velocity,
+            frame: Frame { corner: [4.0 * CELL; D], cell: CELL, extent: [16.0 * CELL; D] },
+        }
+    }
+
+    fn scheme(&self) -> Scheme<'_> {
+        Scheme {
+            boxes: BoxPolicy::default(),
+            root_cell: CELL,
+            transfer: Transfer::Apic,
+            materials: &self.materials,
+        }
+    }
+}
+
+fn scatter<const D: usize>(bencher: Bencher, model: &str) {
+    let setting = Setting::<D>::new(model);
+    let mut arena = vec![Row::default(); arena_nodes(D)];
+    bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
+        let scheme = setting.scheme();
+        for chunk in &setting.chunks {
+            arena.fill(Row::default());
+            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena);
+        }
+        arena[100 % arena_nodes(D)]
+    });
+}
+
+fn gather<const D: usize>(bencher: Bencher, model: &str) {
+    let mut setting = Setting::<D>::new(model);
+    let mut chunks = std::mem::take(&mut setting.chunks);
+    bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
+        let scheme = setting.scheme();
+        let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
+        chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
+            greatest.max(g2p::gather(chunk, Select::All, &setting.frame, &scheme, DT, &fields))
+        })
+    });
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn p2g_3d(bencher: Bencher, model: &str) {
+    scatter::<3>(bencher, model);
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn g2p_3d(bencher: Bencher, model: &str) {
+    gather::<3>(bencher, model);
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn p2g_2d(bencher: Bencher, model: &str) {
+    scatter::<2>(bencher, model);
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn g2p_2d(bencher: Bencher, model: &str) {
+    gather::<2>(bencher, model);
+}

@@ -1,0 +1,162 @@
+//! Particle kernels on a uniform block of cells: GIMP weights, scatter (P2G) and gather (G2P).
+//!
+//! Knows particles and materials, but no tree, no ranks and no constraints: whatever happens at level
+//! jumps is prepared in the arenas by its caller. The kernels allocate nothing, and every sum runs
+//! over particles in the order of the selection, so the bits of a result depend on nothing else.
+use bytemuck::{Pod, Zeroable};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::material::Material;
+
+mod batch;
+pub mod domain;
+pub mod g2p;
+pub mod math;
+pub mod p2g;
+pub mod simd;
+pub mod stencil;
+#[cfg(test)]
+mod tests;
+
+/// Cells of a block along one axis.
+pub const BLOCK: usize = 4;
+/// Nodes of an arena along one axis: -1 to 5 of its block.
+pub const ARENA_EDGE: usize = BLOCK + 3;
+/// Lowest nodes that a stencil may have along one axis: -1 to 3 of the block.
+pub const BASES: usize = BLOCK + 1;
+
+/// Nodes of an arena in `d` dimensions, x running fastest: index `x + 7 y (+ 49 z)`, where 0 is node
+/// -1 of the block.
+pub const fn arena_nodes(d: usize) -> usize {
+    ARENA_EDGE.pow(d as u32)
+}
+
+/// Number of stencil positions in an arena, and so the length of a table over them: index
+/// `x + 5 y (+ 25 z)`, where 0 is the stencil whose lowest node is node -1 of the block.
+pub const fn stencil_bases(d: usize) -> usize {
+    BASES.pow(d as u32)
+}
+
+/// What a node carries: `(px, py, pz, m)` while scattering, `(vx, vy, vz, unused)` while gathering.
+/// In plane strain the z lane is 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct Row(pub [f64; 4]);
+
+/// The block of cells that a call works on. Lengths in m, relative to the lower corner of the domain.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<const D: usize> {
+    /// Lower corner of the block.
+    pub corner: [f64; D],
+    /// Edge of a cell of the block.
+    pub cell: f64,
+    /// Upper corner of the domain.
+    pub extent: [f64; D],
+}
+
+/// Which particles of a chunk take part.
+#[derive(Clone, Copy, Debug)]
+pub enum Select<'a> {
+    /// All, in the order of the chunk.
+    All,
+    /// These, in this order; no index twice.
+    List(&'a [u32]),
+}
+
+/// How velocities travel between particles and nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "scheme", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Transfer {
+    /// Affine particle-in-cell (Jiang et al. 2015): `C = B D⁻¹`; conserves angular momentum.
+    #[default]
+    Apic,
+    /// Taylor particle-in-cell: `C` is the velocity gradient.
+    Tpic,
+    /// Blend of increments (FLIP) and velocities (PIC).
+    Flip {
+        /// Share of FLIP, 0 to 1.
+        blend: f64,
+    },
+}
+
+/// How the half widths of a particle's box follow its deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "policy", rename_all = "snake_case", deny_unknown_fields)]
+pub enum BoxPolicy {
+    /// The box keeps the particle's volume: each axis follows the stretch along it, or the cube (2D:
+    /// square) root of the volume ratio for materials whose plastic stretch is unbounded.
+    Volume {
+        /// Least ratio of a half width to the undeformed one.
+        #[serde(default = "least_stretch")]
+        min_stretch: f64,
+        /// Greatest ratio of a half width to the undeformed one.
+        #[serde(default = "greatest_stretch")]
+        max_stretch: f64,
+    },
+    /// Undeformed half widths.
+    Fixed,
+    /// One cell of the level that the particle was made for: the quadratic B-spline on uniform regions.
+    Cell,
+}
+
+fn least_stretch() -> f64 {
+    0.25
+}
+fn greatest_stretch() -> f64 {
+    2.0
+}
+
+impl Default for BoxPolicy {
+    fn default() -> Self {
+        Self::Volume { min_stretch: least_stretch(), max_stretch: greatest_stretch() }
+    }
+}
+
+/// What the kernels need to know of the run. The same for all particles.
+pub struct Scheme<'a> {
+    /// Box policy.
+    pub boxes: BoxPolicy,
+    /// Edge of a cell of level 0, m.
+    pub root_cell: f64,
+    /// Transfer of velocities.
+    pub transfer: Transfer,
+    /// Materials by index (see [`crate::particle::chunk::Tag`]).
+    pub materials: &'a [Box<dyn Material>],
+}
+
+/// Part of a particle's box, for boxes wider than a cell: the weight of a box is the mean of the
+/// weights of its equal parts, each transferred with the same 3^D kernel, maybe in different blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct SubBox<const D: usize> {
+    /// Index of the particle in its chunk.
+    pub particle: u32,
+    /// Where [`g2p::gather_sub_boxes`] adds what this part gathers.
+    pub slot: u32,
+    /// Centre of the part, m.
+    pub centre: [f64; D],
+    /// Half widths of the part, m; at most half a cell of the block.
+    pub half: [f64; D],
+    /// Share of the particle that the part carries: 1 / number of parts.
+    pub fraction: f64,
+}
+
+/// Nodes from the first to the last of a stencil in an arena, both included.
+const fn stencil_span(d: usize) -> usize {
+    if d == 2 { 2 + 2 * ARENA_EDGE + 1 } else { 2 + 2 * ARENA_EDGE + 2 * ARENA_EDGE * ARENA_EDGE + 1 }
+}
+
+/// Component of a symmetric tensor in the order of [`crate::particle::Layout`].
+const fn symmetric_index<const D: usize>(i: usize, j: usize) -> usize {
+    if i == j { i } else { i + j + 2 }
+}
+
+/// Calls `f` with the place in the arena, relative to the first node, and the index along each axis
+/// of all nodes of a stencil.
+#[inline(always)]
+fn for_each_node<const D: usize>(mut f: impl FnMut(usize, [usize; D])) {
+    for i in 0..3usize.pow(D as u32) {
+        let index = std::array::from_fn(|k| i / 3usize.pow(k as u32) % 3);
+        f((0..D).rev().fold(0, |place, k| place * ARENA_EDGE + index[k]), index);
+    }
+}

@@ -1,0 +1,136 @@
+//! GIMP weights of one axis (Bardenhagen & Kober 2004) for boxes at most one cell wide.
+//!
+//! The weight of a node is the average over the box of the node's hat function, the gradient the
+//! average of its derivative. A box `[lo, hi]` in cell units, `lo` in the cell of the lowest node,
+//! covers `a` of that cell and `b` of the next; integrating the hats over the two parts gives
+//! ```text
+//! w0 = a (1 - (lo + m)/2) / V        dw0 = -a / (V h)
+//! w1 = (a (lo + m)/2 + b (1 - b/2)) / V    dw1 = (a - b) / (V h)
+//! w2 = b² / (2 V)                    dw2 = b / (V h)
+//! ```
+//! with `m = min(hi, 1)`, `a = m - lo`, `b = max(hi - 1, 0)`, `V = a + b`.
+use super::BLOCK;
+use super::simd::Lanes;
+
+/// Three nodes of one axis for a batch of boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis {
+    /// Lowest node of the stencil, counted from the corner of the block: an integer in -1..=3.
+    pub base: Lanes,
+    /// Weights.
+    pub weight: [Lanes; 3],
+    /// Derivatives of the weights, 1/m.
+    pub slope: [Lanes; 3],
+}
+
+impl Axis {
+    /// Weights of boxes centred at `centre` with half width `half`, both in cells and relative to the
+    /// corner of the block. `half` is at most 1/2 and the centre lies in the block. `inverse_cell` is
+    /// 1 / cell edge, 1/m.
+    #[inline(always)]
+    pub fn new(centre: Lanes, half: Lanes, inverse_cell: f64) -> Self {
+        let zero = Lanes::splat(0.0);
+        let one = Lanes::splat(1.0);
+        let lower = centre - half;
+        // The bounds matter only for centres that round to the upper face of the block.
+        let base = lower.floor().max(Lanes::splat(-1.0)).min(Lanes::splat(BLOCK as f64 - 1.0));
+        let low = lower - base;
+        let high = half.mul_add(Lanes::splat(2.0), low);
+        let middle = high.min(one);
+        let a = (middle - low).max(zero);
+        let b = (high - one).max(zero);
+        let volume_inverse = one / (a + b);
+        let a_share = a * volume_inverse;
+        let b_share = b * volume_inverse;
+        let mean = (low + middle) * 0.5;
+        let half_b = b * 0.5;
+        let weight =
+            [a_share * (one - mean), a_share.mul_add(mean, b_share * (one - half_b)), b_share * half_b];
+        let (a_slope, b_slope) = (a_share * inverse_cell, b_share * inverse_cell);
+        Self { base, weight, slope: [-a_slope, a_slope - b_slope, b_slope] }
+    }
+
+    /// Node minus particle, m, for a particle at `position` cells from the corner of the block.
+    #[inline(always)]
+    pub fn offsets(&self, position: Lanes, cell: f64) -> [Lanes; 3] {
+        let first = self.base - position;
+        std::array::from_fn(|i| (first + Lanes::splat(i as f64)) * cell)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::simd::LANES;
+
+    /// Centres over a block and half widths from tiny to half a cell, aligned ones among them.
+    fn boxes() -> Vec<(f64, f64)> {
+        let halves = [0.5, 0.25, 0.125, 0.1, 1.0 / 3.0, 0.499_999, 1e-3, 1e-6];
+        let mut all = Vec::new();
+        for half in halves {
+            for i in 0..4000 {
+                all.push((i as f64 / 1000.0 + 1e-9, half));
+            }
+            all.extend((0..32).map(|i| (i as f64 / 8.0, half)));
+        }
+        all
+    }
+
+    #[test]
+    fn unity_linear_reproduction_and_sign() {
+        for chunk in boxes().chunks_exact(LANES) {
+            let centre = Lanes::new(std::array::from_fn(|lane| chunk[lane].0));
+            let half = Lanes::new(std::array::from_fn(|lane| chunk[lane].1));
+            let axis = Axis::new(centre, half, 8.0);
+            let offset = axis.offsets(centre, 0.125);
+            for lane in 0..LANES {
+                let (x, l) = chunk[lane];
+                let at = |lanes: &[Lanes; 3]| lanes.map(|v| v.to_array()[lane]);
+                let (w, dw, d) = (at(&axis.weight), at(&axis.slope), at(&offset));
+                let base = axis.base.to_array()[lane];
+                assert!((-1.0..=3.0).contains(&base) && base == base.floor());
+                assert!(w.iter().all(|w| *w >= 0.0));
+                assert!((w.iter().sum::<f64>() - 1.0).abs() <= 4.0 * f64::EPSILON);
+                assert!((0..3).map(|i| w[i] * d[i]).sum::<f64>().abs() <= 8.0 * f64::EPSILON);
+                let slope = f64::EPSILON * 32.0 / l;
+                assert!(dw.iter().sum::<f64>().abs() <= slope);
+                assert!(((0..3).map(|i| dw[i] * d[i]).sum::<f64>() - 1.0).abs() <= slope, "{x} {l}");
+            }
+        }
+    }
+
+    #[test]
+    fn half_cell_boxes_are_quadratic_splines() {
+        for i in 0..400 {
+            let x = f64::from(i) / 100.0;
+            let axis = Axis::new(Lanes::splat(x), Lanes::splat(0.5), 1.0);
+            for node in 0..3 {
+                let distance = (axis.base.to_array()[0] + node as f64 - x).abs();
+                let spline = if distance <= 0.5 {
+                    0.75 - distance * distance
+                } else {
+                    0.5 * (1.5 - distance) * (1.5 - distance)
+                };
+                assert!((axis.weight[node].to_array()[0] - spline).abs() <= 8.0 * f64::EPSILON);
+            }
+        }
+    }
+
+    #[test]
+    fn slope_is_the_derivative_of_the_weight() {
+        let (cell, step) = (0.5, 1e-6);
+        for i in 0..390 {
+            let x = 0.05 + f64::from(i) / 100.0;
+            let at = |x: f64| Axis::new(Lanes::splat(x), Lanes::splat(0.2), 1.0 / cell);
+            let (axis, left, right) = (at(x), at(x - step), at(x + step));
+            if left.base.to_array()[0] != right.base.to_array()[0] {
+                continue;
+            }
+            for node in 0..3 {
+                let difference = right.weight[node] - left.weight[node];
+                let slope = difference.to_array()[0] / (2.0 * step * cell);
+                assert!((slope - axis.slope[node].to_array()[0]).abs() <= 1e-5);
+            }
+        }
+    }
+}

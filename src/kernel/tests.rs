@@ -1,0 +1,516 @@
+//! Scatter and gather together, against a plain scalar definition.
+use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
+use super::p2g::{MomentSums, scatter, scatter_sub_boxes, scatter_with_moments};
+use super::*;
+use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
+use crate::material::{Material, Parameters, build};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// A small deterministic generator of numbers in [0, 1).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+const CELL: f64 = 0.05;
+const DT: f64 = 1e-4;
+
+fn materials() -> Vec<Box<dyn Material>> {
+    let elastic = Elastic { young: 1e5, poisson: 0.3 };
+    let von_mises = VonMises { young: 1e5, poisson: 0.3, yield_stress: 500.0, hardening: 100.0 };
+    let sand = DruckerPrager {
+        young: 1e5,
+        poisson: 0.3,
+        friction_angle: 30.0,
+        matching: FrictionMatch::TriaxialCompression,
+        volume_correction: true,
+    };
+    [
+        Parameters::NeoHookean(elastic),
+        Parameters::VonMises(von_mises),
+        Parameters::DruckerPrager(sand),
+        Parameters::Hencky(elastic),
+        Parameters::FixedCorotated(elastic),
+    ]
+    .iter()
+    .map(|p| build(p, 1000.0))
+    .collect()
+}
+
+fn frame<const D: usize>() -> Frame<D> {
+    // Away from the walls: second block of a domain of four.
+    Frame { corner: [4.0 * CELL; D], cell: CELL, extent: [16.0 * CELL; D] }
+}
+
+fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
+    Scheme { boxes: BoxPolicy::default(), root_cell: CELL, transfer, materials }
+}
+
+/// `n` particles at random in the block with random velocity, C, b and stress; materials in turn.
+fn particles<const D: usize>(n: usize, seed: u64, kinds: u16) -> Chunk<D> {
+    let mut numbers = Numbers(seed);
+    let mut chunk = Chunk::new();
+    for id in 0..n {
+        let tag = Tag { material: id as u16 % kinds, body: 0, level: 0 };
+        let p = chunk.push_zeroed(id as u64, tag);
+        let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
+        for k in 0..D {
+            set(Layout::<D>::POSITION + k, CELL * (4.0 + 4.0 * numbers.next()));
+            set(Layout::<D>::VELOCITY + k, numbers.next() - 0.5);
+        }
+        for k in 0..D * D {
+            set(Layout::<D>::AFFINE + k, 20.0 * (numbers.next() - 0.5));
+        }
+        for c in 0..Layout::<D>::SYMMETRIC {
+            let unit = if c < 3 { 1.0 } else { 0.0 };
+            set(Layout::<D>::LEFT_CAUCHY_GREEN + c, unit + 0.05 * (numbers.next() - 0.5));
+            set(Layout::<D>::STRESS + c, 1e4 * (numbers.next() - 0.5));
+        }
+        set(Layout::<D>::MASS, 0.1 + numbers.next());
+        set(Layout::<D>::HALF, CELL * (0.05 + 0.2 * numbers.next()));
+    }
+    chunk
+}
+
+fn position<const D: usize>(node: usize) -> [f64; D] {
+    std::array::from_fn(|k| CELL * (4.0 + (node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE) as f64 - 1.0))
+}
+
+/// Average of a hat function of node at 0 over `[lo, hi]` by exact integration, and its derivative.
+fn hat(lo: f64, hi: f64) -> (f64, f64) {
+    let piece = |a: f64, b: f64, sign: f64| {
+        let (a, b) = (a.max(lo), b.min(hi));
+        if b <= a { (0.0, 0.0) } else { ((b - a) + sign * (b * b - a * a) / 2.0, sign * (b - a)) }
+    };
+    let (left, right) = (piece(-1.0, 0.0, 1.0), piece(0.0, 1.0, -1.0));
+    ((left.0 + right.0) / (hi - lo), (left.1 + right.1) / (hi - lo))
+}
+
+/// Weight and gradient of a node from the definition.
+fn definition<const D: usize>(node: [f64; D], x: [f64; D], half: [f64; D]) -> (f64, [f64; D]) {
+    let axes: [(f64, f64); D] = std::array::from_fn(|k| {
+        let (w, slope) = hat((x[k] - half[k] - node[k]) / CELL, (x[k] + half[k] - node[k]) / CELL);
+        (w, slope / CELL)
+    });
+    let weight = axes.iter().map(|a| a.0).product();
+    let gradient =
+        std::array::from_fn(|k| (0..D).map(|i| if i == k { axes[i].1 } else { axes[i].0 }).product());
+    (weight, gradient)
+}
+
+fn scatter_equals_definition<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let chunk = particles::<D>(61, 5, 5);
+    let mut half = Vec::new();
+    domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let mut arena = vec![Row::default(); arena_nodes(D)];
+    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena);
+    let at = |column: usize, p: usize| chunk.column(column)[p];
+    for node in 0..arena_nodes(D) {
+        let x_j = position::<D>(node);
+        let mut expected = [0.0; 4];
+        for p in 0..chunk.len() {
+            let x = chunk.position(p);
+            let (w, gradient) = definition(x_j, x, half[p]);
+            let mass = at(Layout::<D>::MASS, p);
+            let volume = (2.0 * at(Layout::<D>::HALF, p)).powi(D as i32);
+            for i in 0..D {
+                let mut v = at(Layout::<D>::VELOCITY + i, p);
+                let mut force = 0.0;
+                for k in 0..D {
+                    v += at(Layout::<D>::AFFINE + D * i + k, p) * (x_j[k] - x[k]);
+                    force -= volume * at(Layout::<D>::STRESS + symmetric_index::<D>(i, k), p) * gradient[k];
+                }
+                expected[i] += w * mass * v + DT * force;
+            }
+            expected[3] += w * mass;
+        }
+        for i in 0..4 {
+            assert!(
+                (arena[node].0[i] - expected[i]).abs() < 1e-13,
+                "{node} {i} {:?} {expected:?}",
+                arena[node]
+            );
+        }
+    }
+}
+
+#[test]
+fn scatter_is_the_definition() {
+    scatter_equals_definition::<2>();
+    scatter_equals_definition::<3>();
+}
+
+/// An affine field on the nodes comes back exactly; x, b and C follow.
+fn affine_field<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut numbers = Numbers(77);
+    let a: [[f64; D]; D] = std::array::from_fn(|_| std::array::from_fn(|_| numbers.next() - 0.5));
+    let field = |x: [f64; D]| -> [f64; D] {
+        std::array::from_fn(|i| 0.3 * i as f64 + (0..D).map(|k| a[i][k] * x[k]).sum::<f64>())
+    };
+    let velocity: Vec<Row> = (0..arena_nodes(D))
+        .map(|node| {
+            let v = field(position::<D>(node));
+            Row(std::array::from_fn(|i| if i < D { v[i] } else { f64::from(i == 3) }))
+        })
+        .collect();
+    let before = particles::<D>(45, 9, 1);
+    let mut chunk = before.clone();
+    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let speed = gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+    assert!(speed > materials[0].wave_speed() * 0.8 && speed < materials[0].wave_speed() * 1.5);
+    for p in 0..chunk.len() {
+        let expected = field(before.position(p));
+        for i in 0..D {
+            let v = chunk.column(Layout::<D>::VELOCITY + i)[p];
+            assert!((v - expected[i]).abs() < 1e-14);
+            let moved = before.position(p)[i] + DT * expected[i];
+            assert!((chunk.position(p)[i] - moved).abs() < 1e-15);
+            for k in 0..D {
+                let c = chunk.column(Layout::<D>::AFFINE + D * i + k)[p];
+                assert!((c - a[i][k]).abs() < 1e-12, "{c} {}", a[i][k]);
+            }
+        }
+        let b = |chunk: &Chunk<D>, i: usize, k: usize| {
+            chunk.column(Layout::<D>::LEFT_CAUCHY_GREEN + symmetric_index::<D>(i, k))[p]
+        };
+        let f = |i: usize, k: usize| f64::from(i == k) + DT * a[i][k];
+        for i in 0..D {
+            for k in i..D {
+                let mut expected = 0.0;
+                for r in 0..D {
+                    for s in 0..D {
+                        let rs = if r < s { b(&before, r, s) } else { b(&before, s, r) };
+                        expected += f(i, r) * rs * f(k, s);
+                    }
+                }
+                assert!((b(&chunk, i, k) - expected).abs() < 1e-14);
+            }
+        }
+    }
+}
+
+#[test]
+fn gather_reproduces_affine_fields() {
+    affine_field::<2>();
+    affine_field::<3>();
+}
+
+/// Linear and angular momentum of particles (with the affine part) and of nodes.
+fn momenta<const D: usize>(chunk: &Chunk<D>, half: &[[f64; D]]) -> ([f64; D], [[f64; D]; D]) {
+    let mut linear = [0.0; D];
+    let mut angular = [[0.0; D]; D];
+    for p in 0..chunk.len() {
+        let x = chunk.position(p);
+        let at = |column: usize| chunk.column(column)[p];
+        let mass = at(Layout::<D>::MASS);
+        let mut spread = [0.0; D];
+        for node in 0..arena_nodes(D) {
+            let x_j = position::<D>(node);
+            let (w, _) = definition(x_j, x, half[p]);
+            for k in 0..D {
+                spread[k] += w * (x_j[k] - x[k]) * (x_j[k] - x[k]);
+            }
+        }
+        let affine = |i: usize, k: usize| at(Layout::<D>::AFFINE + D * i + k) * spread[k];
+        let v = |i: usize| at(Layout::<D>::VELOCITY + i);
+        for i in 0..D {
+            linear[i] += mass * v(i);
+            for k in 0..D {
+                angular[i][k] += mass * (x[i] * v(k) - x[k] * v(i) + affine(k, i) - affine(i, k));
+            }
+        }
+    }
+    (linear, angular)
+}
+
+fn round_trip_conserves<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut chunk = particles::<D>(100, 3, 5);
+    let mut half = Vec::new();
+    domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let before = momenta(&chunk, &half);
+    let mut arena = vec![Row::default(); arena_nodes(D)];
+    // The stress takes part: symmetric stress has no total force and no torque.
+    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena);
+    let mut grid = ([0.0; D], [[0.0; D]; D]);
+    for (node, row) in arena.iter().enumerate() {
+        let x = position::<D>(node);
+        for i in 0..D {
+            grid.0[i] += row.0[i];
+            for k in 0..D {
+                grid.1[i][k] += x[i] * row.0[k] - x[k] * row.0[i];
+            }
+        }
+    }
+    let mass: f64 = arena.iter().map(|row| row.0[3]).sum();
+    let expected: f64 = chunk.column(Layout::<D>::MASS).iter().sum();
+    assert!((mass - expected).abs() < 1e-13 * expected);
+    for row in &mut arena {
+        let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
+        row.0 = row.0.map(|x| x * inverse);
+    }
+    // No time passes, so that particles stay where their momenta are compared.
+    let fields = Fields { velocity: &arena, increment: None, moments: None };
+    gather(&mut chunk, Select::All, &frame, &scheme, 0.0, &fields);
+    let after = momenta(&chunk, &half);
+    for i in 0..D {
+        assert!((grid.0[i] - before.0[i]).abs() < 1e-12 && (after.0[i] - before.0[i]).abs() < 1e-12);
+        for k in 0..D {
+            assert!((grid.1[i][k] - before.1[i][k]).abs() < 1e-12);
+            assert!((after.1[i][k] - before.1[i][k]).abs() < 1e-12, "{:?} {:?}", before.1, after.1);
+        }
+    }
+}
+
+#[test]
+fn momentum_and_angular_momentum_are_conserved() {
+    round_trip_conserves::<2>();
+    round_trip_conserves::<3>();
+}
+
+fn bits<const D: usize>(chunk: &Chunk<D>, p: usize) -> Vec<u64> {
+    (0..Layout::<D>::REALS).map(|column| chunk.column(column)[p].to_bits()).collect()
+}
+
+/// A particle's bits do not depend on the batch it is in, nor on the materials beside it.
+fn batches_do_not_matter<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let start = particles::<D>(53, 21, 5);
+    let mut numbers = Numbers(4);
+    let velocity: Vec<Row> = (0..arena_nodes(D))
+        .map(|_| Row(std::array::from_fn(|i| if i < D { 200.0 * (numbers.next() - 0.5) } else { 0.0 })))
+        .collect();
+    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let mut all = start.clone();
+    gather(&mut all, Select::All, &frame, &scheme, DT, &fields);
+    let mut split = start.clone();
+    let (even, odd): (Vec<u32>, Vec<u32>) = (0..53).partition(|p| p % 2 == 0);
+    gather(&mut split, Select::List(&odd), &frame, &scheme, DT, &fields);
+    gather(&mut split, Select::List(&even), &frame, &scheme, DT, &fields);
+    let mut single = start.clone();
+    for p in 0..53 {
+        gather(&mut single, Select::List(&[p]), &frame, &scheme, DT, &fields);
+    }
+    for p in 0..53 {
+        assert_eq!(bits(&all, p), bits(&split, p));
+        assert_eq!(bits(&all, p), bits(&single, p));
+    }
+    let sum = |select: &[Select]| {
+        let mut arena = vec![Row::default(); arena_nodes(D)];
+        for &select in select {
+            scatter(&all, select, &frame, &scheme, DT, &mut arena);
+        }
+        arena
+    };
+    let order: Vec<u32> = (0..53).collect();
+    let (whole, pieces) =
+        (sum(&[Select::All]), sum(&[Select::List(&order[..10]), Select::List(&order[10..])]));
+    assert_eq!(whole, pieces);
+}
+
+#[test]
+fn bits_do_not_depend_on_batches() {
+    batches_do_not_matter::<2>();
+    batches_do_not_matter::<3>();
+}
+
+/// A box in 2^D parts gives the sums of the box.
+fn parts_equal_the_whole<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut whole = particles::<D>(23, 8, 1);
+    for k in 0..D {
+        // Parts must have their centres in the block too.
+        for x in whole.column_mut(Layout::<D>::POSITION + k) {
+            *x = CELL * 4.5 + (*x - CELL * 4.0) * 0.75;
+        }
+    }
+    let mut parted = whole.clone();
+    let mut half = Vec::new();
+    domain::half_widths(&whole, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let mut parts = Vec::new();
+    for p in 0..whole.len() {
+        for corner in 0..1usize << D {
+            let side = |k: usize| if corner >> k & 1 == 1 { 0.5 } else { -0.5 };
+            parts.push(SubBox {
+                particle: p as u32,
+                slot: p as u32,
+                centre: std::array::from_fn(|k| whole.position(p)[k] + side(k) * half[p][k]),
+                half: half[p].map(|h| 0.5 * h),
+                fraction: 1.0 / (1 << D) as f64,
+            });
+        }
+    }
+    let mut arena = vec![Row::default(); arena_nodes(D)];
+    let mut other = arena.clone();
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena);
+    scatter_sub_boxes(&parted, &parts, &frame, DT, &mut other, None);
+    for (a, b) in arena.iter().zip(&other) {
+        for i in 0..4 {
+            assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
+        }
+    }
+    let fields = Fields { velocity: &arena, increment: None, moments: None };
+    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields);
+    let mut gathered = vec![Gathered::default(); parted.len()];
+    gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
+    let list: Vec<u32> = (0..parted.len() as u32).collect();
+    advance_gathered(&mut parted, &list, &gathered, &scheme, DT);
+    for column in 0..Layout::<D>::REALS {
+        for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
+            assert!((a - b).abs() <= 1e-11 * a.abs().max(1.0), "column {column}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn parts_of_a_box_equal_the_box() {
+    parts_equal_the_whole::<2>();
+    parts_equal_the_whole::<3>();
+}
+
+/// First moments: scattered ones are `Σ w m C`; moments of zero change nothing, others add up.
+fn moments_follow<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let start = particles::<D>(19, 15, 1);
+    let mut half = Vec::new();
+    domain::half_widths(&start, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let touched: Vec<bool> = (0..stencil_bases(D)).map(|base| base % 2 == 0).collect();
+    let base = |p: usize| {
+        (0..D).rev().fold(0, |index, k| {
+            let lower = ((start.position(p)[k] - half[p][k]) / CELL - 4.0).floor();
+            index * BASES + (lower + 1.0) as usize
+        })
+    };
+    let nodes = arena_nodes(D);
+    let (mut plain, mut arena) = (vec![Row::default(); nodes], vec![Row::default(); nodes]);
+    let mut sums = vec![[Row::default(); D]; nodes];
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain);
+    let moments = MomentSums { touched: &touched, sums: &mut sums };
+    scatter_with_moments(&start, Select::All, &frame, &scheme, DT, &mut arena, moments);
+    assert_eq!(plain, arena);
+    for node in 0..nodes {
+        for i in 0..D {
+            for k in 0..D {
+                let expected: f64 = (0..start.len())
+                    .filter(|&p| touched[base(p)])
+                    .map(|p| {
+                        let (w, _) = definition(position::<D>(node), start.position(p), half[p]);
+                        let mass = start.column(Layout::<D>::MASS)[p];
+                        w * mass * start.column(Layout::<D>::AFFINE + D * i + k)[p]
+                    })
+                    .sum();
+                assert!((sums[node][k].0[i] - expected).abs() < 1e-13);
+            }
+        }
+    }
+    let zero = (vec![[Row::default(); D]; nodes], vec![Row::default(); nodes]);
+    let one = (vec![[Row([0.5; 4]); D]; nodes], vec![Row([2.0; 4]); nodes]);
+    let run = |moments: Option<Moments<D>>| {
+        let mut chunk = start.clone();
+        let fields = Fields { velocity: &plain, increment: None, moments };
+        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+        chunk
+    };
+    let without = run(None);
+    let with_zero = run(Some(Moments { touched: &touched, first: &zero.0, second: &zero.1 }));
+    let with_one = run(Some(Moments { touched: &touched, first: &one.0, second: &one.1 }));
+    for p in 0..start.len() {
+        assert_eq!(bits(&without, p), bits(&with_zero, p));
+        for i in 0..D {
+            for k in 0..D {
+                let mut spread = 0.0;
+                for node in 0..nodes {
+                    let (w, _) = definition(position::<D>(node), start.position(p), half[p]);
+                    spread += w * (position::<D>(node)[k] - start.position(p)[k]).powi(2);
+                }
+                let column = Layout::<D>::AFFINE + D * i + k;
+                let (plain, moved) = (without.column(column)[p], with_one.column(column)[p]);
+                let expected = if touched[base(p)] { (plain * spread + 0.5) / (spread + 2.0) } else { plain };
+                assert!((moved - expected).abs() < 1e-10 * expected.abs().max(1.0), "{moved} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn moments_are_scattered_and_gathered() {
+    moments_follow::<2>();
+    moments_follow::<3>();
+}
+
+#[test]
+fn boxes_stay_in_the_domain_and_follow_the_policy() {
+    let materials = materials();
+    let extent = [4.0 * CELL; 3];
+    let mut chunk = particles::<3>(40, 2, 3);
+    for k in 0..3 {
+        let mut numbers = Numbers(k as u64 + 1);
+        for x in chunk.column_mut(Layout::<3>::POSITION + k) {
+            *x = 4.0 * CELL * numbers.next();
+        }
+    }
+    chunk.column_mut(Layout::<3>::POSITION)[0] = 0.01 * CELL;
+    let mut half = Vec::new();
+    for boxes in [BoxPolicy::default(), BoxPolicy::Fixed, BoxPolicy::Cell] {
+        let scheme = Scheme { boxes, root_cell: CELL, transfer: Transfer::Apic, materials: &materials };
+        domain::half_widths(&chunk, Select::All, CELL, &extent, &scheme, &mut half);
+        assert_eq!(half[0][0], 0.01 * CELL);
+        for p in 0..chunk.len() {
+            for k in 0..3 {
+                let x = chunk.position(p)[k];
+                let room = x.min(extent[k] - x);
+                let free = match boxes {
+                    BoxPolicy::Fixed => chunk.column(Layout::<3>::HALF)[p],
+                    BoxPolicy::Cell => 0.5 * CELL,
+                    BoxPolicy::Volume { .. } => {
+                        let stretch = chunk.column(Layout::<3>::LEFT_CAUCHY_GREEN + k)[p].sqrt();
+                        if p % 3 != 0 {
+                            continue;
+                        }
+                        chunk.column(Layout::<3>::HALF)[p] * stretch
+                    }
+                };
+                assert_eq!(half[p][k], free.min(0.5 * CELL).min(room).max(1e-6 * CELL));
+            }
+        }
+    }
+}
+
+#[test]
+fn flip_and_tpic() {
+    let (materials, frame) = (materials(), frame::<3>());
+    let start = particles::<3>(11, 31, 1);
+    let velocity = vec![Row([1.0, 2.0, 3.0, 0.0]); arena_nodes(3)];
+    let increment = vec![Row([0.1, 0.2, 0.3, 0.0]); arena_nodes(3)];
+    let fields = Fields { velocity: &velocity, increment: Some(&increment), moments: None };
+    let mut chunk = start.clone();
+    let flip = Transfer::Flip { blend: 0.75 };
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields);
+    for p in 0..start.len() {
+        for i in 0..3 {
+            let old = start.column(Layout::<3>::VELOCITY + i)[p];
+            let (v, dv) = ([1.0, 2.0, 3.0][i], [0.1, 0.2, 0.3][i]);
+            let expected = 0.75 * (old + dv) + 0.25 * v;
+            assert!((chunk.column(Layout::<3>::VELOCITY + i)[p] - expected).abs() < 1e-14);
+            assert_eq!(chunk.column(Layout::<3>::AFFINE + 4 * i)[p], 0.0);
+            assert!((chunk.position(p)[i] - start.position(p)[i] - DT * v).abs() < 1e-15);
+        }
+    }
+    let mut chunk = start.clone();
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, Transfer::Tpic), DT, &fields);
+    assert!(chunk.column(Layout::<3>::AFFINE).iter().all(|c| c.abs() < 1e-9));
+}

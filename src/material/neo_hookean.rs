@@ -1,0 +1,56 @@
+//! Compressible neo-Hookean elasticity: `W = μ/2 (tr b - 3) - μ ln J + λ/2 ln² J`,
+//! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
+use super::eigen::{determinant, greatest_bound};
+use super::{Lame, Material, State, Symmetric};
+use crate::kernel::math::ln;
+use crate::kernel::simd::Lanes;
+
+/// Compressible neo-Hookean solid.
+#[derive(Clone, Copy, Debug)]
+pub struct NeoHookean {
+    lame: Lame,
+    density: f64,
+}
+
+impl NeoHookean {
+    /// From elastic constants and density, kg/m³.
+    pub fn new(lame: Lame, density: f64) -> Self {
+        Self { lame, density }
+    }
+}
+
+impl Material for NeoHookean {
+    /// Along a principal direction of stretch s, `ρ₀ c² = s² ∂P/∂F = μ (s² + 1) + λ (1 - ln J)`.
+    fn update(&self, state: &mut State, _plane: bool) {
+        let Lame { lambda, mu } = self.lame;
+        let one = Lanes::splat(1.0);
+        let b = &state.elastic;
+        let volume_log = ln(determinant(b)) * 0.5;
+        let pressure = volume_log * lambda;
+        for i in 0..3 {
+            state.stress[i] = (b[i] - one).mul_add(Lanes::splat(mu), pressure);
+        }
+        for i in 3..6 {
+            state.stress[i] = b[i] * mu;
+        }
+        let modulus = (greatest_bound(b) + one) * mu + (one - volume_log).max(one) * lambda;
+        state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
+        state.work = Lanes::splat(0.0);
+    }
+
+    fn energy(&self, b: &Symmetric, _plane: bool) -> Lanes {
+        let Lame { lambda, mu } = self.lame;
+        let one = Lanes::splat(1.0);
+        let volume_log = ln(determinant(b)) * 0.5;
+        let trace = (b[0] - one) + (b[1] - one) + (b[2] - one);
+        (trace * 0.5 - volume_log) * mu + volume_log * volume_log * (0.5 * lambda)
+    }
+
+    fn density(&self) -> f64 {
+        self.density
+    }
+
+    fn wave_speed(&self) -> f64 {
+        (self.lame.pressure_wave() / self.density).sqrt()
+    }
+}

@@ -1,0 +1,4 @@
+//! A whole run.
+pub mod history;
+pub mod report;
+pub mod stop;
