@@ -1,0 +1,152 @@
+//! Sends under way, with the buffers they read from.
+//!
+//! A small owning wrapper around `MPI_Isend` and `MPI_Issend`. The wrapper of the `mpi` crate
+//! borrows its buffer for a scope, which cannot be stored beside that buffer in one value.
+
+use std::os::raw::c_void;
+
+use bytemuck::Pod;
+use mpi::ffi;
+use mpi::point_to_point::{Message, Status};
+use mpi::traits::{AsRaw, Equivalence};
+
+use super::Comm;
+
+/// How a send completes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// When the buffer may be reused.
+    Standard,
+    /// When the receiver has started to receive.
+    Synchronous,
+}
+
+/// A message on its way: owns the buffer until MPI has finished reading it.
+pub(super) struct Outgoing<T: Pod> {
+    requests: Vec<ffi::MPI_Request>,
+    /// Only kept alive; nothing touches it while requests are open.
+    _buffer: Vec<T>,
+}
+
+impl<T: Pod> Outgoing<T> {
+    /// Not collective. Starts to send `buffer` to rank `to`.
+    ///
+    /// Sent in pieces of [`Comm::piece_len`] items; the last piece is shorter than that (maybe
+    /// empty), which tells the receiver that the message is complete.
+    pub(super) fn start(comm: &Comm, to: usize, tag: i32, mode: Mode, buffer: Vec<T>) -> Self {
+        assert!(to < comm.size(), "no rank {to} among {}", comm.size());
+        let limit = comm.piece_len::<T>();
+        let pieces = buffer.len() / limit + 1;
+        let mut requests = Vec::with_capacity(pieces);
+        for piece in 0..pieces {
+            let items = &buffer[piece * limit..buffer.len().min((piece + 1) * limit)];
+            let bytes: &[u8] = bytemuck::cast_slice(items);
+            let send = match mode {
+                Mode::Standard => ffi::MPI_Isend,
+                Mode::Synchronous => ffi::MPI_Issend,
+            };
+            // SAFETY: `bytes` lies in the heap block of `buffer`, which moves into `_buffer` below.
+            // That block neither moves nor changes until `drop` has waited for all requests (and
+            // if the value is leaked, so is the block). The count fits in 31 bits by `piece_len`.
+            let request = unsafe {
+                let mut request = ffi::RSMPI_REQUEST_NULL;
+                send(
+                    bytes.as_ptr() as *const c_void,
+                    bytes.len() as i32,
+                    u8::equivalent_datatype().as_raw(),
+                    to as i32,
+                    tag,
+                    comm.raw(),
+                    &mut request,
+                );
+                request
+            };
+            requests.push(request);
+        }
+        Outgoing { requests, _buffer: buffer }
+    }
+
+    /// Not collective. Whether the send has completed; lets MPI make progress.
+    pub(super) fn test(&mut self) -> bool {
+        let mut done = 0;
+        // SAFETY: the requests are ours; completed ones are set to the null request by MPI.
+        unsafe {
+            ffi::MPI_Testall(
+                self.requests.len() as i32,
+                self.requests.as_mut_ptr(),
+                &mut done,
+                ffi::RSMPI_STATUSES_IGNORE,
+            );
+        }
+        done != 0
+    }
+}
+
+impl<T: Pod> Drop for Outgoing<T> {
+    /// Waits until the buffer is free.
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            // The receiver may never come. Leaking the block keeps the open sends valid.
+            std::mem::forget(std::mem::take(&mut self._buffer));
+            return;
+        }
+        // SAFETY: the requests are ours, and the buffer is dropped after this call.
+        unsafe {
+            ffi::MPI_Waitall(
+                self.requests.len() as i32,
+                self.requests.as_mut_ptr(),
+                ffi::RSMPI_STATUSES_IGNORE,
+            );
+        }
+    }
+}
+
+/// A message that is arriving, piece by piece.
+#[derive(Debug, Default)]
+pub(super) struct Incoming<T> {
+    items: Vec<T>,
+}
+
+impl<T: Pod> Incoming<T> {
+    pub(super) fn new() -> Self {
+        Incoming { items: Vec::new() }
+    }
+
+    /// Not collective. Receives the next piece, which a matched probe has found. Returns the whole
+    /// message after its last piece.
+    pub(super) fn receive(&mut self, comm: &Comm, found: (Message, Status)) -> Option<Vec<T>> {
+        let (message, status) = found;
+        let bytes = status.count(u8::equivalent_datatype()) as usize;
+        let item = size_of::<T>();
+        assert!(bytes.is_multiple_of(item), "a message of {bytes} bytes does not hold items of {item} bytes");
+        let count = bytes / item;
+        let before = self.items.len();
+        self.items.resize(before + count, T::zeroed());
+        let target: &mut [u8] = bytemuck::cast_slice_mut(&mut self.items[before..]);
+        message.matched_receive_into(target);
+        (count < comm.piece_len::<T>()).then(|| std::mem::take(&mut self.items))
+    }
+}
+
+/// Waits politely: looks again at once for a while, then gives the core away between looks.
+#[derive(Debug, Default)]
+pub(super) struct Patience {
+    looks: u32,
+}
+
+impl Patience {
+    /// Not collective. To be called after each look that found nothing.
+    pub(super) fn wait(&mut self) {
+        self.looks += 1;
+        if self.looks > 100 {
+            std::thread::yield_now();
+        } else {
+            std::hint::spin_loop();
+        }
+    }
+
+    /// Not collective. To be called after a look that found something.
+    pub(super) fn reset(&mut self) {
+        self.looks = 0;
+    }
+}

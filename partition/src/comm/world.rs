@@ -1,0 +1,162 @@
+//! Start and end of MPI, and the communicator handle.
+
+use std::cell::Cell;
+use std::panic::PanicHookInfo;
+use std::rc::Rc;
+
+use mpi::Threading;
+use mpi::environment::Universe;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
+
+/// MPI's own communicator handle, for libraries that need one (the parallel HDF5 driver).
+pub type RawComm = mpi::ffi::MPI_Comm;
+
+/// Exit code of a job that ended by a panic (the one Rust uses for a panic in `main`).
+const PANIC_CODE: i32 = 101;
+
+/// Why MPI could not be started.
+#[derive(Debug, thiserror::Error)]
+pub enum CommError {
+    /// MPI can be started once per process only.
+    #[error("MPI has been started before in this process")]
+    AlreadyStarted,
+    /// The MPI library refuses to run in a process that has threads.
+    #[error("the MPI library does not support threads beside the one that calls it (needs FUNNELED)")]
+    Threads,
+}
+
+/// The running MPI library and all its ranks.
+///
+/// MPI ends when the `World` and every clone of its [`Comm`] are dropped, so a communicator can
+/// never outlive it. Files opened through MPI must be closed before.
+#[derive(Debug)]
+pub struct World {
+    comm: Comm,
+}
+
+impl World {
+    /// Collective. Starts MPI and installs a panic hook.
+    ///
+    /// Works without `mpirun` too, as a world of one rank. A panic on any thread of any rank
+    /// prints `agimp: rank R: <message> (<file>:<line>)` and ends all ranks; with one rank it
+    /// prints the same line and unwinds as usual.
+    pub fn init() -> Result<World, CommError> {
+        let (universe, threading) =
+            mpi::initialize_with_threading(Threading::Funneled).ok_or(CommError::AlreadyStarted)?;
+        if threading < Threading::Funneled {
+            return Err(CommError::Threads);
+        }
+        // Our own copy of the communicator: messages of other libraries cannot be mistaken for ours.
+        let communicator = universe.world().duplicate();
+        let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
+        std::panic::set_hook(Box::new(move |panic| end_by_panic(rank, size, panic)));
+        let shared = Shared {
+            communicator,
+            sparse_parity: Cell::new(0),
+            largest_message: Cell::new(LARGEST_MESSAGE),
+            _universe: universe,
+        };
+        Ok(World { comm: Comm { shared: Rc::new(shared), rank, size } })
+    }
+
+    /// Not collective. The communicator of all ranks.
+    pub fn comm(&self) -> &Comm {
+        &self.comm
+    }
+}
+
+/// Bytes of the largest single MPI message; counts are 32-bit. Longer messages are split.
+const LARGEST_MESSAGE: usize = 1 << 30;
+
+/// A group of ranks and the calls between them. Clones share one communicator.
+#[derive(Clone)]
+pub struct Comm {
+    shared: Rc<Shared>,
+    rank: usize,
+    size: usize,
+}
+
+/// What clones of a [`Comm`] share. Fields drop in this order: the communicator before MPI.
+struct Shared {
+    communicator: SimpleCommunicator,
+    /// Number of sparse exchanges so far, modulo 2.
+    sparse_parity: Cell<usize>,
+    largest_message: Cell<usize>,
+    _universe: Universe,
+}
+
+impl Comm {
+    /// Not collective. Number of this rank, from 0.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// Not collective. Number of ranks.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Not collective. MPI's handle; valid as long as this `Comm`.
+    pub fn raw(&self) -> RawComm {
+        self.shared.communicator.as_raw()
+    }
+
+    /// Collective. Returns when every rank has called it.
+    pub fn barrier(&self) {
+        self.communicator().barrier();
+    }
+
+    /// Not collective. Ends all ranks at once with this exit code.
+    pub fn abort(&self, code: i32) -> ! {
+        self.communicator().abort(code)
+    }
+
+    /// Collective. Splits messages longer than `bytes` (default 2^30). Every rank must give the
+    /// same value while no exchange is under way. Lets tests reach the splitting with small data.
+    pub fn set_largest_message(&self, bytes: usize) {
+        assert!((1..=LARGEST_MESSAGE).contains(&bytes), "largest message of {bytes} bytes");
+        self.shared.largest_message.set(bytes);
+    }
+
+    pub(super) fn communicator(&self) -> &SimpleCommunicator {
+        &self.shared.communicator
+    }
+
+    /// Items of `T` in the largest single message: the same on all ranks, at least 1.
+    pub(super) fn piece_len<T>(&self) -> usize {
+        assert!(size_of::<T>() > 0, "messages need a type with a size");
+        (self.shared.largest_message.get() / size_of::<T>()).max(1)
+    }
+
+    /// Advances the count of sparse exchanges and returns its parity.
+    pub(super) fn next_sparse_parity(&self) -> usize {
+        let parity = self.shared.sparse_parity.get();
+        self.shared.sparse_parity.set(1 - parity);
+        parity
+    }
+}
+
+impl std::fmt::Debug for Comm {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Comm(rank {} of {})", self.rank, self.size)
+    }
+}
+
+/// The panic hook: one line, then the end of all ranks. Without it the others would wait forever.
+fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
+    let payload = panic.payload();
+    let message = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("panic without a message");
+    let place = panic.location().map(|l| format!(" ({}:{})", l.file(), l.line())).unwrap_or_default();
+    eprintln!("agimp: rank {rank}: {message}{place}");
+    let running = mpi::environment::is_initialized() && !mpi::environment::is_finalized();
+    if size > 1 && running {
+        // Possibly not the main thread. The process ends either way, and waiting for the main
+        // thread to notice could take forever if that one waits for a message.
+        SimpleCommunicator::world().abort(PANIC_CODE);
+    }
+}

@@ -1,0 +1,157 @@
+//! Moving leaves, and what belongs to them, to their new owners.
+
+use std::ops::Range;
+
+use bytemuck::Pod;
+
+use crate::forest::owner;
+use crate::{Comm, Forest, Octant, weight};
+
+/// Which leaves a [`Forest::partition`] has moved, so that what belongs to them can follow.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shipment {
+    old_len: usize,
+    new_len: usize,
+    sends: Vec<(usize, Range<usize>)>,
+    receives: Vec<(usize, Range<usize>)>,
+    kept: (Range<usize>, Range<usize>),
+    changed: bool,
+}
+
+impl<const D: usize> Forest<D> {
+    /// Collective. Moves the cuts between ranks so that each gets an equal share of the weight, up
+    /// to half a family, and moves the leaves accordingly. The tree stays.
+    ///
+    /// The new partition depends on the leaves, their `weights` and the number of ranks only, not
+    /// on the present one. Sibling leaves are kept on one rank. Ranks may end empty.
+    ///
+    /// # Panics
+    /// If there is not one weight per leaf or the sum of all weights exceeds 64 bits.
+    pub fn partition(&mut self, comm: &Comm, weights: &[u64]) -> Shipment {
+        let markers = weight::cuts(self, comm, weights);
+        let old_len = self.leaves.len();
+        let rank = comm.rank();
+        let mut sends = Vec::new();
+        let mut kept_old = 0..0;
+        let mut first = 0;
+        while first < old_len {
+            let to = owner(&markers, self.keys[first]);
+            let end = first + self.keys[first..].partition_point(|&key| key < markers[to + 1]);
+            if to == rank {
+                kept_old = first..end;
+            } else {
+                sends.push((to, first..end));
+            }
+            first = end;
+        }
+
+        let codes = |range: &Range<usize>| self.leaves[range.clone()].iter().map(Octant::code).collect();
+        let received = comm.sparse_exchange::<u64>(sends.iter().map(|(to, r)| (*to, codes(r))).collect());
+
+        let mut leaves = Vec::new();
+        let mut receives = Vec::with_capacity(received.len());
+        let split = received.partition_point(|&(source, _)| source < rank);
+        let mut append = |leaves: &mut Vec<Octant<D>>, part: &[(usize, Vec<u64>)]| {
+            for (source, codes) in part {
+                let first = leaves.len();
+                leaves.extend(
+                    codes.iter().map(|&c| Octant::from_code(c).expect("ranks send codes of octants")),
+                );
+                receives.push((*source, first..leaves.len()));
+            }
+        };
+        append(&mut leaves, &received[..split]);
+        let kept_new = leaves.len()..leaves.len() + kept_old.len();
+        leaves.extend_from_slice(&self.leaves[kept_old.clone()]);
+        append(&mut leaves, &received[split..]);
+
+        // Cuts can move over keys without leaves or change while all leaves stay: compare leaves.
+        let changed = comm.any(!sends.is_empty());
+        let new_len = leaves.len();
+        if changed {
+            self.markers = markers;
+            self.set_leaves(comm, leaves);
+            self.revision += 1;
+        }
+        Shipment { old_len, new_len, sends, receives, kept: (kept_old, kept_new), changed }
+    }
+}
+
+impl Shipment {
+    /// Not collective. Whether any leaf of any rank moved; the same on all ranks.
+    pub fn changed(&self) -> bool {
+        self.changed
+    }
+
+    /// Not collective. `(rank, old leaves)` that left, sorted; `old leaves` are indices among the
+    /// leaves before.
+    pub fn sends(&self) -> &[(usize, Range<usize>)] {
+        &self.sends
+    }
+
+    /// Not collective. `(rank, new leaves)` that arrived, sorted; `new leaves` are indices among
+    /// the leaves after.
+    pub fn receives(&self) -> &[(usize, Range<usize>)] {
+        &self.receives
+    }
+
+    /// Not collective. The leaves that stayed, as indices `(before, after)`.
+    pub fn kept(&self) -> (Range<usize>, Range<usize>) {
+        self.kept.clone()
+    }
+
+    /// Collective. Moves one list per old leaf and returns one list per new leaf. Lists of leaves
+    /// that stay are not copied; those of leaves that leave are freed while they are packed. May be
+    /// called any number of times, for different things.
+    ///
+    /// # Panics
+    /// If there is not one list per old leaf.
+    pub fn move_payload<T: Pod>(&self, comm: &Comm, mut per_leaf: Vec<Vec<T>>) -> Vec<Vec<T>> {
+        assert_eq!(per_leaf.len(), self.old_len, "one list per leaf");
+        let pack = |(to, range): &(usize, Range<usize>)| (*to, pack(&mut per_leaf[range.clone()]));
+        let outgoing = self.sends.iter().map(pack).collect();
+        let received = comm.sparse_exchange(outgoing);
+        assert!(
+            received.iter().map(|(source, _)| source).eq(self.receives.iter().map(|(source, _)| source)),
+            "payload comes from the ranks that sent leaves"
+        );
+        let mut result = Vec::with_capacity(self.new_len);
+        let (kept_old, kept_new) = self.kept();
+        let mut kept = Some(per_leaf.drain(kept_old));
+        for ((_, range), (_, bytes)) in self.receives.iter().zip(received) {
+            if range.start >= kept_new.start
+                && let Some(kept) = kept.take()
+            {
+                result.extend(kept);
+            }
+            unpack(&bytes, range.len(), &mut result);
+        }
+        result.extend(kept.into_iter().flatten());
+        assert_eq!(result.len(), self.new_len, "one list per new leaf");
+        result
+    }
+}
+
+/// The lengths of the lists, then their items. Empties the lists.
+fn pack<T: Pod>(lists: &mut [Vec<T>]) -> Vec<u8> {
+    let items: usize = lists.iter().map(Vec::len).sum();
+    let mut bytes = Vec::with_capacity(8 * lists.len() + items * size_of::<T>());
+    for list in lists.iter() {
+        bytes.extend_from_slice(&(list.len() as u64).to_ne_bytes());
+    }
+    for list in lists {
+        bytes.extend_from_slice(bytemuck::cast_slice(&std::mem::take(list)));
+    }
+    bytes
+}
+
+/// Inverse of [`pack`]: appends `count` lists.
+fn unpack<T: Pod>(bytes: &[u8], count: usize, lists: &mut Vec<Vec<T>>) {
+    let (lengths, mut items) = bytes.split_at(8 * count);
+    for length in bytemuck::allocation::pod_collect_to_vec::<u8, u64>(lengths) {
+        let (list, rest) = items.split_at(length as usize * size_of::<T>());
+        lists.push(bytemuck::allocation::pod_collect_to_vec(list));
+        items = rest;
+    }
+    assert!(items.is_empty(), "payload is as long as its lengths say");
+}

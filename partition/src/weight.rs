@@ -1,0 +1,102 @@
+//! Where to cut the curve so that every rank gets its share of the weight.
+
+use crate::{Brick, Comm, Forest, Octant};
+
+/// A place where the curve may be cut, between two leaves.
+#[derive(Clone, Copy, Debug)]
+struct Boundary {
+    /// Weight of all leaves before it.
+    before: u64,
+    /// Key of the leaf after it.
+    key: u64,
+}
+
+/// What every rank tells about its leaves, as five integers.
+const SUMMARY: usize = 5;
+
+/// Collective. Markers that share out the weight: cut `r` is the boundary nearest to `r / ranks` of
+/// the total weight (the earlier one of two equally near; next to the ideal place along the curve if
+/// leaves without weight leave a choice). Boundaries lie between leaves that are
+/// not siblings, so families stay whole. Depends on the leaves, their weights and the number of
+/// ranks only, not on the present partition. If all weights are 0, all count the same.
+///
+/// One gather of five integers per rank and one reduction of one integer per rank.
+pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u64]) -> Vec<u64> {
+    assert_eq!(weights.len(), forest.leaves.len(), "one weight per leaf");
+    let leaves = &forest.leaves;
+    let mut before = Vec::with_capacity(leaves.len());
+    let mut own_weight = 0u64;
+    for &weight in weights {
+        before.push(own_weight);
+        own_weight = own_weight.checked_add(weight).expect("weights of a rank exceed 64 bits");
+    }
+    // Whether the first leaf starts a run of siblings depends on the rank before; others are known.
+    let starts_run = |i: usize| !leaves[i].is_sibling(&leaves[i - 1]);
+    let second = (1..leaves.len()).find(|&i| starts_run(i));
+    let summaries = comm.all_gather_u64(&[
+        own_weight,
+        leaves.first().map_or(0, Octant::code),
+        leaves.last().map_or(0, Octant::code),
+        second.map_or(u64::MAX, |i| before[i]),
+        second.map_or(u64::MAX, |i| forest.keys[i]),
+    ]);
+    let total = summaries
+        .chunks_exact(SUMMARY)
+        .try_fold(0u64, |sum, s| sum.checked_add(s[0]))
+        .expect("weights of all ranks exceed 64 bits");
+    if total == 0 {
+        return cuts(forest, comm, &vec![1; leaves.len()]);
+    }
+
+    // First boundary of each rank (if any) and weight before each rank, from the summaries.
+    let mut first_boundary: Vec<Option<Boundary>> = Vec::with_capacity(comm.size());
+    let mut rank_before = Vec::with_capacity(comm.size());
+    let mut first_starts = Vec::with_capacity(comm.size());
+    let (mut weight_before, mut last) = (0u64, None::<Octant<D>>);
+    for summary in summaries.chunks_exact(SUMMARY) {
+        let first = Octant::<D>::from_code(summary[1]);
+        let starts = first.is_some_and(|first| last.is_none_or(|last| !last.is_sibling(&first)));
+        rank_before.push(weight_before);
+        first_starts.push(starts);
+        first_boundary.push(match first {
+            Some(first) if starts => Some(Boundary { before: weight_before, key: first.key() }),
+            _ => (summary[3] != u64::MAX)
+                .then(|| Boundary { before: weight_before + summary[3], key: summary[4] }),
+        });
+        weight_before += summary[0];
+        last = Octant::from_code(summary[2]).or(last);
+    }
+
+    let rank = comm.rank();
+    let end = Boundary { before: total, key: Brick::<D>::KEY_END };
+    let after_own = first_boundary[rank + 1..].iter().flatten().next().copied().unwrap_or(end);
+    let own = (0..leaves.len())
+        .filter(|&i| if i == 0 { first_starts[rank] } else { starts_run(i) })
+        .map(|i| Boundary { before: rank_before[rank] + before[i], key: forest.keys[i] });
+
+    // Each cut lies between two consecutive boundaries, of which exactly one rank owns the first.
+    let mut markers = vec![0u64; comm.size() + 1];
+    let mut lower: Option<Boundary> = None;
+    for upper in own.chain([after_own]) {
+        if let Some(lower) = lower {
+            place_cuts(&mut markers, total, lower, upper);
+        }
+        lower = Some(upper);
+    }
+    markers[comm.size()] = Brick::<D>::KEY_END;
+    comm.max_u64(&mut markers);
+    markers
+}
+
+/// Sets the markers of all cuts whose ideal place lies at `lower` or after it and before `upper`.
+fn place_cuts(markers: &mut [u64], total: u64, lower: Boundary, upper: Boundary) {
+    let ranks = (markers.len() - 1) as u128;
+    // Everything times `ranks`, so that ideal places are integers.
+    let (low, high) = (u128::from(lower.before) * ranks, u128::from(upper.before) * ranks);
+    let total = u128::from(total);
+    for cut in low.div_ceil(total).max(1)..high.div_ceil(total).min(ranks) {
+        let ideal = cut * total;
+        let nearest = if ideal - low <= high - ideal { lower } else { upper };
+        markers[cut as usize] = nearest.key;
+    }
+}

@@ -1,0 +1,70 @@
+//! Shapes: signed distance, membership, bounds, and classification of boxes against them.
+//!
+//! Shapes fill bodies with particles and select the leaves to refine. Distances are exact for the
+//! primitives; for booleans the value is a bound, never larger in magnitude than the distance to the
+//! surface and with the right sign, so that a ball of that radius lies on one side.
+mod classify;
+mod primitives;
+mod shape;
+
+pub use classify::Side;
+pub use shape::{Frustum, Placement, Shape};
+
+/// An axis-aligned box, possibly unbounded or empty (`lower > upper` along some axis).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb<const D: usize> {
+    /// Lower corner, m.
+    pub lower: [f64; D],
+    /// Upper corner, m.
+    pub upper: [f64; D],
+}
+
+impl<const D: usize> Aabb<D> {
+    /// All of space.
+    pub const EVERYWHERE: Self = Self { lower: [f64::NEG_INFINITY; D], upper: [f64::INFINITY; D] };
+    /// No point at all; the neutral element of [`Aabb::hull`].
+    pub const EMPTY: Self = Self { lower: [f64::INFINITY; D], upper: [f64::NEG_INFINITY; D] };
+
+    /// The box between two corners.
+    pub const fn new(lower: [f64; D], upper: [f64; D]) -> Self {
+        Self { lower, upper }
+    }
+
+    /// The midpoint.
+    pub fn centre(&self) -> [f64; D] {
+        std::array::from_fn(|a| 0.5 * (self.lower[a] + self.upper[a]))
+    }
+
+    /// Half of the space diagonal: the radius of the ball about the centre that holds the box.
+    pub fn half_diagonal(&self) -> f64 {
+        let edges = std::array::from_fn::<f64, D, _>(|a| self.upper[a] - self.lower[a]);
+        0.5 * edges.iter().map(|e| e * e).sum::<f64>().sqrt()
+    }
+
+    /// The smallest box that holds both.
+    pub fn hull(&self, other: &Self) -> Self {
+        Self {
+            lower: std::array::from_fn(|a| self.lower[a].min(other.lower[a])),
+            upper: std::array::from_fn(|a| self.upper[a].max(other.upper[a])),
+        }
+    }
+
+    /// The common part.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            lower: std::array::from_fn(|a| self.lower[a].max(other.lower[a])),
+            upper: std::array::from_fn(|a| self.upper[a].min(other.upper[a])),
+        }
+    }
+
+    /// True when the box holds no open set.
+    pub fn is_empty(&self) -> bool {
+        // `!(<)` rather than `>=`, so that a NaN corner counts as empty.
+        (0..D).any(|a| self.lower[a].partial_cmp(&self.upper[a]) != Some(std::cmp::Ordering::Less))
+    }
+
+    /// True for points with `lower <= x < upper`, so that boxes which tile space share no point.
+    pub fn contains(&self, x: &[f64; D]) -> bool {
+        (0..D).all(|a| self.lower[a] <= x[a] && x[a] < self.upper[a])
+    }
+}

@@ -1,0 +1,265 @@
+//! A job that has been checked, typed by its dimension.
+//!
+//! All positions are relative to the lower corner of the domain; only output adds
+//! [`Problem::origin`]. All quantities are in SI units.
+pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
+use crate::geometry::{Aabb, Shape};
+pub use crate::kernel::{BoxPolicy, Transfer};
+use crate::material::parameters::Parameters;
+use partition::{Brick, Octant};
+use std::path::PathBuf;
+
+/// Cells along the edge of a leaf.
+pub const CELLS_PER_LEAF: u32 = 4;
+
+/// A checked job of either dimension.
+#[derive(Clone, Debug)]
+pub enum AnyProblem {
+    /// Plane strain.
+    Two(Problem<2>),
+    /// Three dimensions.
+    Three(Problem<3>),
+}
+
+/// A checked job in `D` dimensions.
+#[derive(Clone, Debug)]
+pub struct Problem<const D: usize> {
+    /// Name of the job: the stem of its file; prefix of output files.
+    pub name: String,
+    /// Title for people; may be empty.
+    pub title: String,
+    /// Checksum of everything that changes the state (not of outputs, checkpoints or the end time).
+    pub digest: u64,
+    /// Lower corner of the domain, m.
+    pub origin: [f64; D],
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Root octants along each axis.
+    pub brick: Brick<D>,
+    /// Levels of the tree.
+    pub tree: TreeSetup<D>,
+    /// Materials.
+    pub materials: Vec<MaterialSetup>,
+    /// Bodies, in the order of the job file.
+    pub bodies: Vec<Body<D>>,
+    /// Acceleration of gravity, m/s².
+    pub gravity: [f64; D],
+    /// Conditions on the lower and the upper face of the domain along each axis.
+    pub faces: [[FaceCondition; 2]; D],
+    /// What happens to particles that leave the domain.
+    pub leaving: LeavingPolicy,
+    /// End and time step.
+    pub time: TimeSetup,
+    /// Transfer of velocity between particles and grid.
+    pub transfer: Transfer,
+    /// How particle boxes follow the deformation.
+    pub boxes: BoxPolicy,
+    /// Output files.
+    pub output: OutputSetup,
+    /// Checkpoints.
+    pub checkpoint: CheckpointSetup,
+    /// Steps between rows of `history.csv`.
+    pub history_every: u64,
+    /// Steps between lines of `telemetry.jsonl`.
+    pub telemetry_every: u64,
+    /// Evaluation at the end of the run.
+    pub report: Option<ReportSetup<D>>,
+}
+
+impl<const D: usize> Problem<D> {
+    /// Edge lengths of the domain, m.
+    pub fn size(&self) -> [f64; D] {
+        self.brick.roots.map(|n| f64::from(n) * self.root_edge)
+    }
+
+    /// Edge of a leaf of this level, m. Exact: a division by a power of two.
+    pub fn leaf_edge(&self, level: u8) -> f64 {
+        self.root_edge / f64::from(1_u32 << level)
+    }
+
+    /// Edge of a cell of this level, m.
+    pub fn cell_edge(&self, level: u8) -> f64 {
+        self.leaf_edge(level) / f64::from(CELLS_PER_LEAF)
+    }
+
+    /// The box that an octant covers.
+    pub fn octant_box(&self, octant: &Octant<D>) -> Aabb<D> {
+        let edge = self.leaf_edge(octant.level);
+        Aabb::new(octant.coord.map(|c| f64::from(c) * edge), octant.coord.map(|c| f64::from(c + 1) * edge))
+    }
+
+    /// The finest level that the job asks for.
+    pub fn finest_level(&self) -> u8 {
+        self.tree.regions.iter().map(|region| region.level).fold(self.tree.base_level, u8::max)
+    }
+
+    /// True when the job wants the leaf finer: a region that it crosses or lies in asks for a deeper
+    /// level.
+    pub fn wants_refinement(&self, octant: &Octant<D>) -> bool {
+        if octant.level < self.tree.base_level {
+            return true;
+        }
+        let cell = self.octant_box(octant);
+        self.tree.regions.iter().any(|region| {
+            octant.level < region.level && region.shape.classify(&cell) != crate::geometry::Side::Outside
+        })
+    }
+}
+
+/// Levels of the tree at the start.
+#[derive(Clone, Debug)]
+pub struct TreeSetup<const D: usize> {
+    /// Level of all leaves outside the regions.
+    pub base_level: u8,
+    /// Whether neighbours may differ by one level at most, over faces, edges and corners.
+    pub graded: bool,
+    /// Regions with a deeper level; a leaf is split while it meets one whose level it has not reached.
+    pub regions: Vec<Region<D>>,
+}
+
+/// A region of given refinement.
+#[derive(Clone, Debug)]
+pub struct Region<const D: usize> {
+    /// Where.
+    pub shape: Shape<D>,
+    /// Level that leaves have there at least.
+    pub level: u8,
+}
+
+/// A material of the job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialSetup {
+    /// Name.
+    pub name: String,
+    /// Density of the undeformed material, kg/m³.
+    pub density: f64,
+    /// Constitutive model.
+    pub model: Parameters,
+}
+
+/// A body of particles.
+#[derive(Clone, Debug)]
+pub struct Body<const D: usize> {
+    /// Name.
+    pub name: String,
+    /// Region that it fills.
+    pub shape: Shape<D>,
+    /// Index into [`Problem::materials`].
+    pub material: usize,
+    /// Velocity of the body's centre, m/s.
+    pub velocity: [f64; D],
+    /// Angular velocity about the body's centre, rad/s; only the third component in plane strain.
+    pub angular_velocity: [f64; 3],
+    /// The point that the angular velocity turns about: the centre of the bounding box, m.
+    pub centre: [f64; D],
+    /// Particles per cell along each axis; not necessarily a whole number.
+    pub particles_per_cell: f64,
+}
+
+/// End and time step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeSetup {
+    /// End of the run, s.
+    pub end: f64,
+    /// Courant number.
+    pub cfl: f64,
+    /// Longest time step, s.
+    pub dt_max: Option<f64>,
+    /// Most that a step may exceed the one before it, as a factor.
+    pub growth: f64,
+}
+
+/// A field of the particle output.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Field {
+    /// Identifier, unique over the run.
+    Id,
+    /// Index of the body.
+    Body,
+    /// Index of the material.
+    Material,
+    /// Level of the leaf that holds the particle.
+    Level,
+    /// Velocity, m/s.
+    Velocity,
+    /// Mass, kg.
+    Mass,
+    /// Density, kg/m³.
+    Density,
+    /// Cauchy stress, Pa.
+    Stress,
+    /// Pressure, Pa; compression is positive.
+    Pressure,
+    /// Von Mises stress, Pa.
+    MisesStress,
+    /// First history variable of the material: plastic strain, as a rule.
+    PlasticStrain,
+    /// Volume over undeformed volume, elastic part.
+    VolumeRatio,
+}
+
+/// Output files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputSetup {
+    /// Directory for all files of the run; made if missing.
+    pub directory: PathBuf,
+    /// Simulated time between output files, s; `None`: at the start and the end only.
+    pub every: Option<f64>,
+    /// Particle fields beside the position.
+    pub fields: Vec<Field>,
+    /// Whether each output file carries the complete state, so that a run can restart from it.
+    pub restart: bool,
+}
+
+/// When checkpoints are written, beside the end of the run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CheckpointSetup {
+    /// Steps between checkpoints.
+    pub every_steps: Option<u64>,
+    /// Simulated time between checkpoints, s.
+    pub every_time: Option<f64>,
+    /// Minutes of wall time between checkpoints.
+    pub every_wall_minutes: Option<f64>,
+    /// Checkpoints kept; older ones are deleted once a newer one is complete.
+    pub keep: usize,
+}
+
+/// Evaluation at the end of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReportSetup<const D: usize> {
+    /// Run-out and height of a collapsed granular column beside published laws.
+    ColumnCollapse {
+        /// Centre of the column's foot, m.
+        base: [f64; D],
+        /// The axis that points up.
+        up: usize,
+        /// Initial radius (axisymmetric) or half width (planar), m.
+        radius: f64,
+        /// Initial height, m.
+        height: f64,
+        /// Which laws to compare with.
+        law: CollapseLaw,
+    },
+}
+
+/// Published laws of granular column collapse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CollapseLaw {
+    /// Cylinders: Lube, Huppert, Sparks, Hallworth, J. Fluid Mech. 508 (2004).
+    Axisymmetric,
+    /// Columns between walls: Lube, Huppert, Sparks, Freundt, Phys. Rev. E 72 (2005).
+    Planar,
+}

@@ -1,0 +1,63 @@
+//! From a job to the first state: tree, partition and particles.
+use partition::Forest;
+use partition::comm::Comm;
+use rayon::prelude::*;
+
+use crate::job::Problem;
+use crate::material;
+use crate::particle::seed::{SeedError, fill_leaf};
+use crate::particle::Chunk;
+use crate::solver::rebalance::leaf_weight;
+use crate::solver::time_step::StepControl;
+use crate::solver::{Clock, Physics, Solver};
+
+/// The constant part of a run.
+pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
+    Physics {
+        root_edge: problem.root_edge,
+        graded: problem.tree.graded,
+        materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
+        gravity: problem.gravity,
+        faces: problem.faces,
+        leaving: problem.leaving,
+        transfer: problem.transfer,
+        boxes: problem.boxes,
+        control: StepControl {
+            cfl: problem.time.cfl,
+            dt_max: problem.time.dt_max,
+            growth: problem.time.growth,
+        },
+    }
+}
+
+/// Collective. The tree that the job asks for, partitioned by the particles that its leaves will hold.
+///
+/// # Errors
+/// Two bodies overlap; on the rank that found it.
+pub fn forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Forest<D>, SeedError> {
+    let mut forest = Forest::uniform(comm, problem.brick, problem.tree.base_level);
+    forest.refine_where(comm, |leaf| problem.wants_refinement(leaf));
+    if problem.tree.graded {
+        forest.balance(comm);
+    }
+    let counted = seed(&forest, problem);
+    let weights: Vec<u64> = match &counted {
+        Ok(chunks) => chunks.iter().map(leaf_weight).collect(),
+        Err(_) => vec![1; forest.leaves().len()],
+    };
+    forest.partition(comm, &weights);
+    counted.map(|_| forest)
+}
+
+/// Not collective. The particles of the own leaves, ids not yet given.
+fn seed<const D: usize>(forest: &Forest<D>, problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedError> {
+    forest
+        .leaves()
+        .par_iter()
+        .map(|leaf| {
+            let mut chunk = Chunk::new();
+            fill_leaf(problem, leaf, &mut chunk)?;
+            Ok(chunk)
+        })
+        .collect()
+}
