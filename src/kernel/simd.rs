@@ -680,6 +680,7 @@ mod tests {
                 same(rows[i].to_array(), others[i].to_array(), "transpose");
             }
         }
+        same(F64x4::splat(0.1).to_array(), portable::F64x4::splat(0.1).to_array(), "splat");
         for bits in 0..16 {
             assert_eq!(Mask4::from_bits(bits).bits(), bits);
             assert_eq!(portable::Mask4::from_bits(bits).bits(), bits);
