@@ -79,15 +79,10 @@ pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<O
 }
 
 /// The same-size neighbours of an octant that are subdivided.
-fn finer_neighbours<const D: usize>(
-    tree: &KnownTree<D>,
-    here: Octant<D>,
-) -> impl Iterator<Item = [u32; D]> {
-    (0..offset_count(D))
-        .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
-        .filter(move |&beside| {
-            beside != here.coord && matches!(tree.cover(here.level, beside), Cover::Finer(_))
-        })
+fn finer_neighbours<const D: usize>(tree: &KnownTree<D>, here: Octant<D>) -> impl Iterator<Item = [u32; D]> {
+    (0..offset_count(D)).filter_map(move |index| shifted(here.coord, offset::<D>(index))).filter(
+        move |&beside| beside != here.coord && matches!(tree.cover(here.level, beside), Cover::Finer(_)),
+    )
 }
 
 /// The blocks of `other`'s level that lie in `leaf` and touch `other`.
@@ -271,7 +266,9 @@ impl<const D: usize> Closure<D> {
             .levels
             .iter()
             .enumerate()
-            .flat_map(|(level, blocks)| blocks.iter().map(move |(&coord, &sets)| ((level as u8, coord), sets)))
+            .flat_map(|(level, blocks)| {
+                blocks.iter().map(move |(&coord, &sets)| ((level as u8, coord), sets))
+            })
             .collect();
         Self { blocks, missing }
     }
@@ -406,9 +403,8 @@ impl<const D: usize> Builder<'_, D> {
                 let centre = coord.map(|c| c >> shift);
                 for offset in box_offsets::<D>(reach) {
                     let Some(octant) = shifted(centre, offset) else { continue };
-                    let known = *checked
-                        .entry((level, octant))
-                        .or_insert_with(|| self.tree.is_known(level, octant));
+                    let known =
+                        *checked.entry((level, octant)).or_insert_with(|| self.tree.is_known(level, octant));
                     if !known {
                         missing.push(Octant { level, coord: octant });
                         checked.insert((level, octant), true);

@@ -56,13 +56,7 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(
-        &mut self,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        received: &ReceivedArenas<D>,
-        part: Part,
-    ) {
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
         let nodes = block_nodes(D);
         let shared = &self.shared;
         let mut moments = self.moments.chunks_mut(nodes);
@@ -124,9 +118,8 @@ impl<const D: usize> NodeFields<D> {
                             let mut a = child[lane];
                             for axis in 0..D {
                                 a = child_moments[axis].0[lane].mul_add(delta[axis], a);
-                                own[axis].0[lane] = link
-                                    .weight
-                                    .mul_add(child_moments[axis].0[lane], own[axis].0[lane]);
+                                own[axis].0[lane] =
+                                    link.weight.mul_add(child_moments[axis].0[lane], own[axis].0[lane]);
                             }
                             row[lane] = link.weight.mul_add(a, row[lane]);
                         }
@@ -162,8 +155,7 @@ impl<const D: usize> NodeFields<D> {
                         for lane in 0..3 {
                             row[lane] = link.weight.mul_add(parent[lane], row[lane]);
                             for axis in 0..D {
-                                let moment =
-                                    parent[lane].mul_add(delta[axis], parent_moments[axis].0[lane]);
+                                let moment = parent[lane].mul_add(delta[axis], parent_moments[axis].0[lane]);
                                 let sum = &mut moments[axis].0[lane];
                                 *sum = link.weight.mul_add(moment, *sum);
                             }

@@ -447,7 +447,8 @@ impl<const D: usize> GridPlan<D> {
 
     fn find_face_nodes(&mut self) {
         for (index, block) in self.blocks.iter().enumerate() {
-            let real = block.value & !block.constrained & nodes_in_domain(&self.tree, block.level, block.coord);
+            let real =
+                block.value & !block.constrained & nodes_in_domain(&self.tree, block.level, block.coord);
             for bit in bits(real) {
                 let node = node_coord(block.coord, bit);
                 let mut faces = 0u8;

@@ -2,5 +2,7 @@
 //! telemetry, progress and pictures.
 pub mod hdf5_file;
 pub mod history;
+pub mod progress;
 pub mod series;
 pub mod snapshot;
+pub mod telemetry;

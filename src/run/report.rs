@@ -109,7 +109,12 @@ impl std::fmt::Display for Collapse {
             value.map_or_else(|| "no published fit".into(), |value| format!("published fit {value:.4} m"))
         };
         writeln!(f, "column collapse, aspect ratio {:.3}", self.aspect)?;
-        writeln!(f, "  run-out radius  {:.4} m (98 % of the mass)   {}", self.front, published(self.law_edge))?;
+        writeln!(
+            f,
+            "  run-out radius  {:.4} m (98 % of the mass)   {}",
+            self.front,
+            published(self.law_edge)
+        )?;
         writeln!(f, "  outer edge      {:.4} m (connected deposit)", self.edge)?;
         write!(f, "  final height    {:.4} m   {}", self.height, published(self.law_height))
     }

@@ -58,10 +58,7 @@ impl<const D: usize> Grid<D> {
     /// Messages and bytes that this rank has sent since the grid was built.
     pub fn traffic(&self) -> Traffic {
         let (arenas, particles) = (self.exchange.traffic(), self.migration.traffic());
-        Traffic {
-            messages: arenas.messages + particles.messages,
-            bytes: arenas.bytes + particles.bytes,
-        }
+        Traffic { messages: arenas.messages + particles.messages, bytes: arenas.bytes + particles.bytes }
     }
 }
 

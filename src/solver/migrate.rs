@@ -88,11 +88,7 @@ impl<const D: usize> Migration<D> {
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
     /// in any case.
-    pub fn migrate(
-        &mut self,
-        tree: &KnownTree<D>,
-        chunks: &mut [Chunk<D>],
-    ) -> Result<Moved, MigrateError> {
+    pub fn migrate(&mut self, tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) -> Result<Moved, MigrateError> {
         let (first, rule) = (tree.first_own(), self.rule);
         let found: Vec<Result<Vec<(u32, Destination)>, MigrateError>> = chunks
             .par_iter_mut()
@@ -250,8 +246,7 @@ fn pack<const D: usize>(message: &mut Vec<u8>, key: u64, chunk: &Chunk<D>, p: us
 
 fn unpack<const D: usize>(message: &[u8], tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) {
     for record in message.chunks_exact(record_bytes::<D>()) {
-        let mut words =
-            record.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
+        let mut words = record.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
         let mut next = || words.next().unwrap_or_default();
         let leaf = tree.locate(next()).and_then(|known| tree.local(known));
         let Some(chunk) = leaf.map(|leaf| &mut chunks[leaf]) else { continue };

@@ -2,9 +2,9 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod grid;
 pub mod migrate;
 pub mod phases;
-pub mod grid;
 pub mod rebalance;
 pub mod time_step;
 pub mod totals;

@@ -20,8 +20,9 @@ use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5l::{H5Lcreate_hard, H5Lexists};
 use hdf5_sys::h5p::{
     H5FD_mpio_xfer_t, H5P_CLS_DATASET_CREATE, H5P_CLS_DATASET_XFER, H5P_CLS_FILE_ACCESS, H5P_CLS_FILE_CREATE,
-    H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_alignment, H5Pset_coll_metadata_write,
-    H5Pset_dxpl_mpio, H5Pset_fill_time, H5Pset_libver_bounds, H5Pset_obj_track_times,
+    H5P_CLS_GROUP_CREATE, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_alignment, H5Pset_attr_phase_change,
+    H5Pset_coll_metadata_write, H5Pset_dxpl_mpio, H5Pset_fill_time, H5Pset_libver_bounds,
+    H5Pset_link_phase_change, H5Pset_obj_track_times, H5Pset_small_data_block_size,
 };
 use partition::comm::Comm;
 
@@ -35,6 +36,8 @@ pub use error::FileError;
 
 /// Data sets of at least this many bytes start at a multiple of [`ALIGNMENT`].
 const ALIGN_FROM: u64 = 4 << 20;
+/// Links or attributes of a group that are stored without an index.
+const MOST_COMPACT: c_uint = 255;
 /// The usual stripe of parallel file systems.
 const ALIGNMENT: u64 = 1 << 20;
 
@@ -139,6 +142,8 @@ impl ParallelFile {
             // The 1.8 format carries checksums of its own metadata, which the older one does not.
             H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_LATEST);
             H5Pset_alignment(access, ALIGN_FROM, ALIGNMENT);
+            // No reserve for small data sets: what stays unused of it would hold arbitrary bytes.
+            H5Pset_small_data_block_size(access, 0);
             if comm.is_some() {
                 H5Pset_coll_metadata_write(access, 1);
             }
@@ -226,6 +231,10 @@ impl ParallelFile {
         let made = unsafe {
             let list = H5Pcreate(*H5P_CLS_GROUP_CREATE);
             H5Pset_obj_track_times(list, 0);
+            // Up to these numbers, links and attributes stay in the group's header: smaller files, and no
+            // remains of outgrown indices in them.
+            H5Pset_link_phase_change(list, MOST_COMPACT, 0);
+            H5Pset_attr_phase_change(list, MOST_COMPACT, 0);
             let id = H5Gcreate2(self.id(), name.as_ptr(), H5P_DEFAULT, list, H5P_DEFAULT);
             let made = self.wrap(id, H5Gclose, "create group", group);
             H5Pclose(list);

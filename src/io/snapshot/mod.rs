@@ -182,9 +182,14 @@ fn safely(
 ) -> Result<(), FileError> {
     let part = path.with_added_extension("part");
     let written = ParallelFile::create(comm, &part).and_then(|file| {
-        fill(&file)?;
-        Header::mark_complete(&file)?;
-        file.close()
+        let filled = fill(&file).and_then(|()| Header::mark_complete(&file));
+        if filled.is_err() && comm.rank() == 0 {
+            // On a full disk the library could not even close the file, and would crash at the end of
+            // the program; so give the space back first. If that fails too, the first error matters.
+            let _ = File::options().write(true).open(&part).and_then(|file| file.set_len(0));
+        }
+        comm.barrier();
+        filled.and_then(|()| file.close())
     });
     let named = written.and_then(|()| {
         let here = if comm.rank() == 0 { sync_and_rename(&part, path) } else { Ok(()) };
