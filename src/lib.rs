@@ -8,5 +8,4 @@ pub mod job;
 pub mod kernel;
 pub mod material;
 pub mod particle;
-pub mod run;
 pub mod solver;

@@ -15,7 +15,8 @@ struct Boundary {
 const SUMMARY: usize = 5;
 
 /// Collective. Markers that share out the weight: cut `r` is the boundary nearest to `r / ranks` of
-/// the total weight (the earlier one of two equally near). Boundaries lie between leaves that are
+/// the total weight (the earlier one of two equally near; next to the ideal place along the curve if
+/// leaves without weight leave a choice). Boundaries lie between leaves that are
 /// not siblings, so families stay whole. Depends on the leaves, their weights and the number of
 /// ranks only, not on the present partition. If all weights are 0, all count the same.
 ///

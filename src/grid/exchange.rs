@@ -188,11 +188,8 @@ fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
     let mut bitmap = vec![0u8; 8 * bins.len().div_ceil(64)];
     let mut values: Vec<f64> = Vec::new();
     for (number, sent) in bins.iter().enumerate() {
-        if !arenas.is_occupied(sent.bin) {
-            continue;
-        }
+        let Some(rows) = arenas.rows(sent.bin) else { continue };
         bitmap[number / 8] |= 1 << (number % 8);
-        let rows = arenas.rows(sent.bin);
         for &(offset, nodes, constrained) in &sent.parts {
             for bit in bits(nodes) {
                 let row = &rows[arena_index::<D>(offset as usize, bit)].0;

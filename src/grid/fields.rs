@@ -79,16 +79,16 @@ impl<const D: usize> NodeFields<D> {
             }
             for contribution in contributions {
                 match contribution.source {
-                    Source::Own(bin) if arenas.is_occupied(bin.0) => {
+                    Source::Own(bin) => {
+                        let Some(arena) = arenas.rows(bin.0) else { continue };
                         let shared = &shared[contribution.offset as usize];
-                        add_rows(rows, arenas.rows(bin.0), shared);
+                        add_rows(rows, arena, shared);
                         if let (Some(to), Some(from)) = (&mut moments, arenas.moments(bin.0)) {
                             for &(at, bit) in shared {
                                 add_moments(&mut to[bit as usize], &from[at as usize]);
                             }
                         }
                     }
-                    Source::Own(_) => {}
                     Source::Received(bin, part) => {
                         received.add(bin, part, rows, moments.as_deref_mut());
                     }

@@ -1,4 +1,58 @@
 //! Job files: what a run is asked to do.
+//!
+//! A file is parsed to a tree that knows where everything stands ([`load`]), checked against the
+//! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a
+//! [`Problem`] of its dimension.
+mod convert;
+pub mod error;
+pub mod estimate;
+pub mod file;
+pub mod file_shape;
+mod overlap;
 pub mod problem;
+mod schema;
+mod shapes;
+mod source;
+mod structure;
 
+pub use error::{Fault, FaultList, JobError};
 pub use problem::{AnyProblem, Problem};
+pub use schema::schema;
+
+use std::path::Path;
+
+/// Reads and checks a job file. Not collective: every rank that calls it reads the file.
+///
+/// # Errors
+/// The file cannot be read, or its content is not a valid job; all faults that were found, with their
+/// places.
+pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
+    let bytes = std::fs::read(path)
+        .map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+        let message = "found a byte that is not UTF-8; expected text in UTF-8".into();
+        let faults = vec![Fault { key: String::new(), message, span: valid..valid, help: None }];
+        FaultList { path: path.to_path_buf(), text, faults }
+    })?;
+    let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
+    parse(&text, &name).map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
+}
+
+/// Checks the text of a job file; `name` becomes the name of the job.
+///
+/// # Errors
+/// All faults that were found.
+pub fn parse(text: &str, name: &str) -> Result<AnyProblem, Vec<Fault>> {
+    let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None }];
+    let tree = source::Node::parse(text).map_err(|(span, message)| alone(span, message))?;
+    let faults = structure::check(&tree, &schema());
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    // What the schema accepts, the types accept; should they ever differ, the parser's words count.
+    let file: file::JobFile = toml::from_str(text)
+        .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
+    convert::convert(&file, &tree, name)
+}

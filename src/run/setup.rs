@@ -3,7 +3,7 @@ use partition::Forest;
 use partition::comm::Comm;
 use rayon::prelude::*;
 
-use crate::job::problem::{FaceCondition as Face, Problem};
+use crate::job::Problem;
 use crate::material;
 use crate::particle::seed::{SeedError, fill_leaf};
 use crate::particle::Chunk;
@@ -15,6 +15,7 @@ use crate::solver::{Clock, Physics, Solver};
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     Physics {
         root_edge: problem.root_edge,
+        graded: problem.tree.graded,
         materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
         gravity: problem.gravity,
         faces: problem.faces,

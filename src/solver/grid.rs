@@ -5,10 +5,13 @@ use partition::comm::{Comm, Pending, Traffic};
 use super::bins::BinLists;
 use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
+use super::transfer::width_bound;
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::exchange::ReceivedArenas;
 use crate::grid::known::Allowance;
+use crate::kernel::Scheme;
+use crate::particle::Chunk;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 
 /// Plan, arenas, fields and exchanges.
@@ -27,13 +30,16 @@ pub struct Grid<const D: usize> {
 
 impl<const D: usize> Grid<D> {
     /// Collective. The grid for the current tree and partition.
-    pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>) -> Self {
-        let allowance = Allowance { reach: 0, graded: physics.graded };
+    ///
+    /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
+    /// [`needed_reach`] gives it.
+    pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>, reach: u32) -> Self {
+        let allowance = Allowance { reach, graded: physics.graded };
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
         let neighbours = exchange.neighbours().to_vec();
         Self {
-            arenas: Arenas::new(&plan),
+            arenas: Arenas::default(),
             fields: NodeFields::new(&plan),
             migration: Migration::new(comm, &plan, neighbours, physics.leaving),
             lists: BinLists::new(&plan),
@@ -56,7 +62,26 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// Not collective. Half width of the widest box that the particles of a leaf can have, in cells of that leaf rounded
+/// up; 0 if all are at most a cell wide.
+pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
+    let cells = width_bound(chunk, scheme) / cell;
+    // Rounding must not make a box that is exactly one cell wide a wide one.
+    if cells <= 0.5 * (1.0 + 1e-12) { 0 } else { cells.ceil() as u32 }
+}
+
 impl<const D: usize> Solver<D> {
+    /// Not collective. [`needed_reach`] of this rank's particles.
+    pub(super) fn local_reach(&self) -> u32 {
+        let scheme = self.physics.scheme();
+        let leaves = self.forest.leaves().iter().zip(&self.chunks);
+        let reaches = leaves.map(|(leaf, chunk)| {
+            let cell = self.physics.root_edge / f64::from(4u32 << leaf.level);
+            needed_reach(&scheme, chunk, cell)
+        });
+        reaches.max().unwrap_or(0)
+    }
+
     /// The grid of the current tree and partition.
     pub fn grid(&self) -> &Grid<D> {
         &self.grid

@@ -83,8 +83,17 @@ pub struct Clock {
 pub struct StepReport {
     /// Particles that changed leaf.
     pub moved: Moved,
-    /// Whether some rank was asked to stop.
+    /// What any rank asked for.
+    pub granted: Requests,
+}
+
+/// What a rank wants all ranks to do after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Requests {
+    /// Stop.
     pub stop: bool,
+    /// Write a checkpoint.
+    pub checkpoint: bool,
 }
 
 /// Particles, tree and clock of one rank, and what advances them.
@@ -117,7 +126,7 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
-        let grid = Grid::build(comm, &forest, &physics);
+        let grid = Grid::build(comm, &forest, &physics, 0);
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -129,6 +138,10 @@ impl<const D: usize> Solver<D> {
             grid,
             deleted: 0,
         };
+        let reach = solver.agreed_reach();
+        if reach > 0 {
+            solver.rebuild_grid(reach);
+        }
         if clock == Clock::default() {
             solver.signal = solver.chunks.iter().map(|chunk| solver.signal_at_rest(chunk)).collect();
             solver.clock.bound = comm.min_f64(solver.local_bound());
@@ -136,12 +149,13 @@ impl<const D: usize> Solver<D> {
         solver
     }
 
-    /// Collective. One time step of at most `dt_limit` seconds. `stop` of any rank is reported to all.
+    /// Collective. One time step, not beyond the time `end`. Requests of any rank are granted to all.
     ///
     /// # Errors
     /// On all ranks when any rank failed, with that rank and its reason.
-    pub fn step(&mut self, dt_limit: f64, stop: bool) -> Result<StepReport, Disagreement> {
-        let dt = self.choose_dt(dt_limit);
+    pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
+        let left = end - self.clock.time;
+        let dt = self.choose_dt(left);
 
         let sorted = self.sort_into_bins();
         self.scatter(dt, Reach::Neighbours);
@@ -155,11 +169,24 @@ impl<const D: usize> Solver<D> {
         self.prolong();
         self.gather(dt);
         let moved = self.migrate();
+        let reach = self.local_reach();
 
         self.clock.step += 1;
-        self.clock.time += dt;
+        self.clock.time = if dt < left { self.clock.time + dt } else { end };
         self.clock.dt = dt;
-        self.close_step(sorted, moved, stop)
+        self.close_step(sorted, moved, reach, requests)
+    }
+
+    /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
+    pub(super) fn rebuild_grid(&mut self, reach: u32) {
+        self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
+    }
+
+    /// Collective. Reach that the boxes of all ranks need.
+    fn agreed_reach(&self) -> u32 {
+        let mut reach = [u64::from(self.local_reach())];
+        self.comm.max_u64(&mut reach);
+        reach[0] as u32
     }
 
     /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.
@@ -167,7 +194,8 @@ impl<const D: usize> Solver<D> {
         &mut self,
         sorted: Result<(), BinMissing>,
         moved: Result<Moved, MigrateError>,
-        stop: bool,
+        reach: u32,
+        requests: Requests,
     ) -> Result<StepReport, Disagreement> {
         let bound = self.local_bound();
         let outcome: Result<Moved, StepError> = match (sorted, moved) {
@@ -178,13 +206,22 @@ impl<const D: usize> Solver<D> {
             (_, Ok(moved)) => Ok(moved),
         };
         let flag = |set: bool| if set { -1.0 } else { 0.0 };
-        let mut least = [if outcome.is_ok() { bound } else { 0.0 }, flag(outcome.is_err()), flag(stop)];
+        let bound = if outcome.is_ok() { bound } else { 0.0 };
+        let mut least = [
+            bound,
+            flag(outcome.is_err()),
+            flag(requests.stop),
+            flag(requests.checkpoint),
+            -f64::from(reach),
+        ];
         self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
-        if least[1] < 0.0 {
-            self.comm.agree(outcome).map(|moved| StepReport { moved, stop: false })
-        } else {
-            self.clock.bound = least[0];
-            Ok(StepReport { moved: outcome.unwrap_or_default(), stop: least[2] < 0.0 })
+        let [bound, failed, stop, checkpoint, reach] = least;
+        let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
+        self.clock.bound = bound;
+        if -reach > f64::from(self.grid.plan.tree.reach()) {
+            self.rebuild_grid(-reach as u32);
         }
+        let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
+        Ok(StepReport { moved, granted })
     }
 }

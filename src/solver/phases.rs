@@ -1,5 +1,5 @@
 //! Wall time by phase of the step.
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Phases of a run whose wall time is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,8 +69,13 @@ impl Phases {
     pub fn time<R>(&mut self, phase: Phase, work: impl FnOnce() -> R) -> R {
         let start = Instant::now();
         let result = work();
-        self.seconds[phase as usize] += start.elapsed().as_secs_f64();
+        self.book(phase, start.elapsed());
         result
+    }
+
+    /// Books wall time measured elsewhere.
+    pub fn book(&mut self, phase: Phase, time: Duration) {
+        self.seconds[phase as usize] += time.as_secs_f64();
     }
 
     /// Seconds booked so far, in the order of [`Phase::ALL`].

@@ -1,6 +1,6 @@
 //! Partition of leaves by the cost of their particles.
 use super::phases::Phase;
-use super::{Grid, Solver};
+use super::Solver;
 use crate::particle::Chunk;
 
 /// Cost of a leaf without particles, in units of a particle's: its share of node sums and bookkeeping.
@@ -28,16 +28,14 @@ impl<const D: usize> Solver<D> {
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
     /// grid. Changes no bit of the state.
     pub fn rebalance(&mut self) {
-        let mut phases = self.phases;
-        phases.time(Phase::Regrid, || {
-            let weights: Vec<u64> = self.chunks.iter().map(leaf_weight).collect();
-            let shipment = self.forest.partition(&self.comm, &weights);
-            let payload = std::mem::take(&mut self.chunks).into_iter().map(|c| c.to_bytes()).collect();
-            let arrived: Vec<Vec<u8>> = shipment.move_payload(&self.comm, payload);
-            self.chunks = arrived.into_iter().map(|bytes| Chunk::from_bytes(&bytes)).collect();
-            self.signal = vec![0.0; self.chunks.len()];
-            self.grid = Grid::build(&self.comm, &self.forest, &self.physics);
-        });
-        self.phases = phases;
+        let start = std::time::Instant::now();
+        let weights: Vec<u64> = self.chunks.iter().map(leaf_weight).collect();
+        let shipment = self.forest.partition(&self.comm, &weights);
+        let payload = std::mem::take(&mut self.chunks).iter().map(Chunk::to_bytes).collect();
+        let arrived: Vec<Vec<u8>> = shipment.move_payload(&self.comm, payload);
+        self.chunks = arrived.iter().map(|bytes| Chunk::from_bytes(bytes)).collect();
+        self.signal = vec![0.0; self.chunks.len()];
+        self.rebuild_grid(self.grid.plan.tree.reach());
+        self.phases.book(Phase::Regrid, start.elapsed());
     }
 }

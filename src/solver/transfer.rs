@@ -1,17 +1,18 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinMissing, Members};
+use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
 use super::phases::Phase;
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
 use crate::grid::GridPlan;
 use crate::grid::fields::{Part, VelocityArena};
 use crate::grid::plan::Bin;
-use crate::kernel::g2p::{Fields, Moments};
+use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::{Frame, Row, Scheme, Select, domain, g2p, p2g};
+use crate::kernel::{BoxPolicy, Frame, Row, Scheme, Select, SubBox, domain, g2p, p2g};
 use crate::particle::Chunk;
+use crate::particle::chunk::Tag;
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,13 +25,25 @@ pub(super) enum Reach {
 
 impl<const D: usize> Physics<D> {
     /// What the kernels need to know.
-    fn scheme(&self) -> Scheme<'_> {
+    pub(super) fn scheme(&self) -> Scheme<'_> {
         Scheme {
             boxes: self.boxes,
             root_cell: self.root_edge / 4.0,
             transfer: self.transfer,
             materials: &self.materials,
         }
+    }
+}
+
+/// Memory that a thread reuses from leaf to leaf.
+struct Scratch<const D: usize> {
+    arena: VelocityArena<D>,
+    gathered: Vec<Gathered<D>>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { arena: VelocityArena::default(), gathered: Vec::new() }
     }
 }
 
@@ -45,23 +58,71 @@ fn frame<const D: usize>(plan: &GridPlan<D>, bin: &Bin<D>) -> Frame<D> {
     Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: extent(plan) }
 }
 
-fn select<'a, const D: usize>(chunk: &Chunk<D>, members: Members<'a>) -> Option<Select<'a>> {
-    match members {
-        Members::All => (!chunk.is_empty()).then_some(Select::All),
-        Members::List(list) => (!list.is_empty()).then_some(Select::List(list)),
+/// Half widths as the kernels compute them.
+struct Widths<'a, const D: usize> {
+    scheme: Scheme<'a>,
+    extent: [f64; D],
+}
+
+impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
+    fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>) {
+        domain::full_half_widths(chunk, Select::All, cell, &self.extent, &self.scheme, out);
+    }
+
+    fn bound(&self, chunk: &Chunk<D>) -> f64 {
+        width_bound(chunk, &self.scheme)
+    }
+}
+
+/// A bound on the half widths of all boxes that the particles of a chunk can have, m.
+pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>) -> f64 {
+    match scheme.boxes {
+        BoxPolicy::Fixed => greatest_half(chunk),
+        BoxPolicy::Volume { max_stretch, .. } => max_stretch * greatest_half(chunk),
+        BoxPolicy::Cell => {
+            let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
+            coarsest.map_or(0.0, |level| 0.5 * scheme.root_cell / f64::from(1u32 << level))
+        }
+    }
+}
+
+/// The members of a bin.
+struct Selected<'a, const D: usize> {
+    whole: Option<Select<'a>>,
+    parts: &'a [SubBox<D>],
+}
+
+impl<'a, const D: usize> Selected<'a, D> {
+    /// Members of bin number `number` of leaf `leaf`.
+    fn of(lists: &'a BinLists<D>, leaf: usize, number: usize, chunk: &Chunk<D>) -> Self {
+        let Some(bins) = lists.of_leaf(leaf) else {
+            let whole = (number == 0 && !chunk.is_empty()).then_some(Select::All);
+            return Self { whole, parts: &[] };
+        };
+        let members = &bins.members[number];
+        let whole = (!members.whole.is_empty()).then_some(Select::List(&members.whole));
+        Self { whole, parts: &members.parts }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.whole.is_none() && self.parts.is_empty()
     }
 }
 
 impl<const D: usize> Solver<D> {
     /// Lists the particles of each bin in leaves beside finer leaves.
     pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let scheme = self.physics.scheme();
         let (grid, chunks) = (&mut self.grid, &self.chunks);
-        let extent = extent(&grid.plan);
+        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&grid.plan) };
         self.phases.time(Phase::Sort, || {
-            grid.lists.sort(&grid.plan, chunks, |chunk, cell, out| {
-                domain::half_widths(chunk, Select::All, cell, &extent, &scheme, out);
-            })
+            let sorted = grid.lists.sort(&grid.plan, chunks, &widths);
+            let (plan, lists) = (&grid.plan, &grid.lists);
+            grid.arenas.occupy(plan, |bin| {
+                let leaf = plan.bins[bin].leaf as usize;
+                let number = bin - plan.leaf_bins(leaf).start;
+                !Selected::of(lists, leaf, number, &chunks[leaf]).is_empty()
+            });
+            sorted
         })
     }
 
@@ -77,20 +138,27 @@ impl<const D: usize> Solver<D> {
             arenas.into_par_iter().for_each(|arena| {
                 let bin = &plan.bins[arena.bin];
                 let leaf = bin.leaf as usize;
-                let members = lists.members(leaf, arena.bin - plan.leaf_bins(leaf).start);
-                let selected = select(&chunks[leaf], members);
-                *arena.occupied = selected.is_some();
-                let Some(selected) = selected else { return };
-                arena.rows.fill(Row([0.0; 4]));
-                let (chunk, frame) = (&chunks[leaf], frame(plan, bin));
-                match arena.moments.zip(bin.touched) {
-                    None => p2g::scatter(chunk, selected, &frame, &scheme, dt, arena.rows),
-                    Some((sums, table)) => {
-                        sums.fill([Row([0.0; 4]); D]);
-                        let touched = &plan.touched[table as usize];
-                        let moments = MomentSums { touched, sums };
-                        p2g::scatter_with_moments(chunk, selected, &frame, &scheme, dt, arena.rows, moments);
+                let chunk = &chunks[leaf];
+                let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
+                let (frame, rows) = (frame(plan, bin), arena.rows);
+                rows.fill(Row([0.0; 4]));
+                let touched = bin.touched.map_or(&[][..], |table| &plan.touched[table as usize]);
+                let mut sums = arena.moments;
+                if let Some(sums) = &mut sums {
+                    sums.fill([Row([0.0; 4]); D]);
+                }
+                if let Some(whole) = selected.whole {
+                    match sums.as_deref_mut() {
+                        None => p2g::scatter(chunk, whole, &frame, &scheme, dt, rows),
+                        Some(sums) => {
+                            let moments = MomentSums { touched, sums };
+                            p2g::scatter_with_moments(chunk, whole, &frame, &scheme, dt, rows, moments);
+                        }
                     }
+                }
+                if !selected.parts.is_empty() {
+                    let moments = sums.map(|sums| MomentSums { touched, sums });
+                    p2g::scatter_sub_boxes(chunk, selected.parts, &frame, dt, rows, moments);
                 }
             });
         });
@@ -132,9 +200,17 @@ impl<const D: usize> Solver<D> {
         let (chunks, signal) = (&mut self.chunks, &mut self.signal);
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().enumerate();
-            let speeds = leaves.map_init(VelocityArena::default, |arena, (leaf, chunk)| {
-                plan.leaf_bins(leaf).enumerate().fold(0.0, |signal: f64, (number, bin)| {
-                    let Some(selected) = select(chunk, lists.members(leaf, number)) else { return signal };
+            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                let Scratch { arena, gathered } = scratch;
+                let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
+                gathered.clear();
+                gathered.resize(cut.len(), Gathered::default());
+                let mut signal: f64 = 0.0;
+                for (number, bin) in plan.leaf_bins(leaf).enumerate() {
+                    let selected = Selected::of(lists, leaf, number, chunk);
+                    if selected.is_empty() {
+                        continue;
+                    }
                     fields.load(plan, bin, arena);
                     let bin = &plan.bins[bin];
                     let frame = frame(plan, bin);
@@ -144,8 +220,12 @@ impl<const D: usize> Solver<D> {
                         second: &arena.spread,
                     });
                     let nodes = Fields { velocity: &arena.rows, increment: None, moments };
-                    signal.max(g2p::gather(chunk, selected, &frame, &scheme, dt, &nodes))
-                })
+                    g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
+                    if let Some(whole) = selected.whole {
+                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes));
+                    }
+                }
+                signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
             });
             speeds.collect_into_vec(signal);
         });
