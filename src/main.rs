@@ -1,2 +1,48 @@
-//! The `agimp` program.
-fn main() {}
+//! The `agimp` program: maps what a command returns to messages and an exit code.
+use agimp::cli::{Arguments, Failure, execute};
+use agimp::job::{FaultList, JobError};
+use clap::Parser as _;
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use std::io::IsTerminal as _;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match execute(Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            explain(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+fn explain(failure: &Failure) {
+    match failure {
+        Failure::Job(JobError::Invalid(list)) => explain_faults(list),
+        other => eprintln!("agimp: {other}"),
+    }
+}
+
+/// Each fault on a line of its own that editors and scripts understand, then its place in the file.
+fn explain_faults(list: &FaultList) {
+    let theme =
+        if std::io::stderr().is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
+    let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(0);
+    for fault in &list.faults {
+        let mut diagnostic = MietteDiagnostic::new(list.headline(fault))
+            .with_label(LabeledSpan::at(fault.span.clone(), "here"));
+        if let Some(help) = &fault.help {
+            diagnostic = diagnostic.with_help(help.clone());
+        }
+        let source = NamedSource::new(list.path.display().to_string(), list.text.clone());
+        let report = Report::new(diagnostic).with_source_code(source);
+        let mut text = String::new();
+        match handler.render_report(&mut text, report.as_ref()) {
+            Ok(()) => eprintln!("{text}"),
+            Err(_) => eprintln!("{}", list.headline(fault)),
+        }
+    }
+    if list.faults.len() > 1 {
+        eprintln!("agimp: {} faults in {}", list.faults.len(), list.path.display());
+    }
+}

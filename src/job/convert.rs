@@ -155,7 +155,10 @@ fn domain<const D: usize>(
             let near = if below < above { format!("{below} or {above}") } else { format!("{above}") };
             checks.fault(
                 &here,
-                format!("found {}; expected a whole multiple of domain.root_edge = {edge}, such as {near}", size[a]),
+                format!(
+                    "found {}; expected a whole multiple of domain.root_edge = {edge}, such as {near}",
+                    size[a]
+                ),
             );
         } else if whole > f64::from(MAX_ROOTS) {
             checks.fault(
@@ -190,13 +193,19 @@ fn tree<const D: usize>(
         if region.level <= tree.base_level {
             checks.fault(
                 &here.key("level"),
-                format!("found {}; expected a level deeper than tree.base_level = {}", region.level, tree.base_level),
+                format!(
+                    "found {}; expected a level deeper than tree.base_level = {}",
+                    region.level, tree.base_level
+                ),
             );
         }
         let Some(shape) = checks.shape(&region.shape, space, &here.key("shape")) else { continue };
         let inside = shape.bounds().intersection(&Aabb::new([0.0; D], space.size));
         if inside.is_empty() {
-            checks.fault(&here.key("shape"), "found a region outside the domain; expected one that meets it".into());
+            checks.fault(
+                &here.key("shape"),
+                "found a region outside the domain; expected one that meets it".into(),
+            );
         }
         regions.push(Region { shape, level: region.level });
     }
@@ -260,10 +269,15 @@ fn body<const D: usize>(
     let material = materials.iter().position(|material| material.name == body.material);
     if material.is_none() {
         let known = || materials.iter().map(|material| material.name.as_str());
-        let guess = nearest(&body.material, known()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
+        let guess =
+            nearest(&body.material, known()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
         checks.fault(
             &path.key("material"),
-            format!("found \"{}\"; expected the name of a material: {}{guess}", body.material, alternatives(known())),
+            format!(
+                "found \"{}\"; expected the name of a material: {}{guess}",
+                body.material,
+                alternatives(known())
+            ),
         );
     }
     let velocity = match &body.velocity {
@@ -328,7 +342,8 @@ fn faces<const D: usize>(
     if D == 2 {
         for (key, face) in [("z_min", z_min), ("z_max", z_max)] {
             if face.is_some() {
-                checks.fault(&path.key(key), "found a face along z; expected only x and y in a 2D job".into());
+                checks
+                    .fault(&path.key(key), "found a face along z; expected only x and y in a 2D job".into());
                 return None;
             }
         }
@@ -345,7 +360,10 @@ fn faces<const D: usize>(
 
 fn numerics(checks: &mut Checks, numerics: &file::Numerics, path: &Path) -> (Transfer, BoxPolicy) {
     if let (Some(_), false) = (numerics.flip, numerics.transfer == file::Transfer::Flip) {
-        checks.fault(&path.key("flip"), "found a share of FLIP; expected it only with transfer = \"flip\"".into());
+        checks.fault(
+            &path.key("flip"),
+            "found a share of FLIP; expected it only with transfer = \"flip\"".into(),
+        );
     }
     let transfer = match numerics.transfer {
         file::Transfer::Apic => Transfer::Apic,
@@ -375,7 +393,10 @@ fn output(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> Outpu
     let output = &file.output;
     let directory = match output.directory.as_deref() {
         Some(directory) if directory.trim().is_empty() => {
-            checks.fault(&path.key("directory"), "found an empty text; expected the name of a directory".into());
+            checks.fault(
+                &path.key("directory"),
+                "found an empty text; expected the name of a directory".into(),
+            );
             String::new()
         }
         Some(directory) => directory.to_owned(),
@@ -384,12 +405,18 @@ fn output(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> Outpu
     if let Some(every) = output.every.filter(|every| file.time.end / every > MAX_OUTPUTS) {
         checks.fault(
             &path.key("every"),
-            format!("found {every}; expected at least {:e}, for at most {MAX_OUTPUTS} outputs until time.end", file.time.end / MAX_OUTPUTS),
+            format!(
+                "found {every}; expected at least {:e}, for at most {MAX_OUTPUTS} outputs until time.end",
+                file.time.end / MAX_OUTPUTS
+            ),
         );
     }
     for (i, field) in output.fields.iter().enumerate() {
         if output.fields[..i].contains(field) {
-            checks.fault(&path.key("fields").index(i), "found a field a second time; expected each once".into());
+            checks.fault(
+                &path.key("fields").index(i),
+                "found a field a second time; expected each once".into(),
+            );
         }
     }
     OutputSetup {
@@ -440,6 +467,7 @@ fn digest(file: &JobFile) -> u64 {
     state.time.end = 0.0;
     // Field order and shortest round-trip numbers make the text canonical.
     let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
-    text.bytes()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
 }

@@ -27,8 +27,8 @@ use std::path::Path;
 /// The file cannot be read, or its content is not a valid job; all faults that were found, with their
 /// places.
 pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
-    let bytes = std::fs::read(path)
-        .map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();

@@ -26,11 +26,17 @@ impl Checks<'_> {
             }
             Written::Circle { centre, radius } => {
                 self.only(2, D, "circle", "sphere", path)?;
-                Some(Shape::Sphere { centre: self.point(centre, space, &path.key("centre"))?, radius: *radius })
+                Some(Shape::Sphere {
+                    centre: self.point(centre, space, &path.key("centre"))?,
+                    radius: *radius,
+                })
             }
             Written::Sphere { centre, radius } => {
                 self.only(3, D, "sphere", "circle", path)?;
-                Some(Shape::Sphere { centre: self.point(centre, space, &path.key("centre"))?, radius: *radius })
+                Some(Shape::Sphere {
+                    centre: self.point(centre, space, &path.key("centre"))?,
+                    radius: *radius,
+                })
             }
             Written::Cylinder { base, axis, height, radius } => {
                 self.only(3, D, "cylinder", "box", path)?;
@@ -79,7 +85,14 @@ impl Checks<'_> {
         }
     }
 
-    fn only(&mut self, needed: usize, dimension: usize, kind: &str, instead: &str, path: &Path) -> Option<()> {
+    fn only(
+        &mut self,
+        needed: usize,
+        dimension: usize,
+        kind: &str,
+        instead: &str,
+        path: &Path,
+    ) -> Option<()> {
         if needed != dimension {
             self.fault(
                 &path.key("kind"),
@@ -132,7 +145,10 @@ impl Checks<'_> {
         match axis {
             None => Some([0.0, 0.0, 1.0]),
             Some(_) if D == 2 => {
-                self.fault(path, "found an axis; expected none in a 2D job, where shapes turn about z".into());
+                self.fault(
+                    path,
+                    "found an axis; expected none in a 2D job, where shapes turn about z".into(),
+                );
                 None
             }
             Some(axis) => self.direction(axis, path),
@@ -179,9 +195,8 @@ fn rotation<const D: usize>(axis: [f64; 3], angle: f64) -> [[f64; D]; D] {
 /// The first edge that meets an edge other than its neighbours, or has no length or folds back.
 fn first_crossing(corners: &[[f64; 2]]) -> Option<usize> {
     let n = corners.len();
-    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
+    let turn =
+        |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     let within = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
         (0..2).all(|k| a[k].min(b[k]) <= c[k] && c[k] <= a[k].max(b[k]))
     };

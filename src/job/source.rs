@@ -140,7 +140,9 @@ fn from_value(spanned: Spanned<DeValue<'_>>, key_span: Option<Range<usize>>) -> 
         DeValue::String(text) => Value::Text(text.into_owned()),
         DeValue::Integer(digits) => match i64::from_str_radix(digits.as_str(), digits.radix()) {
             Ok(number) => Value::Integer(number),
-            Err(_) => return Err((span, format!("found the integer {digits}; expected one of at most 63 bits"))),
+            Err(_) => {
+                return Err((span, format!("found the integer {digits}; expected one of at most 63 bits")));
+            }
         },
         DeValue::Float(digits) => match digits.as_str().parse() {
             Ok(number) => Value::Float(number),

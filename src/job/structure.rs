@@ -119,7 +119,8 @@ impl<'s> Checker<'s> {
                 self.mismatch(node, &alternatives(words()), layers, path);
                 return None;
             };
-            let found = options.iter().find(|option| option.get("const") == Some(&Value::from(word.as_str())));
+            let found =
+                options.iter().find(|option| option.get("const") == Some(&Value::from(word.as_str())));
             if found.is_none() {
                 self.unknown_word(node, word, words(), layers, path);
             }
@@ -134,7 +135,12 @@ impl<'s> Checker<'s> {
             let word_of = |option: &'s Value| option.get("properties")?.get(tag)?.get("const")?.as_str();
             let words = || options.iter().filter_map(|option| word_of(option));
             let Some(kind) = node.get(tag) else {
-                self.fault(node, path, format!("found no key \"{tag}\"; expected {tag} = {}", alternatives(words())), layers);
+                self.fault(
+                    node,
+                    path,
+                    format!("found no key \"{tag}\"; expected {tag} = {}", alternatives(words())),
+                    layers,
+                );
                 return None;
             };
             let Toml::Text(word) = &kind.value else {
@@ -256,7 +262,8 @@ impl<'s> Checker<'s> {
         layers: &Layers<'s>,
         path: &Path,
     ) {
-        let guess = nearest(word, words.clone()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
+        let guess =
+            nearest(word, words.clone()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
         let message = format!("found \"{word}\"; expected {}{guess}", alternatives(words));
         self.fault(node, path, message, layers);
     }

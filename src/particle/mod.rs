@@ -1,4 +1,5 @@
 //! Particles: structure-of-arrays chunks, one per leaf, in a canonical order.
 pub mod chunk;
+pub mod seed;
 
 pub use chunk::{Chunk, Layout};

@@ -1,0 +1,105 @@
+//! `agimp check`: the size and cost of a job, without running it.
+use super::{Failure, bytes, grouped};
+use crate::job::estimate::{Estimate, estimate};
+use crate::job::{self, AnyProblem, Problem};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Arguments of `agimp check`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Job file.
+    job: PathBuf,
+    /// Ranks that share the memory.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    ranks: u32,
+}
+
+/// Reads the job and prints what it will take.
+///
+/// # Errors
+/// The job is wrong.
+pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    match job::load(&arguments.job)? {
+        AnyProblem::Two(problem) => report(arguments, &problem),
+        AnyProblem::Three(problem) => report(arguments, &problem),
+    }
+}
+
+fn report<const D: usize>(arguments: &Arguments, problem: &Problem<D>) -> Result<(), Failure> {
+    let path = arguments.job.display().to_string();
+    let estimate = estimate(problem).map_err(|error| Failure::Seed { path: path.clone(), error })?;
+    if let Some(empty) = estimate.particles.iter().position(|count| *count == 0) {
+        return Err(Failure::Usage(format!(
+            "{path}: bodies[{empty}].shape: found no particle in the body \"{}\"; expected a shape larger than \
+             the distance of particles, or finer cells there",
+            problem.bodies[empty].name
+        )));
+    }
+    write(&mut std::io::stdout().lock(), arguments, problem, &estimate)?;
+    Ok(())
+}
+
+fn write<const D: usize>(
+    out: &mut impl Write,
+    arguments: &Arguments,
+    problem: &Problem<D>,
+    estimate: &Estimate,
+) -> std::io::Result<()> {
+    if !problem.title.is_empty() {
+        writeln!(out, "{}", problem.title)?;
+    }
+    let size: Vec<String> = problem.size().iter().map(|edge| format!("{edge}")).collect();
+    let roots: Vec<String> = problem.brick.roots.iter().map(u32::to_string).collect();
+    writeln!(out, "domain       {} m, {} root octants", size.join(" x "), roots.join(" x "))?;
+    writeln!(out, "particles    {}", grouped(estimate.total_particles()))?;
+    for (body, count) in problem.bodies.iter().zip(&estimate.particles) {
+        writeln!(
+            out,
+            "  {:18} {:>14}  {}",
+            body.name,
+            grouped(*count),
+            problem.materials[body.material].name
+        )?;
+    }
+    writeln!(out, "leaves       {}", grouped(estimate.total_leaves()))?;
+    writeln!(out, "  level   cell edge, m         leaves         filled          cells      particles")?;
+    let cells_per_leaf = 4_u64.pow(D as u32);
+    for (level, count) in estimate.levels.iter().enumerate().filter(|(_, count)| count.leaves > 0) {
+        writeln!(
+            out,
+            "  {level:5}   {:12.6} {:>14} {:>14} {:>14} {:>14}",
+            problem.cell_edge(level as u8),
+            grouped(count.leaves),
+            grouped(count.filled),
+            grouped(count.leaves * cells_per_leaf),
+            grouped(count.particles)
+        )?;
+    }
+    let ranks = f64::from(arguments.ranks);
+    writeln!(
+        out,
+        "memory       about {} per rank on {}",
+        bytes(estimate.memory / ranks),
+        plural(arguments.ranks)
+    )?;
+    writeln!(out, "time step    about {:.3e} s", estimate.time_step)?;
+    writeln!(out, "steps        about {:.0} to {} s", estimate.steps, problem.time.end)?;
+    writeln!(
+        out,
+        "outputs      {} of about {} each",
+        grouped(estimate.outputs),
+        bytes(estimate.output_bytes)
+    )?;
+    writeln!(
+        out,
+        "checkpoints  about {} each, the last {} kept",
+        bytes(estimate.checkpoint_bytes),
+        problem.checkpoint.keep
+    )?;
+    Ok(())
+}
+
+fn plural(ranks: u32) -> String {
+    if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
+}

@@ -1,0 +1,114 @@
+//! Command line: one file per subcommand. The only part of the library that prints.
+use crate::job::JobError;
+use crate::particle::seed::SeedError;
+use clap::{Parser, Subcommand};
+
+pub mod check;
+pub mod new;
+pub mod schema;
+
+/// Adaptive generalized interpolation material point method on a distributed octree.
+#[derive(Debug, Parser)]
+#[command(name = "agimp", version, about, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check a job file and tell its size and cost, without running it.
+    Check(check::Arguments),
+    /// Print the JSON schema of job files.
+    Schema,
+    /// Write a commented job file to start from.
+    New(new::Arguments),
+}
+
+/// Why the program ends without success.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The job file is wrong.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// The bodies of a job cannot be filled.
+    #[error("{path}: {error}")]
+    Seed {
+        /// The job file.
+        path: String,
+        /// What is wrong.
+        error: SeedError,
+    },
+    /// The command cannot be carried out as given.
+    #[error("{0}")]
+    Usage(String),
+    /// Something failed while the command ran.
+    #[error("{0}")]
+    Run(String),
+}
+
+impl Failure {
+    /// 2 for wrong input, 1 for what goes wrong later.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Job(_) | Self::Seed { .. } | Self::Usage(_) => 2,
+            Self::Run(_) => 1,
+        }
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self::Run(format!("cannot write: {error}"))
+    }
+}
+
+/// Carries out a command.
+///
+/// # Errors
+/// Wrong input, or a failure on the way; [`Failure::exit_code`] tells which.
+pub fn execute(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Check(arguments) => check::execute(&arguments),
+        Command::Schema => schema::execute(),
+        Command::New(arguments) => new::execute(&arguments),
+    }
+}
+
+/// A count with its thousands set apart: `1 234 567`.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Bytes in the largest unit that leaves a number of at least 1.
+fn bytes(count: f64) -> String {
+    let units = ["B", "kB", "MB", "GB", "TB", "PB"];
+    let power = (0..units.len() - 1).find(|&power| count < 1000_f64.powi(power as i32 + 1));
+    let power = power.unwrap_or(units.len() - 1);
+    let value = count / 1000_f64.powi(power as i32);
+    if power == 0 { format!("{value:.0} B") } else { format!("{value:.1} {}", units[power]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_for_people() {
+        assert_eq!(grouped(0), "0");
+        assert_eq!(grouped(1_234_567), "1 234 567");
+        assert_eq!(bytes(999.0), "999 B");
+        assert_eq!(bytes(54_400_000.0), "54.4 MB");
+        assert_eq!(bytes(2e18), "2000.0 PB");
+    }
+}

@@ -1,0 +1,208 @@
+//! What a job will cost, found without running it.
+use super::problem::{Field, Problem};
+use crate::material;
+use crate::particle::Layout;
+use crate::particle::seed::{SeedError, count_leaf};
+use partition::Octant;
+use rayon::prelude::*;
+use std::collections::HashSet;
+
+/// Size and cost of a job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Particles of each body, in the order of the job.
+    pub particles: Vec<u64>,
+    /// Leaves by level, from level 0 to the finest one.
+    pub levels: Vec<LevelCount>,
+    /// First time step, s.
+    pub time_step: f64,
+    /// Steps to the end if the first time step were kept.
+    pub steps: f64,
+    /// Bytes of memory of all ranks together; about.
+    pub memory: f64,
+    /// Bytes of one output file with its tree; about.
+    pub output_bytes: f64,
+    /// Number of outputs, the first and the last one included.
+    pub outputs: u64,
+    /// Bytes of one checkpoint; about.
+    pub checkpoint_bytes: f64,
+}
+
+/// Leaves of one level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LevelCount {
+    /// All leaves.
+    pub leaves: u64,
+    /// Leaves with particles.
+    pub filled: u64,
+    /// Particles.
+    pub particles: u64,
+}
+
+impl Estimate {
+    /// Particles of all bodies.
+    pub fn total_particles(&self) -> u64 {
+        self.particles.iter().sum()
+    }
+
+    /// Leaves of all levels.
+    pub fn total_leaves(&self) -> u64 {
+        self.levels.iter().map(|level| level.leaves).sum()
+    }
+}
+
+/// Not collective. Builds the tree and counts the points that bodies have in its leaves.
+///
+/// # Errors
+/// Two bodies share a lattice point.
+pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, SeedError> {
+    let leaves = leaves(problem);
+    let counts: Vec<(u8, Vec<u64>)> = leaves
+        .par_iter()
+        .map(|leaf| {
+            let mut counts = vec![0; problem.bodies.len()];
+            count_leaf(problem, leaf, &mut counts)?;
+            Ok((leaf.level, counts))
+        })
+        .collect::<Result<_, SeedError>>()?;
+
+    let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
+    let mut particles = vec![0; problem.bodies.len()];
+    let mut levels = vec![LevelCount::default(); usize::from(finest) + 1];
+    for (level, counts) in counts {
+        let level = &mut levels[usize::from(level)];
+        let here: u64 = counts.iter().sum();
+        level.leaves += 1;
+        level.filled += u64::from(here > 0);
+        level.particles += here;
+        for (sum, count) in particles.iter_mut().zip(counts) {
+            *sum += count;
+        }
+    }
+    let time_step = time_step(problem, finest);
+    let outputs =
+        problem.output.every.map_or(2, |every| (problem.time.end / every - 1e-9).floor() as u64 + 2);
+    let mut estimate = Estimate {
+        particles,
+        levels,
+        time_step,
+        steps: (problem.time.end / time_step).ceil(),
+        memory: 0.0,
+        output_bytes: 0.0,
+        outputs,
+        checkpoint_bytes: 0.0,
+    };
+    add_bytes(problem, &mut estimate);
+    Ok(estimate)
+}
+
+/// Courant condition over the fastest wave and the fastest particle at the start, on the finest cells.
+fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
+    let wave = problem
+        .bodies
+        .iter()
+        .map(|body| &problem.materials[body.material])
+        .map(|material| material::build(&material.model, material.density).wave_speed())
+        .fold(0.0, f64::max);
+    let norm = |v: &[f64]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let speed = problem
+        .bodies
+        .iter()
+        .map(|body| {
+            let bounds = body.shape.bounds();
+            let reach = if bounds.half_diagonal().is_finite() { bounds.half_diagonal() } else { 0.0 };
+            norm(&body.velocity) + norm(&body.angular_velocity) * reach
+        })
+        .fold(0.0, f64::max);
+    let courant = problem.time.cfl * problem.cell_edge(finest) / (wave + speed);
+    problem.time.dt_max.map_or(courant, |longest| courant.min(longest)).min(problem.time.end)
+}
+
+fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
+    let particles = estimate.total_particles() as f64;
+    let leaves = estimate.total_leaves() as f64;
+    let filled: u64 = estimate.levels.iter().map(|level| level.filled).sum();
+
+    // Reals, identifier and tag of a particle; chunks have a few slots to spare.
+    let state = 8.0 * (Layout::<D>::REALS + 2) as f64;
+    // A bin's arena of (4 + 3)^D rows of four reals, and twice as many rows for node values; bins lie
+    // at filled leaves and about as many more where they border finer ones.
+    let bin = 3.0 * 7_f64.powi(D as i32) * 32.0;
+    estimate.memory = 1.05 * particles * state + 2.0 * filled as f64 * bin + leaves * 64.0;
+
+    // A particle in the file: three coordinates, a vertex (connectivity, offset, type), the fields.
+    let fields: usize = problem.output.fields.iter().map(|field| field_bytes(*field)).sum();
+    let restart = if problem.output.restart { state } else { 0.0 };
+    // A leaf in the tree's file: eight corners, their connectivity, offset, type and level.
+    let leaf = 8.0 * 24.0 + 8.0 * 8.0 + 8.0 + 2.0;
+    estimate.output_bytes = particles * (24.0 + 17.0 + fields as f64 + restart) + leaves * leaf;
+    estimate.checkpoint_bytes = particles * state + leaves * 16.0;
+}
+
+fn field_bytes(field: Field) -> usize {
+    match field {
+        Field::Level => 1,
+        Field::Body | Field::Material => 2,
+        Field::Velocity => 24,
+        Field::Stress => 48,
+        Field::Id
+        | Field::Mass
+        | Field::Density
+        | Field::Pressure
+        | Field::MisesStress
+        | Field::PlasticStrain
+        | Field::VolumeRatio => 8,
+    }
+}
+
+/// Not collective. All leaves of the tree that the job asks for, along the curve.
+pub fn leaves<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
+    // The octants that are split, by level; everything else follows from them.
+    let mut split: Vec<HashSet<Octant<D>>> = vec![HashSet::new(); usize::from(problem.finest_level()) + 1];
+    let mut pending = roots(problem);
+    while let Some(octant) = pending.pop() {
+        if problem.wants_refinement(&octant) {
+            split[usize::from(octant.level)].insert(octant);
+            pending.extend((0..1 << D).map(|i| octant.child(i)));
+        }
+    }
+    if problem.tree.graded {
+        balance(problem, &mut split);
+    }
+    let mut leaves = Vec::new();
+    let mut pending = roots(problem);
+    while let Some(octant) = pending.pop() {
+        if split[usize::from(octant.level)].contains(&octant) {
+            pending.extend((0..1 << D).map(|i| octant.child(i)));
+        } else {
+            leaves.push(octant);
+        }
+    }
+    leaves.sort_unstable();
+    leaves
+}
+
+/// An octant that is split has children next to all its neighbours, so those must exist: their parents
+/// are split too. Finest level first; each level only adds to the coarser ones.
+fn balance<const D: usize>(problem: &Problem<D>, split: &mut [HashSet<Octant<D>>]) {
+    for level in (1..split.len()).rev() {
+        let octants: Vec<Octant<D>> = split[level].iter().copied().collect();
+        for octant in octants {
+            for offset in 0..3_usize.pow(D as u32) {
+                let offset = std::array::from_fn(|a| (offset / 3_usize.pow(a as u32) % 3) as i32 - 1);
+                let Some(neighbour) = octant.neighbour(offset, &problem.brick) else { continue };
+                let mut parent = neighbour.parent();
+                while let Some(ancestor) = parent {
+                    if !split[usize::from(ancestor.level)].insert(ancestor) {
+                        break;
+                    }
+                    parent = ancestor.parent();
+                }
+            }
+        }
+    }
+}
+
+fn roots<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
+    (0..problem.brick.root_count()).map(|i| problem.brick.root_on_curve(i)).collect()
+}

@@ -1,0 +1,195 @@
+//! Fills bodies with particles.
+//!
+//! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per
+//! cell, anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its
+//! own points, on whichever rank it is, and no point is made twice.
+use super::chunk::{Chunk, Layout, Tag};
+use crate::geometry::{Aabb, Side};
+use crate::job::problem::{Body, Problem};
+use partition::Octant;
+
+/// A particle cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SeedError {
+    /// A lattice point lies in two bodies.
+    #[error(
+        "the bodies \"{first}\" and \"{second}\" overlap at {point:?} m; expected bodies that share no point"
+    )]
+    Overlap {
+        /// The body that comes first in the job.
+        first: String,
+        /// The other one.
+        second: String,
+        /// The point in the coordinates of the job file, m.
+        point: Vec<f64>,
+    },
+}
+
+/// Not collective. True when a body may have points in the leaf: never false for a leaf that
+/// [`fill_leaf`] puts particles in.
+pub fn leaf_is_touched<const D: usize>(problem: &Problem<D>, octant: &Octant<D>) -> bool {
+    let cell = problem.octant_box(octant);
+    problem.bodies.iter().any(|body| body.shape.classify(&cell) != Side::Outside)
+}
+
+/// Not collective. Appends all particles of the leaf, at rest in their undeformed state except for the
+/// velocity of their body: bodies in the order of the job, points of a body in lexicographic order.
+/// Identifiers are 0; the run numbers them along the curve.
+///
+/// # Errors
+/// A point lies in two bodies.
+pub fn fill_leaf<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    chunk: &mut Chunk<D>,
+) -> Result<(), SeedError> {
+    visit(problem, octant, |index, points| {
+        let body = &problem.bodies[index];
+        let spacing = spacing(problem, octant.level, body);
+        let volume: f64 = [spacing; D].iter().product();
+        let mass = problem.materials[body.material].density * volume;
+        let tag = Tag { material: body.material as u16, body: index as u16, level: octant.level };
+        let affine = velocity_gradient::<D>(body.angular_velocity);
+        chunk.reserve_exact(chunk.len() + points.len());
+        for x in points {
+            let p = chunk.push_zeroed(0, tag);
+            let (reals, stride) = chunk.reals_mut();
+            let mut set = |column: usize, value: f64| reals[column * stride + p] = value;
+            for i in 0..D {
+                let turning: f64 = (0..D).map(|j| affine[i][j] * (x[j] - body.centre[j])).sum();
+                set(Layout::<D>::POSITION + i, x[i]);
+                set(Layout::<D>::VELOCITY + i, body.velocity[i] + turning);
+                for j in 0..D {
+                    set(Layout::<D>::AFFINE + D * i + j, affine[i][j]);
+                }
+            }
+            // The identity: xx, yy and zz come first in either dimension.
+            for diagonal in 0..3 {
+                set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
+            }
+            set(Layout::<D>::MASS, mass);
+            set(Layout::<D>::HALF, 0.5 * spacing);
+        }
+    })
+}
+
+/// Not collective. The number of particles of each body that [`fill_leaf`] makes in the leaf, added to
+/// `counts`.
+///
+/// # Errors
+/// A point lies in two bodies.
+pub fn count_leaf<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    counts: &mut [u64],
+) -> Result<(), SeedError> {
+    visit(problem, octant, |body, points| counts[body] += points.len() as u64)
+}
+
+/// Distance of lattice points of a body in leaves of a level, m.
+fn spacing<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
+    problem.cell_edge(level) / body.particles_per_cell
+}
+
+/// Gradient of the velocity of a rotation: `C r = ω × r`.
+fn velocity_gradient<const D: usize>(spin: [f64; 3]) -> [[f64; D]; D] {
+    let [x, y, z] = spin;
+    let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    std::array::from_fn(|i| std::array::from_fn(|j| skew[i][j]))
+}
+
+/// Calls `take(body, points)` for each body with points in the leaf.
+fn visit<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    mut take: impl FnMut(usize, &[[f64; D]]),
+) -> Result<(), SeedError> {
+    let cell = problem.octant_box(octant);
+    let near: Vec<(usize, Side)> = problem
+        .bodies
+        .iter()
+        .enumerate()
+        .map(|(index, body)| (index, body.shape.classify(&cell)))
+        .filter(|(_, side)| *side != Side::Outside)
+        .collect();
+    let mut points = Vec::new();
+    for &(index, side) in &near {
+        let body = &problem.bodies[index];
+        let spacing = spacing(problem, octant.level, body);
+        points.clear();
+        lattice(&cell, spacing, &mut points);
+        if side == Side::Crosses {
+            points.retain(|x| body.shape.contains(x));
+        }
+        for &(other, _) in near.iter().filter(|(other, _)| *other != index) {
+            // Bodies that touch may both claim a point by a rounding; it belongs to the first.
+            let rounding = -1e-9 * spacing;
+            let neighbour = &problem.bodies[other];
+            let mut overlap = None;
+            points.retain(|x| {
+                if !neighbour.shape.contains(x) {
+                    return true;
+                }
+                if body.shape.distance(x).max(neighbour.shape.distance(x)) < rounding {
+                    overlap.get_or_insert(*x);
+                }
+                index < other
+            });
+            if let Some(x) = overlap {
+                let (first, second) = (index.min(other), index.max(other));
+                return Err(SeedError::Overlap {
+                    first: problem.bodies[first].name.clone(),
+                    second: problem.bodies[second].name.clone(),
+                    point: (0..D).map(|a| x[a] + problem.origin[a]).collect(),
+                });
+            }
+        }
+        if !points.is_empty() {
+            take(index, &points);
+        }
+    }
+    Ok(())
+}
+
+/// The lattice points in a half-open box, lexicographic with the last axis fastest.
+fn lattice<const D: usize>(cell: &Aabb<D>, spacing: f64, points: &mut Vec<[f64; D]>) {
+    let range: [(u64, u64); D] = std::array::from_fn(|a| {
+        (first_at_or_after(cell.lower[a], spacing), first_at_or_after(cell.upper[a], spacing))
+    });
+    if range.iter().any(|(first, end)| first >= end) {
+        return;
+    }
+    let mut index: [u64; D] = std::array::from_fn(|a| range[a].0);
+    loop {
+        points.push(index.map(|i| coordinate(i, spacing)));
+        let mut axis = D;
+        loop {
+            if axis == 0 {
+                return;
+            }
+            axis -= 1;
+            index[axis] += 1;
+            if index[axis] < range[axis].1 {
+                break;
+            }
+            index[axis] = range[axis].0;
+        }
+    }
+}
+
+fn coordinate(index: u64, spacing: f64) -> f64 {
+    (index as f64 + 0.5) * spacing
+}
+
+/// The first lattice index whose coordinate is not below `bound`: decided by the coordinate itself, so
+/// that two leaves with a common face agree on every point.
+fn first_at_or_after(bound: f64, spacing: f64) -> u64 {
+    let mut index = (bound / spacing - 0.5).ceil().max(0.0) as u64;
+    while index > 0 && coordinate(index - 1, spacing) >= bound {
+        index -= 1;
+    }
+    while coordinate(index, spacing) < bound {
+        index += 1;
+    }
+    index
+}
