@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{checkpoint_path, find_latest, output_path};
 use agimp::io::snapshot::{self, Options, Outputs, PointField, Scalars, View};
@@ -460,6 +461,28 @@ fn differences_are_named() {
             assert_eq!((name, component, count), ("stress", 1, 1));
             assert!((largest - 1.0).abs() < 1e-15);
             assert_eq!(found.len(), 4);
+        },
+    );
+}
+
+#[test]
+fn a_picture_is_the_same_on_any_ranks() {
+    on_ranks(
+        "a_picture_is_the_same_on_any_ranks",
+        &[1, 3],
+        |comm, directory| {
+            let path = |d: usize| directory.join(format!("{d}_{}.png", comm.size()));
+            let settings = Settings::new("made up", PointField::Speed);
+            let solid = Run::<3>::example(share(comm, 40, 0b10), 20);
+            draw(comm, &solid.view(), &settings, &path(3)).expect("drawn");
+            let plane = Run::<2>::example(share(comm, 40, 0b10), 20);
+            draw(comm, &plane.view(), &settings, &path(2)).expect("drawn");
+        },
+        |directory| {
+            for d in [2, 3] {
+                let path = |n: usize| directory.join(format!("{d}_{n}.png"));
+                assert!(bytes(&path(1)) == bytes(&path(3)), "{d}D");
+            }
         },
     );
 }

@@ -10,7 +10,7 @@ use partition::comm::Comm;
 use super::hdf5_file::{FileError, ParallelFile};
 use super::snapshot::fields::Values;
 use super::snapshot::{Header, PointField, View};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::Layout;
 
 mod canvas;
 mod colour;
@@ -306,7 +306,7 @@ fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
 
 /// Name and unit of a field beside the drawing; the row below it.
 fn heading(canvas: &mut Canvas, field: PointField) -> (i64, i64) {
-    let x = canvas.width as i64 - 170;
+    let x = canvas.width as i64 - 185;
     let name = field.name().replace('_', " ");
     canvas.text(x, 110, 2, name.get(..14).unwrap_or(&name), INK);
     if !field.unit().is_empty() {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::io::snapshot::Scalars;
+use crate::particle::chunk::Chunk;
 use crate::particle::chunk::Tag;
 use partition::{Brick, Octant};
 
