@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use agimp::io::hdf5_file::ParallelFile;
 use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{checkpoint_path, find_latest, output_path};
@@ -285,7 +286,17 @@ fn damaged_and_foreign_files_are_refused() {
             refused("cut.vtkhdf", None, "cut short");
             refused("flipped.vtkhdf", None, "wrong checksum of state/particles/position");
             refused("flipped_header.vtkhdf", None, "");
-            refused("format.vtkhdf", None, "");
+            refused("flipped_mark.vtkhdf", None, "");
+            let file = ParallelFile::create(comm, &directory.join("format.vtkhdf")).expect("created");
+            file.create_group("state").expect("group");
+            file.set_text("state", "magic", "agimp state").expect("text");
+            file.set_text("state", "program", "7.0.0").expect("text");
+            file.set_attribute("state", "format", &[99_u64]).expect("number");
+            file.close().expect("closed");
+            refused("format.vtkhdf", None, "written in format 99 by agimp 7.0.0");
+            let file = ParallelFile::create(comm, &directory.join("foreign.vtkhdf")).expect("created");
+            file.close().expect("closed");
+            refused("foreign.vtkhdf", None, "not a file of agimp");
             refused("light.vtkhdf", None, "no restart state");
             refused("good.vtkhdf", Some(7), "belongs to another job");
             let error = snapshot::read::<2>(comm, &path, None).expect_err("dimension").to_string();
@@ -318,7 +329,7 @@ fn damage(directory: &Path) {
     save("flipped.vtkhdf", &flip(&position));
     // The library's own checksum of metadata notices these.
     save("flipped_header.vtkhdf", &flip(&0.1_f64.to_le_bytes()));
-    save("format.vtkhdf", &flip(b"agimp state"));
+    save("flipped_mark.vtkhdf", &flip(b"agimp state"));
 }
 
 #[test]

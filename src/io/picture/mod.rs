@@ -233,6 +233,7 @@ impl Drawing<'_> {
         let [low, high] = self.range(settings, classes);
         let (width, height) = (settings.width as f64, settings.height as f64);
         let [left, right, top, bottom] = MARGINS;
+        let left = if self.flat { left + 60.0 } else { left };
         let camera = Camera::new(
             self.flat,
             &frame,
@@ -298,8 +299,9 @@ fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
     }
     for y in ticks(frame.low[1], frame.high[1]) {
         let row = camera.project([0.0, y, 0.0])[1] as i64;
-        canvas.fill(left, row, 8, 2, INK);
-        canvas.text(left + 12, row - 7, 2, &short(y), INK);
+        let text = short(y);
+        canvas.fill(left - 10, row, 8, 2, INK);
+        canvas.text(left - 14 - Canvas::text_width(2, &text), row - 7, 2, &text, INK);
     }
     canvas.text(right + 8, bottom - 8, 2, "m", INK);
 }
