@@ -4,7 +4,12 @@ use crate::particle::seed::SeedError;
 use clap::{Parser, Subcommand};
 
 pub mod check;
+pub mod diff;
+pub mod digest;
+pub mod info;
+pub mod material;
 pub mod new;
+pub mod plot;
 pub mod run;
 pub mod schema;
 
@@ -28,6 +33,14 @@ pub enum Command {
     Schema,
     /// Write a commented job file to start from.
     New(new::Arguments),
+    /// Tell what is in an output or checkpoint file.
+    Info(info::Arguments),
+    /// Draw the particles of an output file as PNG.
+    Plot(plot::Arguments),
+    /// Print a number that tells states apart, whatever the ranks that wrote the files.
+    Digest(digest::Arguments),
+    /// Tell where the states in two files differ.
+    Diff(diff::Arguments),
 }
 
 /// Why the program ends without success.
@@ -85,6 +98,10 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Check(arguments) => check::execute(&arguments),
         Command::Schema => schema::execute(),
         Command::New(arguments) => new::execute(&arguments),
+        Command::Info(arguments) => info::execute(&arguments),
+        Command::Plot(arguments) => plot::execute(&arguments),
+        Command::Digest(arguments) => digest::execute(&arguments),
+        Command::Diff(arguments) => diff::execute(&arguments),
     }
 }
 

@@ -10,9 +10,9 @@ use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::exchange::ReceivedArenas;
 use crate::grid::known::Allowance;
+use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 use crate::kernel::Scheme;
 use crate::particle::Chunk;
-use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 
 /// Plan, arenas, fields and exchanges.
 pub struct Grid<const D: usize> {
