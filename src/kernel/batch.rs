@@ -1,7 +1,11 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
-use super::simd::{LANES, Lanes};
+use super::simd::{LANES, Lanes, prefetch};
 use crate::particle::chunk::Layout;
+
+/// How far ahead columns are asked for, in particles: a batch at a time is too many streams for the
+/// processor to foresee.
+const AHEAD: usize = 2 * LANES;
 
 /// Up to [`LANES`] particles. Lanes beyond `count` repeat the last one, so that they compute something
 /// valid that is never stored.
@@ -56,6 +60,7 @@ impl Batch {
         let column = column * stride;
         if self.contiguous {
             let start = column + self.particle(0);
+            prefetch(reals, start + AHEAD);
             match reals[start..start + LANES].first_chunk() {
                 Some(values) => Lanes::load(values),
                 None => Lanes::splat(0.0),
@@ -76,6 +81,7 @@ impl Batch {
         let column = column * stride;
         if self.contiguous {
             let start = column + self.particle(0);
+            prefetch(reals, start + AHEAD);
             if let Some(to) = reals[start..start + LANES].first_chunk_mut() {
                 values.store(to);
             }

@@ -4,8 +4,6 @@
 //! jumps is prepared in the arenas by its caller. The kernels allocate nothing, and every sum runs
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use self::simd::Lanes;
 use crate::material::Material;
@@ -67,8 +65,7 @@ pub enum Select<'a> {
 }
 
 /// How velocities travel between particles and nodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "scheme", rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Transfer {
     /// Affine particle-in-cell (Jiang et al. 2015): `C = B D⁻¹`; conserves angular momentum.
     #[default]
@@ -83,17 +80,14 @@ pub enum Transfer {
 }
 
 /// How the half widths of a particle's box follow its deformation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "policy", rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BoxPolicy {
     /// The box keeps the particle's volume: each axis follows the stretch along it, or the cube (2D:
     /// square) root of the volume ratio for materials whose plastic stretch is unbounded.
     Volume {
         /// Least ratio of a half width to the undeformed one.
-        #[serde(default = "least_stretch")]
         min_stretch: f64,
         /// Greatest ratio of a half width to the undeformed one.
-        #[serde(default = "greatest_stretch")]
         max_stretch: f64,
     },
     /// Undeformed half widths.
@@ -102,16 +96,9 @@ pub enum BoxPolicy {
     Cell,
 }
 
-fn least_stretch() -> f64 {
-    0.25
-}
-fn greatest_stretch() -> f64 {
-    2.0
-}
-
 impl Default for BoxPolicy {
     fn default() -> Self {
-        Self::Volume { min_stretch: least_stretch(), max_stretch: greatest_stretch() }
+        Self::Volume { min_stretch: 0.25, max_stretch: 2.0 }
     }
 }
 

@@ -395,6 +395,20 @@ mod avx {
     }
 }
 
+/// Asks the processor to fetch the cache line of `values[index]`; a hint without effect on results.
+#[inline(always)]
+pub fn prefetch(values: &[f64], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch of any address is allowed, and never faults; `wrapping_add` makes no claim
+        // that the address lies within the slice.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(values.as_ptr().wrapping_add(index).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, index);
+}
+
 /// One number for each of [`LANES`] particles.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes(pub(crate) [F64x4; 2]);
@@ -666,6 +680,7 @@ mod tests {
                 same(rows[i].to_array(), others[i].to_array(), "transpose");
             }
         }
+        same(F64x4::splat(0.1).to_array(), portable::F64x4::splat(0.1).to_array(), "splat");
         for bits in 0..16 {
             assert_eq!(Mask4::from_bits(bits).bits(), bits);
             assert_eq!(portable::Mask4::from_bits(bits).bits(), bits);

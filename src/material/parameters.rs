@@ -75,3 +75,47 @@ pub enum Parameters {
     /// Drucker-Prager plasticity.
     DruckerPrager(DruckerPrager),
 }
+
+/// A parameter outside the range that its model needs.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key} = {value} is out of range: it must be {range}")]
+pub struct OutOfRange {
+    /// Name of the parameter in a job file.
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The range in words.
+    pub range: &'static str,
+}
+
+impl Parameters {
+    /// Checks the ranges that the models need.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        let require =
+            |ok: bool, key, value, range| if ok { Ok(()) } else { Err(OutOfRange { key, value, range }) };
+        let elastic = |young: f64, poisson: f64| {
+            require(young > 0.0 && young.is_finite(), "young", young, "above 0 (Pa)")?;
+            require(poisson > -1.0 && poisson < 0.5, "poisson", poisson, "above -1 and below 0.5")
+        };
+        match *self {
+            Self::NeoHookean(p) | Self::FixedCorotated(p) | Self::Hencky(p) => elastic(p.young, p.poisson),
+            Self::VonMises(p) => {
+                elastic(p.young, p.poisson)?;
+                let stress = p.yield_stress;
+                require(stress > 0.0 && stress.is_finite(), "yield_stress", stress, "above 0 (Pa)")?;
+                let hardening = p.hardening;
+                require(hardening >= 0.0 && hardening.is_finite(), "hardening", hardening, "0 or above (Pa)")
+            }
+            Self::DruckerPrager(p) => {
+                elastic(p.young, p.poisson)?;
+                let angle = p.friction_angle;
+                require(
+                    (0.0..90.0).contains(&angle),
+                    "friction_angle",
+                    angle,
+                    "at least 0 and below 90 (degrees)",
+                )
+            }
+        }
+    }
+}
