@@ -1,5 +1,6 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
 pub mod boundary;
+pub mod cli;
 pub mod exact_sum;
 pub mod geometry;
 pub mod grid;

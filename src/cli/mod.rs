@@ -4,6 +4,7 @@ use crate::particle::seed::SeedError;
 use clap::{Parser, Subcommand};
 
 pub mod check;
+pub mod material;
 pub mod new;
 pub mod schema;
 
@@ -25,6 +26,8 @@ pub enum Command {
     Schema,
     /// Write a commented job file to start from.
     New(new::Arguments),
+    /// Drive one particle of a material along a path of deformation and print its states.
+    Material(material::Arguments),
 }
 
 /// Why the program ends without success.
@@ -74,6 +77,9 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Check(arguments) => check::execute(&arguments),
         Command::Schema => schema::execute(),
         Command::New(arguments) => new::execute(&arguments),
+        Command::Material(arguments) => {
+            material::execute(&arguments).map_err(|error| Failure::Usage(error.to_string()))
+        }
     }
 }
 
