@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use agimp::io::hdf5_file::ParallelFile;
+use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{checkpoint_path, find_latest, output_path};
 use agimp::io::snapshot::{self, Options, Outputs, PointField, Scalars, View};
@@ -284,7 +286,17 @@ fn damaged_and_foreign_files_are_refused() {
             refused("cut.vtkhdf", None, "cut short");
             refused("flipped.vtkhdf", None, "wrong checksum of state/particles/position");
             refused("flipped_header.vtkhdf", None, "");
-            refused("format.vtkhdf", None, "");
+            refused("flipped_mark.vtkhdf", None, "");
+            let file = ParallelFile::create(comm, &directory.join("format.vtkhdf")).expect("created");
+            file.create_group("state").expect("group");
+            file.set_text("state", "magic", "agimp state").expect("text");
+            file.set_text("state", "program", "7.0.0").expect("text");
+            file.set_attribute("state", "format", &[99_u64]).expect("number");
+            file.close().expect("closed");
+            refused("format.vtkhdf", None, "written in format 99 by agimp 7.0.0");
+            let file = ParallelFile::create(comm, &directory.join("foreign.vtkhdf")).expect("created");
+            file.close().expect("closed");
+            refused("foreign.vtkhdf", None, "not a file of agimp");
             refused("light.vtkhdf", None, "no restart state");
             refused("good.vtkhdf", Some(7), "belongs to another job");
             let error = snapshot::read::<2>(comm, &path, None).expect_err("dimension").to_string();
@@ -317,7 +329,7 @@ fn damage(directory: &Path) {
     save("flipped.vtkhdf", &flip(&position));
     // The library's own checksum of metadata notices these.
     save("flipped_header.vtkhdf", &flip(&0.1_f64.to_le_bytes()));
-    save("format.vtkhdf", &flip(b"agimp state"));
+    save("flipped_mark.vtkhdf", &flip(b"agimp state"));
 }
 
 #[test]
@@ -460,6 +472,28 @@ fn differences_are_named() {
             assert_eq!((name, component, count), ("stress", 1, 1));
             assert!((largest - 1.0).abs() < 1e-15);
             assert_eq!(found.len(), 4);
+        },
+    );
+}
+
+#[test]
+fn a_picture_is_the_same_on_any_ranks() {
+    on_ranks(
+        "a_picture_is_the_same_on_any_ranks",
+        &[1, 3],
+        |comm, directory| {
+            let path = |d: usize| directory.join(format!("{d}_{}.png", comm.size()));
+            let settings = Settings::new("made up", PointField::Speed);
+            let solid = Run::<3>::example(share(comm, 40, 0b10), 20);
+            draw(comm, &solid.view(), &settings, &path(3)).expect("drawn");
+            let plane = Run::<2>::example(share(comm, 40, 0b10), 20);
+            draw(comm, &plane.view(), &settings, &path(2)).expect("drawn");
+        },
+        |directory| {
+            for d in [2, 3] {
+                let path = |n: usize| directory.join(format!("{d}_{n}.png"));
+                assert!(bytes(&path(1)) == bytes(&path(3)), "{d}D");
+            }
         },
     );
 }

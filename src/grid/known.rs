@@ -1,6 +1,8 @@
 //! The part of the tree that one rank knows: its own leaves and its ghost layer.
 use partition::{Brick, Forest, Octant};
 
+use crate::kernel::BLOCK;
+
 /// What covers an octant, as far as this rank knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cover {
@@ -32,14 +34,11 @@ pub struct KnownTree<const D: usize> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Allowance {
     /// Half width of the widest boxes in cells of the leaf that holds them, rounded up, if any is wider
-    /// than a cell; 0 otherwise. At most [`MAX_REACH`].
+    /// than a cell; 0 otherwise. Any number is allowed; the ghost layer widens with it.
     pub reach: u32,
     /// Whether neighbouring leaves differ by one level at most.
     pub graded: bool,
 }
-
-/// Greatest half width of a box, in cells of the leaf that holds the particle: one edge of the leaf.
-pub const MAX_REACH: u32 = 4;
 
 impl<const D: usize> KnownTree<D> {
     /// Not collective. The own leaves of a rank, without a ghost layer.
@@ -96,10 +95,33 @@ impl<const D: usize> KnownTree<D> {
         self.first_own
     }
 
+    /// Numbers of the own leaves among the known leaves.
+    pub fn own_leaves(&self) -> std::ops::Range<usize> {
+        self.first_own..self.first_own + self.own_len
+    }
+
     /// Index of a known leaf among the rank's own leaves.
     pub fn local(&self, known: usize) -> Option<usize> {
         let local = known.wrapping_sub(self.first_own);
         (local < self.own_len).then_some(local)
+    }
+
+    /// Not collective. A whole tree in one place, as rank 0 of 1 knows it. `leaves` must fill the brick.
+    pub fn whole(brick: Brick<D>, leaves: Vec<Octant<D>>) -> Self {
+        let mut tree = Self {
+            brick,
+            rank: 0,
+            owners: vec![0; leaves.len()],
+            keys: Vec::new(),
+            first_own: 0,
+            own_len: leaves.len(),
+            reach: 0,
+            graded: false,
+            leaves,
+        };
+        tree.leaves.sort_unstable_by_key(Octant::key);
+        tree.index();
+        tree
     }
 
     /// See [`Allowance::reach`].
@@ -107,15 +129,28 @@ impl<const D: usize> KnownTree<D> {
         self.reach
     }
 
+    /// Whether all leaves that feed a bin lie within the block around it.
+    pub fn sources_are_near(&self) -> bool {
+        self.graded && self.reach <= 1
+    }
+
+    /// Leaves that boxes of a leaf can reach lie within so many of the leaf's edges from it.
+    pub fn reach_in_leaves(&self) -> u32 {
+        self.reach.div_ceil(BLOCK as u32).max(1)
+    }
+
     /// Coarsest level of leaves whose boxes can have parts in a bin of `level`.
     ///
-    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf, so that parts
-    /// of that leaf's boxes cannot reach the bin.
+    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf: at a distance of
+    /// `e (1 - 2^-k)` from a leaf of edge `e` the leaves are at most `k + 1` levels finer, and bins one level more. Parts of
+    /// that leaf's boxes come as far as `e reach / 4`.
     pub fn coarsest_reaching(&self, level: u8) -> u8 {
-        if !self.graded {
-            return 0;
+        match self.reach {
+            _ if !self.graded => 0,
+            0..=2 => level.saturating_sub(2),
+            3 => level.saturating_sub(3),
+            _ => 0,
         }
-        level.saturating_sub(if self.reach > 1 { 3 } else { 2 })
     }
 
     /// Number of leaves of other ranks that are known.
@@ -171,6 +206,11 @@ impl<const D: usize> KnownTree<D> {
             reached = self.leaves[next].key_end();
         }
         reached >= end
+    }
+
+    /// Whether a leaf is known that lies inside the octant and is smaller.
+    pub fn is_finer_within(&self, level: u8, coord: [u32; D]) -> bool {
+        self.leaves_within(level, coord).any(|leaf| self.leaves[leaf].level > level)
     }
 
     /// Known leaves inside the octant, which must be subdivided.

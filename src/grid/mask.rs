@@ -29,6 +29,14 @@ pub const fn opposite(d: usize, index: usize) -> usize {
     offset_count(d) - 1 - index
 }
 
+/// All offsets in `{-reach, …, reach}^D`, first axis fastest.
+pub fn box_offsets<const D: usize>(reach: u32) -> impl Iterator<Item = [i32; D]> {
+    let edge = 2 * reach as usize + 1;
+    (0..edge.pow(D as u32)).map(move |index| {
+        std::array::from_fn(|axis| (index / edge.pow(axis as u32) % edge) as i32 - reach as i32)
+    })
+}
+
 /// `coord + offset`, or `None` below zero.
 pub fn shifted<const D: usize>(coord: [u32; D], offset: [i32; D]) -> Option<[u32; D]> {
     let mut shifted = coord;

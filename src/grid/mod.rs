@@ -11,6 +11,7 @@ pub mod fields;
 pub mod known;
 pub mod mask;
 pub mod plan;
+pub mod reach;
 
 pub use exchange::ArenaExchange;
 pub use fields::NodeFields;

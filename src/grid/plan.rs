@@ -2,14 +2,15 @@
 use std::collections::HashMap;
 
 use partition::comm::Comm;
-use partition::{Forest, MAX_LEVEL, Octant, Region};
+use partition::{Forest, MAX_LEVEL, Octant};
 
-use super::closure::{Closure, NeededBlocks, bin_sources, nodes_in_domain, potential_bins};
+use super::closure::{Closure, NeededBlocks, nodes_in_domain};
 use super::constraint::{block_and_bit, node_coord, parents_of};
 use super::known::{Allowance, KnownTree};
 use super::mask::{
     arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, opposite, shifted,
 };
+use super::reach::{bin_sources, potential_bins};
 use crate::kernel::{ARENA_EDGE, Row};
 
 /// No block: outside the domain, or not needed by this rank.
@@ -176,8 +177,7 @@ impl<const D: usize> GridPlan<D> {
                 break closure.blocks;
             }
             rounds += 1;
-            let queries: Vec<Region<D>> = closure.missing.iter().map(interior).collect();
-            tree.add(&forest.leaves_in(comm, &queries));
+            tree.add(&forest.leaves_in(comm, &closure.missing));
         };
         let mut plan = Self {
             revision: forest.revision(),
@@ -511,15 +511,4 @@ pub fn arena_index<const D: usize>(index: usize, bit: u32) -> usize {
 
 fn offset_index_u8<const D: usize>(offset: [i32; D]) -> u8 {
     super::mask::offset_index(offset) as u8
-}
-
-/// The region of an octant without its surface, so that only leaves that overlap it answer.
-fn interior<const D: usize>(octant: &Octant<D>) -> Region<D> {
-    let shift = MAX_LEVEL - octant.level;
-    let lo = octant.coord.map(|c| c << shift);
-    // An octant of the finest level has no interior; its whole box then asks for neighbours as well.
-    if shift == 0 {
-        return Region { lo, hi: octant.coord.map(|c| c + 1) };
-    }
-    Region { lo: lo.map(|c| c + 1), hi: octant.coord.map(|c| ((c + 1) << shift) - 1) }
 }

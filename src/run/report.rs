@@ -4,8 +4,8 @@ use partition::comm::Comm;
 use crate::job::problem::{CollapseLaw, ReportSetup};
 use crate::particle::Chunk;
 
-/// Radial bins of the deposit's profile.
-const BINS: usize = 400;
+/// Bins of the deposit's profile over the initial radius.
+const BINS_PER_RADIUS: f64 = 25.0;
 /// Share of the mass within the reported front; the rest are far-flung grains.
 const FRONT_SHARE: f64 = 0.98;
 
@@ -36,10 +36,11 @@ pub fn evaluate<const D: usize>(
 ) -> Collapse {
     let ReportSetup::ColumnCollapse { base, up, radius, height, law } = *setup;
     let reach = size.iter().fold(0.0, |sum: f64, s| s.mul_add(*s, sum)).sqrt();
-    let width = reach / BINS as f64;
+    let width = radius / BINS_PER_RADIUS;
+    let bins = (reach / width).ceil() as usize + 1;
     // Counts by distance, and the top per distance, so that one small reduction is enough.
-    let mut mass = vec![0u64; BINS];
-    let mut top = vec![0.0f64; BINS];
+    let mut mass = vec![0u64; bins];
+    let mut top = vec![0.0f64; bins];
     for chunk in chunks {
         for p in 0..chunk.len() {
             let x = chunk.position(p);
@@ -47,7 +48,7 @@ pub fn evaluate<const D: usize>(
                 .filter(|&axis| axis != up)
                 .fold(0.0, |sum: f64, axis| (x[axis] - base[axis]).mul_add(x[axis] - base[axis], sum))
                 .sqrt();
-            let bin = ((distance / width) as usize).min(BINS - 1);
+            let bin = ((distance / width) as usize).min(bins - 1);
             let half = chunk.column(crate::particle::Layout::<D>::HALF)[p];
             let particle = chunk.column(crate::particle::Layout::<D>::MASS)[p];
             // Integers add exactly in any order.
@@ -64,11 +65,11 @@ pub fn evaluate<const D: usize>(
         inside += m;
         inside as f64 >= FRONT_SHARE * total as f64
     });
-    let edge = mass.iter().position(|&m| m == 0).unwrap_or(BINS);
+    let edge = mass.iter().position(|&m| m == 0).unwrap_or(bins);
     let aspect = height / radius;
     let (law_edge, law_height) = fits(law, aspect, radius, height);
-    // The centre is taken over a tenth of the initial radius, where a bin alone may be empty.
-    let centre = ((0.1 * radius / width) as usize).clamp(1, BINS);
+    // The centre is a tenth of the initial radius, where a bin alone may be empty.
+    let centre = (0.1 * BINS_PER_RADIUS).ceil() as usize;
     Collapse {
         aspect,
         front: (front.unwrap_or(0) as f64 + 1.0) * width,

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::migrate::leaf_box;
 use crate::grid::GridPlan;
-use crate::grid::mask::{offset, offset_count, shifted};
-use crate::grid::{Cover, KnownTree};
+use crate::grid::KnownTree;
+use crate::grid::mask::{offset, offset_count};
+use crate::grid::reach::leaves_around;
 use crate::kernel::SubBox;
 use crate::particle::chunk::{Chunk, Layout};
 
@@ -108,20 +109,9 @@ impl<const D: usize> LeafBins<D> {
     fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
-        let mut near = Vec::new();
-        let mut beside_finer = false;
-        for index in 0..offset_count(D) {
-            let Some(beside) = shifted(here.coord, offset::<D>(index)) else { continue };
-            let leaves = match tree.cover(here.level, beside) {
-                Cover::Leaf(leaf) => leaf..leaf + 1,
-                Cover::Finer(_) => {
-                    beside_finer = true;
-                    tree.leaves_within(here.level, beside)
-                }
-                _ => continue,
-            };
-            near.extend(leaves.map(|leaf| near_leaf(tree, leaf, plan.root_edge)));
-        }
+        let around = leaves_around(tree, known);
+        let beside_finer = around.iter().any(|&leaf| tree.leaves()[leaf].level > here.level);
+        let near = around.into_iter().map(|leaf| near_leaf(tree, leaf, plan.root_edge)).collect();
         Self { members: vec![Members::default(); bins], cut: Vec::new(), near, beside_finer }
     }
 

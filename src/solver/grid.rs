@@ -10,9 +10,9 @@ use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::exchange::ReceivedArenas;
 use crate::grid::known::Allowance;
+use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 use crate::kernel::Scheme;
 use crate::particle::Chunk;
-use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 
 /// Plan, arenas, fields and exchanges.
 pub struct Grid<const D: usize> {
@@ -80,6 +80,15 @@ impl<const D: usize> Solver<D> {
             needed_reach(&scheme, chunk, cell)
         });
         reaches.max().unwrap_or(0)
+    }
+
+    /// Messages and bytes that this rank has sent in steps so far.
+    pub fn traffic(&self) -> Traffic {
+        let now = self.grid.traffic();
+        Traffic {
+            messages: self.sent_before.messages + now.messages,
+            bytes: self.sent_before.bytes + now.bytes,
+        }
     }
 
     /// The grid of the current tree and partition.

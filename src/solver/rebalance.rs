@@ -1,6 +1,6 @@
 //! Partition of leaves by the cost of their particles.
-use super::phases::Phase;
 use super::Solver;
+use super::phases::Phase;
 use crate::particle::Chunk;
 
 /// Cost of a leaf without particles, in units of a particle's: its share of node sums and bookkeeping.

@@ -209,3 +209,16 @@ fn sync_and_rename(part: &Path, path: &Path) -> std::io::Result<()> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     File::open(directory)?.sync_all()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::compatible;
+
+    #[test]
+    fn states_of_the_same_series_are_continued() {
+        assert!(compatible(env!("CARGO_PKG_VERSION")));
+        assert!(!compatible("9999.0.0"));
+        assert!(!compatible(""));
+        assert!(!compatible("new"));
+    }
+}

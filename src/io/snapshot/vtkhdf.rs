@@ -87,12 +87,12 @@ pub(super) fn write_particles<const D: usize>(
     let extent = view.brick.roots.iter().fold(0.0, |most: f64, &n| most.max(f64::from(n))) * view.root_edge;
     let near = view.origin.iter().all(|x| x.abs() <= FAR * extent);
     let points = Values::Real(positions(view), 3);
-    let points = if options.single && near { points.to_single() } else { points };
+    let points = if options.single && near { points.into_single() } else { points };
     grid(checked, comm, particles, 1, VERTEX, &points)?;
     drop(points);
     for chosen in &options.fields {
         let values = chosen.values(view);
-        let values = if options.single { values.to_single() } else { values };
+        let values = if options.single { values.into_single() } else { values };
         field(checked, &format!("PointData/{}", chosen.name()), particles, &values)?;
     }
     Ok(())

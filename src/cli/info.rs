@@ -1,0 +1,93 @@
+//! `agimp info`: what is in an output or checkpoint file.
+use super::{Failure, bytes, grouped};
+use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::snapshot::{Header, PointField, compare};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Arguments of `agimp info`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The file.
+    file: PathBuf,
+    /// Read everything and compare the checksums.
+    #[arg(long)]
+    verify: bool,
+}
+
+/// What the file tells.
+struct Contents {
+    header: Header,
+    size: u64,
+    fields: Vec<&'static str>,
+    /// Leaves and particles by level, where the file holds the tree.
+    levels: BTreeMap<u8, (u64, u64)>,
+}
+
+/// Prints what is in the file.
+///
+/// # Errors
+/// The file is damaged or not of this program.
+pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let failed = |error: FileError| Failure::Usage(error.to_string());
+    let contents = read(arguments).map_err(failed)?;
+    let mut out = std::io::stdout().lock();
+    write(&mut out, &contents)?;
+    if arguments.verify {
+        let digest = compare::digest(&arguments.file).map_err(failed)?;
+        writeln!(out, "checksums        all right; digest {:016x}", digest.whole)?;
+    }
+    Ok(())
+}
+
+fn read(arguments: &Arguments) -> Result<Contents, FileError> {
+    let file = ParallelFile::open_alone(&arguments.file)?;
+    let header = Header::read(&file)?;
+    let size = std::fs::metadata(&arguments.file).map_or(0, |data| data.len());
+    let shown = |field: &&PointField| file.exists(&format!("VTKHDF/PointData/{}", field.name()));
+    let fields = PointField::ALL.iter().filter(shown).map(|field| field.name()).collect();
+    let mut levels: BTreeMap<u8, (u64, u64)> = BTreeMap::new();
+    for group in ["state/tree", "VTKHDF/CellData"] {
+        let (level, particles) = (format!("{group}/level"), format!("{group}/particles"));
+        if levels.is_empty() && file.exists(&level) {
+            let counts = file.read_slab::<u64>(&particles, 0, header.leaves)?;
+            for (level, count) in file.read_slab::<u8>(&level, 0, header.leaves)?.into_iter().zip(counts) {
+                let entry = levels.entry(level).or_default();
+                *entry = (entry.0 + 1, entry.1 + count);
+            }
+        }
+    }
+    Ok(Contents { header, size, fields, levels })
+}
+
+fn write(out: &mut impl Write, contents: &Contents) -> std::io::Result<()> {
+    let Contents { header, size, fields, levels } = contents;
+    let size = bytes(*size as f64);
+    writeln!(out, "written by       agimp {} (format {}), {size}", header.program, header.format)?;
+    writeln!(out, "job digest       {:016x}", header.job_digest)?;
+    writeln!(out, "restart          {}", if header.restart { "possible" } else { "not from this file" })?;
+    let high: Vec<f64> = (header.origin.iter().zip(&header.roots))
+        .map(|(low, &roots)| low + header.root_edge * roots as f64)
+        .collect();
+    writeln!(out, "domain           {}D, {:?} to {high:?} m", header.dimension, header.origin)?;
+    writeln!(out, "step             {}", header.step)?;
+    writeln!(out, "time             {:?} s (last step {:?} s)", header.time, header.dt)?;
+    writeln!(out, "particles        {}", grouped(header.particles))?;
+    writeln!(out, "leaves           {}", grouped(header.leaves))?;
+    for (level, (leaves, particles)) in levels {
+        let (leaves, particles) = (grouped(*leaves), grouped(*particles));
+        writeln!(out, "  level {level:<2}       {leaves} leaves, {particles} particles")?;
+    }
+    writeln!(out, "materials        {}", header.materials.join(", "))?;
+    if !fields.is_empty() {
+        writeln!(out, "fields           {}", fields.join(", "))?;
+    }
+    for (name, value) in &header.scalars.reals {
+        writeln!(out, "scalar           {name} = {value:?}")?;
+    }
+    for (name, value) in &header.scalars.counts {
+        writeln!(out, "counter          {name} = {value}")?;
+    }
+    Ok(())
+}

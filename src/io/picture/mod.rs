@@ -1,0 +1,368 @@
+//! Pictures of the particles, drawn by the program itself.
+//!
+//! Each rank draws its own particles into an image with depth; the nearest of all ranks is kept for
+//! each pixel, so a picture does not depend on the number of ranks.
+
+use std::path::Path;
+
+use partition::comm::Comm;
+
+use super::hdf5_file::{FileError, ParallelFile};
+use super::snapshot::fields::Values;
+use super::snapshot::{Header, PointField, View};
+use crate::particle::chunk::Layout;
+
+mod canvas;
+mod colour;
+mod font;
+mod scene;
+
+use canvas::Canvas;
+use scene::{Bounds, Camera, Raster, Splat};
+
+/// How a picture looks.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// First line.
+    pub title: String,
+    /// Field that gives the colours; of vectors the magnitude.
+    pub field: PointField,
+    /// Values of the first and the last colour; `None`: as found, without the outermost half percents.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Settings {
+    /// A picture of usual size, coloured by `field`.
+    pub fn new(title: &str, field: PointField) -> Self {
+        Self { width: 1280, height: 800, title: title.into(), field, range: None }
+    }
+}
+
+/// Free space beside the drawing: left, right, top, bottom, in pixels.
+const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
+const PAPER: colour::Rgb = [250, 250, 248];
+const INK: colour::Rgb = [40, 40, 44];
+
+/// The particles of one rank and what all ranks know.
+struct Drawing<'a> {
+    comm: Option<&'a Comm>,
+    flat: bool,
+    domain: Bounds,
+    /// Values are not yet scaled.
+    splats: Vec<Splat>,
+    caption: String,
+}
+
+/// Collective. Draws the particles of a run and writes the picture as PNG on rank 0.
+pub fn draw<const D: usize>(
+    comm: &Comm,
+    view: &View<D>,
+    settings: &Settings,
+    path: &Path,
+) -> Result<(), FileError> {
+    let domain = domain(&view.origin, view.root_edge, &view.brick.roots.map(u64::from));
+    let values = scalars(settings.field.values(view));
+    let mut values = values.into_iter();
+    let mut splats = Vec::with_capacity(values.len());
+    for chunk in view.chunks {
+        let half = chunk.column(Layout::<D>::HALF);
+        for (p, (half, value)) in half.iter().zip(values.by_ref()).enumerate() {
+            let inner = chunk.position(p);
+            let position = std::array::from_fn(|i| if i < D { view.origin[i] + inner[i] } else { 0.0 });
+            splats.push(Splat { position, radius: 1.2 * half, value });
+        }
+    }
+    let mut particles = [view.chunks.iter().map(|chunk| chunk.len() as u64).sum()];
+    comm.sum_u64(&mut particles);
+    let caption = caption(view.time, view.step, particles[0]);
+    let drawing = Drawing { comm: Some(comm), flat: D == 2, domain, splats, caption };
+    let canvas = drawing.compose(settings);
+    let saved = if comm.rank() == 0 { canvas.save(path) } else { Ok(()) };
+    Ok(comm.agree(saved)?)
+}
+
+/// Not collective. Draws the particles of an output file, coloured by a field that the file shows.
+pub fn draw_file(source: &Path, settings: &Settings, path: &Path) -> Result<(), FileError> {
+    let file = ParallelFile::open_alone(source)?;
+    let header = Header::read(&file)?;
+    let dataset = |name: &str| format!("VTKHDF/PointData/{name}");
+    let field = settings.field.name();
+    if !file.exists("VTKHDF/PointData") || !file.exists(&dataset(field)) {
+        let shown: Vec<&str> = PointField::ALL
+            .map(PointField::name)
+            .into_iter()
+            .filter(|name| file.exists(&dataset(name)))
+            .collect();
+        let shown = if shown.is_empty() { "nothing (is it a tree file?)".into() } else { shown.join(", ") };
+        return Err(file.refuse(format!("the file does not show {field}; it shows {shown}")));
+    }
+    let n = header.particles;
+    let points: Vec<f64> = file.read_slab("VTKHDF/Points", 0, n)?;
+    let (_, components) = file.shape(&dataset(field))?;
+    let values = scalars(Values::Real(file.read_slab(&dataset(field), 0, n)?, components));
+    let domain = domain(&header.origin, header.root_edge, &header.roots);
+    let radii = radii(&file, &header)?;
+    let splats = points.chunks_exact(3).zip(values).zip(radii);
+    let splats = splats
+        .map(|((point, value), half)| Splat {
+            position: [point[0], point[1], point[2]],
+            radius: 1.2 * half,
+            value,
+        })
+        .collect();
+    let caption = caption(header.time, header.step, n);
+    Drawing { comm: None, flat: header.dimension == 2, domain, splats, caption }.compose(settings).save(path)
+}
+
+/// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
+/// root octants where the file does not tell.
+fn radii(file: &ParallelFile, header: &Header) -> Result<Vec<f64>, FileError> {
+    const CELLS: f64 = 4.0;
+    let n = header.particles;
+    let (state, level) = ("state/particles/half_width", "VTKHDF/PointData/leaf_level");
+    if file.exists(state) {
+        return file.read_slab(state, 0, n);
+    }
+    let quarter = |level: i32| header.root_edge / f64::from(1_u32 << level.clamp(0, 31)) / CELLS / 4.0;
+    if file.exists(level) {
+        return Ok(file.read_slab::<i32>(level, 0, n)?.into_iter().map(quarter).collect());
+    }
+    Ok(vec![quarter(3); n as usize])
+}
+
+/// One number per particle: scalars as they are, of vectors the magnitude.
+fn scalars(values: Values) -> Vec<f64> {
+    match values {
+        Values::Id(ids) => ids.into_iter().map(|id| id as f64).collect(),
+        Values::Integer(numbers) => numbers.into_iter().map(f64::from).collect(),
+        Values::Single(values, components) => {
+            scalars(Values::Real(values.into_iter().map(f64::from).collect(), components))
+        }
+        Values::Real(values, 0 | 1) => values,
+        Values::Real(values, components) => {
+            values.chunks_exact(components).map(|row| row.iter().map(|v| v * v).sum::<f64>().sqrt()).collect()
+        }
+    }
+}
+
+fn domain(origin: &[f64], root_edge: f64, roots: &[u64]) -> Bounds {
+    let at = |axis: usize, list: &[f64]| list.get(axis).copied().unwrap_or(0.0);
+    let edges: Vec<f64> = roots.iter().map(|&n| n as f64 * root_edge).collect();
+    Bounds {
+        low: std::array::from_fn(|axis| at(axis, origin)),
+        high: std::array::from_fn(|axis| at(axis, origin) + at(axis, &edges)),
+    }
+}
+
+fn caption(time: f64, step: u64, particles: u64) -> String {
+    format!("t = {time:.4} s   step {step}   {particles} particles")
+}
+
+impl Drawing<'_> {
+    fn min(&self, value: f64) -> f64 {
+        self.comm.map_or(value, |comm| comm.min_f64(value))
+    }
+
+    fn max(&self, value: f64) -> f64 {
+        self.comm.map_or(value, |comm| comm.max_f64(value))
+    }
+
+    /// Collective on a shared drawing. The box around all particles; the domain if there are none.
+    fn bounds(&self) -> Bounds {
+        let reach = |axis: usize, sign: f64| {
+            let far = self.splats.iter().map(|s| sign * s.position[axis] + s.radius);
+            sign * self.max(far.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let (low, high): ([f64; 3], [f64; 3]) =
+            (std::array::from_fn(|axis| reach(axis, -1.0)), std::array::from_fn(|axis| reach(axis, 1.0)));
+        if low.iter().chain(&high).all(|x| x.is_finite()) { Bounds { low, high } } else { self.domain }
+    }
+
+    /// What the picture shows: the particles with some room, and the floor if it is not far below.
+    fn frame(&self) -> Bounds {
+        let mut frame = self.bounds();
+        let room = 0.12 * frame.extent();
+        for axis in 0..2 {
+            frame.low[axis] = (frame.low[axis] - room).max(self.domain.low[axis].min(frame.low[axis]));
+            frame.high[axis] = (frame.high[axis] + room).min(self.domain.high[axis].max(frame.high[axis]));
+        }
+        if frame.low[2] - self.domain.low[2] < frame.extent() {
+            frame.low[2] = self.domain.low[2];
+        }
+        frame
+    }
+
+    /// Collective on a shared drawing. The values between which the colours run.
+    fn range(&self, settings: &Settings, classes: bool) -> [f64; 2] {
+        const BINS: usize = 1000;
+        let values = || self.splats.iter().map(|splat| splat.value).filter(|value| value.is_finite());
+        let low = self.min(values().fold(f64::INFINITY, f64::min));
+        let high = self.max(values().fold(f64::NEG_INFINITY, f64::max));
+        if let Some(range) = settings.range {
+            return range;
+        }
+        if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) || classes {
+            return if low.is_finite() { [low, high] } else { [0.0, 0.0] };
+        }
+        let mut counts = vec![0_u64; BINS];
+        let width = (high - low) / BINS as f64;
+        values().for_each(|value| counts[(((value - low) / width) as usize).min(BINS - 1)] += 1);
+        if let Some(comm) = self.comm {
+            comm.sum_u64(&mut counts);
+        }
+        let outer = counts.iter().sum::<u64>() / 200;
+        let beyond = |counts: &mut dyn Iterator<Item = &u64>| {
+            let mut passed = 0;
+            counts.take_while(|&&count| (passed, passed += count).0 + count <= outer).count()
+        };
+        let (below, above) = (beyond(&mut counts.iter()), beyond(&mut counts.iter().rev()));
+        [low + width * below as f64, high - width * above as f64]
+    }
+
+    /// Collective on a shared drawing. The picture; whole on rank 0.
+    fn compose(mut self, settings: &Settings) -> Canvas {
+        let classes = matches!(
+            settings.field,
+            PointField::Material | PointField::Body | PointField::ParticleLevel | PointField::LeafLevel
+        );
+        let frame = self.frame();
+        let [low, high] = self.range(settings, classes);
+        let (width, height) = (settings.width as f64, settings.height as f64);
+        let [left, right, top, bottom] = MARGINS;
+        let left = if self.flat { left + 60.0 } else { left };
+        let camera = Camera::new(
+            self.flat,
+            &frame,
+            left..(width - right).max(left + 1.0),
+            top..(height - bottom).max(top + 1.0),
+        );
+        let spacing = nice(frame.extent() / 8.0);
+
+        let mut raster = Raster::new(settings.width, settings.height);
+        let span = if high > low { high - low } else { 1.0 };
+        for splat in &mut self.splats {
+            splat.value = (splat.value - low) / span;
+            raster.splat(&camera, splat);
+        }
+        if !self.flat {
+            raster.ground(&camera, &frame, spacing);
+        }
+        if let Some(comm) = self.comm {
+            comm.max_u64(&mut raster.pixels);
+        }
+        let mut canvas = Canvas::new(settings.width, settings.height, PAPER);
+        if self.comm.is_some_and(|comm| comm.rank() != 0) {
+            return canvas;
+        }
+        if self.flat {
+            axes(&mut canvas, &camera, &frame, spacing);
+        } else {
+            let note = format!("grid {} m", short(spacing));
+            canvas.text(24, settings.height as i64 - 36, 2, &note, INK);
+        }
+        raster.paint(&camera, &mut canvas, !self.flat, |value| {
+            if classes {
+                colour::class((low + value * span).round() as usize)
+            } else {
+                colour::sequential(value)
+            }
+        });
+        canvas.text(24, 20, 3, &settings.title, INK);
+        canvas.text(24, 60, 2, &self.caption, INK);
+        if classes {
+            legend(&mut canvas, settings.field, low as usize..=high as usize);
+        } else {
+            colour_bar(&mut canvas, settings.field, [low, high]);
+        }
+        canvas
+    }
+}
+
+/// Lines and numbers along the lower and the left side of a plane picture.
+fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
+    let [left, bottom, _] = camera.project(frame.low).map(|x| x as i64);
+    let [right, top, _] = camera.project(frame.high).map(|x| x as i64);
+    canvas.fill(left, bottom, right - left + 1, 2, INK);
+    canvas.fill(left - 2, top, 2, bottom - top + 2, INK);
+    let ticks = |low: f64, high: f64| {
+        ((low / spacing).ceil() as i64..=(high / spacing).floor() as i64).map(move |n| n as f64 * spacing)
+    };
+    for x in ticks(frame.low[0], frame.high[0]) {
+        let column = camera.project([x, 0.0, 0.0])[0] as i64;
+        canvas.fill(column, bottom, 2, 8, INK);
+        let text = short(x);
+        canvas.text(column - Canvas::text_width(2, &text) / 2, bottom + 14, 2, &text, INK);
+    }
+    for y in ticks(frame.low[1], frame.high[1]) {
+        let row = camera.project([0.0, y, 0.0])[1] as i64;
+        let text = short(y);
+        canvas.fill(left - 10, row, 8, 2, INK);
+        canvas.text(left - 14 - Canvas::text_width(2, &text), row - 7, 2, &text, INK);
+    }
+    canvas.text(right + 8, bottom - 8, 2, "m", INK);
+}
+
+/// Name and unit of a field beside the drawing; the row below it.
+fn heading(canvas: &mut Canvas, field: PointField) -> (i64, i64) {
+    let x = canvas.width as i64 - 185;
+    let name = field.name().replace('_', " ");
+    canvas.text(x, 110, 2, name.get(..14).unwrap_or(&name), INK);
+    if !field.unit().is_empty() {
+        canvas.text(x, 134, 2, &format!("[{}]", field.unit()), INK);
+    }
+    (x, 164)
+}
+
+fn colour_bar(canvas: &mut Canvas, field: PointField, [low, high]: [f64; 2]) {
+    let (x, top) = heading(canvas, field);
+    let length = (canvas.height as i64 - top - 80).max(10);
+    for row in 0..length {
+        let value = 1.0 - row as f64 / (length - 1) as f64;
+        canvas.fill(x, top + row, 24, 1, colour::sequential(value));
+    }
+    for tick in 0..5 {
+        let part = f64::from(tick) / 4.0;
+        let row = top + ((1.0 - part) * (length - 1) as f64) as i64;
+        canvas.fill(x + 24, row, 6, 1, INK);
+        canvas.text(x + 34, row - 7, 2, &short(low + part * (high - low)), INK);
+    }
+}
+
+fn legend(canvas: &mut Canvas, field: PointField, numbers: std::ops::RangeInclusive<usize>) {
+    let (x, top) = heading(canvas, field);
+    for (line, number) in numbers.take(16).enumerate() {
+        let row = top + 30 * line as i64;
+        canvas.fill(x, row, 24, 20, colour::class(number));
+        canvas.text(x + 34, row + 3, 2, &number.to_string(), INK);
+    }
+}
+
+/// The largest of 1, 2 and 5 times a power of ten that is not above `length`.
+fn nice(length: f64) -> f64 {
+    if !(length.is_finite() && length > 0.0) {
+        return 1.0;
+    }
+    let power = 10.0_f64.powi(length.log10().floor() as i32);
+    [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&x| x <= length).unwrap_or(power)
+}
+
+/// A number with three digits.
+fn short(value: f64) -> String {
+    if value.abs() < 1e-12 {
+        return "0".into();
+    }
+    let digits = value.abs().log10().floor() as i32;
+    if (-3..5).contains(&digits) {
+        let text = format!("{value:.*}", (2 - digits).max(0) as usize);
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+#[cfg(test)]
+mod tests;
