@@ -9,4 +9,5 @@ pub mod job;
 pub mod kernel;
 pub mod material;
 pub mod particle;
+pub mod run;
 pub mod solver;

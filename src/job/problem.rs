@@ -4,6 +4,7 @@
 //! [`Problem::origin`]. All quantities are in SI units.
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
+pub use crate::io::snapshot::PointField as Field;
 pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::parameters::Parameters;
 use partition::{Brick, Octant};
@@ -167,47 +168,6 @@ pub struct TimeSetup {
     pub dt_max: Option<f64>,
     /// Most that a step may exceed the one before it, as a factor.
     pub growth: f64,
-}
-
-/// A field of the particle output.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Field {
-    /// Identifier, unique over the run.
-    Id,
-    /// Index of the body.
-    Body,
-    /// Index of the material.
-    Material,
-    /// Level of the leaf that holds the particle.
-    Level,
-    /// Velocity, m/s.
-    Velocity,
-    /// Mass, kg.
-    Mass,
-    /// Density, kg/m³.
-    Density,
-    /// Cauchy stress, Pa.
-    Stress,
-    /// Pressure, Pa; compression is positive.
-    Pressure,
-    /// Von Mises stress, Pa.
-    MisesStress,
-    /// First history variable of the material: plastic strain, as a rule.
-    PlasticStrain,
-    /// Volume over undeformed volume, elastic part.
-    VolumeRatio,
 }
 
 /// Output files.

@@ -1,5 +1,6 @@
 //! A whole run: from a checked job to its last file.
 pub mod history;
+pub mod record;
 pub mod report;
 pub mod restart;
 pub mod schedule;
@@ -10,11 +11,11 @@ use std::path::PathBuf;
 
 use partition::comm::{Comm, Disagreement};
 
+use self::record::Recorder;
 use self::restart::From;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::hdf5_file::FileError;
-use crate::io::history::History;
 use crate::io::snapshot::{Outputs, Scalars, View};
 use crate::job::Problem;
 use crate::solver::{Requests, Solver};
@@ -24,8 +25,10 @@ use crate::solver::{Requests, Solver};
 pub struct Options {
     /// File to go on from; a new run without it.
     pub restart: Option<From>,
-    /// Whether progress is shown.
-    pub progress: bool,
+    /// Whether this process tells the user how the run goes on.
+    pub speaks: bool,
+    /// Threads of this rank.
+    pub threads: usize,
 }
 
 /// How a run ended.
@@ -85,8 +88,8 @@ pub fn run<const D: usize>(
     stop: &StopRequest,
 ) -> Result<Outcome, RunError> {
     let mut run = match &options.restart {
-        None => Run::start(comm, problem)?,
-        Some(from) => Run::resume(comm, problem, from)?,
+        None => Run::start(comm, problem, options)?,
+        Some(from) => Run::resume(comm, problem, options, from)?,
     };
     while run.solver.clock.time < problem.time.end {
         let requests = Requests { stop: stop.is_set(), checkpoint: run.schedule.wall_due() };
@@ -109,25 +112,30 @@ struct Run<'a, const D: usize> {
     solver: Solver<D>,
     outputs: Outputs,
     schedule: Schedule,
-    history: Option<History>,
+    recorder: Recorder,
     materials: Vec<String>,
     histories: Vec<String>,
 }
 
 impl<'a, const D: usize> Run<'a, D> {
     /// Collective. A new run: directory, first output and first row of the history.
-    fn start(comm: &'a Comm, problem: &'a Problem<D>) -> Result<Self, RunError> {
+    fn start(comm: &'a Comm, problem: &'a Problem<D>, options: &Options) -> Result<Self, RunError> {
         let solver = setup::solver(comm, problem)?;
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
-        let mut run = Self::with(comm, problem, solver, outputs, 0)?;
+        let mut run = Self::with(comm, problem, options, solver, outputs)?;
+        run.recorder.write(comm, &mut run.solver, true, true)?;
         run.write_output()?;
-        run.write_history()?;
         Ok(run)
     }
 
     /// Collective. Goes on from a file.
-    fn resume(comm: &'a Comm, problem: &'a Problem<D>, from: &From) -> Result<Self, RunError> {
+    fn resume(
+        comm: &'a Comm,
+        problem: &'a Problem<D>,
+        options: &Options,
+        from: &From,
+    ) -> Result<Self, RunError> {
         let (solver, scalars) = restart::solver(comm, problem, from)?;
         let next = scalars.count(restart::NEXT_OUTPUT).unwrap_or(0);
         let outputs = Outputs::resume(
@@ -138,23 +146,31 @@ impl<'a, const D: usize> Run<'a, D> {
             next,
             solver.clock.time,
         )?;
-        let step = solver.clock.step;
-        Self::with(comm, problem, solver, outputs, step)
+        Self::with(comm, problem, options, solver, outputs)
     }
 
     fn with(
         comm: &'a Comm,
         problem: &'a Problem<D>,
+        options: &Options,
         solver: Solver<D>,
         outputs: Outputs,
-        step: u64,
     ) -> Result<Self, RunError> {
-        let path = problem.output.directory.join(format!("{}.history.csv", problem.name));
-        let history = match (comm.rank(), step) {
-            (0, 0) => History::create(&path, &history::COLUMNS).map(Some),
-            (0, _) => History::resume(&path, &history::COLUMNS, step).map(Some),
-            _ => Ok(None),
-        };
+        let mut recorder = Recorder::open(comm, problem, options, &solver)?;
+        let (cores, wanted) = (available_cores(), comm.size() * options.threads);
+        recorder.message(&format!(
+            "{}: {} ranks x {} threads on {cores} cores, {} leaves",
+            problem.name,
+            comm.size(),
+            options.threads,
+            solver.forest.global_len()
+        ));
+        if wanted > cores {
+            recorder.message(&format!(
+                "warning: {wanted} threads share {cores} cores here; expect less speed (several machines \
+                 count as one here)"
+            ));
+        }
         let histories = solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect();
         Ok(Self {
             comm,
@@ -162,7 +178,7 @@ impl<'a, const D: usize> Run<'a, D> {
             schedule: Schedule::new(problem, solver.clock.time),
             solver,
             outputs,
-            history: comm.agree(history)?,
+            recorder,
             materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
             histories,
         })
@@ -176,10 +192,8 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Collective. Writes what is due after a step.
     fn write_due(&mut self, checkpoint: bool) -> Result<(), RunError> {
+        self.recorder.after_step(self.comm, &mut self.solver)?;
         let clock = self.solver.clock;
-        if clock.step.is_multiple_of(self.problem.history_every) {
-            self.write_history()?;
-        }
         if self.schedule.output_due(self.outputs.next(), clock.time) {
             self.write_output()?;
         }
@@ -200,31 +214,19 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Collective. Last output, last row, last checkpoint, report.
+    /// Collective. Last row, last output, report.
     fn finish(&mut self) -> Result<(), RunError> {
-        if !self.solver.clock.step.is_multiple_of(self.problem.history_every) {
-            self.write_history()?;
-        }
+        let row = !self.solver.clock.step.is_multiple_of(self.problem.history_every);
+        self.recorder.write(self.comm, &mut self.solver, row, true)?;
         self.write_output()?;
+        self.recorder.finish(&self.solver);
         if let Some(setup) = &self.problem.report {
             let mass = self.solver.particle_totals().mass;
             let size = self.problem.size();
             let collapse = report::evaluate(self.comm, setup, size, &self.solver.chunks, mass);
-            if self.comm.rank() == 0 {
-                tracing::info!("{collapse}");
-            }
+            self.recorder.message(&collapse.to_string());
         }
         Ok(())
-    }
-
-    fn write_history(&mut self) -> Result<(), RunError> {
-        let clock = self.solver.clock;
-        let grid = self.solver.grid_totals();
-        let grid = self.comm.agree(grid)?;
-        let particles = self.solver.particle_totals();
-        let row = history::row(clock.time, clock.dt, &particles, &grid);
-        let written = self.history.as_mut().map_or(Ok(()), |history| history.row(clock.step, &row));
-        Ok(self.comm.agree(written)?)
     }
 
     fn write_output(&mut self) -> Result<(), RunError> {
@@ -240,6 +242,11 @@ impl<'a, const D: usize> Run<'a, D> {
         self.schedule.checkpoint_written(self.solver.clock.time);
         Ok(self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?)
     }
+}
+
+/// Cores that this process may use; `mpirun` binds it to some of them.
+fn available_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// The state of a run as files show it.
@@ -266,4 +273,3 @@ fn view<'a, const D: usize>(
         scalars,
     }
 }
-

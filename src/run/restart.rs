@@ -5,7 +5,7 @@ use partition::Forest;
 use partition::comm::Comm;
 
 use super::{RunError, setup};
-use crate::io::snapshot::{self, PointField, Scalars, directory};
+use crate::io::snapshot::{self, Scalars, directory};
 use crate::job::Problem;
 use crate::solver::rebalance::leaf_weight;
 use crate::solver::{Clock, Solver};
@@ -26,12 +26,8 @@ const DELETED: &str = "deleted";
 
 /// What output files hold.
 pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
-    let fields = problem.output.fields.iter().filter_map(|field| PointField::from_name(field.name()));
-    snapshot::Options {
-        fields: fields.collect(),
-        single: problem.output.single,
-        restart: problem.output.restart,
-    }
+    let output = &problem.output;
+    snapshot::Options { fields: output.fields.clone(), single: false, restart: output.restart }
 }
 
 /// Collective. Scalars that a restart needs beside those in every header.

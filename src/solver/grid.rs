@@ -82,6 +82,15 @@ impl<const D: usize> Solver<D> {
         reaches.max().unwrap_or(0)
     }
 
+    /// Messages and bytes that this rank has sent in steps so far.
+    pub fn traffic(&self) -> Traffic {
+        let now = self.grid.traffic();
+        Traffic {
+            messages: self.sent_before.messages + now.messages,
+            bytes: self.sent_before.bytes + now.bytes,
+        }
+    }
+
     /// The grid of the current tree and partition.
     pub fn grid(&self) -> &Grid<D> {
         &self.grid

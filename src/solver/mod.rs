@@ -12,7 +12,7 @@ pub mod transfer;
 pub mod update;
 
 use partition::Forest;
-use partition::comm::{Comm, Disagreement};
+use partition::comm::{Comm, Disagreement, Traffic};
 
 use self::bins::BinMissing;
 use self::grid::Grid;
@@ -114,6 +114,8 @@ pub struct Solver<const D: usize> {
     signal: Vec<f64>,
     /// Particles that this rank deleted because they left the domain.
     pub deleted: u64,
+    /// What grids of earlier trees and partitions have sent.
+    sent_before: Traffic,
 }
 
 impl<const D: usize> Solver<D> {
@@ -137,6 +139,7 @@ impl<const D: usize> Solver<D> {
             phases: Phases::default(),
             grid,
             deleted: 0,
+            sent_before: Traffic::default(),
         };
         let reach = solver.agreed_reach();
         if reach > 0 {
@@ -179,6 +182,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
+        self.sent_before = self.traffic();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
     }
 
