@@ -1,5 +1,5 @@
 //! From the file's types to a checked problem: everything that the schema cannot say.
-use super::error::{Fault, alternatives, nearest};
+use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
 use super::overlap;
 use super::problem::*;
@@ -12,13 +12,18 @@ const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
 /// Most output files of one run.
 const MAX_OUTPUTS: f64 = 100_000.0;
 
-/// Converts and checks; `name` becomes the name of the job.
-pub(super) fn convert(file: &JobFile, tree: &Node, name: &str) -> Result<AnyProblem, Vec<Fault>> {
-    let mut checks = Checks { tree, faults: Vec::new() };
+/// Converts and checks; `text` is what `file` and `tree` were made from.
+pub(super) fn convert(
+    file: &JobFile,
+    tree: &Node,
+    text: &str,
+    path: &std::path::Path,
+) -> Result<AnyProblem, Vec<Fault>> {
+    let mut checks = Checks { tree, text, faults: Vec::new() };
     let problem = if file.dimension == 2 {
-        problem(&mut checks, file, name).map(AnyProblem::Two)
+        problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
-        problem(&mut checks, file, name).map(AnyProblem::Three)
+        problem(&mut checks, file, path).map(AnyProblem::Three)
     };
     match problem {
         Some(problem) if checks.faults.is_empty() => Ok(problem),
@@ -32,6 +37,7 @@ pub(super) fn convert(file: &JobFile, tree: &Node, name: &str) -> Result<AnyProb
 /// Collects faults; knows where the keys of the file stand.
 pub(super) struct Checks<'t> {
     tree: &'t Node,
+    text: &'t str,
     faults: Vec<Fault>,
 }
 
@@ -52,7 +58,12 @@ impl Checks<'_> {
     }
 }
 
-fn problem<const D: usize>(checks: &mut Checks, file: &JobFile, name: &str) -> Option<Problem<D>> {
+fn problem<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    path: &std::path::Path,
+) -> Option<Problem<D>> {
+    let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
     let root = Path::default();
     let (origin, brick) = domain::<D>(checks, &file.domain, &root.key("domain"))?;
     let root_edge = file.domain.root_edge;
@@ -67,13 +78,14 @@ fn problem<const D: usize>(checks: &mut Checks, file: &JobFile, name: &str) -> O
     };
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
-    let output = output(checks, file, name, &root.key("output"));
+    let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(report) => Some(self::report(checks, report, &space, &root.key("report"))?),
         None => None,
     };
     let problem = Problem {
-        name: name.to_owned(),
+        name,
+        path: path.to_path_buf(),
         title: file.title.clone(),
         digest: digest(file),
         origin,
@@ -306,7 +318,7 @@ fn body<const D: usize>(
     }
     for a in 0..D {
         // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
-        let slack = 1e-9 * space.size[a];
+        let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
         let (low, high) = (bounds.lower[a], bounds.upper[a]);
         let below = low.is_finite() && low < -slack;
         let above = high.is_finite() && high > space.size[a] + slack;
@@ -324,6 +336,7 @@ fn body<const D: usize>(
     }
     Some(Body {
         name: body.name.clone(),
+        place: position(checks.text, checks.tree.locate(&here).start),
         centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
         shape,
         material: material?,
