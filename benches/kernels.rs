@@ -48,8 +48,10 @@ struct Setting<const D: usize> {
 }
 
 impl<const D: usize> Setting<D> {
-    fn new(model: &str) -> Self {
-        let mut chunk = Chunk::new();
+    /// `distinct` blocks, visited in turn: two stay in the cache, as many as the particles fill do not.
+    fn new(model: &str, distinct: usize) -> Self {
+        // An odd number of cache lines per column: columns do not fall into the same cache set.
+        let mut chunk = Chunk::with_capacity(8usize.pow(D as u32) + 8);
         for i in 0..8usize.pow(D as u32) {
             let p = chunk.push_zeroed(i as u64, Tag { material: 0, body: 0, level: 0 });
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
@@ -67,7 +69,6 @@ impl<const D: usize> Setting<D> {
             set(Layout::<D>::MASS, 1.0);
             set(Layout::<D>::HALF, 0.25 * CELL);
         }
-        let blocks = PARTICLES / chunk.len();
         let velocity = (0..arena_nodes(D))
             .map(|node| {
                 let [x, y, z] = std::array::from_fn(|k| (node / 7usize.pow(k as u32) % 7) as f64);
@@ -75,7 +76,7 @@ impl<const D: usize> Setting<D> {
             })
             .collect();
         Self {
-            chunks: vec![chunk; blocks],
+            chunks: vec![chunk; distinct.min(PARTICLES / 8usize.pow(D as u32))],
             materials: vec![material(model)],
             velocity,
             frame: Frame { corner: [4.0 * CELL; D], cell: CELL, extent: [16.0 * CELL; D] },
@@ -92,12 +93,17 @@ impl<const D: usize> Setting<D> {
     }
 }
 
-fn scatter<const D: usize>(bencher: Bencher, model: &str) {
-    let setting = Setting::<D>::new(model);
+/// Blocks in all.
+fn blocks<const D: usize>() -> usize {
+    PARTICLES / 8usize.pow(D as u32)
+}
+
+fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
+    let setting = Setting::<D>::new(model, distinct);
     let mut arena = vec![Row::default(); arena_nodes(D)];
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
-        for chunk in &setting.chunks {
+        for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
             p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena);
         }
@@ -105,13 +111,14 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str) {
     });
 }
 
-fn gather<const D: usize>(bencher: Bencher, model: &str) {
-    let mut setting = Setting::<D>::new(model);
+fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
+    let mut setting = Setting::<D>::new(model, distinct);
     let mut chunks = std::mem::take(&mut setting.chunks);
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
-        chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
+        (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
+            let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
             greatest.max(g2p::gather(chunk, Select::All, &setting.frame, &scheme, DT, &fields))
         })
     });
@@ -119,20 +126,30 @@ fn gather<const D: usize>(bencher: Bencher, model: &str) {
 
 #[divan::bench(args = MODELS, sample_count = 9)]
 fn p2g_3d(bencher: Bencher, model: &str) {
-    scatter::<3>(bencher, model);
+    scatter::<3>(bencher, model, PARTICLES);
 }
 
 #[divan::bench(args = MODELS, sample_count = 9)]
 fn g2p_3d(bencher: Bencher, model: &str) {
-    gather::<3>(bencher, model);
+    gather::<3>(bencher, model, PARTICLES);
 }
 
 #[divan::bench(args = MODELS, sample_count = 9)]
 fn p2g_2d(bencher: Bencher, model: &str) {
-    scatter::<2>(bencher, model);
+    scatter::<2>(bencher, model, PARTICLES);
 }
 
 #[divan::bench(args = MODELS, sample_count = 9)]
 fn g2p_2d(bencher: Bencher, model: &str) {
-    gather::<2>(bencher, model);
+    gather::<2>(bencher, model, PARTICLES);
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn p2g_3d_in_cache(bencher: Bencher, model: &str) {
+    scatter::<3>(bencher, model, 2);
+}
+
+#[divan::bench(args = MODELS, sample_count = 9)]
+fn g2p_3d_in_cache(bencher: Bencher, model: &str) {
+    gather::<3>(bencher, model, 2);
 }

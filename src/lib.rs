@@ -1,7 +1,13 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
+pub mod boundary;
 pub mod cli;
+pub mod exact_sum;
 pub mod geometry;
+pub mod grid;
+pub mod io;
 pub mod job;
 pub mod kernel;
 pub mod material;
 pub mod particle;
+pub mod run;
+pub mod solver;

@@ -19,6 +19,7 @@ fn main() -> ExitCode {
 fn explain(failure: &Failure) {
     match failure {
         Failure::Job(JobError::Invalid(list)) => explain_faults(list),
+        Failure::Elsewhere => {}
         other => eprintln!("agimp: {other}"),
     }
 }

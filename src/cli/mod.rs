@@ -5,6 +5,7 @@ use clap::{Parser, Subcommand};
 
 pub mod check;
 pub mod new;
+pub mod run;
 pub mod schema;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
@@ -19,6 +20,8 @@ pub struct Arguments {
 /// Subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Run a job; under `mpirun` on all its ranks.
+    Run(run::Arguments),
     /// Check a job file and tell its size and cost, without running it.
     Check(check::Arguments),
     /// Print the JSON schema of job files.
@@ -42,14 +45,21 @@ pub enum Failure {
     /// Something failed while the command ran.
     #[error("{0}")]
     Run(String),
+    /// The run was asked to stop and has written a checkpoint.
+    #[error("stopped on request; go on with --restart {}", .0.display())]
+    Stopped(std::path::PathBuf),
+    /// Another rank reports the failure.
+    #[error("another rank reports the failure")]
+    Elsewhere,
 }
 
 impl Failure {
-    /// 2 for wrong input, 1 for what goes wrong later.
+    /// 2 for wrong input, 1 for what goes wrong later, 3 after a stop on request.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Job(_) | Self::Seed(_) | Self::Usage(_) => 2,
-            Self::Run(_) => 1,
+            Self::Run(_) | Self::Elsewhere => 1,
+            Self::Stopped(_) => crate::run::stop::STOPPED,
         }
     }
 }
@@ -66,6 +76,7 @@ impl From<std::io::Error> for Failure {
 /// Wrong input, or a failure on the way; [`Failure::exit_code`] tells which.
 pub fn execute(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Run(arguments) => run::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
         Command::Schema => schema::execute(),
         Command::New(arguments) => new::execute(&arguments),

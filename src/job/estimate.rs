@@ -141,17 +141,10 @@ fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
 
 fn field_bytes(field: Field) -> usize {
     match field {
-        Field::Level => 1,
-        Field::Body | Field::Material => 2,
+        Field::Body | Field::Material | Field::LeafLevel | Field::ParticleLevel => 4,
         Field::Velocity => 24,
         Field::Stress => 48,
-        Field::Id
-        | Field::Mass
-        | Field::Density
-        | Field::Pressure
-        | Field::MisesStress
-        | Field::PlasticStrain
-        | Field::VolumeRatio => 8,
+        _ => 8,
     }
 }
 

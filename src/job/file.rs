@@ -335,7 +335,7 @@ impl Default for Output {
 
 fn default_fields() -> Vec<Field> {
     use Field::*;
-    vec![Id, Body, Material, Level, Velocity, Density, Pressure, MisesStress, PlasticStrain]
+    vec![Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain]
 }
 
 /// Checkpoints. With no interval, one is written only when the run ends or is told to stop.

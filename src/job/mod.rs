@@ -11,6 +11,7 @@ pub mod file_shape;
 mod overlap;
 pub mod problem;
 mod schema;
+mod settings;
 mod shapes;
 mod source;
 mod structure;

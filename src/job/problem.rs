@@ -2,7 +2,10 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
+pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
+pub use crate::io::snapshot::PointField as Field;
+pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::parameters::Parameters;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
@@ -182,35 +185,6 @@ pub struct Body<const D: usize> {
     pub particles_per_cell: f64,
 }
 
-/// Condition on one face of the domain.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum FaceCondition {
-    /// No velocity.
-    Sticky,
-    /// No normal velocity; free to slide.
-    #[default]
-    Slip,
-    /// Material may leave the face; while it presses on it, Coulomb friction.
-    Separating {
-        /// Friction coefficient tan(φ).
-        friction: f64,
-    },
-    /// A plane of symmetry.
-    Symmetric,
-}
-
-/// What happens to particles that leave the domain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LeavingPolicy {
-    /// The run ends with an error that names the particles.
-    #[default]
-    Error,
-    /// They are deleted and counted.
-    Delete,
-    /// They are put back to the face, counted.
-    Clamp,
-}
-
 /// End and time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeSetup {
@@ -222,84 +196,6 @@ pub struct TimeSetup {
     pub dt_max: Option<f64>,
     /// Most that a step may exceed the one before it, as a factor.
     pub growth: f64,
-}
-
-/// Transfer of velocity between particles and grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Transfer {
-    /// Affine particle-in-cell.
-    #[default]
-    Apic,
-    /// Blend of FLIP and PIC.
-    Flip {
-        /// Share of FLIP: 1 is pure FLIP, 0 pure PIC.
-        blend: f64,
-    },
-    /// Taylor particle-in-cell.
-    Tpic,
-}
-
-/// How the box of a particle follows its deformation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BoxPolicy {
-    /// Half widths follow the stretch along each axis, within bounds.
-    Volume {
-        /// Least half width over the undeformed one.
-        min_stretch: f64,
-        /// Greatest half width over the undeformed one.
-        max_stretch: f64,
-    },
-    /// Half widths never change.
-    Fixed,
-    /// One cell of the particle's own level.
-    Cell,
-}
-
-impl Default for BoxPolicy {
-    fn default() -> Self {
-        Self::Volume { min_stretch: 0.25, max_stretch: 2.0 }
-    }
-}
-
-/// A field of the particle output.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Field {
-    /// Identifier, unique over the run.
-    Id,
-    /// Index of the body.
-    Body,
-    /// Index of the material.
-    Material,
-    /// Level of the leaf that holds the particle.
-    Level,
-    /// Velocity, m/s.
-    Velocity,
-    /// Mass, kg.
-    Mass,
-    /// Density, kg/m³.
-    Density,
-    /// Cauchy stress, Pa.
-    Stress,
-    /// Pressure, Pa; compression is positive.
-    Pressure,
-    /// Von Mises stress, Pa.
-    MisesStress,
-    /// First history variable of the material: plastic strain, as a rule.
-    PlasticStrain,
-    /// Volume over undeformed volume, elastic part.
-    VolumeRatio,
 }
 
 /// Output files.

@@ -1,6 +1,7 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
 use super::simd::{LANES, Lanes};
+use crate::particle::chunk::Layout;
 
 /// Up to [`LANES`] particles. Lanes beyond `count` repeat the last one, so that they compute something
 /// valid that is never stored.
@@ -55,9 +56,10 @@ impl Batch {
         let column = column * stride;
         if self.contiguous {
             let start = column + self.particle(0);
-            let mut values = [0.0; LANES];
-            values.copy_from_slice(&reals[start..start + LANES]);
-            Lanes::new(values)
+            match reals[start..start + LANES].first_chunk() {
+                Some(values) => Lanes::load(values),
+                None => Lanes::splat(0.0),
+            }
         } else {
             self.load_scattered(reals, column)
         }
@@ -74,7 +76,9 @@ impl Batch {
         let column = column * stride;
         if self.contiguous {
             let start = column + self.particle(0);
-            reals[start..start + LANES].copy_from_slice(&values.to_array());
+            if let Some(to) = reals[start..start + LANES].first_chunk_mut() {
+                values.store(to);
+            }
         } else {
             self.store_scattered(reals, column, values);
         }
@@ -86,6 +90,16 @@ impl Batch {
         for lane in 0..self.count {
             reals[column + self.particle(lane)] = values[lane];
         }
+    }
+
+    /// Positions.
+    #[inline(always)]
+    pub fn positions<const D: usize>(&self, reals: &[f64], stride: usize) -> [Lanes; D] {
+        let mut position = [Lanes::splat(0.0); D];
+        for axis in 0..D {
+            position[axis] = self.load(reals, stride, Layout::<D>::POSITION + axis);
+        }
+        position
     }
 
     /// Material index of each lane.

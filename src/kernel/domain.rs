@@ -52,8 +52,7 @@ fn collect<const D: usize>(
     let (reals, stride) = chunk.reals();
     for i in 0..Batch::number(&select, chunk.len()) {
         let batch = Batch::of(&select, chunk.len(), i);
-        let position: [Lanes; D] =
-            std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
+        let position = batch.positions(reals, stride);
         let half = of_batch(reals, stride, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
         let half = half.map(Lanes::to_array);
         out.extend((0..batch.count).map(|lane| std::array::from_fn(|axis| half[axis][lane])));
@@ -73,7 +72,7 @@ pub(super) fn of_batch<const D: usize>(
     extent: &[f64; D],
     scheme: &Scheme,
 ) -> [Lanes; D] {
-    let own = match scheme.boxes {
+    let mut half = match scheme.boxes {
         BoxPolicy::Fixed => [batch.load(reals, stride, Layout::<D>::HALF); D],
         BoxPolicy::Cell => {
             let half = std::array::from_fn(|lane| {
@@ -83,16 +82,19 @@ pub(super) fn of_batch<const D: usize>(
             [Lanes::new(half); D]
         }
         BoxPolicy::Volume { min_stretch, max_stretch } => {
-            let half = batch.load(reals, stride, Layout::<D>::HALF);
-            let stretch = stretches(reals, stride, tags, batch, scheme);
-            let (least, most) = (Lanes::splat(min_stretch), Lanes::splat(max_stretch));
-            stretch.map(|s| half * s.max(least).min(most))
+            let original = batch.load(reals, stride, Layout::<D>::HALF);
+            let mut half = stretches(reals, stride, tags, batch, scheme);
+            for half in &mut half {
+                *half = original * half.max(Lanes::splat(min_stretch)).min(Lanes::splat(max_stretch));
+            }
+            half
         }
     };
-    std::array::from_fn(|axis| {
+    for axis in 0..D {
         let wall = position[axis].min(Lanes::splat(extent[axis]) - position[axis]);
-        own[axis].min(Lanes::splat(greatest)).min(wall).max(Lanes::splat(LEAST_SHARE * cell))
-    })
+        half[axis] = half[axis].min(Lanes::splat(greatest)).min(wall).max(Lanes::splat(LEAST_SHARE * cell));
+    }
+    half
 }
 
 /// Ratio of the half widths to the undeformed ones that keeps the volume.
@@ -104,20 +106,38 @@ fn stretches<const D: usize>(
     batch: &Batch,
     scheme: &Scheme,
 ) -> [Lanes; D] {
-    let index = batch.materials(tags);
-    let plastic = (0..LANES).fold(0u32, |bits, lane| {
-        bits | u32::from(scheme.materials[usize::from(index[lane])].is_plastic()) << lane
-    });
-    let load = |c: usize| batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
-    let along_axes: [Lanes; D] = std::array::from_fn(|axis| load(axis).sqrt());
-    if plastic == 0 {
-        return along_axes;
+    let plastic = plastic_lanes(&batch.materials(tags), scheme);
+    let mut elastic = [Lanes::splat(0.0); 6];
+    let mut stretch = [Lanes::splat(0.0); D];
+    for axis in 0..D {
+        elastic[axis] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + axis);
+        stretch[axis] = elastic[axis].sqrt();
     }
-    let zero = Lanes::splat(0.0);
-    let elastic = std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { load(c) } else { zero });
+    if plastic == 0 {
+        return stretch;
+    }
+    for c in D..Layout::<D>::SYMMETRIC {
+        elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+    }
     let gain = batch.load(reals, stride, Layout::<D>::HISTORY + 1);
     let volume_log = ln(determinant(&elastic)).mul_add(Lanes::splat(0.5), gain);
     let isotropic = exp(volume_log * (1.0 / D as f64));
+    if plastic == (1 << LANES) - 1 {
+        return [isotropic; D];
+    }
     let mask = Mask::from_bits(plastic);
-    along_axes.map(|axis| mask.select(isotropic, axis))
+    for stretch in &mut stretch {
+        *stretch = mask.select(isotropic, *stretch);
+    }
+    stretch
+}
+
+/// Bit i tells whether lane i is of a plastic material.
+#[inline(always)]
+pub(super) fn plastic_lanes(index: &[u16; LANES], scheme: &Scheme) -> u32 {
+    let is_plastic = |lane: usize| scheme.materials[usize::from(index[lane])].is_plastic();
+    if index.iter().all(|&i| i == index[0]) {
+        return if is_plastic(0) { (1 << LANES) - 1 } else { 0 };
+    }
+    (0..LANES).fold(0, |bits, lane| bits | u32::from(is_plastic(lane)) << lane)
 }

@@ -4,13 +4,13 @@
 //! ```text
 //! v = Σ w v_j,  ∇v = Σ v_j ⊗ ∇w,  B = Σ w (v_j ⊗ d + V_j),  D_k = Σ w (d_k² + S_j,k)
 //! ```
-//! axis by axis, where V and S are the first and second moments that constrained nodes inherit (zero
+//! where V and S are the first and second moments that constrained nodes inherit (zero
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::Batch;
 use super::simd::{F64x4, LANES, Lanes};
-use super::stencil::Axis;
-use super::{ARENA_EDGE, BASES, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::weights::Weights;
+use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
 use crate::particle::chunk::{Chunk, Layout};
 
@@ -85,17 +85,22 @@ pub fn gather<const D: usize>(
 ) -> f64 {
     let len = chunk.len();
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
+    let plain = fields.increment.is_none() && fields.moments.is_none();
+    let cell = frame.cell;
+    let mut weights = Weights::new();
+    let mut sums = Sums::new();
     let mut greatest = Lanes::splat(0.0);
     for i in 0..Batch::number(&select, len) {
         let batch = Batch::of(&select, len, i);
-        let position: [Lanes; D] =
-            std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
-        let cap = 0.5 * frame.cell;
+        let position = batch.positions(reals, stride);
         let half =
-            domain::of_batch(reals, stride, tags, &batch, &position, frame.cell, cap, &frame.extent, scheme);
-        let weights = Weights::new(frame, &position, &position, &half);
-        let gathered = weights.gather_batch(batch.count, fields);
-        greatest = advance(reals, stride, tags, &batch, &position, &gathered, scheme, dt).max(greatest);
+            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        weights.fill(frame, &position, &position, &half);
+        for lane in 0..batch.count.min(LANES) {
+            sums.gather(&weights, lane, fields, plain);
+        }
+        let spread = weights.spread;
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, &spread, scheme, dt).max(greatest);
     }
     largest(greatest)
 }
@@ -110,17 +115,20 @@ pub fn gather_sub_boxes<const D: usize>(
     gathered: &mut [Gathered<D>],
 ) {
     let (reals, stride) = chunk.reals();
+    let mut weights = Weights::new();
+    let mut sums = Sums::new();
+    let zero = Lanes::splat(0.0);
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let part = |lane: usize| &parts[lane.min(parts.len() - 1)];
-        let lanes = |f: &dyn Fn(&SubBox<D>) -> f64| Lanes::new(std::array::from_fn(|lane| f(part(lane))));
-        let centre = std::array::from_fn(|axis| lanes(&|part| part.centre[axis]));
-        let half = std::array::from_fn(|axis| lanes(&|part| part.half[axis]));
-        let position = std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
-        let weights = Weights::new(frame, &position, &centre, &half);
-        let spread = weights.spread_rows();
+        let position = batch.positions(reals, stride);
+        let (centre, half) = SubBox::lanes(parts);
+        weights.fill(frame, &position, &centre, &half);
+        let mut spread = [zero; 4];
+        spread[..D].copy_from_slice(&weights.spread);
+        let spread = Lanes::rows(spread);
         for (lane, part) in parts.iter().enumerate() {
-            let mut one = weights.gather_one(lane, fields);
+            sums.gather(&weights, lane, fields, false);
+            let mut one = sums.row(lane);
             one.spread = one.spread + spread[lane];
             gathered[part.slot as usize].add(&one, part.fraction);
         }
@@ -136,14 +144,17 @@ pub fn advance_gathered<const D: usize>(
     dt: f64,
 ) -> f64 {
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
+    let mut sums = Sums::new();
     let mut greatest = Lanes::splat(0.0);
     for (particles, gathered) in particles.chunks(LANES).zip(gathered.chunks(LANES)) {
         let batch = Batch::from_indices(particles, |&p| p);
-        let position: [Lanes; D] =
-            std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
-        let of = |lane: usize| &gathered[lane.min(gathered.len() - 1)];
-        let lanes = GatheredLanes::from_rows(&of);
-        greatest = advance(reals, stride, tags, &batch, &position, &lanes, scheme, dt).max(greatest);
+        let position = batch.positions(reals, stride);
+        for (lane, gathered) in gathered.iter().enumerate() {
+            sums.set(lane, gathered);
+        }
+        // The sums hold the whole spread already.
+        let none = [Lanes::splat(0.0); D];
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, &none, scheme, dt).max(greatest);
     }
     largest(greatest)
 }
@@ -152,196 +163,124 @@ fn largest(lanes: Lanes) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }
 
-/// Factors of one axis for the lanes of a batch.
-#[derive(Clone, Copy)]
-struct Factors {
-    weight: [[f64; LANES]; 3],
-    /// Weight times (node - particle).
-    arm: [[f64; LANES]; 3],
-    slope: [[f64; LANES]; 3],
+/// [`Gathered`] of a batch, one row per lane. Made once and filled for batch after batch; lanes that
+/// a batch does not fill keep what they had, which is valid.
+struct Sums<const D: usize> {
+    velocity: [F64x4; LANES],
+    gradient: [[F64x4; LANES]; D],
+    affine: [[F64x4; LANES]; D],
+    spread: [F64x4; LANES],
+    increment: [F64x4; LANES],
 }
 
-/// Stencils of a batch: scalars by lane.
-struct Weights<const D: usize> {
-    base: [[f64; LANES]; D],
-    axis: [Factors; D],
-    /// `Σ w d_k²` over the nodes.
-    spread: [Lanes; D],
-}
-
-impl<const D: usize> Weights<D> {
-    #[inline(always)]
-    fn new(frame: &Frame<D>, position: &[Lanes; D], centre: &[Lanes; D], half: &[Lanes; D]) -> Self {
-        let inverse = 1.0 / frame.cell;
-        let local = |x: Lanes, axis: usize| (x - Lanes::splat(frame.corner[axis])) * inverse;
-        let mut spread = [Lanes::splat(0.0); D];
-        let mut base = [[0.0; LANES]; D];
-        let axis = std::array::from_fn(|k| {
-            let axis = Axis::new(local(centre[k], k), half[k] * inverse, inverse);
-            let offset = axis.offsets(local(position[k], k), frame.cell);
-            let arm: [Lanes; 3] = std::array::from_fn(|i| axis.weight[i] * offset[i]);
-            spread[k] = arm[0].mul_add(offset[0], arm[1].mul_add(offset[1], arm[2] * offset[2]));
-            base[k] = axis.base.to_array();
-            Factors {
-                weight: axis.weight.map(Lanes::to_array),
-                arm: arm.map(Lanes::to_array),
-                slope: axis.slope.map(Lanes::to_array),
-            }
-        });
-        Self { base, axis, spread }
+impl<const D: usize> Sums<D> {
+    fn new() -> Self {
+        let zero = [F64x4::splat(0.0); LANES];
+        // One keeps 1 / spread finite in lanes never filled.
+        let spread = [F64x4::splat(1.0); LANES];
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], spread, increment: zero }
     }
 
-    /// Index of the lowest node of a stencil in a cube with `edge` nodes per axis, from node -1 on.
-    #[inline(always)]
-    fn first(&self, lane: usize, edge: usize) -> usize {
-        (0..D).rev().fold(0, |index, k| index * edge + (self.base[k][lane] + 1.0) as usize)
-    }
-
-    fn spread_rows(&self) -> [F64x4; LANES] {
-        let zero = Lanes::splat(0.0);
-        Lanes::rows(std::array::from_fn(|k| if k < D { self.spread[k] } else { zero }))
-    }
-
-    /// All lanes; those beyond `count` stay zero.
-    #[inline(always)]
-    fn gather_batch(&self, count: usize, fields: &Fields<D>) -> GatheredLanes<D> {
-        let mut rows = [Gathered::default(); LANES];
-        if fields.increment.is_none() && fields.moments.is_none() {
-            let span = super::stencil_span(D);
-            for (lane, row) in rows.iter_mut().enumerate().take(count) {
-                let first = self.first(lane, ARENA_EDGE);
-                self.contract(lane, &fields.velocity[first..first + span], row);
-            }
-        } else {
-            for (lane, row) in rows.iter_mut().enumerate().take(count) {
-                *row = self.gather_one(lane, fields);
-            }
+    fn row(&self, lane: usize) -> Gathered<D> {
+        Gathered {
+            velocity: self.velocity[lane],
+            gradient: std::array::from_fn(|k| self.gradient[k][lane]),
+            affine: std::array::from_fn(|k| self.affine[k][lane]),
+            spread: self.spread[lane],
+            increment: self.increment[lane],
         }
-        let mut lanes = GatheredLanes::from_rows(&|lane| &rows[lane]);
+    }
+
+    fn set(&mut self, lane: usize, row: &Gathered<D>) {
+        self.velocity[lane] = row.velocity;
+        self.spread[lane] = row.spread;
+        self.increment[lane] = row.increment;
         for k in 0..D {
-            lanes.spread[k] = lanes.spread[k] + self.spread[k];
+            self.gradient[k][lane] = row.gradient[k];
+            self.affine[k][lane] = row.affine[k];
         }
-        lanes
     }
 
-    /// One lane, with all that the fields offer; the spread holds second moments only.
+    /// One lane, with all that the fields offer; the spread holds second moments only. `plain` says
+    /// that there are velocities only.
     #[inline(always)]
-    fn gather_one(&self, lane: usize, fields: &Fields<D>) -> Gathered<D> {
+    fn gather(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>, plain: bool) {
         let span = super::stencil_span(D);
-        let first = self.first(lane, ARENA_EDGE);
-        let mut sum = Gathered::default();
-        self.contract(lane, &fields.velocity[first..first + span], &mut sum);
+        let first = weights.first(lane);
+        self.contract(weights, lane, &fields.velocity[first..first + span]);
+        self.spread[lane] = F64x4::splat(0.0);
+        if !plain {
+            self.gather_others(weights, lane, fields);
+        }
+    }
+
+    fn gather_others(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>) {
+        let first = weights.first(lane);
         if let Some(increment) = fields.increment {
-            sum.increment = self.mean(lane, |node| increment[first + node]);
+            self.increment[lane] = mean(weights, lane, |node| increment[first + node]);
         }
         if let Some(moments) = &fields.moments
-            && moments.touched[self.first(lane, BASES)]
+            && moments.touched[weights.base(lane)]
         {
-            sum.spread = self.mean(lane, |node| moments.second[first + node]);
+            self.spread[lane] = mean(weights, lane, |node| moments.second[first + node]);
             for k in 0..D {
-                sum.affine[k] = sum.affine[k] + self.mean(lane, |node| moments.first[first + node][k]);
+                let moment = mean(weights, lane, |node| moments.first[first + node][k]);
+                self.affine[k][lane] = self.affine[k][lane] + moment;
             }
         }
-        sum
     }
 
-    /// `Σ w f_j`.
-    fn mean(&self, lane: usize, f: impl Fn(usize) -> Row) -> F64x4 {
-        let mut sum = F64x4::splat(0.0);
-        super::for_each_node::<D>(|node, index| {
-            let weight = (0..D).fold(1.0, |weight, k| weight * self.axis[k].weight[index[k]][lane]);
-            sum = F64x4::splat(weight).mul_add(F64x4::new(f(node).0), sum);
-        });
-        sum
-    }
-
-    /// Velocity, gradient and affine sums: x first, then y, then z.
+    /// Velocity, gradient and affine sums.
+    ///
+    /// Each needs the nodes averaged over all axes but one: the pencil along x is
+    /// `X_a = Σ_bc wy_b wz_c v_abc`, and so on. All three come from one pass over the nodes.
     #[inline(always)]
-    fn contract(&self, lane: usize, nodes: &[Row], out: &mut Gathered<D>) {
+    fn contract(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
         let nodes = &nodes[..super::stencil_span(D)];
-        let of = |values: &[[f64; LANES]; 3]| -> [F64x4; 3] {
-            std::array::from_fn(|i| F64x4::splat(values[i][lane]))
-        };
-        let dot = |factor: &[F64x4; 3], value: &[F64x4; 3]| {
-            factor[2].mul_add(value[2], factor[1].mul_add(value[1], factor[0] * value[0]))
-        };
-        let [weight, arm, slope] = [of(&self.axis[0].weight), of(&self.axis[0].arm), of(&self.axis[0].slope)];
-        let y = &self.axis[1];
-        let [weight_y, arm_y, slope_y] = [of(&y.weight), of(&y.arm), of(&y.slope)];
-        // Of one plane z: mean, then the arms along x and y, then the slopes along x and y.
-        let plane = |c: usize| -> [F64x4; 5] {
-            let mut mean = [F64x4::splat(0.0); 3];
-            let mut arms = mean;
-            let mut slopes = mean;
+        let zero = F64x4::splat(0.0);
+        let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
+        let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
+        let weight_x = [of(&x.weight[0]), of(&x.weight[1]), of(&x.weight[2])];
+        let mut pencil = [[zero; 3]; D];
+        for c in 0..if D == 3 { 3 } else { 1 } {
             for b in 0..3 {
-                let row: [F64x4; 3] =
-                    std::array::from_fn(|a| F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0));
-                mean[b] = dot(&weight, &row);
-                arms[b] = dot(&arm, &row);
-                slopes[b] = dot(&slope, &row);
+                let product = of(if D == 3 { &weights.product[b][c] } else { &y.weight[b] });
+                let mut across = zero;
+                for a in 0..3 {
+                    let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
+                    pencil[0][a] = product.mul_add(row, pencil[0][a]);
+                    across = weight_x[a].mul_add(row, across);
+                }
+                if D == 3 {
+                    pencil[1][b] = of(&z.weight[c]).mul_add(across, pencil[1][b]);
+                    pencil[D - 1][c] = of(&y.weight[b]).mul_add(across, pencil[D - 1][c]);
+                } else {
+                    pencil[1][b] = across;
+                }
             }
-            [
-                dot(&weight_y, &mean),
-                dot(&weight_y, &arms),
-                dot(&arm_y, &mean),
-                dot(&weight_y, &slopes),
-                dot(&slope_y, &mean),
-            ]
-        };
-        if D == 2 {
-            let [mean, arm_x, arm_y, slope_x, slope_y] = plane(0);
-            out.velocity = mean;
-            (out.affine[0], out.affine[1]) = (arm_x, arm_y);
-            (out.gradient[0], out.gradient[1]) = (slope_x, slope_y);
-            return;
         }
-        let planes: [[F64x4; 5]; 3] = std::array::from_fn(plane);
-        let z = &self.axis[D - 1];
-        let [weight_z, arm_z, slope_z] = [of(&z.weight), of(&z.arm), of(&z.slope)];
-        let through = |i: usize| [planes[0][i], planes[1][i], planes[2][i]];
-        let mean = through(0);
-        out.velocity = dot(&weight_z, &mean);
-        out.affine[0] = dot(&weight_z, &through(1));
-        out.affine[1] = dot(&weight_z, &through(2));
-        out.affine[D - 1] = dot(&arm_z, &mean);
-        out.gradient[0] = dot(&weight_z, &through(3));
-        out.gradient[1] = dot(&weight_z, &through(4));
-        out.gradient[D - 1] = dot(&slope_z, &mean);
-    }
-}
-
-/// [`Gathered`] of a batch, component by component.
-struct GatheredLanes<const D: usize> {
-    velocity: [Lanes; D],
-    /// `gradient[i][k]` is ∂v_i/∂x_k.
-    gradient: [[Lanes; D]; D],
-    affine: [[Lanes; D]; D],
-    spread: [Lanes; D],
-    increment: [Lanes; D],
-}
-
-impl<const D: usize> GatheredLanes<D> {
-    #[inline(always)]
-    fn from_rows<'a>(of: &impl Fn(usize) -> &'a Gathered<D>) -> Self {
-        let vector = |f: &dyn Fn(&Gathered<D>) -> F64x4| -> [Lanes; D] {
-            let columns = Lanes::columns(std::array::from_fn(|lane| f(of(lane))));
-            std::array::from_fn(|i| columns[i])
+        let dot = |factor: &[[f64; LANES]; 3], pencil: &[F64x4; 3]| {
+            let sum = of(&factor[1]).mul_add(pencil[1], of(&factor[0]) * pencil[0]);
+            of(&factor[2]).mul_add(pencil[2], sum)
         };
-        let matrix = |f: &dyn Fn(&Gathered<D>, usize) -> F64x4| -> [[Lanes; D]; D] {
-            let columns: [[Lanes; D]; D] = std::array::from_fn(|k| vector(&|g| f(g, k)));
-            std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
-        };
-        Self {
-            velocity: vector(&|g| g.velocity),
-            gradient: matrix(&|g, k| g.gradient[k]),
-            affine: matrix(&|g, k| g.affine[k]),
-            spread: vector(&|g| g.spread),
-            increment: vector(&|g| g.increment),
+        self.velocity[lane] = dot(&x.weight, &pencil[0]);
+        for k in 0..D {
+            self.affine[k][lane] = dot(&weights.axis[k].arm, &pencil[k]);
+            self.gradient[k][lane] = dot(&weights.axis[k].slope, &pencil[k]);
         }
     }
 }
 
-/// New state of a batch; returns wave speed plus particle speed.
+/// `Σ w f_j`.
+fn mean<const D: usize>(weights: &Weights<D>, lane: usize, f: impl Fn(usize) -> Row) -> F64x4 {
+    let mut sum = F64x4::splat(0.0);
+    super::for_each_node::<D>(|node, index| {
+        sum = F64x4::splat(weights.weight(lane, index)).mul_add(F64x4::new(f(node).0), sum);
+    });
+    sum
+}
+
+/// New state of a batch; returns wave speed plus particle speed. `spread` is added to that of `sums`.
 #[inline(always)]
 fn advance<const D: usize>(
     reals: &mut [f64],
@@ -349,50 +288,62 @@ fn advance<const D: usize>(
     tags: &[u64],
     batch: &Batch,
     position: &[Lanes; D],
-    gathered: &GatheredLanes<D>,
+    sums: &Sums<D>,
+    spread: &[Lanes; D],
     scheme: &Scheme,
     dt: f64,
 ) -> Lanes {
     let zero = Lanes::splat(0.0);
     let step = Lanes::splat(dt);
-    let mut velocity = gathered.velocity;
-    let affine: [[Lanes; D]; D] = match scheme.transfer {
-        Transfer::Apic => {
-            let inverse = gathered.spread.map(|spread| Lanes::splat(1.0) / spread);
-            std::array::from_fn(|i| std::array::from_fn(|k| gathered.affine[i][k] * inverse[k]))
-        }
-        Transfer::Tpic => gathered.gradient,
-        Transfer::Flip { blend } => {
-            for i in 0..D {
-                let old = batch.load(reals, stride, Layout::<D>::VELOCITY + i);
-                let flip = old + gathered.increment[i];
-                velocity[i] = (flip - velocity[i]).mul_add(Lanes::splat(blend), velocity[i]);
-            }
-            [[zero; D]; D]
-        }
-    };
+    let velocity = Lanes::columns(sums.velocity);
     let mut square = zero;
+    let mut gradient = [[zero; D]; D];
+    for k in 0..D {
+        let column = Lanes::columns(sums.gradient[k]);
+        for i in 0..D {
+            gradient[i][k] = column[i];
+        }
+    }
+    let increment = match scheme.transfer {
+        Transfer::Flip { .. } => Lanes::columns(sums.increment),
+        _ => [zero; 4],
+    };
     for i in 0..D {
-        let moved = gathered.velocity[i].mul_add(step, position[i]);
+        let moved = velocity[i].mul_add(step, position[i]);
         batch.store(reals, stride, Layout::<D>::POSITION + i, moved);
-        batch.store(reals, stride, Layout::<D>::VELOCITY + i, velocity[i]);
-        square = velocity[i].mul_add(velocity[i], square);
-        for k in 0..D {
-            batch.store(reals, stride, Layout::<D>::AFFINE + D * i + k, affine[i][k]);
+        let new = if let Transfer::Flip { blend } = scheme.transfer {
+            let flip = batch.load(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
+            (flip - velocity[i]).mul_add(Lanes::splat(blend), velocity[i])
+        } else {
+            velocity[i]
+        };
+        batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
+        square = new.mul_add(new, square);
+    }
+    let moments = Lanes::columns(sums.spread);
+    for k in 0..D {
+        let inverse = Lanes::splat(1.0) / (spread[k] + moments[k]);
+        let affine = Lanes::columns(sums.affine[k]);
+        for i in 0..D {
+            let value = match scheme.transfer {
+                Transfer::Apic => affine[i] * inverse,
+                Transfer::Tpic => gradient[i][k],
+                Transfer::Flip { .. } => zero,
+            };
+            batch.store(reals, stride, Layout::<D>::AFFINE + D * i + k, value);
         }
     }
     let index = batch.materials(tags);
-    let plastic = index.iter().any(|&i| scheme.materials[usize::from(i)].is_plastic());
-    let elastic = std::array::from_fn(|c| {
-        if c < Layout::<D>::SYMMETRIC {
-            batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c)
-        } else {
-            zero
-        }
-    });
-    let mut state = State::new(strained(&elastic, &gathered.gradient, step));
+    let plastic = domain::plastic_lanes(&index, scheme) != 0;
+    let mut elastic = [zero; 6];
+    for c in 0..Layout::<D>::SYMMETRIC {
+        elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+    }
+    let mut state = State::new(strained(&elastic, &gradient, step));
     if plastic {
-        state.history = std::array::from_fn(|h| batch.load(reals, stride, Layout::<D>::HISTORY + h));
+        for h in 0..material::HISTORIES {
+            state.history[h] = batch.load(reals, stride, Layout::<D>::HISTORY + h);
+        }
     }
     material::update(scheme.materials, &index, &mut state, D == 2);
     for c in 0..Layout::<D>::SYMMETRIC {
@@ -413,25 +364,28 @@ fn advance<const D: usize>(
 /// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.
 #[inline(always)]
 fn strained<const D: usize>(b: &[Lanes; 6], gradient: &[[Lanes; D]; D], step: Lanes) -> [Lanes; 6] {
-    let one = Lanes::splat(1.0);
-    let a: [[Lanes; D]; D] =
-        std::array::from_fn(|i| {
-            std::array::from_fn(|k| {
-                if i == k { gradient[i][k].mul_add(step, one) } else { gradient[i][k] * step }
-            })
-        });
-    let ab: [[Lanes; D]; D] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            (1..D).fold(a[i][0] * b[super::symmetric_index::<D>(0, j)], |sum, k| {
-                a[i][k].mul_add(b[super::symmetric_index::<D>(k, j)], sum)
-            })
-        })
-    });
+    let mut a = *gradient;
+    for i in 0..D {
+        for k in 0..D {
+            let unit = Lanes::splat(if i == k { 1.0 } else { 0.0 });
+            a[i][k] = gradient[i][k].mul_add(step, unit);
+        }
+    }
     let mut out = *b;
     for i in 0..D {
+        let mut ab = [Lanes::splat(0.0); D];
+        for j in 0..D {
+            ab[j] = a[i][0] * b[super::symmetric_index::<D>(0, j)];
+            for k in 1..D {
+                ab[j] = a[i][k].mul_add(b[super::symmetric_index::<D>(k, j)], ab[j]);
+            }
+        }
         for j in i..D {
-            out[super::symmetric_index::<D>(i, j)] =
-                (1..D).fold(ab[i][0] * a[j][0], |sum, k| ab[i][k].mul_add(a[j][k], sum));
+            let mut sum = ab[0] * a[j][0];
+            for k in 1..D {
+                sum = ab[k].mul_add(a[j][k], sum);
+            }
+            out[super::symmetric_index::<D>(i, j)] = sum;
         }
     }
     out

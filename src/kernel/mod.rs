@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use self::simd::Lanes;
 use crate::material::Material;
 
 mod batch;
@@ -18,6 +19,7 @@ pub mod simd;
 pub mod stencil;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 /// Cells of a block along one axis.
 pub const BLOCK: usize = 4;
@@ -139,6 +141,19 @@ pub struct SubBox<const D: usize> {
     pub half: [f64; D],
     /// Share of the particle that the part carries: 1 / number of parts.
     pub fraction: f64,
+}
+
+impl<const D: usize> SubBox<D> {
+    /// Centres and half widths of up to a batch of parts; lanes beyond repeat the last.
+    fn lanes(parts: &[Self]) -> ([Lanes; D], [Lanes; D]) {
+        let lanes = |value: &dyn Fn(&Self) -> f64| {
+            Lanes::new(std::array::from_fn(|lane| value(&parts[lane.min(parts.len() - 1)])))
+        };
+        (
+            std::array::from_fn(|axis| lanes(&|part| part.centre[axis])),
+            std::array::from_fn(|axis| lanes(&|part| part.half[axis])),
+        )
+    }
 }
 
 /// Nodes from the first to the last of a stencil in an arena, both included.

@@ -13,8 +13,8 @@
 //! ```
 use super::batch::Batch;
 use super::simd::{F64x4, LANES, Lanes};
-use super::stencil::Axis;
-use super::{ARENA_EDGE, BASES, Frame, Row, Scheme, Select, SubBox, domain};
+use super::weights::Weights;
+use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Layout};
 
 /// First moments `A = Σ w m C` of the nodes, gathered only from stencils that touch a constrained
@@ -64,15 +64,13 @@ pub fn scatter_sub_boxes<const D: usize>(
     mut moments: Option<MomentSums<D>>,
 ) {
     let (reals, stride) = chunk.reals();
+    let mut prepared = Prepared::new();
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let part = |lane: usize| &parts[lane.min(parts.len() - 1)];
-        let lanes = |f: &dyn Fn(&SubBox<D>) -> f64| Lanes::new(std::array::from_fn(|lane| f(part(lane))));
-        let centre = std::array::from_fn(|axis| lanes(&|part| part.centre[axis]));
-        let half = std::array::from_fn(|axis| lanes(&|part| part.half[axis]));
-        let position = std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
-        let share = Some(lanes(&|part| part.fraction));
-        let prepared = Prepared::new(reals, stride, &batch, frame, dt, &position, &centre, &half, share);
+        let position = batch.positions(reals, stride);
+        prepared.fill_parts(frame, &position, parts);
+        prepared.load(reals, stride, &batch, dt);
+        prepared.share(parts);
         prepared.add(batch.count, arena, moments.as_mut());
     }
 }
@@ -88,97 +86,86 @@ fn scatter_all<const D: usize>(
     mut moments: Option<MomentSums<D>>,
 ) {
     let (reals, stride) = chunk.reals();
+    let (tags, cell) = (chunk.tags(), frame.cell);
+    let mut prepared = Prepared::new();
     for i in 0..Batch::number(&select, chunk.len()) {
         let batch = Batch::of(&select, chunk.len(), i);
-        let position: [Lanes; D] =
-            std::array::from_fn(|axis| batch.load(reals, stride, Layout::<D>::POSITION + axis));
-        let half = domain::of_batch(
-            reals,
-            stride,
-            chunk.tags(),
-            &batch,
-            &position,
-            frame.cell,
-            0.5 * frame.cell,
-            &frame.extent,
-            scheme,
-        );
-        let prepared = Prepared::new(reals, stride, &batch, frame, dt, &position, &position, &half, None);
+        let position = batch.positions(reals, stride);
+        let half =
+            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        prepared.weights.fill(frame, &position, &position, &half);
+        prepared.load(reals, stride, &batch, dt);
         prepared.add(batch.count, arena, moments.as_mut());
     }
 }
 
-/// Factors of one axis for the lanes of a batch.
-#[derive(Clone, Copy)]
-struct Factors {
-    weight: [[f64; LANES]; 3],
-    /// Weight times (node - particle).
-    arm: [[f64; LANES]; 3],
-    slope: [[f64; LANES]; 3],
-}
-
-/// A batch ready to be added to nodes: scalars by lane, rows by particle.
+/// A batch ready to be added to nodes: factors by lane, rows by particle.
 struct Prepared<const D: usize> {
-    base: [[f64; LANES]; D],
-    axis: [Factors; D],
-    /// Products of y and z weights.
-    product: [[[f64; LANES]; 3]; 3],
+    weights: Weights<D>,
+    /// `m (v, 1)`.
     momentum: [F64x4; LANES],
+    /// `m C e_k`.
     affine: [[F64x4; LANES]; D],
+    /// `-Δt V₀ τ e_k`.
     impulse: [[F64x4; LANES]; D],
 }
 
 impl<const D: usize> Prepared<D> {
+    fn new() -> Self {
+        let rows = [F64x4::splat(0.0); LANES];
+        Self { weights: Weights::new(), momentum: rows, affine: [rows; D], impulse: [rows; D] }
+    }
+
+    fn fill_parts(&mut self, frame: &Frame<D>, position: &[Lanes; D], parts: &[SubBox<D>]) {
+        let (centre, half) = SubBox::lanes(parts);
+        self.weights.fill(frame, position, &centre, &half);
+    }
+
+    /// Reads the particles' state.
     #[inline(always)]
-    fn new(
-        reals: &[f64],
-        stride: usize,
-        batch: &Batch,
-        frame: &Frame<D>,
-        dt: f64,
-        position: &[Lanes; D],
-        centre: &[Lanes; D],
-        half: &[Lanes; D],
-        share: Option<Lanes>,
-    ) -> Self {
+    fn load(&mut self, reals: &[f64], stride: usize, batch: &Batch, dt: f64) {
         let zero = Lanes::splat(0.0);
-        let load = |column: usize| batch.load(reals, stride, column);
-        let inverse = 1.0 / frame.cell;
-        let local = |x: Lanes, axis: usize| (x - Lanes::splat(frame.corner[axis])) * inverse;
-        let axes: [Axis; D] =
-            std::array::from_fn(|k| Axis::new(local(centre[k], k), half[k] * inverse, inverse));
-        let axis = std::array::from_fn(|k| {
-            let offset = axes[k].offsets(local(position[k], k), frame.cell);
-            Factors {
-                weight: axes[k].weight.map(Lanes::to_array),
-                arm: std::array::from_fn(|i| (axes[k].weight[i] * offset[i]).to_array()),
-                slope: axes[k].slope.map(Lanes::to_array),
-            }
-        });
-        let product = std::array::from_fn(|b| {
-            std::array::from_fn(|c| {
-                if D == 3 { (axes[1].weight[b] * axes[2].weight[c]).to_array() } else { [0.0; LANES] }
-            })
-        });
-        let mut mass = load(Layout::<D>::MASS);
-        let width = load(Layout::<D>::HALF) * 2.0;
-        let mut volume = (0..D).fold(Lanes::splat(-dt), |product, _| product * width);
-        if let Some(share) = share {
-            (mass, volume) = (mass * share, volume * share);
+        let mass = batch.load(reals, stride, Layout::<D>::MASS);
+        let width = batch.load(reals, stride, Layout::<D>::HALF) * 2.0;
+        let mut volume = Lanes::splat(-dt);
+        for _ in 0..D {
+            volume = volume * width;
         }
-        let row = |column: &dyn Fn(usize) -> Lanes, factor: Lanes, last: Lanes| {
-            let z = if D == 3 { column(2) * factor } else { zero };
-            Lanes::rows([column(0) * factor, column(1) * factor, z, last])
-        };
-        Self {
-            base: std::array::from_fn(|k| axes[k].base.to_array()),
-            axis,
-            product,
-            momentum: row(&|i| load(Layout::<D>::VELOCITY + i), mass, mass),
-            affine: std::array::from_fn(|k| row(&|i| load(Layout::<D>::AFFINE + D * i + k), mass, zero)),
-            impulse: std::array::from_fn(|k| {
-                row(&|i| load(Layout::<D>::STRESS + super::symmetric_index::<D>(i, k)), volume, zero)
-            }),
+        let mut column = [zero, zero, zero, mass];
+        for i in 0..D {
+            column[i] = batch.load(reals, stride, Layout::<D>::VELOCITY + i) * mass;
+        }
+        self.momentum = Lanes::rows(column);
+        column[3] = zero;
+        for k in 0..D {
+            for i in 0..D {
+                column[i] = batch.load(reals, stride, Layout::<D>::AFFINE + D * i + k) * mass;
+            }
+            self.affine[k] = Lanes::rows(column);
+        }
+        let mut stress = [zero; 6];
+        for c in 0..Layout::<D>::SYMMETRIC {
+            if D == 3 || c != 2 {
+                stress[c] = batch.load(reals, stride, Layout::<D>::STRESS + c) * volume;
+            }
+        }
+        for k in 0..D {
+            for i in 0..D {
+                column[i] = stress[super::symmetric_index::<D>(i, k)];
+            }
+            self.impulse[k] = Lanes::rows(column);
+        }
+    }
+
+    /// Leaves each lane the share of its part.
+    fn share(&mut self, parts: &[SubBox<D>]) {
+        for (lane, part) in parts.iter().enumerate() {
+            let share = F64x4::splat(part.fraction);
+            self.momentum[lane] = self.momentum[lane] * share;
+            for k in 0..D {
+                self.affine[k][lane] = self.affine[k][lane] * share;
+                self.impulse[k][lane] = self.impulse[k][lane] * share;
+            }
         }
     }
 
@@ -187,61 +174,49 @@ impl<const D: usize> Prepared<D> {
     fn add(&self, count: usize, arena: &mut [Row], mut moments: Option<&mut MomentSums<D>>) {
         let span = super::stencil_span(D);
         for lane in 0..count.min(LANES) {
-            let first = self.first(lane, ARENA_EDGE);
+            let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
             if let Some(moments) = moments.as_deref_mut()
-                && moments.touched[self.first(lane, BASES)]
+                && moments.touched[self.weights.base(lane)]
             {
                 self.add_moments(lane, &mut moments.sums[first..first + span]);
             }
         }
     }
 
-    /// Index of the lowest node of a stencil in a cube with `edge` nodes per axis, from node -1 on.
-    #[inline(always)]
-    fn first(&self, lane: usize, edge: usize) -> usize {
-        (0..D).rev().fold(0, |index, k| index * edge + (self.base[k][lane] + 1.0) as usize)
-    }
-
     #[inline(always)]
     fn add_one(&self, lane: usize, nodes: &mut [Row]) {
         let nodes = &mut nodes[..super::stencil_span(D)];
+        let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
-        let momentum = self.momentum[lane];
-        let x = &self.axis[0];
-        let (affine, impulse) = (self.affine[0][lane], self.impulse[0][lane]);
-        let along_x: [F64x4; 3] = std::array::from_fn(|a| {
-            let sum = of(&x.slope[a]).mul_add(impulse, of(&x.arm[a]) * affine);
-            of(&x.weight[a]).mul_add(momentum, sum)
-        });
-        let along = |k: usize| -> [F64x4; 3] {
-            let (axis, affine, impulse) = (&self.axis[k], self.affine[k][lane], self.impulse[k][lane]);
-            std::array::from_fn(|i| of(&axis.slope[i]).mul_add(impulse, of(&axis.arm[i]) * affine))
-        };
-        let along_y = along(1);
-        let weight_x: [F64x4; 3] = std::array::from_fn(|a| of(&x.weight[a]));
-        let y = &self.axis[1];
-        if D == 2 {
-            for b in 0..3 {
-                let weight = of(&y.weight[b]);
-                for a in 0..3 {
-                    let node = &mut nodes[a + ARENA_EDGE * b].0;
-                    let sum = weight.mul_add(along_x[a], F64x4::new(*node));
-                    *node = weight_x[a].mul_add(along_y[b], sum).to_array();
-                }
+        let mut along = [[zero; 3]; D];
+        for k in 0..D {
+            let (axis, affine, impulse) =
+                (&self.weights.axis[k], self.affine[k][lane], self.impulse[k][lane]);
+            for i in 0..3 {
+                along[k][i] = of(&axis.slope[i]).mul_add(impulse, of(&axis.arm[i]) * affine);
             }
-            return;
         }
-        let along_z = along(D - 1);
-        let z = &self.axis[D - 1];
-        for c in 0..3 {
-            let weight_z = of(&z.weight[c]);
+        let mut weight_x = [zero; 3];
+        for a in 0..3 {
+            weight_x[a] = of(&self.weights.axis[0].weight[a]);
+            along[0][a] = weight_x[a].mul_add(self.momentum[lane], along[0][a]);
+        }
+        for c in 0..if D == 3 { 3 } else { 1 } {
             for b in 0..3 {
-                let other = weight_z.mul_add(along_y[b], of(&y.weight[b]) * along_z[c]);
-                let product = of(&self.product[b][c]);
+                let weight_y = of(&self.weights.axis[1].weight[b]);
+                let (product, other) = if D == 3 {
+                    let weight_z = of(&self.weights.axis[D - 1].weight[c]);
+                    (
+                        of(&self.weights.product[b][c]),
+                        weight_z.mul_add(along[1][b], weight_y * along[D - 1][c]),
+                    )
+                } else {
+                    (weight_y, along[1][b])
+                };
                 for a in 0..3 {
                     let node = &mut nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0;
-                    let sum = product.mul_add(along_x[a], F64x4::new(*node));
+                    let sum = product.mul_add(along[0][a], F64x4::new(*node));
                     *node = weight_x[a].mul_add(other, sum).to_array();
                 }
             }
@@ -249,12 +224,11 @@ impl<const D: usize> Prepared<D> {
     }
 
     fn add_moments(&self, lane: usize, nodes: &mut [[Row; D]]) {
-        let affine: [F64x4; D] = std::array::from_fn(|k| self.affine[k][lane]);
         super::for_each_node::<D>(|node, index| {
-            let weight = (0..D).fold(1.0, |weight, k| weight * self.axis[k].weight[index[k]][lane]);
+            let weight = F64x4::splat(self.weights.weight(lane, index));
             for k in 0..D {
                 let sum = &mut nodes[node][k].0;
-                *sum = F64x4::splat(weight).mul_add(affine[k], F64x4::new(*sum)).to_array();
+                *sum = weight.mul_add(self.affine[k][lane], F64x4::new(*sum)).to_array();
             }
         });
     }

@@ -415,6 +415,21 @@ impl Lanes {
         let [a, b, c, d, e, f, g, h] = values;
         Self([F64x4::new([a, b, c, d]), F64x4::new([e, f, g, h])])
     }
+    /// Reads from an array.
+    #[inline(always)]
+    pub fn load(from: &[f64; LANES]) -> Self {
+        let (low, high) = from.split_at(4);
+        let mut parts = [[0.0; 4]; 2];
+        parts[0].copy_from_slice(low);
+        parts[1].copy_from_slice(high);
+        Self([F64x4::new(parts[0]), F64x4::new(parts[1])])
+    }
+    /// Writes to an array.
+    #[inline(always)]
+    pub fn store(self, to: &mut [f64; LANES]) {
+        to[..4].copy_from_slice(&self.0[0].to_array());
+        to[4..].copy_from_slice(&self.0[1].to_array());
+    }
     /// To an array.
     #[inline(always)]
     pub fn to_array(self) -> [f64; LANES] {

@@ -201,6 +201,37 @@ impl<const D: usize> Chunk<D> {
         first
     }
 
+    /// All columns as bytes, to send the particles to another rank of the same job.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut words: Vec<u64> = Vec::with_capacity(1 + self.len * (Layout::<D>::REALS + 2));
+        words.push(self.len as u64);
+        for column in 0..Layout::<D>::REALS {
+            words.extend(self.column(column).iter().map(|value| value.to_bits()));
+        }
+        words.extend(self.ids());
+        words.extend(self.tags());
+        bytemuck::cast_slice(&words).to_vec()
+    }
+
+    /// The particles that [`Chunk::to_bytes`] packed; empty if the bytes are not of that form.
+    pub fn from_bytes(bytes: &[u8]) -> Self {
+        let mut words = bytes.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
+        let len = words.next().unwrap_or(0) as usize;
+        if bytes.len() != 8 * (1 + len * (Layout::<D>::REALS + 2)) {
+            return Self::new();
+        }
+        let mut chunk = Self::with_capacity(len);
+        chunk.extend_zeroed(len);
+        for column in 0..Layout::<D>::REALS {
+            for (value, word) in chunk.column_mut(column).iter_mut().zip(&mut words) {
+                *value = f64::from_bits(word);
+            }
+        }
+        chunk.ids_mut().iter_mut().zip(&mut words).for_each(|(id, word)| *id = word);
+        chunk.tags_mut().iter_mut().zip(&mut words).for_each(|(tag, word)| *tag = word);
+        chunk
+    }
+
     /// Keeps the particles for which `keep(p)` holds, in their order.
     pub fn retain(&mut self, mut keep: impl FnMut(usize) -> bool) {
         let kept: Vec<u32> = (0..self.len).filter(|&p| keep(p)).map(|p| p as u32).collect();
@@ -263,6 +294,22 @@ mod tests {
     fn tag_round_trip() {
         let tag = Tag { material: 513, body: 7, level: 9 };
         assert_eq!(Tag::unpack(tag.pack()), tag);
+    }
+
+    #[test]
+    fn bytes_round_trip() {
+        let mut chunk = Chunk::<3>::new();
+        for id in 0..11 {
+            let p = chunk.push_zeroed(id << 40, Tag { material: 1, body: 2, level: 3 });
+            chunk.column_mut(Layout::<3>::WORK)[p] = -0.1 * id as f64;
+        }
+        let back = Chunk::<3>::from_bytes(&chunk.to_bytes());
+        assert_eq!(back.ids(), chunk.ids());
+        assert_eq!(back.tags(), chunk.tags());
+        for column in 0..Layout::<3>::REALS {
+            assert_eq!(back.column(column), chunk.column(column));
+        }
+        assert!(Chunk::<3>::from_bytes(&[1, 2, 3]).is_empty());
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //!   [`Comm::agree`] (`agree.rs`) and [`Comm::sparse_exchange`] (`sparse.rs`),
 //! * [`NeighbourExchange`] sends one message to each of a fixed set of neighbours, with a begin
 //!   and a finish between which other work can be done (`neighbour.rs`),
-//! * `request.rs` owns the buffers of sends under way; with `abort.rs` it holds the `unsafe`.
+//! * `request.rs` owns the buffers of sends under way; it holds all `unsafe` of this crate.
 //!
 //! Everything here runs on the main thread (`MPI_THREAD_FUNNELED`); [`Comm`] is neither `Send`
 //! nor `Sync`, so the compiler keeps it there. No call has a cost that grows like the number of

@@ -1,0 +1,16 @@
+//! Boundary conditions on the velocities of real nodes, and what becomes of particles that leave.
+pub mod face;
+
+pub use face::FaceCondition;
+
+/// What happens to particles that leave the domain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Leaving {
+    /// The run ends with an error that names them.
+    #[default]
+    Error,
+    /// They are removed and counted.
+    Delete,
+    /// They are put back on the face they crossed.
+    Clamp,
+}

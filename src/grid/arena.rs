@@ -1,0 +1,91 @@
+//! Arenas: what the particles of each bin scattered, before nodes sum it up.
+use super::plan::GridPlan;
+use crate::kernel::{Row, arena_nodes};
+
+/// First moments of one node: row `k` is column `k` of the matrix `A_j = Σ w m C` on the way from particles
+/// to nodes, or of `V_j` on the way back. Lane 3 is zero.
+pub type Moments<const D: usize> = [Row; D];
+
+/// No arena.
+const NONE: u32 = u32::MAX;
+
+/// Arenas of the bins that are occupied in a step; empty bins hold no memory.
+#[derive(Clone, Debug, Default)]
+pub struct Arenas<const D: usize> {
+    rows: Vec<Row>,
+    moments: Vec<Moments<D>>,
+    /// Per bin, number of its arena.
+    slot: Vec<u32>,
+    /// Per bin, number of its moments.
+    moment_slot: Vec<u32>,
+}
+
+/// The arena of one bin, to scatter into.
+pub struct ArenaMut<'a, const D: usize> {
+    /// Number of the bin.
+    pub bin: usize,
+    /// Momentum and mass.
+    pub rows: &'a mut [Row],
+    /// First moments, for bins that touch constrained nodes.
+    pub moments: Option<&'a mut [Moments<D>]>,
+}
+
+impl<const D: usize> Arenas<D> {
+    /// Makes room for the bins that `is_occupied` names. Contents are left over from earlier steps.
+    pub fn occupy(&mut self, plan: &GridPlan<D>, is_occupied: impl Fn(usize) -> bool) {
+        let (mut slots, mut moment_slots) = (0, 0);
+        self.slot.resize(plan.bins.len(), NONE);
+        self.moment_slot.resize(plan.bins.len(), NONE);
+        for (bin, touched) in plan.bins.iter().map(|bin| bin.touched.is_some()).enumerate() {
+            let occupied = is_occupied(bin);
+            self.slot[bin] = if occupied { slots } else { NONE };
+            self.moment_slot[bin] = if occupied && touched { moment_slots } else { NONE };
+            slots += u32::from(occupied);
+            moment_slots += u32::from(occupied && touched);
+        }
+        let nodes = arena_nodes(D);
+        grow(&mut self.rows, slots as usize * nodes, Row([0.0; 4]));
+        grow(&mut self.moments, moment_slots as usize * nodes, [Row([0.0; 4]); D]);
+    }
+
+    /// The arenas of all occupied bins, mutable and disjoint, in bin order.
+    pub fn each_mut(&mut self) -> Vec<ArenaMut<'_, D>> {
+        let mut rows = self.rows.chunks_mut(arena_nodes(D));
+        let mut moments = self.moments.chunks_mut(arena_nodes(D));
+        let mut arenas = Vec::with_capacity(self.slot.len());
+        for (bin, (slot, moment_slot)) in self.slot.iter().zip(&self.moment_slot).enumerate() {
+            if *slot != NONE
+                && let Some(rows) = rows.next()
+            {
+                let moments = if *moment_slot == NONE { None } else { moments.next() };
+                arenas.push(ArenaMut { bin, rows, moments });
+            }
+        }
+        arenas
+    }
+
+    /// Momentum and mass rows of a bin, if it is occupied.
+    pub fn rows(&self, bin: u32) -> Option<&[Row]> {
+        let slot = self.slot[bin as usize];
+        (slot != NONE).then(|| &self.rows[slot as usize * arena_nodes(D)..][..arena_nodes(D)])
+    }
+
+    /// First moments of a bin, if it is occupied and touches constrained nodes.
+    pub fn moments(&self, bin: u32) -> Option<&[Moments<D>]> {
+        let slot = self.moment_slot[bin as usize];
+        (slot != NONE).then(|| &self.moments[slot as usize * arena_nodes(D)..][..arena_nodes(D)])
+    }
+
+    /// Heap bytes held.
+    pub fn heap_bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Moments<D>>()
+    }
+}
+
+/// Grows without room to spare: arenas are a large part of the memory beside the particles.
+fn grow<T: Clone>(values: &mut Vec<T>, len: usize, value: T) {
+    if len > values.len() {
+        values.reserve_exact(len - values.len());
+        values.resize(len, value);
+    }
+}

@@ -1,0 +1,183 @@
+//! The part of the tree that one rank knows: its own leaves and its ghost layer.
+use partition::{Brick, Forest, Octant};
+
+/// What covers an octant, as far as this rank knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cover {
+    /// The octant lies outside the domain.
+    Outside,
+    /// One leaf (index into the known leaves) contains or equals the octant.
+    Leaf(usize),
+    /// The octant is subdivided; the index is that of the leaf at its lower corner.
+    Finer(usize),
+    /// This rank does not know.
+    Unknown,
+}
+
+/// Own leaves and ghost leaves, sorted along the curve, with their owners.
+#[derive(Clone, Debug)]
+pub struct KnownTree<const D: usize> {
+    brick: Brick<D>,
+    rank: usize,
+    leaves: Vec<Octant<D>>,
+    keys: Vec<u64>,
+    owners: Vec<u32>,
+    first_own: usize,
+    own_len: usize,
+    reach: u32,
+    graded: bool,
+}
+
+/// What the ghost layer has to allow for, the same on every rank.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Allowance {
+    /// Half width of the widest boxes in cells of the leaf that holds them, rounded up, if any is wider
+    /// than a cell; 0 otherwise. At most [`MAX_REACH`].
+    pub reach: u32,
+    /// Whether neighbouring leaves differ by one level at most.
+    pub graded: bool,
+}
+
+/// Greatest half width of a box, in cells of the leaf that holds the particle: one edge of the leaf.
+pub const MAX_REACH: u32 = 4;
+
+impl<const D: usize> KnownTree<D> {
+    /// Not collective. The own leaves of a rank, without a ghost layer.
+    pub fn own(forest: &Forest<D>, rank: usize, allowance: Allowance) -> Self {
+        let leaves = forest.leaves().to_vec();
+        let mut tree = Self {
+            brick: *forest.brick(),
+            rank,
+            owners: vec![rank as u32; leaves.len()],
+            keys: Vec::new(),
+            first_own: 0,
+            own_len: leaves.len(),
+            reach: allowance.reach,
+            graded: allowance.graded,
+            leaves,
+        };
+        tree.index();
+        tree
+    }
+
+    /// Adds leaves with their owners; those known already are ignored.
+    pub fn add(&mut self, found: &[(Octant<D>, usize)]) {
+        let mut all: Vec<(Octant<D>, u32)> =
+            self.leaves.iter().copied().zip(self.owners.iter().copied()).collect();
+        all.extend(found.iter().map(|&(leaf, owner)| (leaf, owner as u32)));
+        all.sort_unstable_by_key(|(leaf, _)| leaf.key());
+        all.dedup_by_key(|(leaf, _)| *leaf);
+        (self.leaves, self.owners) = all.into_iter().unzip();
+        self.index();
+    }
+
+    fn index(&mut self) {
+        self.keys = self.leaves.iter().map(Octant::key).collect();
+        self.first_own = self.owners.iter().position(|&owner| owner as usize == self.rank).unwrap_or(0);
+    }
+
+    /// The brick of root octants.
+    pub fn brick(&self) -> &Brick<D> {
+        &self.brick
+    }
+
+    /// All known leaves along the curve.
+    pub fn leaves(&self) -> &[Octant<D>] {
+        &self.leaves
+    }
+
+    /// Owner of a known leaf.
+    pub fn owner(&self, known: usize) -> usize {
+        self.owners[known] as usize
+    }
+
+    /// Own leaves: their number among the known leaves is `first_own() + local index`.
+    pub fn first_own(&self) -> usize {
+        self.first_own
+    }
+
+    /// Index of a known leaf among the rank's own leaves.
+    pub fn local(&self, known: usize) -> Option<usize> {
+        let local = known.wrapping_sub(self.first_own);
+        (local < self.own_len).then_some(local)
+    }
+
+    /// See [`Allowance::reach`].
+    pub fn reach(&self) -> u32 {
+        self.reach
+    }
+
+    /// Coarsest level of leaves whose boxes can have parts in a bin of `level`.
+    ///
+    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf, so that parts
+    /// of that leaf's boxes cannot reach the bin.
+    pub fn coarsest_reaching(&self, level: u8) -> u8 {
+        if !self.graded {
+            return 0;
+        }
+        level.saturating_sub(if self.reach > 1 { 3 } else { 2 })
+    }
+
+    /// Number of leaves of other ranks that are known.
+    pub fn ghost_len(&self) -> usize {
+        self.leaves.len() - self.own_len
+    }
+
+    /// Heap bytes held.
+    pub fn heap_bytes(&self) -> usize {
+        self.leaves.capacity() * (size_of::<Octant<D>>() + 8 + 4)
+    }
+
+    /// The known leaf that contains the finest-level position `key`.
+    pub fn locate(&self, key: u64) -> Option<usize> {
+        let after = self.keys.partition_point(|&k| k <= key);
+        let candidate = after.checked_sub(1)?;
+        (key < self.leaves[candidate].key_end()).then_some(candidate)
+    }
+
+    /// What covers the octant of `level` at `coord`.
+    pub fn cover(&self, level: u8, coord: [u32; D]) -> Cover {
+        if !self.contains(level, coord) {
+            return Cover::Outside;
+        }
+        match self.locate(Octant { level, coord }.key()) {
+            None => Cover::Unknown,
+            Some(leaf) if self.leaves[leaf].level > level => Cover::Finer(leaf),
+            Some(leaf) => Cover::Leaf(leaf),
+        }
+    }
+
+    /// True when the octant lies in the domain.
+    pub fn contains(&self, level: u8, coord: [u32; D]) -> bool {
+        (0..D).all(|axis| coord[axis] < self.brick.roots[axis] << level)
+    }
+
+    /// True when every position of the octant lies in a known leaf (or outside the domain).
+    pub fn is_known(&self, level: u8, coord: [u32; D]) -> bool {
+        if !self.contains(level, coord) {
+            return true;
+        }
+        let octant = Octant { level, coord };
+        let Some(first) = self.locate(octant.key()) else { return false };
+        let end = octant.key_end();
+        let mut reached = self.leaves[first].key_end();
+        for next in first + 1..self.leaves.len() {
+            if reached >= end {
+                break;
+            }
+            if self.keys[next] != reached {
+                return false;
+            }
+            reached = self.leaves[next].key_end();
+        }
+        reached >= end
+    }
+
+    /// Known leaves inside the octant, which must be subdivided.
+    pub fn leaves_within(&self, level: u8, coord: [u32; D]) -> std::ops::Range<usize> {
+        let octant = Octant { level, coord };
+        let start = self.keys.partition_point(|&k| k < octant.key());
+        let end = self.keys.partition_point(|&k| k < octant.key_end());
+        start..end
+    }
+}

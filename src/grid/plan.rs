@@ -1,0 +1,525 @@
+//! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
+use std::collections::HashMap;
+
+use partition::comm::Comm;
+use partition::{Forest, MAX_LEVEL, Octant, Region};
+
+use super::closure::{Closure, NeededBlocks, bin_sources, nodes_in_domain, potential_bins};
+use super::constraint::{block_and_bit, node_coord, parents_of};
+use super::known::{Allowance, KnownTree};
+use super::mask::{
+    arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, opposite, shifted,
+};
+use crate::kernel::{ARENA_EDGE, Row};
+
+/// No block: outside the domain, or not needed by this rank.
+pub const NO_BLOCK: u32 = u32::MAX;
+
+/// Number of a bin of this rank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BinId(pub u32);
+
+/// A block of `4^D` nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<const D: usize> {
+    /// Level of its nodes.
+    pub level: u8,
+    /// Coordinate in blocks; one past the last octant for nodes on the upper faces of the domain.
+    pub coord: [u32; D],
+    /// Nodes whose velocity this rank needs.
+    pub value: u64,
+    /// Nodes whose complete sum this rank needs.
+    pub sum: u64,
+    /// Nodes that touch a coarser leaf.
+    pub constrained: u64,
+    /// Real nodes that this rank counts when it sums over the grid.
+    pub owned: u64,
+    /// Place of its first moments, for blocks with needed constrained nodes.
+    pub moments: Option<u32>,
+}
+
+/// A bin: the particles of one leaf, or parts of their boxes, that scatter on one level into the arena of one
+/// block. Blocks inside the leaf come first; parts of boxes may also reach blocks of other leaves.
+#[derive(Clone, Debug)]
+pub struct Bin<const D: usize> {
+    /// Own leaf whose particles it takes.
+    pub leaf: u32,
+    /// Level and block coordinate of the arena.
+    pub block: Octant<D>,
+    /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
+    pub around: [u32; 27],
+    /// Which stencils (by base, see [`GridPlan::touched`]) reach a constrained node, if any does.
+    pub touched: Option<u32>,
+}
+
+/// One part of a node sum: nodes of `arena` that fall into the block at `offset` from the bin.
+#[derive(Clone, Copy, Debug)]
+pub struct Contribution {
+    /// The arena: of an own bin, or of a bin received from another rank.
+    pub source: Source,
+    /// Offset number of the block, seen from the bin.
+    pub offset: u8,
+}
+
+/// Where an arena comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// An own bin.
+    Own(BinId),
+    /// A received bin: number among the received bins, and its part for this block.
+    Received(u32, u32),
+}
+
+/// A link between a constrained node and one of its parents.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// Node at the other end (block number × nodes per block + bit).
+    pub node: u32,
+    /// Offset number of parent minus constrained node, in cells of the finer level.
+    pub offset: u8,
+    /// Weight.
+    pub weight: f64,
+}
+
+/// Links of a list of nodes: `links[start[i]..start[i + 1]]` belong to `nodes[i]`. Nodes ascend.
+#[derive(Clone, Debug, Default)]
+pub struct Links {
+    /// The nodes that gather.
+    pub nodes: Vec<u32>,
+    /// Start of each node's links.
+    pub start: Vec<u32>,
+    /// The links.
+    pub links: Vec<Link>,
+}
+
+impl Links {
+    /// Groups `(node, order, link)` by node; `order` fixes the order of a node's links.
+    fn group(mut entries: Vec<(u32, u32, Link)>) -> Self {
+        entries.sort_unstable_by_key(|&(node, order, _)| (node, order));
+        let mut grouped = Self::default();
+        for (node, _, link) in entries {
+            if grouped.nodes.last() != Some(&node) {
+                grouped.nodes.push(node);
+                grouped.start.push(grouped.links.len() as u32);
+            }
+            grouped.links.push(link);
+        }
+        grouped.start.push(grouped.links.len() as u32);
+        grouped
+    }
+
+    /// Links of the `i`-th node.
+    pub fn of(&self, i: usize) -> &[Link] {
+        &self.links[self.start[i] as usize..self.start[i + 1] as usize]
+    }
+}
+
+/// A bin of another rank that contributes here, with the nodes needed of it.
+#[derive(Clone, Debug)]
+pub struct ReceivedBin<const D: usize> {
+    /// Owner.
+    pub rank: usize,
+    /// Known leaf whose particles it takes.
+    pub leaf: u32,
+    /// Level and block coordinate of the arena.
+    pub block: Octant<D>,
+    /// Needed nodes by block: `(offset number of the block from the bin, nodes, constrained nodes)`.
+    pub parts: Vec<(u8, u64, u64)>,
+}
+
+/// The grid of one rank. Valid for one revision of the forest.
+pub struct GridPlan<const D: usize> {
+    /// Revision of the forest it was made for.
+    pub revision: u64,
+    /// Own leaves and ghost layer.
+    pub tree: KnownTree<D>,
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Blocks, by level and then along the curve.
+    pub blocks: Vec<Block<D>>,
+    /// First block of each level, and the number of blocks at the end.
+    pub level_start: Vec<usize>,
+    /// Bins of this rank, leaf by leaf.
+    pub bins: Vec<Bin<D>>,
+    /// First bin of each own leaf, and the number of bins at the end.
+    pub leaf_start: Vec<u32>,
+    /// Bins of other ranks that contribute to sums here, by rank, leaf and bin.
+    pub received: Vec<ReceivedBin<D>>,
+    /// Contributions to each block in canonical order (source leaf along the curve, then bin).
+    pub contributions: Vec<Contribution>,
+    /// First contribution of each block, and the number of contributions at the end.
+    pub contribution_start: Vec<u32>,
+    /// Per level, restriction into its nodes from constrained nodes one level finer.
+    pub restriction: Vec<Links>,
+    /// Per level, prolongation into its constrained nodes from one level coarser.
+    pub prolongation: Vec<Links>,
+    /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
+    pub face_nodes: Vec<(u32, u8)>,
+    /// Number of blocks with first moments.
+    pub moment_blocks: usize,
+    /// Tables of [`Bin::touched`], each `(BLOCK + 1)^D` long: base `-1..=3` per axis, first axis fastest.
+    pub touched: Vec<Vec<bool>>,
+    /// Second moments of the constraints (`S` of the design), one row per moment node: axis by axis, m².
+    pub spread: Vec<Row>,
+    /// Rounds that the ghost layer took to close.
+    pub rounds: usize,
+}
+
+impl<const D: usize> GridPlan<D> {
+    /// Collective. Builds the ghost layer and the grid of each rank.
+    pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
+        let mut tree = KnownTree::own(forest, comm.rank(), allowance);
+        let mut rounds = 0;
+        let needed = loop {
+            let closure = Closure::compute(&tree);
+            if !comm.any(!closure.missing.is_empty()) {
+                break closure.blocks;
+            }
+            rounds += 1;
+            let queries: Vec<Region<D>> = closure.missing.iter().map(interior).collect();
+            tree.add(&forest.leaves_in(comm, &queries));
+        };
+        let mut plan = Self {
+            revision: forest.revision(),
+            root_edge,
+            blocks: Vec::new(),
+            level_start: Vec::new(),
+            bins: Vec::new(),
+            leaf_start: Vec::new(),
+            received: Vec::new(),
+            contributions: Vec::new(),
+            contribution_start: Vec::new(),
+            restriction: Vec::new(),
+            prolongation: Vec::new(),
+            face_nodes: Vec::new(),
+            moment_blocks: 0,
+            touched: Vec::new(),
+            spread: Vec::new(),
+            rounds,
+            tree,
+        };
+        plan.list_blocks(&needed);
+        let number: HashMap<(u8, [u32; D]), u32> =
+            plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
+        plan.list_bins(&number);
+        plan.list_contributions(comm.rank());
+        plan.link_levels(&number);
+        plan.find_face_nodes();
+        plan.spread = plan.constraint_spread();
+        plan
+    }
+
+    /// Edge of a cell of `level`, m.
+    pub fn cell(&self, level: u8) -> f64 {
+        self.root_edge / f64::from(4u32 << level)
+    }
+
+    /// Number of levels, the deepest included.
+    pub fn levels(&self) -> usize {
+        self.level_start.len() - 1
+    }
+
+    /// Blocks of `level`.
+    pub fn level_blocks(&self, level: usize) -> std::ops::Range<usize> {
+        self.level_start[level]..self.level_start[level + 1]
+    }
+
+    /// Bins of own leaf `leaf`.
+    pub fn leaf_bins(&self, leaf: usize) -> std::ops::Range<usize> {
+        self.leaf_start[leaf] as usize..self.leaf_start[leaf + 1] as usize
+    }
+
+    /// Contributions to block `block`.
+    pub fn block_contributions(&self, block: usize) -> &[Contribution] {
+        let range = self.contribution_start[block] as usize..self.contribution_start[block + 1] as usize;
+        &self.contributions[range]
+    }
+
+    /// Position of a node relative to the domain's lower corner, m.
+    pub fn node_position(&self, node: u32) -> [f64; D] {
+        let block = &self.blocks[node as usize / block_nodes(D)];
+        let coord = node_coord(block.coord, node % block_nodes(D) as u32);
+        let cell = self.cell(block.level);
+        coord.map(|c| f64::from(c) * cell)
+    }
+
+    /// Heap bytes held by the larger tables.
+    pub fn heap_bytes(&self) -> usize {
+        self.tree.heap_bytes()
+            + self.blocks.capacity() * size_of::<Block<D>>()
+            + self.bins.capacity() * size_of::<Bin<D>>()
+            + self.contributions.capacity() * size_of::<Contribution>()
+            + self.spread.capacity() * size_of::<Row>()
+    }
+
+    fn list_blocks(&mut self, needed: &NeededBlocks<D>) {
+        let mut blocks: Vec<Block<D>> = needed
+            .iter()
+            .map(|(&(level, coord), sets)| Block {
+                level,
+                coord,
+                value: sets.value,
+                sum: sets.sum,
+                constrained: sets.constrained,
+                owned: self.owned_nodes(level, coord, sets.value & !sets.constrained),
+                moments: None,
+            })
+            .collect();
+        blocks.sort_unstable_by_key(|b| (b.level, Octant { level: b.level, coord: b.coord }.key(), b.coord));
+        for block in &mut blocks {
+            if block.constrained & (block.sum | block.value) != 0 {
+                block.moments = Some(self.moment_blocks as u32);
+                self.moment_blocks += 1;
+            }
+        }
+        let deepest = blocks.last().map_or(0, |block| block.level as usize);
+        self.level_start = (0..=deepest + 1)
+            .map(|level| blocks.partition_point(|block| (block.level as usize) < level))
+            .collect();
+        self.blocks = blocks;
+    }
+
+    /// The real nodes among `real` that lie in an own leaf; nodes on upper faces of the domain belong to
+    /// the leaf below them.
+    fn owned_nodes(&self, level: u8, coord: [u32; D], real: u64) -> u64 {
+        bits(real)
+            .filter(|&bit| {
+                let node = node_coord(coord, bit);
+                let position: [u32; D] = std::array::from_fn(|axis| {
+                    let end = self.tree.brick().roots[axis] << MAX_LEVEL;
+                    // Node coordinates count cells, of which an octant of the level has four per edge.
+                    let lattice = (u64::from(node[axis]) << MAX_LEVEL >> (level + 2)) as u32;
+                    lattice.min(end - 1)
+                });
+                let finest = Octant { level: MAX_LEVEL, coord: position };
+                self.tree.locate(finest.key()).is_some_and(|leaf| self.tree.local(leaf).is_some())
+            })
+            .fold(0, |mask, bit| mask | 1 << bit)
+    }
+
+    fn list_bins(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
+        let first = self.tree.first_own();
+        let own = self.tree.leaves().len() - self.tree.ghost_len();
+        for leaf in 0..own {
+            self.leaf_start.push(self.bins.len() as u32);
+            for block in potential_bins(&self.tree, first + leaf) {
+                let mut around = [NO_BLOCK; 27];
+                for (index, slot) in around.iter_mut().enumerate().take(offset_count(D)) {
+                    if let Some(coord) = shifted(block.coord, offset::<D>(index))
+                        && let Some(&found) = number.get(&(block.level, coord))
+                    {
+                        *slot = found;
+                    }
+                }
+                let touched = self.touched_bases(&around);
+                self.bins.push(Bin { leaf: leaf as u32, block, around, touched });
+            }
+        }
+        self.leaf_start.push(self.bins.len() as u32);
+    }
+
+    /// Table of the stencil bases that reach a constrained node, or `None` if there is no such base.
+    fn touched_bases(&mut self, around: &[u32; 27]) -> Option<u32> {
+        let mut constrained = vec![false; ARENA_EDGE.pow(D as u32)];
+        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
+            if block != NO_BLOCK {
+                let mask = self.blocks[block as usize].constrained & arena_overlap::<D>(offset(index));
+                for bit in bits(mask) {
+                    constrained[arena_index::<D>(index, bit)] = true;
+                }
+            }
+        }
+        if !constrained.contains(&true) {
+            return None;
+        }
+        let bases = ARENA_EDGE - 2;
+        let table: Vec<bool> = (0..bases.pow(D as u32))
+            .map(|base| {
+                (0..offset_count(D)).any(|node| {
+                    let index: usize = (0..D as u32)
+                        .map(|axis| {
+                            let at = base / bases.pow(axis) % bases + node / 3usize.pow(axis) % 3;
+                            at * ARENA_EDGE.pow(axis)
+                        })
+                        .sum();
+                    constrained[index]
+                })
+            })
+            .collect();
+        self.touched.push(table);
+        Some(self.touched.len() as u32 - 1)
+    }
+
+    /// Lists the arenas that make up each block's sum, own and received, in canonical order.
+    fn list_contributions(&mut self, rank: usize) {
+        let own_bins = self.own_bins();
+        // (block, source leaf, bin, offset, nodes)
+        let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
+        for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
+            for towards in 0..offset_count(D) {
+                let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
+                let seen_from_bin = opposite(D, towards);
+                let nodes = block.sum & arena_overlap::<D>(offset(seen_from_bin));
+                if nodes == 0 {
+                    continue;
+                }
+                let bin = Octant { level: block.level, coord };
+                for leaf in bin_sources(&self.tree, block.level, coord) {
+                    sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
+                }
+            }
+        }
+        let mut remote: Vec<_> = sources
+            .iter()
+            .filter(|source| self.tree.owner(source.1 as usize) != rank)
+            .map(|&(block, leaf, bin, offset, nodes)| (leaf, bin, offset, nodes, block))
+            .collect();
+        remote.sort_unstable_by_key(|&(leaf, bin, offset, ..)| (leaf, bin.level, bin.key(), offset));
+        let mut part_of: HashMap<(u32, Octant<D>, u8), (u32, u32)> = HashMap::new();
+        for (leaf, bin, offset, nodes, block) in remote {
+            let constrained = nodes & self.blocks[block as usize].constrained;
+            if self.received.last().is_none_or(|last| (last.leaf, last.block) != (leaf, bin)) {
+                let rank = self.tree.owner(leaf as usize);
+                self.received.push(ReceivedBin { rank, leaf, block: bin, parts: Vec::new() });
+            }
+            let number = self.received.len() as u32 - 1;
+            let parts = &mut self.received[number as usize].parts;
+            part_of.insert((leaf, bin, offset), (number, parts.len() as u32));
+            parts.push((offset, nodes, constrained));
+        }
+        sources.sort_unstable_by_key(|&(block, leaf, bin, offset, _)| (block, leaf, bin.key(), offset));
+        let mut next = 0;
+        for (block, leaf, bin, offset, _) in sources {
+            while next <= block {
+                self.contribution_start.push(self.contributions.len() as u32);
+                next += 1;
+            }
+            let source = match own_bins.get(&(leaf, bin)) {
+                Some(&own) => Source::Own(BinId(own)),
+                None => {
+                    let (number, part) = part_of[&(leaf, bin, offset)];
+                    Source::Received(number, part)
+                }
+            };
+            self.contributions.push(Contribution { source, offset });
+        }
+        self.contribution_start.resize(self.blocks.len() + 1, self.contributions.len() as u32);
+    }
+
+    /// Own bins by known source leaf and block.
+    pub(super) fn own_bins(&self) -> HashMap<(u32, Octant<D>), u32> {
+        let first = self.tree.first_own() as u32;
+        self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
+    }
+
+    fn link_levels(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
+        let nodes = block_nodes(D) as u32;
+        let levels = self.levels();
+        let mut restriction: Vec<Vec<(u32, u32, Link)>> = vec![Vec::new(); levels];
+        let mut prolongation = restriction.clone();
+        for (index, block) in self.blocks.iter().enumerate() {
+            let level = block.level as usize;
+            for bit in bits((block.sum | block.value) & block.constrained) {
+                let fine = index as u32 * nodes + bit;
+                for (order, parent) in parents_of::<D>(node_coord(block.coord, bit)).enumerate() {
+                    let (coord, parent_bit) = block_and_bit(parent.node);
+                    let Some(&coarse_block) = number.get(&(block.level - 1, coord)) else { continue };
+                    let coarse = coarse_block * nodes + parent_bit;
+                    let offset = offset_index_u8(parent.offset);
+                    if block.sum >> bit & 1 == 1
+                        && self.blocks[coarse_block as usize].sum >> parent_bit & 1 == 1
+                    {
+                        // A parent meets its children in lexicographic order of their position.
+                        let order = u32::from(opposite(D, offset as usize) as u8);
+                        let link = Link { node: fine, offset, weight: parent.weight };
+                        restriction[level - 1].push((coarse, order, link));
+                    }
+                    if block.value >> bit & 1 == 1 {
+                        let link = Link { node: coarse, offset, weight: parent.weight };
+                        prolongation[level].push((fine, order as u32, link));
+                    }
+                }
+            }
+        }
+        self.restriction = restriction.into_iter().map(Links::group).collect();
+        self.prolongation = prolongation.into_iter().map(Links::group).collect();
+    }
+
+    fn find_face_nodes(&mut self) {
+        for (index, block) in self.blocks.iter().enumerate() {
+            let real =
+                block.value & !block.constrained & nodes_in_domain(&self.tree, block.level, block.coord);
+            for bit in bits(real) {
+                let node = node_coord(block.coord, bit);
+                let mut faces = 0u8;
+                for axis in 0..D {
+                    let last = 4 * (self.tree.brick().roots[axis] << block.level);
+                    faces |= u8::from(node[axis] == 0) << (2 * axis);
+                    faces |= u8::from(node[axis] == last) << (2 * axis + 1);
+                }
+                if faces != 0 {
+                    self.face_nodes.push((index as u32 * block_nodes(D) as u32 + bit, faces));
+                }
+            }
+        }
+    }
+
+    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes.
+    fn constraint_spread(&self) -> Vec<Row> {
+        let nodes = block_nodes(D);
+        let mut spread = vec![Row([0.0; 4]); self.moment_blocks * nodes];
+        for level in 1..self.levels() {
+            let cell_squared = self.cell(level as u8).powi(2);
+            let links = &self.prolongation[level];
+            for (i, &node) in links.nodes.iter().enumerate() {
+                let mut sum = [0.0; 4];
+                for link in links.of(i) {
+                    let parent = self.moment_node(link.node).map_or([0.0; 4], |slot| spread[slot].0);
+                    let delta = offset::<D>(link.offset as usize);
+                    for axis in 0..D {
+                        let squared = f64::from(delta[axis] * delta[axis]) * cell_squared;
+                        sum[axis] += link.weight * (parent[axis] + squared);
+                    }
+                }
+                if let Some(slot) = self.moment_node(node) {
+                    spread[slot] = Row(sum);
+                }
+            }
+        }
+        spread
+    }
+
+    /// Place of a node's first moments, if its block has any.
+    pub fn moment_node(&self, node: u32) -> Option<usize> {
+        let nodes = block_nodes(D);
+        let slot = self.blocks[node as usize / nodes].moments?;
+        Some(slot as usize * nodes + node as usize % nodes)
+    }
+}
+
+/// Index in a bin's arena of node `bit` of the block at offset number `index` from the bin.
+pub fn arena_index<const D: usize>(index: usize, bit: u32) -> usize {
+    let (towards, node) = (offset::<D>(index), node_of_bit::<D>(bit));
+    debug_assert_eq!(bit_of_node(node), bit);
+    (0..D)
+        .map(|axis| {
+            let at = (4 * towards[axis] + node[axis] as i32 + 1) as usize;
+            at * ARENA_EDGE.pow(axis as u32)
+        })
+        .sum()
+}
+
+fn offset_index_u8<const D: usize>(offset: [i32; D]) -> u8 {
+    super::mask::offset_index(offset) as u8
+}
+
+/// The region of an octant without its surface, so that only leaves that overlap it answer.
+fn interior<const D: usize>(octant: &Octant<D>) -> Region<D> {
+    let shift = MAX_LEVEL - octant.level;
+    let lo = octant.coord.map(|c| c << shift);
+    // An octant of the finest level has no interior; its whole box then asks for neighbours as well.
+    if shift == 0 {
+        return Region { lo, hi: octant.coord.map(|c| c + 1) };
+    }
+    Region { lo: lo.map(|c| c + 1), hi: octant.coord.map(|c| ((c + 1) << shift) - 1) }
+}

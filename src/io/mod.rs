@@ -1,0 +1,8 @@
+//! Files: parallel HDF5 output that ParaView opens and a run restarts from, scalar histories,
+//! telemetry, progress and pictures.
+pub mod hdf5_file;
+pub mod history;
+pub mod progress;
+pub mod series;
+pub mod snapshot;
+pub mod telemetry;

@@ -1,0 +1,178 @@
+//! What a user sees while the run goes on: a bar on a terminal, a line every few seconds elsewhere.
+
+use std::io::{IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::telemetry::Record;
+
+/// Time between lines where there is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+/// Time between changes of the bar.
+const BETWEEN_DRAWS: Duration = Duration::from_millis(200);
+/// Units of the bar.
+const LENGTH: u64 = 1000;
+
+/// How the progress is shown.
+enum Display {
+    Nothing,
+    Bar(ProgressBar),
+    Lines(Box<dyn Write>),
+}
+
+/// The progress of a run, on standard error. Speaks on rank 0 only; the other ranks create it silent.
+pub struct Progress {
+    display: Display,
+    start_time: f64,
+    end_time: f64,
+    began: Instant,
+    shown: Option<Instant>,
+    tree: String,
+}
+
+impl Progress {
+    /// A run from `start_time` to `end_time` (s). `speaks` on rank 0 and unless the user wants it quiet.
+    pub fn new(speaks: bool, start_time: f64, end_time: f64) -> Self {
+        let display = if !speaks {
+            Display::Nothing
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr());
+            // The template is fixed; if it could not be read, the plain style would do.
+            if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/blue} {msg}") {
+                bar.set_style(style);
+            }
+            Display::Bar(bar)
+        } else {
+            Display::Lines(Box::new(std::io::stderr()))
+        };
+        let tree = String::new();
+        Self { display, start_time, end_time, began: Instant::now(), shown: None, tree }
+    }
+
+    /// Takes over what changes slowly: particles, leaves per level, imbalance and memory.
+    pub fn record(&mut self, record: &Record) {
+        let levels: Vec<String> =
+            record.levels.iter().map(|level| format!("{}:{}", level.level, level.leaves)).collect();
+        self.tree = format!(
+            "{} particles, leaves {}, imbalance {:.2}, {:.2} GB/rank",
+            grouped(record.particles),
+            levels.join(" "),
+            record.imbalance,
+            record.memory.max / 1e9
+        );
+    }
+
+    /// After each step; shows it now and then.
+    pub fn step(&mut self, step: u64, time: f64, dt: f64) {
+        let pause = match self.display {
+            Display::Nothing => return,
+            Display::Bar(_) => BETWEEN_DRAWS,
+            Display::Lines(_) => BETWEEN_LINES,
+        };
+        if self.shown.is_some_and(|shown| shown.elapsed() < pause) {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        self.show(step, time, dt);
+    }
+
+    fn show(&mut self, step: u64, time: f64, dt: f64) {
+        let done = self.done(time);
+        let left = remaining(self.began.elapsed(), done);
+        let text = self.text(step, time, dt, done, left);
+        match &mut self.display {
+            Display::Nothing => {}
+            Display::Bar(bar) => {
+                bar.set_position((done * LENGTH as f64) as u64);
+                bar.set_message(text);
+            }
+            // A closed pipe must not end the run.
+            Display::Lines(out) => drop(writeln!(out, "{text}")),
+        }
+    }
+
+    fn done(&self, time: f64) -> f64 {
+        let whole = self.end_time - self.start_time;
+        if whole > 0.0 { ((time - self.start_time) / whole).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    fn text(&self, step: u64, time: f64, dt: f64, done: f64, left: Option<Duration>) -> String {
+        let left = left.map_or_else(|| "?".to_owned(), clock);
+        let mut text =
+            format!("{:5.1} %  step {step}  t = {time:.6} s  dt = {dt:.2e} s  ETA {left}", 100.0 * done);
+        if !self.tree.is_empty() {
+            text.push_str("  ");
+            text.push_str(&self.tree);
+        }
+        text
+    }
+
+    /// A message between the progress, for example that a file was written.
+    pub fn message(&mut self, text: &str) {
+        match &mut self.display {
+            Display::Nothing => {}
+            Display::Bar(bar) => bar.println(text),
+            Display::Lines(out) => drop(writeln!(out, "{text}")),
+        }
+    }
+
+    /// The last state; the bar stays on the terminal.
+    pub fn finish(&mut self, step: u64, time: f64, dt: f64) {
+        self.show(step, time, dt);
+        if let Display::Bar(bar) = &self.display {
+            bar.abandon();
+        }
+    }
+}
+
+/// Wall time that is left when the part `done` took `elapsed`.
+fn remaining(elapsed: Duration, done: f64) -> Option<Duration> {
+    // Too early to tell in the first thousandth.
+    (done > 1e-3).then(|| elapsed.mul_f64((1.0 - done) / done))
+}
+
+/// `h:mm:ss`.
+fn clock(duration: Duration) -> String {
+    let seconds = duration.as_secs();
+    format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}
+
+/// Digits in groups of three.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let groups: Vec<&str> = (0..digits.len())
+        .rev()
+        .filter(|i| (digits.len() - i).is_multiple_of(3) || *i == 0)
+        .scan(digits.len(), |end, start| Some(&digits[start..std::mem::replace(end, start)]))
+        .collect();
+    groups.into_iter().rev().collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_line_has_it_all() {
+        let progress = Progress {
+            display: Display::Nothing,
+            start_time: 1.0,
+            end_time: 3.0,
+            began: Instant::now(),
+            shown: None,
+            tree: "1 particles".into(),
+        };
+        let done = progress.done(1.5);
+        let left = remaining(Duration::from_secs(60), done);
+        let text = progress.text(12, 1.5, 1e-4, done, left);
+        assert_eq!(text, " 25.0 %  step 12  t = 1.500000 s  dt = 1.00e-4 s  ETA 0:03:00  1 particles");
+        assert_eq!(remaining(Duration::from_secs(1), 0.0), None);
+    }
+
+    #[test]
+    fn numbers_in_groups() {
+        let shown = [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped);
+        assert_eq!(shown, ["0", "12", "123", "1,234", "123,456", "1,234,567"]);
+    }
+}

@@ -1,0 +1,98 @@
+//! Finding and keeping the files of a run.
+
+use std::path::{Path, PathBuf};
+
+use super::header::Header;
+use crate::io::hdf5_file::{FileError, ParallelFile};
+
+/// Path of output number `number` of the run `name`.
+pub fn output_path(directory: &Path, name: &str, number: u64) -> PathBuf {
+    directory.join(format!("{name}_{number:06}.vtkhdf"))
+}
+
+/// Path of the tree that belongs to an output.
+pub fn tree_path(directory: &Path, name: &str, number: u64) -> PathBuf {
+    directory.join(format!("{name}_{number:06}.tree.vtkhdf"))
+}
+
+/// Path of the checkpoint of a step.
+pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
+    directory.join(format!("{name}.checkpoint_{step:09}.vtkhdf"))
+}
+
+/// What [`find_latest`] found.
+#[derive(Debug)]
+pub struct Latest {
+    /// The newest file that a run can restart from.
+    pub path: PathBuf,
+    /// Its header.
+    pub header: Header,
+    /// Files that were passed over, with the reason.
+    pub damaged: Vec<FileError>,
+}
+
+/// Not collective. The file of the latest step among the checkpoints and outputs of the run `name` that
+/// hold a restart state and look whole. `Ok(None)` if there is none and nothing was damaged.
+pub fn find_latest(directory: &Path, name: &str) -> Result<Option<Latest>, FileError> {
+    let mut best: Option<(PathBuf, Header)> = None;
+    let mut damaged = Vec::new();
+    for path in files(directory)? {
+        let Some(rest) = file_name(&path).strip_prefix(name) else { continue };
+        let number = rest
+            .strip_suffix(".vtkhdf")
+            .and_then(|rest| rest.strip_prefix(".checkpoint_").or_else(|| rest.strip_prefix('_')));
+        if !number.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())) {
+            continue;
+        }
+        match ParallelFile::open_alone(&path).and_then(|file| Header::read(&file)) {
+            Ok(header) if !header.restart => {}
+            Ok(header) => {
+                if best.as_ref().is_none_or(|(_, found)| found.step < header.step) {
+                    best = Some((path, header));
+                }
+            }
+            Err(error) => damaged.push(error),
+        }
+    }
+    match best {
+        Some((path, header)) => Ok(Some(Latest { path, header, damaged })),
+        None => damaged.into_iter().next().map_or(Ok(None), Err),
+    }
+}
+
+/// Not collective. Removes all but the `keep` checkpoints of the latest steps of the run `name`. Temporary files of
+/// checkpoints that were never finished go as well.
+pub fn remove_old_checkpoints(directory: &Path, name: &str, keep: usize) -> Result<(), FileError> {
+    let prefix = format!("{name}.checkpoint_");
+    let mut finished: Vec<(u64, PathBuf)> = Vec::new();
+    let mut remove = Vec::new();
+    for path in files(directory)? {
+        let Some(rest) = file_name(&path).strip_prefix(&prefix) else { continue };
+        if let Some(step) = rest.strip_suffix(".vtkhdf").and_then(|digits| digits.parse().ok()) {
+            finished.push((step, path));
+        } else if rest.ends_with(".vtkhdf.part") {
+            remove.push(path);
+        }
+    }
+    finished.sort();
+    let old = finished.len().saturating_sub(keep);
+    remove.extend(finished.into_iter().take(old).map(|(_, path)| path));
+    remove.into_iter().try_for_each(|path| {
+        std::fs::remove_file(&path).map_err(|source| FileError::System { path, action: "remove", source })
+    })
+}
+
+fn file_name(path: &Path) -> &str {
+    path.file_name().and_then(|name| name.to_str()).unwrap_or_default()
+}
+
+/// Files of a directory, sorted by name.
+fn files(directory: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let listed = std::fs::read_dir(directory).and_then(|entries| {
+        entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>()
+    });
+    let mut paths =
+        listed.map_err(|source| FileError::System { path: directory.into(), action: "list", source })?;
+    paths.sort();
+    Ok(paths)
+}

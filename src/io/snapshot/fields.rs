@@ -1,0 +1,258 @@
+//! The particle fields of output files and how they follow from the state.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::View;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// A field of the particles that an output file can show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PointField {
+    /// Velocity, m/s.
+    Velocity,
+    /// Magnitude of the velocity, m/s.
+    Speed,
+    /// Identifier of the particle.
+    Id,
+    /// Number of the material.
+    Material,
+    /// Number of the body.
+    Body,
+    /// Tree level that the particle was made for.
+    ParticleLevel,
+    /// Level of the leaf that holds the particle.
+    LeafLevel,
+    /// First history variable of the material, as a rule the accumulated plastic strain.
+    PlasticStrain,
+    /// Mean of the Cauchy stress with the sign changed, Pa; compression is positive.
+    Pressure,
+    /// Von Mises equivalent of the Cauchy stress, Pa.
+    VonMises,
+    /// Cauchy stress, Pa; components xx, yy, zz, xy, yz, xz as VTK orders them.
+    Stress,
+    /// Mass, kg (per metre of thickness in plane strain).
+    Mass,
+    /// Density, kg/m³.
+    Density,
+    /// Volume over reference volume, det F.
+    VolumeRatio,
+}
+
+impl PointField {
+    /// All fields.
+    pub const ALL: [Self; 14] = [
+        Self::Velocity,
+        Self::Speed,
+        Self::Id,
+        Self::Material,
+        Self::Body,
+        Self::ParticleLevel,
+        Self::LeafLevel,
+        Self::PlasticStrain,
+        Self::Pressure,
+        Self::VonMises,
+        Self::Stress,
+        Self::Mass,
+        Self::Density,
+        Self::VolumeRatio,
+    ];
+    /// The fields of a run that names none.
+    pub const USUAL: [Self; 8] = [
+        Self::Velocity,
+        Self::Id,
+        Self::Material,
+        Self::LeafLevel,
+        Self::PlasticStrain,
+        Self::Pressure,
+        Self::VonMises,
+        Self::Density,
+    ];
+
+    /// Name in job and output files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Speed => "speed",
+            Self::Id => "id",
+            Self::Material => "material",
+            Self::Body => "body",
+            Self::ParticleLevel => "particle_level",
+            Self::LeafLevel => "leaf_level",
+            Self::PlasticStrain => "plastic_strain",
+            Self::Pressure => "pressure",
+            Self::VonMises => "von_mises",
+            Self::Stress => "stress",
+            Self::Mass => "mass",
+            Self::Density => "density",
+            Self::VolumeRatio => "volume_ratio",
+        }
+    }
+
+    /// The field of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|field| field.name() == name)
+    }
+
+    /// Unit, empty for pure numbers.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Velocity | Self::Speed => "m/s",
+            Self::Pressure | Self::VonMises | Self::Stress => "Pa",
+            Self::Mass => "kg",
+            Self::Density => "kg/m3",
+            _ => "",
+        }
+    }
+
+    /// Values of all particles of the view, in order.
+    pub(crate) fn values<const D: usize>(self, view: &View<D>) -> Values {
+        let tag = |get: fn(Tag) -> u16| {
+            let tags = view.chunks.iter().flat_map(|chunk| chunk.tags());
+            Values::Integer(tags.map(|&bits| i32::from(get(Tag::unpack(bits)))).collect())
+        };
+        match self {
+            Self::Id => Values::Id(view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect()),
+            Self::Material => tag(|tag| tag.material),
+            Self::Body => tag(|tag| tag.body),
+            Self::ParticleLevel => tag(|tag| u16::from(tag.level)),
+            Self::LeafLevel => {
+                let leaves = view.leaves.iter().zip(view.chunks);
+                let levels = leaves.flat_map(|(leaf, chunk)| vec![i32::from(leaf.level); chunk.len()]);
+                Values::Integer(levels.collect())
+            }
+            Self::Velocity => each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p))),
+            Self::Speed => each(view, 0, |chunk, p, out| out.push(speed(chunk, p))),
+            Self::PlasticStrain => each(view, 0, |chunk, p, out| out.push(plastic_strain(chunk, p))),
+            Self::Mass => each(view, 0, |chunk, p, out| out.push(chunk.column(Layout::<D>::MASS)[p])),
+            Self::VolumeRatio => each(view, 0, |chunk, p, out| out.push(volume_ratio(chunk, p))),
+            Self::Density => each(view, 0, |chunk, p, out| {
+                let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
+                let volume = (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p);
+                out.push(chunk.column(Layout::<D>::MASS)[p] / volume);
+            }),
+            Self::Pressure => each(view, 0, |chunk, p, out| out.push(-mean(&cauchy_stress(chunk, p)))),
+            Self::VonMises => each(view, 0, |chunk, p, out| out.push(von_mises(&cauchy_stress(chunk, p)))),
+            Self::Stress => each(view, 6, |chunk, p, out| out.extend(cauchy_stress(chunk, p))),
+        }
+    }
+}
+
+/// Values of a field in the order of the particles.
+pub(crate) enum Values {
+    /// Identifiers.
+    Id(Vec<u64>),
+    /// Small integers.
+    Integer(Vec<i32>),
+    /// Real numbers with their number of components (0 for scalars).
+    Real(Vec<f64>, usize),
+    /// The same in single precision.
+    Single(Vec<f32>, usize),
+}
+
+impl Values {
+    /// Real numbers in single precision; integers stay as they are.
+    pub fn to_single(self) -> Self {
+        match self {
+            Self::Real(values, components) => {
+                Self::Single(values.into_iter().map(|v| v as f32).collect(), components)
+            }
+            other => other,
+        }
+    }
+}
+
+/// Applies `append` to each particle.
+fn each<const D: usize>(
+    view: &View<D>,
+    components: usize,
+    mut append: impl FnMut(&Chunk<D>, usize, &mut Vec<f64>),
+) -> Values {
+    let particles: usize = view.chunks.iter().map(Chunk::len).sum();
+    let mut out = Vec::with_capacity(particles * components.max(1));
+    for chunk in view.chunks {
+        (0..chunk.len()).for_each(|p| append(chunk, p, &mut out));
+    }
+    Values::Real(out, components)
+}
+
+/// Velocity with three components.
+fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
+    std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
+}
+
+/// Magnitude of the velocity, m/s.
+pub(crate) fn speed<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    velocity(chunk, p).iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// First history variable.
+pub(crate) fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    chunk.column(Layout::<D>::HISTORY)[p]
+}
+
+/// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
+fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
+    let at = |component: usize| chunk.column(first + component)[p];
+    let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
+    [at(0), at(1), at(2), at(3), yz, xz]
+}
+
+/// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
+/// variable (0 where a model has none).
+fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    determinant.sqrt() * libm::exp(chunk.column(Layout::<D>::HISTORY + 1)[p])
+}
+
+/// σ = τ / det F.
+fn cauchy_stress<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let ratio = volume_ratio(chunk, p);
+    symmetric(chunk, Layout::<D>::STRESS, p).map(|component| component / ratio)
+}
+
+fn mean(stress: &[f64; 6]) -> f64 {
+    (stress[0] + stress[1] + stress[2]) / 3.0
+}
+
+/// √(3/2 s:s) with the deviator s.
+fn von_mises(stress: &[f64; 6]) -> f64 {
+    let mean = mean(stress);
+    let diagonal: f64 = stress[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
+    let shear: f64 = stress[3..].iter().map(|s| s * s).sum();
+    (1.5 * (diagonal + 2.0 * shear)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_job_files() {
+        for field in PointField::ALL {
+            assert_eq!(serde_json::to_string(&field).unwrap(), format!("\"{}\"", field.name()));
+            assert_eq!(PointField::from_name(field.name()), Some(field));
+        }
+    }
+
+    #[test]
+    fn stress_measures() {
+        let mut chunk = Chunk::<3>::new();
+        let p = chunk.push_zeroed(1, Tag { material: 0, body: 0, level: 0 });
+        let b = Layout::<3>::LEFT_CAUCHY_GREEN;
+        // F = diag(1, 2, 1): det F = 2.
+        for (component, value) in [1.0, 4.0, 1.0].into_iter().enumerate() {
+            chunk.column_mut(b + component)[p] = value;
+        }
+        // Pure shear of 6 Pa in xz on top of a pressure of 2 Pa, as Kirchhoff stress.
+        for (component, value) in [-4.0, -4.0, -4.0, 0.0, 12.0, 0.0].into_iter().enumerate() {
+            chunk.column_mut(Layout::<3>::STRESS + component)[p] = value;
+        }
+        let stress = cauchy_stress(&chunk, p);
+        assert_eq!(stress, [-2.0, -2.0, -2.0, 0.0, 0.0, 6.0]);
+        assert_eq!(-mean(&stress), 2.0);
+        approx::assert_relative_eq!(von_mises(&stress), 6.0 * 3.0_f64.sqrt());
+    }
+}

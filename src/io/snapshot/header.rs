@@ -1,0 +1,270 @@
+//! What a file says about itself: who wrote it, of which job, when, and how much is in it.
+
+use partition::Octant;
+
+use super::View;
+use crate::io::hdf5_file::{FileError, ParallelFile};
+
+/// Version of the layout of the state. A file of another one is refused.
+pub const FORMAT: u64 = 1;
+/// First attribute of every file of ours.
+const MAGIC: &str = "agimp state";
+/// The group with the header and, in files that a run can restart from, the state.
+pub(super) const GROUP: &str = "state";
+
+/// Scalars that are saved and come back bit by bit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scalars {
+    /// Real numbers by name.
+    pub reals: Vec<(String, f64)>,
+    /// Counters by name.
+    pub counts: Vec<(String, u64)>,
+    /// Words of exact sums (see [`crate::exact_sum`]) by name.
+    pub exact: Vec<(String, Vec<i64>)>,
+}
+
+impl Scalars {
+    /// The real number of that name.
+    pub fn real(&self, name: &str) -> Option<f64> {
+        find(&self.reals, name).copied()
+    }
+
+    /// The counter of that name.
+    pub fn count(&self, name: &str) -> Option<u64> {
+        find(&self.counts, name).copied()
+    }
+
+    /// The words of the exact sum of that name.
+    pub fn exact(&self, name: &str) -> Option<&[i64]> {
+        find(&self.exact, name).map(Vec::as_slice)
+    }
+}
+
+fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {
+    list.iter().find(|(n, _)| n == name).map(|(_, value)| value)
+}
+
+/// The header of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Version of the layout.
+    pub format: u64,
+    /// Version of the program that wrote the file.
+    pub program: String,
+    /// 2 (plane strain) or 3.
+    pub dimension: usize,
+    /// Digest of the job.
+    pub job_digest: u64,
+    /// Lower corner of the domain, m.
+    pub origin: Vec<f64>,
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Root octants along each axis.
+    pub roots: Vec<u64>,
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Last time step, s.
+    pub dt: f64,
+    /// Leaves of the tree.
+    pub leaves: u64,
+    /// Particles.
+    pub particles: u64,
+    /// True when the file holds all that a restart needs.
+    pub restart: bool,
+    /// Names of the materials, in the order of the material numbers.
+    pub materials: Vec<String>,
+    /// Names of the history variables.
+    pub histories: Vec<String>,
+    /// Names of the extra fields of leaves.
+    pub leaf_fields: Vec<String>,
+    /// Scalars to be restored.
+    pub scalars: Scalars,
+}
+
+/// One attribute of the header.
+enum Value {
+    Text(String),
+    Count(Vec<u64>),
+    Integer(Vec<i64>),
+    Real(Vec<f64>),
+}
+
+impl Header {
+    /// The header of a view with these totals.
+    pub(super) fn new<const D: usize>(view: &View<D>, leaves: u64, particles: u64, restart: bool) -> Self {
+        Self {
+            format: FORMAT,
+            program: env!("CARGO_PKG_VERSION").into(),
+            dimension: D,
+            job_digest: view.job_digest,
+            origin: view.origin.to_vec(),
+            root_edge: view.root_edge,
+            roots: view.brick.roots.iter().map(|&n| u64::from(n)).collect(),
+            step: view.step,
+            time: view.time,
+            dt: view.dt,
+            leaves,
+            particles,
+            restart,
+            materials: view.materials.to_vec(),
+            histories: view.histories.to_vec(),
+            leaf_fields: view.leaf_fields.iter().map(|(name, _)| name.clone()).collect(),
+            scalars: view.scalars.clone(),
+        }
+    }
+
+    /// Edge of an octant, m.
+    pub fn edge<const D: usize>(&self, octant: &Octant<D>) -> f64 {
+        self.root_edge / f64::from(1_u32 << octant.level)
+    }
+
+    /// All attributes in a fixed order. Those with a leading `true` tell one state from another and
+    /// enter the digest.
+    fn entries(&self) -> Vec<(bool, &'static str, Value)> {
+        let names =
+            |list: Vec<&String>| Value::Text(list.into_iter().cloned().collect::<Vec<_>>().join("\n"));
+        let s = &self.scalars;
+        vec![
+            (false, "magic", Value::Text(MAGIC.into())),
+            (false, "format", Value::Count(vec![self.format])),
+            (false, "program", Value::Text(self.program.clone())),
+            (true, "dimension", Value::Count(vec![self.dimension as u64])),
+            (true, "job_digest", Value::Count(vec![self.job_digest])),
+            (true, "origin", Value::Real(self.origin.clone())),
+            (true, "root_edge", Value::Real(vec![self.root_edge])),
+            (true, "roots", Value::Count(self.roots.clone())),
+            (true, "step", Value::Count(vec![self.step])),
+            (true, "time", Value::Real(vec![self.time])),
+            (true, "dt", Value::Real(vec![self.dt])),
+            (true, "leaves", Value::Count(vec![self.leaves])),
+            (true, "particles", Value::Count(vec![self.particles])),
+            (false, "restart", Value::Count(vec![u64::from(self.restart)])),
+            (true, "materials", names(self.materials.iter().collect())),
+            (true, "histories", names(self.histories.iter().collect())),
+            (true, "leaf_fields", names(self.leaf_fields.iter().collect())),
+            (false, "real_names", names(s.reals.iter().map(|(name, _)| name).collect())),
+            (false, "reals", Value::Real(s.reals.iter().map(|&(_, value)| value).collect())),
+            (false, "count_names", names(s.counts.iter().map(|(name, _)| name).collect())),
+            (false, "counts", Value::Count(s.counts.iter().map(|&(_, value)| value).collect())),
+            (false, "exact_names", names(s.exact.iter().map(|(name, _)| name).collect())),
+            (
+                false,
+                "exact_lengths",
+                Value::Count(s.exact.iter().map(|(_, words)| words.len() as u64).collect()),
+            ),
+            (false, "exact", Value::Integer(s.exact.iter().flat_map(|(_, words)| words.clone()).collect())),
+        ]
+    }
+
+    /// CRC-32 of the names and values of the attributes.
+    fn checksum(&self, only_state: bool) -> u32 {
+        let mut crc = crc32fast::Hasher::new();
+        for (of_state, name, value) in self.entries() {
+            if only_state && !of_state {
+                continue;
+            }
+            crc.update(name.as_bytes());
+            match value {
+                Value::Text(text) => crc.update(text.as_bytes()),
+                Value::Count(values) => values.iter().for_each(|v| crc.update(&v.to_le_bytes())),
+                Value::Integer(values) => values.iter().for_each(|v| crc.update(&v.to_le_bytes())),
+                Value::Real(values) => values.iter().for_each(|v| crc.update(&v.to_bits().to_le_bytes())),
+            }
+        }
+        crc.finalize()
+    }
+
+    /// CRC-32 of what tells one state from another: not the program, and not the bookkeeping of a run.
+    pub fn state_checksum(&self) -> u32 {
+        self.checksum(true)
+    }
+
+    /// Collective on a shared file. Writes the group with the header.
+    pub(super) fn write(&self, file: &ParallelFile) -> Result<(), FileError> {
+        file.create_group(GROUP)?;
+        for (_, name, value) in self.entries() {
+            match value {
+                Value::Text(text) => file.set_text(GROUP, name, &text)?,
+                Value::Count(values) => file.set_attribute(GROUP, name, &values)?,
+                Value::Integer(values) => file.set_attribute(GROUP, name, &values)?,
+                Value::Real(values) => file.set_attribute(GROUP, name, &values)?,
+            }
+        }
+        file.set_attribute(GROUP, "header_crc32", &[u64::from(self.checksum(false))])
+    }
+
+    /// Collective on a shared file. The mark that the file is whole; written last.
+    pub(super) fn mark_complete(file: &ParallelFile) -> Result<(), FileError> {
+        file.set_attribute(GROUP, "complete", &[1_u64])
+    }
+
+    /// Collective on a shared file. Reads the header and refuses what this program cannot trust.
+    pub fn read(file: &ParallelFile) -> Result<Self, FileError> {
+        file.agree(Self::read_here(file))
+    }
+
+    fn read_here(file: &ParallelFile) -> Result<Self, FileError> {
+        if !file.exists(GROUP) || file.text(GROUP, "magic").ok().as_deref() != Some(MAGIC) {
+            return Err(file.refuse("not a file of agimp (no group 'state' with its mark)"));
+        }
+        let one = |name| -> Result<u64, FileError> { only(file, name, file.attribute(GROUP, name)?) };
+        let real = |name| -> Result<f64, FileError> { only(file, name, file.attribute(GROUP, name)?) };
+        let names = |name| -> Result<Vec<String>, FileError> {
+            let text = file.text(GROUP, name)?;
+            Ok(if text.is_empty() { Vec::new() } else { text.split('\n').map(str::to_owned).collect() })
+        };
+        let (format, program) = (one("format")?, file.text(GROUP, "program")?);
+        if format != FORMAT {
+            return Err(file.refuse(format!(
+                "written in format {format} by agimp {program}; this is agimp {}, which reads format {FORMAT}",
+                env!("CARGO_PKG_VERSION")
+            )));
+        }
+        if !file.has_attribute(GROUP, "complete") {
+            return Err(file.refuse("the file is incomplete: its writer did not finish"));
+        }
+        let mut words = file.attribute::<i64>(GROUP, "exact")?.into_iter();
+        let lengths = file.attribute::<u64>(GROUP, "exact_lengths")?;
+        let scalars = Scalars {
+            reals: names("real_names")?.into_iter().zip(file.attribute(GROUP, "reals")?).collect(),
+            counts: names("count_names")?.into_iter().zip(file.attribute(GROUP, "counts")?).collect(),
+            exact: names("exact_names")?
+                .into_iter()
+                .zip(lengths)
+                .map(|(name, length)| (name, words.by_ref().take(length as usize).collect()))
+                .collect(),
+        };
+        let header = Self {
+            format,
+            program,
+            dimension: one("dimension")? as usize,
+            job_digest: one("job_digest")?,
+            origin: file.attribute(GROUP, "origin")?,
+            root_edge: real("root_edge")?,
+            roots: file.attribute(GROUP, "roots")?,
+            step: one("step")?,
+            time: real("time")?,
+            dt: real("dt")?,
+            leaves: one("leaves")?,
+            particles: one("particles")?,
+            restart: one("restart")? != 0,
+            materials: names("materials")?,
+            histories: names("histories")?,
+            leaf_fields: names("leaf_fields")?,
+            scalars,
+        };
+        if one("header_crc32")? != u64::from(header.checksum(false)) {
+            return Err(file.refuse("wrong checksum of the header: the file is damaged"));
+        }
+        Ok(header)
+    }
+}
+
+fn only<T: Copy>(file: &ParallelFile, name: &str, values: Vec<T>) -> Result<T, FileError> {
+    match values[..] {
+        [value] => Ok(value),
+        _ => Err(file.refuse(format!("attribute {name} has {} values, not one", values.len()))),
+    }
+}

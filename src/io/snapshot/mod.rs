@@ -1,0 +1,211 @@
+//! Output and restart files.
+//!
+//! One HDF5 file per output: the group `/VTKHDF` opens in ParaView, the group `/state` holds a header
+//! and, where asked for, all that a restart needs, bit by bit. A file is written under a temporary
+//! name and gets its own when it is whole and on disk. Nothing in it depends on the number of ranks.
+
+use std::fs::File;
+use std::path::Path;
+
+use partition::comm::Comm;
+use partition::{Brick, Octant};
+
+use super::hdf5_file::{FileError, ParallelFile};
+use crate::particle::chunk::Chunk;
+
+mod checked;
+pub mod compare;
+pub mod directory;
+pub(crate) mod fields;
+pub mod header;
+pub mod outputs;
+mod state;
+mod vtkhdf;
+
+use checked::{Checked, Rows};
+pub use fields::PointField;
+pub use header::{Header, Scalars};
+pub use outputs::Outputs;
+
+/// The run as a file shows it: borrowed, this rank's part.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a, const D: usize> {
+    /// Leaves of this rank, in curve order.
+    pub leaves: &'a [Octant<D>],
+    /// Particles of each leaf.
+    pub chunks: &'a [Chunk<D>],
+    /// Extra values per leaf; the same names on all ranks.
+    pub leaf_fields: &'a [(String, Vec<f64>)],
+    /// Lower corner of the domain, m.
+    pub origin: [f64; D],
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Root octants.
+    pub brick: Brick<D>,
+    /// Names of the materials.
+    pub materials: &'a [String],
+    /// Names of the history variables.
+    pub histories: &'a [String],
+    /// Digest of the job.
+    pub job_digest: u64,
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Last time step, s.
+    pub dt: f64,
+    /// Scalars to be restored.
+    pub scalars: &'a Scalars,
+}
+
+/// What goes into a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Fields of the particles for ParaView.
+    pub fields: Vec<PointField>,
+    /// Those fields in single precision (the restart state never is).
+    pub single: bool,
+    /// Also write all that a restart needs.
+    pub restart: bool,
+}
+
+/// A run read back: this rank's share, to be partitioned anew by the caller.
+#[derive(Clone, Debug)]
+pub struct Restored<const D: usize> {
+    /// Header of the file, with the scalars.
+    pub header: Header,
+    /// Leaves of this rank: a contiguous part of the curve.
+    pub leaves: Vec<Octant<D>>,
+    /// Particles of each leaf.
+    pub chunks: Vec<Chunk<D>>,
+    /// Extra values per leaf.
+    pub leaf_fields: Vec<(String, Vec<f64>)>,
+}
+
+/// Collective. Writes particles, and the state if `options` ask for it, to `path`. After an error on any rank
+/// all ranks have it, and no file of that name has been made or changed.
+pub fn write<const D: usize>(
+    comm: &Comm,
+    path: &Path,
+    view: &View<D>,
+    options: &Options,
+) -> Result<(), FileError> {
+    safely(comm, path, |file| {
+        let (leaves, particles) = totals(comm, file, view)?;
+        Header::new(view, leaves.total, particles.total, options.restart).write(file)?;
+        let mut checked = Checked::new(Some(comm), file);
+        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
+        if options.restart {
+            state::write(file, &mut checked, view, leaves, particles)?;
+        }
+        checked.attach()
+    })
+}
+
+/// Collective. Writes the leaves of the tree to `path`, as [`write()`] does the particles.
+pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> Result<(), FileError> {
+    safely(comm, path, |file| {
+        let (leaves, particles) = totals(comm, file, view)?;
+        Header::new(view, leaves.total, particles.total, false).write(file)?;
+        let mut checked = Checked::new(Some(comm), file);
+        vtkhdf::write_leaves(file, &mut checked, comm, view, leaves)?;
+        checked.attach()
+    })
+}
+
+/// Collective. Reads a file for a restart on any number of ranks. Refuses, with the reason, a file that is
+/// damaged, cut short, of another format or dimension, without the restart state, or of another job.
+pub fn read<const D: usize>(
+    comm: &Comm,
+    path: &Path,
+    job_digest: Option<u64>,
+) -> Result<Restored<D>, FileError> {
+    let file = ParallelFile::open(comm, path)?;
+    let header = Header::read(&file)?;
+    let reason = if !header.restart {
+        Some("the file holds no restart state (output with `restart = false`, or a tree)".to_owned())
+    } else if header.dimension != D {
+        Some(format!("the file is of a {}D run, the job is {D}D", header.dimension))
+    } else if !compatible(&header.program) {
+        let (theirs, ours) = (&header.program, env!("CARGO_PKG_VERSION"));
+        Some(format!("written by agimp {theirs}, whose states this version ({ours}) may not continue"))
+    } else {
+        job_digest.filter(|&ours| ours != header.job_digest).map(|ours| {
+            format!(
+                "the file belongs to another job: its digest is {:016x}, this job's is {ours:016x} \
+                 (outputs and end time may differ, everything else must not)",
+                header.job_digest
+            )
+        })
+    };
+    if let Some(reason) = reason {
+        return Err(file.refuse(reason));
+    }
+    let restored = state::read(&file, comm, header)?;
+    file.close()?;
+    Ok(restored)
+}
+
+/// States are continued within one minor version below 1.0 and one major version from there on.
+fn compatible(program: &str) -> bool {
+    let series = |version: &str| -> Option<(u64, u64)> {
+        let mut parts = version.split('.').map(|part| part.parse().ok());
+        let (major, minor) = (parts.next()??, parts.next()??);
+        Some(if major == 0 { (0, minor) } else { (major, 0) })
+    };
+    series(program).is_some() && series(program) == series(env!("CARGO_PKG_VERSION"))
+}
+
+/// Collective. Places of this rank's leaves and particles; refuses a view that does not fit together.
+fn totals<const D: usize>(
+    comm: &Comm,
+    file: &ParallelFile,
+    view: &View<D>,
+) -> Result<(Rows, Rows), FileError> {
+    let lengths = view.leaf_fields.iter().map(|(_, values)| values.len()).chain([view.chunks.len()]);
+    let fits = lengths.into_iter().all(|length| length == view.leaves.len());
+    file.agree(if fits {
+        Ok(())
+    } else {
+        Err(file.refuse("leaves, particles and leaf fields do not match"))
+    })?;
+    let particles = view.chunks.iter().map(|chunk| chunk.len() as u64).sum();
+    Ok((Rows::place(comm, view.leaves.len() as u64), Rows::place(comm, particles)))
+}
+
+/// Collective. Lets `fill` write a new file under a temporary name, brings it to disk and gives it its
+/// name. After an error the temporary file is removed.
+fn safely(
+    comm: &Comm,
+    path: &Path,
+    fill: impl FnOnce(&ParallelFile) -> Result<(), FileError>,
+) -> Result<(), FileError> {
+    let part = path.with_added_extension("part");
+    let written = ParallelFile::create(comm, &part).and_then(|file| {
+        let filled = fill(&file).and_then(|()| Header::mark_complete(&file));
+        if filled.is_err() && comm.rank() == 0 {
+            // On a full disk the library could not even close the file, and would crash at the end of
+            // the program; so give the space back first. If that fails too, the first error matters.
+            let _ = File::options().write(true).open(&part).and_then(|file| file.set_len(0));
+        }
+        comm.barrier();
+        filled.and_then(|()| file.close())
+    });
+    let named = written.and_then(|()| {
+        let here = if comm.rank() == 0 { sync_and_rename(&part, path) } else { Ok(()) };
+        let here = here.map_err(|source| FileError::System { path: path.into(), action: "finish", source });
+        Ok(comm.agree(here)?)
+    });
+    if named.is_err() && comm.rank() == 0 {
+        // It may not exist; the error that matters is the first one.
+        let _ = std::fs::remove_file(&part);
+    }
+    named
+}
+
+fn sync_and_rename(part: &Path, path: &Path) -> std::io::Result<()> {
+    File::open(part)?.sync_all()?;
+    std::fs::rename(part, path)?;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    File::open(directory)?.sync_all()
+}

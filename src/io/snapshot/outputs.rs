@@ -1,0 +1,115 @@
+//! The numbered output files of a run, their series, and its checkpoints.
+
+use std::path::{Path, PathBuf};
+
+use partition::comm::Comm;
+
+use super::directory::{checkpoint_path, output_path, remove_old_checkpoints, tree_path};
+use super::{Options, View, write, write_tree};
+use crate::io::hdf5_file::FileError;
+use crate::io::series::Series;
+
+/// Writes the outputs of one run. The same calls on all ranks.
+#[derive(Clone, Debug)]
+pub struct Outputs {
+    directory: PathBuf,
+    name: String,
+    options: Options,
+    next: u64,
+    particles: Series,
+    tree: Series,
+}
+
+impl Outputs {
+    /// Collective. Creates the directory and starts at output 0.
+    pub fn create(comm: &Comm, directory: &Path, name: &str, options: Options) -> Result<Self, FileError> {
+        Self::start(comm, directory, name, options, None)
+    }
+
+    /// Collective. Goes on with output `next` after a restart from `time`; entries of the series after that time
+    /// are dropped with the next output.
+    pub fn resume(
+        comm: &Comm,
+        directory: &Path,
+        name: &str,
+        options: Options,
+        next: u64,
+        time: f64,
+    ) -> Result<Self, FileError> {
+        Self::start(comm, directory, name, options, Some((next, time)))
+    }
+
+    fn start(
+        comm: &Comm,
+        directory: &Path,
+        name: &str,
+        options: Options,
+        from: Option<(u64, f64)>,
+    ) -> Result<Self, FileError> {
+        let made = if comm.rank() == 0 { std::fs::create_dir_all(directory) } else { Ok(()) };
+        comm.agree(made.map_err(|source| FileError::System {
+            path: directory.into(),
+            action: "create the directory",
+            source,
+        }))?;
+        let series = |suffix: &str| {
+            let path = directory.join(format!("{name}{suffix}.vtkhdf.series"));
+            match from {
+                Some((_, time)) if comm.rank() == 0 => Series::resume(&path, time),
+                _ => Series::new(&path),
+            }
+        };
+        let (particles, tree) = (series(""), series(".tree"));
+        let (directory, name) = (directory.into(), name.into());
+        Ok(Self { directory, name, options, next: from.map_or(0, |(next, _)| next), particles, tree })
+    }
+
+    /// Number of the next output.
+    pub fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Collective. Writes the next output: particles, tree and series. Returns the path of the particles.
+    pub fn write<const D: usize>(&mut self, comm: &Comm, view: &View<D>) -> Result<PathBuf, FileError> {
+        let paths = [
+            output_path(&self.directory, &self.name, self.next),
+            tree_path(&self.directory, &self.name, self.next),
+        ];
+        write(comm, &paths[0], view, &self.options)?;
+        write_tree(comm, &paths[1], view)?;
+        let mut listed = Ok(());
+        if comm.rank() == 0 {
+            for (series, path) in [&mut self.particles, &mut self.tree].into_iter().zip(&paths) {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                listed = listed.and_then(|()| series.push(&name, view.time));
+            }
+        }
+        comm.agree(listed)?;
+        self.next += 1;
+        let [particles, _] = paths;
+        Ok(particles)
+    }
+
+    /// Collective. Writes a checkpoint and removes all but the last `keep` (at least one).
+    pub fn checkpoint<const D: usize>(
+        &self,
+        comm: &Comm,
+        view: &View<D>,
+        keep: usize,
+    ) -> Result<PathBuf, FileError> {
+        let path = checkpoint_path(&self.directory, &self.name, view.step);
+        // Velocity and level are enough to look at; the state has the rest.
+        let options = Options {
+            fields: vec![super::PointField::Velocity, super::PointField::LeafLevel],
+            single: true,
+            restart: true,
+        };
+        write(comm, &path, view, &options)?;
+        let removed = match comm.rank() {
+            0 => remove_old_checkpoints(&self.directory, &self.name, keep.max(1)),
+            _ => Ok(()),
+        };
+        comm.agree(removed)?;
+        Ok(path)
+    }
+}

@@ -1,0 +1,149 @@
+//! The group `/VTKHDF`: particles as vertices, leaves as voxels, in one piece, so that a file does not
+//! depend on the number of ranks.
+
+use partition::Octant;
+use partition::comm::Comm;
+
+use super::checked::{Checked, Rows};
+use super::fields::Values;
+use super::{Options, View};
+use crate::io::hdf5_file::{Element, FileError, ParallelFile};
+use crate::particle::chunk::Chunk;
+
+const GROUP: &str = "VTKHDF";
+/// Cell types of VTK.
+const VERTEX: u8 = 1;
+const PIXEL: u8 = 8;
+const VOXEL: u8 = 11;
+/// Single-precision coordinates are used only if the origin is at most this many domain sizes away.
+const FAR: f64 = 8.0;
+
+/// Collective. The group with its attributes and the time.
+fn start(file: &ParallelFile, checked: &mut Checked, comm: &Comm, time: f64) -> Result<(), FileError> {
+    file.create_group(GROUP)?;
+    file.set_attribute(GROUP, "Version", &[1_i64, 0])?;
+    file.set_text(GROUP, "Type", "UnstructuredGrid")?;
+    for group in ["PointData", "CellData", "FieldData"] {
+        file.create_group(&format!("{GROUP}/{group}"))?;
+    }
+    single(checked, comm, "FieldData/TimeValue", time)
+}
+
+/// Collective. A data set of one value, written by rank 0.
+fn single<T: Element>(checked: &mut Checked, comm: &Comm, name: &str, value: T) -> Result<(), FileError> {
+    let mine: &[T] = if comm.rank() == 0 { &[value] } else { &[] };
+    let rows = Rows::place(comm, mine.len() as u64);
+    checked.write(&format!("{GROUP}/{name}"), rows, 0, mine)
+}
+
+/// Collective. Points and cells; cell `i` has the `corners` points from `corners * i`.
+fn grid(
+    checked: &mut Checked,
+    comm: &Comm,
+    cells: Rows,
+    corners: u64,
+    cell_type: u8,
+    points: &Values,
+) -> Result<(), FileError> {
+    let connectivity = cells.times(corners);
+    for (name, value) in [
+        ("NumberOfPoints", connectivity.total),
+        ("NumberOfCells", cells.total),
+        ("NumberOfConnectivityIds", connectivity.total),
+    ] {
+        single(checked, comm, name, value as i64)?;
+    }
+    field(checked, "Points", connectivity, points)?;
+    let numbers = |rows: Rows, step: u64| -> Vec<i64> {
+        (rows.offset..rows.offset + rows.count).map(|i| (i * step) as i64).collect()
+    };
+    checked.write(&format!("{GROUP}/Connectivity"), connectivity, 0, &numbers(connectivity, 1))?;
+    let ends = cells.and_one(comm);
+    checked.write(&format!("{GROUP}/Offsets"), ends, 0, &numbers(ends, corners))?;
+    checked.write(&format!("{GROUP}/Types"), cells, 0, &vec![cell_type; cells.count as usize])
+}
+
+/// Collective. An array of the group.
+fn field(checked: &mut Checked, name: &str, rows: Rows, values: &Values) -> Result<(), FileError> {
+    let dataset = format!("{GROUP}/{name}");
+    match values {
+        Values::Id(values) => checked.write(&dataset, rows, 0, values),
+        Values::Integer(values) => checked.write(&dataset, rows, 0, values),
+        Values::Real(values, components) => checked.write(&dataset, rows, *components, values),
+        Values::Single(values, components) => checked.write(&dataset, rows, *components, values),
+    }
+}
+
+/// Collective. Writes the particles with the chosen fields.
+pub(super) fn write_particles<const D: usize>(
+    file: &ParallelFile,
+    checked: &mut Checked,
+    comm: &Comm,
+    view: &View<D>,
+    particles: Rows,
+    options: &Options,
+) -> Result<(), FileError> {
+    start(file, checked, comm, view.time)?;
+    let extent = view.brick.roots.iter().fold(0.0, |most: f64, &n| most.max(f64::from(n))) * view.root_edge;
+    let near = view.origin.iter().all(|x| x.abs() <= FAR * extent);
+    let points = Values::Real(positions(view), 3);
+    let points = if options.single && near { points.to_single() } else { points };
+    grid(checked, comm, particles, 1, VERTEX, &points)?;
+    drop(points);
+    for chosen in &options.fields {
+        let values = chosen.values(view);
+        let values = if options.single { values.to_single() } else { values };
+        field(checked, &format!("PointData/{}", chosen.name()), particles, &values)?;
+    }
+    Ok(())
+}
+
+/// Positions with the origin added and three components.
+fn positions<const D: usize>(view: &View<D>) -> Vec<f64> {
+    let mut points = Vec::with_capacity(3 * view.chunks.iter().map(Chunk::len).sum::<usize>());
+    for chunk in view.chunks {
+        for p in 0..chunk.len() {
+            let position = chunk.position(p);
+            points.extend((0..3).map(|axis| if axis < D { view.origin[axis] + position[axis] } else { 0.0 }));
+        }
+    }
+    points
+}
+
+/// Collective. Writes the leaves of the tree as cells with their level and number of particles.
+pub(super) fn write_leaves<const D: usize>(
+    file: &ParallelFile,
+    checked: &mut Checked,
+    comm: &Comm,
+    view: &View<D>,
+    leaves: Rows,
+) -> Result<(), FileError> {
+    start(file, checked, comm, view.time)?;
+    let corners = 1 << D;
+    let cell_type = if D == 2 { PIXEL } else { VOXEL };
+    let points = view.leaves.iter().flat_map(|leaf| leaf_corners(view, leaf)).flatten().collect();
+    grid(checked, comm, leaves, corners, cell_type, &Values::Real(points, 3))?;
+    let levels: Vec<u8> = view.leaves.iter().map(|leaf| leaf.level).collect();
+    checked.write(&format!("{GROUP}/CellData/level"), leaves, 0, &levels)?;
+    let counts: Vec<i64> = view.chunks.iter().map(|chunk| chunk.len() as i64).collect();
+    checked.write(&format!("{GROUP}/CellData/particles"), leaves, 0, &counts)?;
+    for (name, values) in view.leaf_fields {
+        checked.write(&format!("{GROUP}/CellData/{name}"), leaves, 0, values)?;
+    }
+    Ok(())
+}
+
+/// Corners of a leaf, first axis fastest, as VTK's pixels and voxels want them.
+fn leaf_corners<const D: usize>(view: &View<D>, leaf: &Octant<D>) -> Vec<[f64; 3]> {
+    let edge = view.root_edge / f64::from(1_u32 << leaf.level);
+    let corner = |number: usize| {
+        std::array::from_fn(|axis| {
+            if axis >= D {
+                return 0.0;
+            }
+            let count = leaf.coord[axis] + (number >> axis & 1) as u32;
+            view.origin[axis] + edge * f64::from(count)
+        })
+    };
+    (0..1 << D).map(corner).collect()
+}

@@ -1,0 +1,270 @@
+//! `telemetry.jsonl`: one JSON object per reported step, for machines to read.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use partition::comm::{Comm, Traffic};
+use partition::{MAX_LEVEL, Octant};
+use serde::{Deserialize, Serialize};
+
+use super::hdf5_file::FileError;
+use crate::particle::chunk::Chunk;
+
+/// A quantity over the ranks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Smallest value of any rank.
+    pub min: f64,
+    /// Mean over the ranks.
+    pub mean: f64,
+    /// Largest value of any rank.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Collective. The spread of each entry; all ranks give the same number of non-negative entries.
+    pub fn over_ranks(comm: &Comm, values: &[f64]) -> Vec<Self> {
+        let (mut min, mut max) = (values.to_vec(), values.to_vec());
+        comm.min_f64s(&mut min);
+        comm.max_f64s(&mut max);
+        // Reductions add integers only; 32 binary digits of the largest value are plenty for a report.
+        let scale = |max: f64| if max > 0.0 { f64::from(u32::MAX) / max } else { 0.0 };
+        let mut sums: Vec<u64> = values.iter().zip(&max).map(|(v, &max)| (v * scale(max)) as u64).collect();
+        comm.sum_u64(&mut sums);
+        let mean = |sum: u64, max: f64| {
+            if max > 0.0 { sum as f64 / scale(max) / comm.size() as f64 } else { 0.0 }
+        };
+        let both = min.iter().zip(&max);
+        sums.into_iter()
+            .zip(both)
+            .map(|(sum, (&min, &max))| Self { min, mean: mean(sum, max), max })
+            .collect()
+    }
+}
+
+/// Wall time of a phase of the step since the last record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhaseTime {
+    /// Name of the phase.
+    pub phase: String,
+    /// Wall seconds.
+    pub seconds: Spread,
+}
+
+/// Leaves and particles of one level of the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LevelCount {
+    /// Level.
+    pub level: u8,
+    /// Leaves.
+    pub leaves: u64,
+    /// Particles in them.
+    pub particles: u64,
+}
+
+/// One line of the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Last time step, s.
+    pub dt: f64,
+    /// Steps since the last record.
+    pub steps: u64,
+    /// Wall seconds since the last record (of the slowest rank).
+    pub wall_seconds: f64,
+    /// Wall time by phase.
+    pub phases: Vec<PhaseTime>,
+    /// Particles times steps per wall second.
+    pub particle_steps_per_second: f64,
+    /// Messages sent by all ranks since the last record.
+    pub messages: u64,
+    /// Bytes sent by all ranks since the last record.
+    pub bytes: u64,
+    /// Particles.
+    pub particles: u64,
+    /// Levels that have leaves.
+    pub levels: Vec<LevelCount>,
+    /// Largest cost of a rank over the mean cost.
+    pub imbalance: f64,
+    /// Resident memory per rank, bytes.
+    pub memory: Spread,
+    /// Relative difference between the mass on the real nodes and that of the particles.
+    pub mass_error: f64,
+    /// Number of ranks.
+    pub ranks: u64,
+    /// Threads per rank.
+    pub threads: u64,
+}
+
+/// One rank's part of a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Contribution<'a, const D: usize> {
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Last time step, s.
+    pub dt: f64,
+    /// Steps since the last record.
+    pub steps: u64,
+    /// Wall seconds since the last record.
+    pub wall_seconds: f64,
+    /// Names and wall seconds of the phases since the last record; the same names on all ranks.
+    pub phases: &'a [(&'static str, f64)],
+    /// What this rank has sent since the last record.
+    pub traffic: Traffic,
+    /// Leaves of this rank.
+    pub leaves: &'a [Octant<D>],
+    /// Their particles.
+    pub chunks: &'a [Chunk<D>],
+    /// Largest cost of a rank over the mean cost (the same on all ranks).
+    pub imbalance: f64,
+    /// Relative mass error (the same on all ranks).
+    pub mass_error: f64,
+}
+
+impl Record {
+    /// Collective. Puts the parts of all ranks together; every rank gets the record.
+    pub fn gather<const D: usize>(comm: &Comm, mine: &Contribution<D>) -> Self {
+        const LEVELS: usize = MAX_LEVEL as usize + 1;
+        let mut counts = vec![0; 2 * LEVELS + 2];
+        for (leaf, chunk) in mine.leaves.iter().zip(mine.chunks) {
+            counts[usize::from(leaf.level)] += 1;
+            counts[LEVELS + usize::from(leaf.level)] += chunk.len() as u64;
+        }
+        counts[2 * LEVELS] = mine.traffic.messages;
+        counts[2 * LEVELS + 1] = mine.traffic.bytes;
+        comm.sum_u64(&mut counts);
+
+        let mut values: Vec<f64> = mine.phases.iter().map(|&(_, seconds)| seconds).collect();
+        values.extend([mine.wall_seconds, resident_bytes().unwrap_or(0) as f64]);
+        let spreads = Spread::over_ranks(comm, &values);
+        let (phases, rest) = spreads.split_at(mine.phases.len());
+        let (wall_seconds, memory) = (rest[0].max, rest[1]);
+
+        let particles: u64 = counts[LEVELS..2 * LEVELS].iter().sum();
+        let level = |level: usize| LevelCount {
+            level: level as u8,
+            leaves: counts[level],
+            particles: counts[LEVELS + level],
+        };
+        let work = particles as f64 * mine.steps as f64;
+        Self {
+            step: mine.step,
+            time: mine.time,
+            dt: mine.dt,
+            steps: mine.steps,
+            wall_seconds,
+            phases: mine
+                .phases
+                .iter()
+                .zip(phases)
+                .map(|(&(phase, _), &seconds)| PhaseTime { phase: phase.to_owned(), seconds })
+                .collect(),
+            particle_steps_per_second: if wall_seconds > 0.0 { work / wall_seconds } else { 0.0 },
+            messages: counts[2 * LEVELS],
+            bytes: counts[2 * LEVELS + 1],
+            particles,
+            levels: (0..LEVELS).filter(|&l| counts[l] > 0).map(level).collect(),
+            imbalance: mine.imbalance,
+            memory,
+            mass_error: mine.mass_error,
+            ranks: comm.size() as u64,
+            threads: rayon::current_num_threads() as u64,
+        }
+    }
+}
+
+/// Resident memory of this process, bytes; `None` where the system does not tell.
+pub fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+}
+
+/// The open file. Belongs to rank 0.
+#[derive(Debug)]
+pub struct Telemetry {
+    file: File,
+    path: PathBuf,
+}
+
+impl Telemetry {
+    /// Not collective. Starts a new file, replacing an old one.
+    pub fn create(path: &Path) -> Result<Self, FileError> {
+        let file = File::create(path).map_err(|source| failed(path, source))?;
+        Ok(Self { file, path: path.into() })
+    }
+
+    /// Not collective. Goes on with the file of an earlier run, whose records stay; a torn last line
+    /// goes.
+    pub fn resume(path: &Path) -> Result<Self, FileError> {
+        let open = || -> std::io::Result<File> {
+            let mut options = OpenOptions::new();
+            let mut file = options.read(true).write(true).create(true).truncate(false).open(path)?;
+            let mut text = Vec::new();
+            file.read_to_end(&mut text)?;
+            let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
+            file.set_len(whole as u64)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
+        };
+        Ok(Self { file: open().map_err(|source| failed(path, source))?, path: path.into() })
+    }
+
+    /// Not collective. Appends a record and hands it to the operating system.
+    pub fn write(&mut self, record: &Record) -> Result<(), FileError> {
+        let line = serde_json::to_string(record).map_err(std::io::Error::other);
+        line.and_then(|line| self.file.write_all((line + "\n").as_bytes()))
+            .map_err(|source| failed(&self.path, source))
+    }
+}
+
+fn failed(path: &Path, source: std::io::Error) -> FileError {
+    FileError::System { path: path.into(), action: "write", source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_come_back_and_a_torn_line_goes() {
+        let spread = Spread { min: 0.1, mean: 0.2, max: 0.7 };
+        let record = Record {
+            step: 10,
+            time: 0.1 + 0.2,
+            dt: 1e-6,
+            steps: 10,
+            wall_seconds: 2.0,
+            phases: vec![PhaseTime { phase: "scatter".into(), seconds: spread }],
+            particle_steps_per_second: 1e6,
+            messages: 12,
+            bytes: 1 << 40,
+            particles: 200_000,
+            levels: vec![LevelCount { level: 3, leaves: 8, particles: 200_000 }],
+            imbalance: 1.01,
+            memory: spread,
+            mass_error: 1e-16,
+            ranks: 2,
+            threads: 1,
+        };
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("telemetry.jsonl");
+        Telemetry::create(&path).unwrap().write(&record).unwrap();
+        OpenOptions::new().append(true).open(&path).unwrap().write_all(b"{\"step\":1").unwrap();
+        Telemetry::resume(&path).unwrap().write(&record).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let read: Vec<Record> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!(read, [record.clone(), record]);
+    }
+
+    #[test]
+    fn memory_of_this_process() {
+        assert!(resident_bytes().is_none_or(|bytes| bytes > 1 << 20));
+    }
+}

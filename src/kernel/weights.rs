@@ -1,0 +1,97 @@
+//! Tensor-product stencils of a batch of boxes.
+use super::simd::{LANES, Lanes};
+use super::stencil::Axis;
+use super::{ARENA_EDGE, BASES, Frame};
+
+/// Factors of one axis, node by node and lane by lane.
+#[derive(Clone, Copy)]
+pub(super) struct Factors {
+    pub weight: [[f64; LANES]; 3],
+    /// Weight times (node - particle), m.
+    pub arm: [[f64; LANES]; 3],
+    /// Derivative of the weight, 1/m.
+    pub slope: [[f64; LANES]; 3],
+}
+
+/// Stencils of a batch. Made once and filled for batch after batch.
+pub(super) struct Weights<const D: usize> {
+    /// Index of the lowest node in the arena; an integer plus 2^52.
+    first: [f64; LANES],
+    /// Index of the stencil among the bases; an integer plus 2^52.
+    base: [f64; LANES],
+    pub axis: [Factors; D],
+    /// Products of y and z weights, `[b][c]`.
+    pub product: [[[f64; LANES]; 3]; 3],
+    /// `Σ w (node - particle)²` along each axis.
+    pub spread: [Lanes; D],
+}
+
+/// 2^52: integers added to it stand in the low bits.
+const TWO_52: f64 = 4_503_599_627_370_496.0;
+
+impl<const D: usize> Weights<D> {
+    pub fn new() -> Self {
+        let none = [[0.0; LANES]; 3];
+        Self {
+            first: [TWO_52; LANES],
+            base: [TWO_52; LANES],
+            axis: [Factors { weight: none, arm: none, slope: none }; D],
+            product: [none; 3],
+            spread: [Lanes::splat(0.0); D],
+        }
+    }
+
+    /// Boxes around `centre`, arms relative to `position`.
+    #[inline(always)]
+    pub fn fill(&mut self, frame: &Frame<D>, position: &[Lanes; D], centre: &[Lanes; D], half: &[Lanes; D]) {
+        let inverse = 1.0 / frame.cell;
+        let mut first = Lanes::splat(0.0);
+        let mut base = first;
+        for k in (0..D).rev() {
+            let corner = Lanes::splat(frame.corner[k]);
+            let axis = Axis::new((centre[k] - corner) * inverse, half[k] * inverse, inverse);
+            let offset = axis.offsets((position[k] - corner) * inverse, frame.cell);
+            let place = axis.base + Lanes::splat(1.0);
+            first = first.mul_add(Lanes::splat(ARENA_EDGE as f64), place);
+            base = base.mul_add(Lanes::splat(BASES as f64), place);
+            let mut spread = Lanes::splat(0.0);
+            let to = &mut self.axis[k];
+            for i in 0..3 {
+                let arm = axis.weight[i] * offset[i];
+                spread = arm.mul_add(offset[i], spread);
+                axis.weight[i].store(&mut to.weight[i]);
+                arm.store(&mut to.arm[i]);
+                axis.slope[i].store(&mut to.slope[i]);
+            }
+            self.spread[k] = spread;
+        }
+        if D == 3 {
+            let (y, z) = (&self.axis[1].weight, &self.axis[D - 1].weight);
+            for b in 0..3 {
+                for c in 0..3 {
+                    (Lanes::load(&y[b]) * Lanes::load(&z[c])).store(&mut self.product[b][c]);
+                }
+            }
+        }
+        (first + Lanes::splat(TWO_52)).store(&mut self.first);
+        (base + Lanes::splat(TWO_52)).store(&mut self.base);
+    }
+
+    /// Index of the lowest node in the arena.
+    #[inline(always)]
+    pub fn first(&self, lane: usize) -> usize {
+        self.first[lane].to_bits() as u16 as usize
+    }
+
+    /// Index in a table of stencils.
+    #[inline(always)]
+    pub fn base(&self, lane: usize) -> usize {
+        self.base[lane].to_bits() as u16 as usize
+    }
+
+    /// Weight of one node.
+    #[inline(always)]
+    pub fn weight(&self, lane: usize, index: [usize; D]) -> f64 {
+        (0..D).fold(1.0, |weight, k| weight * self.axis[k].weight[index[k]][lane])
+    }
+}

@@ -1,0 +1,144 @@
+//! History, telemetry and progress of a run.
+use std::time::Instant;
+
+use partition::comm::{Comm, Traffic};
+
+use super::{Options, RunError, history};
+use crate::io::history::History;
+use crate::io::progress::Progress;
+use crate::io::telemetry::{Contribution, Record, Telemetry};
+use crate::job::Problem;
+use crate::solver::Solver;
+use crate::solver::phases::Phase;
+
+/// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
+pub struct Recorder {
+    history: Option<History>,
+    telemetry: Option<Telemetry>,
+    progress: Progress,
+    history_every: u64,
+    telemetry_every: u64,
+    since: Instant,
+    since_step: u64,
+    since_traffic: Traffic,
+}
+
+impl Recorder {
+    /// Collective. Opens the files; those of a run that goes on from a later step than 0 are continued.
+    pub fn open<const D: usize>(
+        comm: &Comm,
+        problem: &Problem<D>,
+        options: &Options,
+        solver: &Solver<D>,
+    ) -> Result<Self, RunError> {
+        let step = solver.clock.step;
+        let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
+        let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
+        let files = match (comm.rank(), step) {
+            (0, 0) => History::create(&rows, &history::COLUMNS)
+                .and_then(|history| Ok(Some((history, Telemetry::create(&lines)?)))),
+            (0, _) => History::resume(&rows, &history::COLUMNS, step)
+                .and_then(|history| Ok(Some((history, Telemetry::resume(&lines)?)))),
+            _ => Ok(None),
+        };
+        let (history, telemetry) = comm.agree(files)?.unzip();
+        let time = solver.clock.time;
+        Ok(Self {
+            history,
+            telemetry,
+            progress: Progress::new(options.speaks, time, problem.time.end),
+            history_every: problem.history_every,
+            telemetry_every: problem.telemetry_every,
+            since: Instant::now(),
+            since_step: step,
+            since_traffic: solver.traffic(),
+        })
+    }
+
+    /// Collective. After a step: what is due by step number.
+    pub fn after_step<const D: usize>(
+        &mut self,
+        comm: &Comm,
+        solver: &mut Solver<D>,
+    ) -> Result<(), RunError> {
+        let step = solver.clock.step;
+        let (row, record) =
+            (step.is_multiple_of(self.history_every), step.is_multiple_of(self.telemetry_every));
+        if row || record {
+            self.write(comm, solver, row, record)?;
+        }
+        self.progress.step(step, solver.clock.time, solver.clock.dt);
+        Ok(())
+    }
+
+    /// Collective. A row of the history and a record of telemetry.
+    pub fn write<const D: usize>(
+        &mut self,
+        comm: &Comm,
+        solver: &mut Solver<D>,
+        row: bool,
+        record: bool,
+    ) -> Result<(), RunError> {
+        let clock = solver.clock;
+        // What this takes counts as output, not as steps.
+        let start = Instant::now();
+        let phases = solver.phases;
+        let grid = solver.grid_totals();
+        solver.phases = phases;
+        let grid = comm.agree(grid)?;
+        let particles = solver.particle_totals();
+        solver.phases.book(Phase::Output, start.elapsed());
+        let mut written = Ok(());
+        if row && let Some(history) = &mut self.history {
+            written = history.row(clock.step, &history::row(clock.time, clock.dt, &particles, &grid));
+        }
+        if record {
+            let record = self.record(comm, solver, (grid.mass - particles.mass) / particles.mass);
+            self.progress.record(&record);
+            if let Some(telemetry) = &mut self.telemetry {
+                written = written.and_then(|()| telemetry.write(&record));
+            }
+        }
+        comm.agree(written)?;
+        Ok(())
+    }
+
+    /// Collective. Speed, traffic and memory since the last record.
+    fn record<const D: usize>(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
+        let phases: Vec<(&'static str, f64)> =
+            Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
+        let traffic = solver.traffic();
+        let record = Record::gather(
+            comm,
+            &Contribution {
+                step: solver.clock.step,
+                time: solver.clock.time,
+                dt: solver.clock.dt,
+                steps: solver.clock.step - self.since_step,
+                wall_seconds: self.since.elapsed().as_secs_f64(),
+                phases: &phases,
+                traffic: Traffic {
+                    messages: traffic.messages - self.since_traffic.messages,
+                    bytes: traffic.bytes - self.since_traffic.bytes,
+                },
+                leaves: solver.forest.leaves(),
+                chunks: &solver.chunks,
+                imbalance: solver.imbalance().0,
+                mass_error,
+            },
+        );
+        solver.phases.clear();
+        (self.since, self.since_step, self.since_traffic) = (Instant::now(), solver.clock.step, traffic);
+        record
+    }
+
+    /// Not collective. Shows a line to the user.
+    pub fn message(&mut self, text: &str) {
+        self.progress.message(text);
+    }
+
+    /// Not collective. The run is over.
+    pub fn finish<const D: usize>(&mut self, solver: &Solver<D>) {
+        self.progress.finish(solver.clock.step, solver.clock.time, solver.clock.dt);
+    }
+}

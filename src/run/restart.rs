@@ -1,0 +1,98 @@
+//! Going on from a file.
+use std::path::PathBuf;
+
+use partition::Forest;
+use partition::comm::Comm;
+
+use super::{RunError, setup};
+use crate::io::snapshot::{self, Scalars, directory};
+use crate::job::Problem;
+use crate::solver::rebalance::leaf_weight;
+use crate::solver::{Clock, Solver};
+
+/// Where a run goes on from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum From {
+    /// The newest complete file of the run.
+    Latest,
+    /// This file.
+    File(PathBuf),
+}
+
+/// Name of the counter that holds the number of the next output.
+pub const NEXT_OUTPUT: &str = "next_output";
+const BOUND: &str = "time_step_bound";
+const DELETED: &str = "deleted";
+
+/// What output files hold.
+pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
+    let output = &problem.output;
+    snapshot::Options { fields: output.fields.clone(), single: false, restart: output.restart }
+}
+
+/// Collective. Scalars that a restart needs beside those in every header.
+pub fn scalars<const D: usize>(comm: &Comm, solver: &Solver<D>, next_output: u64) -> Scalars {
+    let mut deleted = [solver.deleted];
+    comm.sum_u64(&mut deleted);
+    Scalars {
+        reals: vec![(BOUND.into(), solver.clock.bound)],
+        counts: vec![(NEXT_OUTPUT.into(), next_output), (DELETED.into(), deleted[0])],
+        exact: Vec::new(),
+    }
+}
+
+/// Collective. Reads the state and spreads it over the ranks.
+///
+/// # Errors
+/// There is no file, or it cannot be trusted; the same on all ranks.
+pub fn solver<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    from: &From,
+) -> Result<(Solver<D>, Scalars), RunError> {
+    let path = match from {
+        From::File(path) => path.clone(),
+        From::Latest => latest(comm, problem)?,
+    };
+    let restored = snapshot::read::<D>(comm, &path, Some(problem.digest))?;
+    let mut forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves))?;
+    let weights: Vec<u64> = restored.chunks.iter().map(leaf_weight).collect();
+    let payload = restored.chunks.iter().map(crate::particle::Chunk::to_bytes).collect();
+    let shipment = forest.partition(comm, &weights);
+    let arrived: Vec<Vec<u8>> = shipment.move_payload(comm, payload);
+    let chunks = arrived.iter().map(|bytes| crate::particle::Chunk::from_bytes(bytes)).collect();
+    let header = restored.header;
+    let clock = Clock {
+        step: header.step,
+        time: header.time,
+        dt: header.dt,
+        bound: header.scalars.real(BOUND).unwrap_or(0.0),
+    };
+    let mut solver = Solver::new(comm, setup::physics(problem), forest, chunks, clock);
+    if comm.rank() == 0 {
+        solver.deleted = header.scalars.count(DELETED).unwrap_or(0);
+    }
+    Ok((solver, header.scalars))
+}
+
+/// Collective. The newest file of the run; rank 0 looks for it and tells the others.
+fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<PathBuf, RunError> {
+    let directory = &problem.output.directory;
+    let found = match comm.rank() {
+        0 => directory::find_latest(directory, &problem.name),
+        _ => Ok(None),
+    };
+    let found = comm.agree(found)?;
+    let mut bytes = Vec::new();
+    if let Some(latest) = &found {
+        for damaged in &latest.damaged {
+            tracing::warn!("passed over: {damaged}");
+        }
+        bytes = latest.path.to_string_lossy().into_owned().into_bytes();
+    }
+    comm.broadcast_bytes(0, &mut bytes);
+    match bytes.is_empty() {
+        true => Err(RunError::NoRestart { name: problem.name.clone(), directory: directory.clone() }),
+        false => Ok(PathBuf::from(String::from_utf8_lossy(&bytes).into_owned())),
+    }
+}

@@ -1,0 +1,86 @@
+//! From a job to the first state: tree, partition and particles.
+use partition::Forest;
+use partition::comm::{Comm, Disagreement};
+use rayon::prelude::*;
+
+use crate::job::Problem;
+use crate::material;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::seed::{SeedError, fill_leaf};
+use crate::solver::rebalance::leaf_weight;
+use crate::solver::time_step::StepControl;
+use crate::solver::{Clock, Physics, Solver};
+
+/// The constant part of a run.
+pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
+    Physics {
+        root_edge: problem.root_edge,
+        graded: problem.tree.graded,
+        materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
+        gravity: problem.gravity,
+        faces: problem.faces,
+        leaving: problem.leaving,
+        transfer: problem.transfer,
+        boxes: problem.boxes,
+        control: StepControl {
+            cfl: problem.time.cfl,
+            dt_max: problem.time.dt_max,
+            growth: problem.time.growth,
+        },
+    }
+}
+
+/// Collective. A solver in the initial state of the job: tree, partition and numbered particles.
+///
+/// # Errors
+/// Two bodies overlap; the same on all ranks.
+pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solver<D>, Disagreement> {
+    let forest = comm.agree(forest(comm, problem))?;
+    let mut chunks = comm.agree(seed(&forest, problem))?;
+    let physics = physics(problem);
+    let mut id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
+    for chunk in &mut chunks {
+        for p in 0..chunk.len() {
+            // Along the curve, so that no id depends on the partition.
+            chunk.ids_mut()[p] = id;
+            id += 1;
+            let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+            for (h, value) in physics.materials[material].initial_history().into_iter().enumerate() {
+                chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
+            }
+        }
+    }
+    Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
+}
+
+/// Collective. The tree that the job asks for, partitioned by the particles that its leaves will hold.
+///
+/// # Errors
+/// Two bodies overlap; on the rank that found it.
+fn forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Forest<D>, SeedError> {
+    let mut forest = Forest::uniform(comm, problem.brick, problem.tree.base_level);
+    forest.refine_where(comm, |leaf| problem.wants_refinement(leaf));
+    if problem.tree.graded {
+        forest.balance(comm);
+    }
+    let counted = seed(&forest, problem);
+    let weights: Vec<u64> = match &counted {
+        Ok(chunks) => chunks.iter().map(leaf_weight).collect(),
+        Err(_) => vec![1; forest.leaves().len()],
+    };
+    forest.partition(comm, &weights);
+    counted.map(|_| forest)
+}
+
+/// Not collective. The particles of the own leaves, ids not yet given.
+fn seed<const D: usize>(forest: &Forest<D>, problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedError> {
+    forest
+        .leaves()
+        .par_iter()
+        .map(|leaf| {
+            let mut chunk = Chunk::new();
+            fill_leaf(problem, leaf, &mut chunk)?;
+            Ok(chunk)
+        })
+        .collect()
+}

@@ -1,0 +1,239 @@
+//! Sorting the particles of a leaf into its bins.
+//!
+//! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
+//! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
+//! beside finer leaves, or where boxes are wider than a cell, each box is held against the leaves around.
+//! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the same way;
+//! its weights are the mean of theirs.
+use rayon::prelude::*;
+
+use super::migrate::leaf_box;
+use crate::grid::GridPlan;
+use crate::grid::mask::{offset, offset_count, shifted};
+use crate::grid::{Cover, KnownTree};
+use crate::kernel::SubBox;
+use crate::particle::chunk::{Chunk, Layout};
+
+/// A leaf near a leaf.
+#[derive(Clone, Copy, Debug)]
+struct NearLeaf<const D: usize> {
+    level: u8,
+    lower: [f64; D],
+    upper: [f64; D],
+}
+
+/// Particles and parts of boxes in one bin, in canonical order.
+#[derive(Clone, Debug, Default)]
+pub struct Members<const D: usize> {
+    /// Particles whose box is transferred whole.
+    pub whole: Vec<u32>,
+    /// Parts of boxes; their slots count the leaf's particles that are cut.
+    pub parts: Vec<SubBox<D>>,
+}
+
+/// Bins of one own leaf whose particles do not all share the leaf's own bin.
+#[derive(Clone, Debug, Default)]
+pub struct LeafBins<const D: usize> {
+    /// Members of each bin of the leaf.
+    pub members: Vec<Members<D>>,
+    /// Particles whose box is cut, in order; a part's slot points here.
+    pub cut: Vec<u32>,
+    near: Vec<NearLeaf<D>>,
+    beside_finer: bool,
+}
+
+/// Particle lists of the bins of one rank.
+#[derive(Clone, Debug, Default)]
+pub struct BinLists<const D: usize> {
+    leaves: Vec<LeafBins<D>>,
+    sorted: Vec<bool>,
+    bounds: Vec<NearLeaf<D>>,
+}
+
+/// A part of a box falls outside the bins of its leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the box of particle {id} reaches beyond the bins of its leaf")]
+pub struct BinMissing {
+    /// Identifier of the particle.
+    pub id: u64,
+}
+
+/// Half widths of the boxes of a chunk, and their bound.
+pub trait BoxWidths<const D: usize>: Sync {
+    /// Lists the half widths of all boxes in a leaf with cells of edge `cell`.
+    fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>);
+    /// A bound on all half widths in a chunk, m.
+    fn bound(&self, chunk: &Chunk<D>) -> f64;
+}
+
+impl<const D: usize> BinLists<D> {
+    /// Not collective. Lists for the bins of a plan.
+    pub fn new(plan: &GridPlan<D>) -> Self {
+        let own = plan.leaf_start.len() - 1;
+        let first = plan.tree.first_own();
+        let leaves = (0..own).map(|leaf| LeafBins::new(plan, first + leaf, plan.leaf_bins(leaf).len()));
+        let bounds = (0..own).map(|leaf| near_leaf(&plan.tree, first + leaf, plan.root_edge));
+        Self { leaves: leaves.collect(), sorted: vec![false; own], bounds: bounds.collect() }
+    }
+
+    /// Not collective. Sorts all particles.
+    ///
+    /// # Errors
+    /// A box that needs a bin outside the plan; the caller makes it collective.
+    pub fn sort(
+        &mut self,
+        plan: &GridPlan<D>,
+        chunks: &[Chunk<D>],
+        widths: &impl BoxWidths<D>,
+    ) -> Result<(), BinMissing> {
+        let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
+        leaves.with_min_len(8).try_for_each_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
+            let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
+            *sorted = bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
+            if *sorted {
+                widths.list(chunk, cell, halves);
+                bins.sort(plan, leaf, own, chunk, halves)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// The bins of own leaf `leaf`, or `None` if all its particles are whole in its own bin.
+    pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
+        self.sorted[leaf].then_some(&self.leaves[leaf])
+    }
+}
+
+impl<const D: usize> LeafBins<D> {
+    fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
+        let tree = &plan.tree;
+        let here = tree.leaves()[known];
+        let mut near = Vec::new();
+        let mut beside_finer = false;
+        for index in 0..offset_count(D) {
+            let Some(beside) = shifted(here.coord, offset::<D>(index)) else { continue };
+            let leaves = match tree.cover(here.level, beside) {
+                Cover::Leaf(leaf) => leaf..leaf + 1,
+                Cover::Finer(_) => {
+                    beside_finer = true;
+                    tree.leaves_within(here.level, beside)
+                }
+                _ => continue,
+            };
+            near.extend(leaves.map(|leaf| near_leaf(tree, leaf, plan.root_edge)));
+        }
+        Self { members: vec![Members::default(); bins], cut: Vec::new(), near, beside_finer }
+    }
+
+    fn sort(
+        &mut self,
+        plan: &GridPlan<D>,
+        leaf: usize,
+        own: &NearLeaf<D>,
+        chunk: &Chunk<D>,
+        halves: &[[f64; D]],
+    ) -> Result<(), BinMissing> {
+        self.cut.clear();
+        for members in &mut self.members {
+            members.whole.clear();
+            members.parts.clear();
+        }
+        for (p, &half) in halves.iter().enumerate() {
+            let centre = chunk.position(p);
+            let level = self.finest_level(own, centre, half);
+            if is_narrow(half, plan.cell(level)) {
+                let bin = self.bin(plan, leaf, level, centre).ok_or(BinMissing { id: chunk.ids()[p] })?;
+                self.members[bin].whole.push(p as u32);
+                continue;
+            }
+            let slot = self.cut.len() as u32;
+            self.cut.push(p as u32);
+            let whole = SubBox { particle: p as u32, slot, centre, half, fraction: 1.0 };
+            self.cut_box(plan, leaf, own, whole).map_err(|()| BinMissing { id: chunk.ids()[p] })?;
+        }
+        Ok(())
+    }
+
+    /// Halves a box along the axes on which it is too wide, until each part fits the level it overlaps.
+    fn cut_box(
+        &mut self,
+        plan: &GridPlan<D>,
+        leaf: usize,
+        own: &NearLeaf<D>,
+        part: SubBox<D>,
+    ) -> Result<(), ()> {
+        let level = self.finest_level(own, part.centre, part.half);
+        let cell = plan.cell(level);
+        let wide: [bool; D] = std::array::from_fn(|axis| !is_narrow([part.half[axis]], cell));
+        let count = wide.iter().filter(|&&wide| wide).count();
+        if count == 0 {
+            let bin = self.bin(plan, leaf, level, part.centre).ok_or(())?;
+            self.members[bin].parts.push(part);
+            return Ok(());
+        }
+        let half: [f64; D] = std::array::from_fn(|axis| part.half[axis] * if wide[axis] { 0.5 } else { 1.0 });
+        for corner in (0..1u32 << D).filter(|corner| (0..D).all(|a| wide[a] || corner >> a & 1 == 0)) {
+            let centre = std::array::from_fn(|axis| match (wide[axis], corner >> axis & 1) {
+                (false, _) => part.centre[axis],
+                (true, 0) => part.centre[axis] - half[axis],
+                (true, _) => part.centre[axis] + half[axis],
+            });
+            let fraction = part.fraction / f64::from(1u32 << count);
+            self.cut_box(plan, leaf, own, SubBox { centre, half, fraction, ..part })?;
+        }
+        Ok(())
+    }
+
+    /// Finest level among the leaves that the open box overlaps.
+    fn finest_level(&self, own: &NearLeaf<D>, centre: [f64; D], half: [f64; D]) -> u8 {
+        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis]);
+        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis]);
+        if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
+            return own.level;
+        }
+        self.near
+            .iter()
+            .filter(|leaf| (0..D).all(|axis| lo[axis] < leaf.upper[axis] && hi[axis] > leaf.lower[axis]))
+            .map(|leaf| leaf.level)
+            .max()
+            .unwrap_or(own.level)
+    }
+
+    /// Bin, counted within the leaf, of the block of `level` that contains `centre`. A centre on the face of
+    /// two blocks may lie in either.
+    fn bin(&self, plan: &GridPlan<D>, leaf: usize, level: u8, centre: [f64; D]) -> Option<usize> {
+        let bins = &plan.bins[plan.leaf_bins(leaf)];
+        let edge = plan.cell(level) * 4.0;
+        let scaled: [f64; D] = centre.map(|x| x / edge);
+        let find = |coord: [u32; D]| {
+            bins.iter().position(|bin| bin.block.level == level && bin.block.coord == coord)
+        };
+        let roots = plan.tree.brick().roots;
+        let coord = std::array::from_fn(|axis| (scaled[axis] as u32).min((roots[axis] << level) - 1));
+        find(coord).or_else(|| {
+            // Rounding may have put a centre on a face into a block that cannot hold it.
+            let nudge = 1e-9;
+            (0..offset_count(D)).find_map(|index| {
+                let shift = offset::<D>(index);
+                find(std::array::from_fn(|axis| (scaled[axis] + f64::from(shift[axis]) * nudge) as u32))
+            })
+        })
+    }
+}
+
+/// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not
+/// cut a box that is exactly one cell wide.
+fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
+    half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 1e-12))
+}
+
+fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) -> NearLeaf<D> {
+    let leaf = tree.leaves()[known];
+    let (lower, upper) = leaf_box(&leaf, root_edge);
+    NearLeaf { level: leaf.level, lower, upper }
+}
+
+/// Greatest half width without deformation in a chunk, m.
+pub fn greatest_half<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    chunk.column(Layout::<D>::HALF).iter().copied().fold(0.0, f64::max)
+}

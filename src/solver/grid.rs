@@ -1,0 +1,118 @@
+//! What lives on the grid for one tree and one partition, and the exchanges of a step.
+use partition::Forest;
+use partition::comm::{Comm, Pending, Traffic};
+
+use super::bins::BinLists;
+use super::migrate::{MigrateError, Migration, Moved};
+use super::phases::Phase;
+use super::transfer::width_bound;
+use super::{Physics, Solver};
+use crate::grid::arena::Arenas;
+use crate::grid::exchange::ReceivedArenas;
+use crate::grid::known::Allowance;
+use crate::grid::{ArenaExchange, GridPlan, NodeFields};
+use crate::kernel::Scheme;
+use crate::particle::Chunk;
+
+/// Plan, arenas, fields and exchanges.
+pub struct Grid<const D: usize> {
+    /// Blocks, bins and constraints.
+    pub plan: GridPlan<D>,
+    pub(super) arenas: Arenas<D>,
+    pub(super) fields: NodeFields<D>,
+    pub(super) exchange: ArenaExchange<D>,
+    pub(super) received: ReceivedArenas<D>,
+    pub(super) migration: Migration<D>,
+    pub(super) lists: BinLists<D>,
+    /// Per bin, whether a neighbour needs it.
+    pub(super) is_sent: Vec<bool>,
+}
+
+impl<const D: usize> Grid<D> {
+    /// Collective. The grid for the current tree and partition.
+    ///
+    /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
+    /// [`needed_reach`] gives it.
+    pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>, reach: u32) -> Self {
+        let allowance = Allowance { reach, graded: physics.graded };
+        let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
+        let (exchange, received) = ArenaExchange::new(comm, &plan);
+        let neighbours = exchange.neighbours().to_vec();
+        Self {
+            arenas: Arenas::default(),
+            fields: NodeFields::new(&plan),
+            migration: Migration::new(comm, &plan, neighbours, physics.leaving),
+            lists: BinLists::new(&plan),
+            is_sent: exchange.sent_bins(plan.bins.len()),
+            exchange,
+            received,
+            plan,
+        }
+    }
+
+    /// Heap bytes held.
+    pub fn heap_bytes(&self) -> usize {
+        self.plan.heap_bytes() + self.arenas.heap_bytes() + self.fields.heap_bytes()
+    }
+
+    /// Messages and bytes that this rank has sent since the grid was built.
+    pub fn traffic(&self) -> Traffic {
+        let (arenas, particles) = (self.exchange.traffic(), self.migration.traffic());
+        Traffic { messages: arenas.messages + particles.messages, bytes: arenas.bytes + particles.bytes }
+    }
+}
+
+/// Not collective. Half width of the widest box that the particles of a leaf can have, in cells of that leaf rounded
+/// up; 0 if all are at most a cell wide.
+pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
+    let cells = width_bound(chunk, scheme) / cell;
+    // Rounding must not make a box that is exactly one cell wide a wide one.
+    if cells <= 0.5 * (1.0 + 1e-12) { 0 } else { cells.ceil() as u32 }
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. [`needed_reach`] of this rank's particles.
+    pub(super) fn local_reach(&self) -> u32 {
+        let scheme = self.physics.scheme();
+        let leaves = self.forest.leaves().iter().zip(&self.chunks);
+        let reaches = leaves.map(|(leaf, chunk)| {
+            let cell = self.physics.root_edge / f64::from(4u32 << leaf.level);
+            needed_reach(&scheme, chunk, cell)
+        });
+        reaches.max().unwrap_or(0)
+    }
+
+    /// Messages and bytes that this rank has sent in steps so far.
+    pub fn traffic(&self) -> Traffic {
+        let now = self.grid.traffic();
+        Traffic {
+            messages: self.sent_before.messages + now.messages,
+            bytes: self.sent_before.bytes + now.bytes,
+        }
+    }
+
+    /// The grid of the current tree and partition.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// Starts sending the arenas that neighbours need.
+    pub(super) fn send_arenas(&mut self) -> Pending {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Exchange, || grid.exchange.begin(&grid.arenas))
+    }
+
+    /// Waits for the arenas of neighbours.
+    pub(super) fn receive_arenas(&mut self, pending: Pending) {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));
+    }
+
+    /// Moves particles to the leaves that contain them.
+    pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
+        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let moved = self.phases.time(Phase::Migrate, || grid.migration.migrate(&grid.plan.tree, chunks));
+        self.deleted += moved.as_ref().map_or(0, |moved| moved.deleted);
+        moved
+    }
+}

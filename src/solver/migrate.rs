@@ -1,0 +1,261 @@
+//! Particles change leaves, and with them ranks.
+//!
+//! Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order
+//! they had there. Ranks hold contiguous segments of the curve, so appending the messages of lower ranks,
+//! then the own moves, then the messages of higher ranks gives that order on every partition.
+use partition::comm::{Comm, NeighbourExchange, Traffic};
+use partition::{MAX_LEVEL, Octant};
+use rayon::prelude::*;
+
+use crate::boundary::Leaving;
+use crate::grid::{GridPlan, KnownTree};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+const TAG: u16 = 12;
+
+/// Why particles could not be migrated.
+#[derive(Debug, thiserror::Error)]
+pub enum MigrateError {
+    /// A particle has left the domain and the job does not allow it.
+    #[error(
+        "particle {id} left the domain at {position:?} m (relative to its lower corner); \
+         `boundaries.leaving` says what to do with such particles"
+    )]
+    Left {
+        /// Identifier of the particle.
+        id: u64,
+        /// Position relative to the domain's lower corner, m.
+        position: Vec<f64>,
+    },
+    /// A particle moved beyond the leaves around its own in one step, or its position is not finite.
+    #[error("particle {id} moved too far in one step, to {position:?} m; the run has become unstable")]
+    TooFar {
+        /// Identifier of the particle.
+        id: u64,
+        /// Position relative to the domain's lower corner, m.
+        position: Vec<f64>,
+    },
+}
+
+/// Where a particle goes.
+enum Destination {
+    Stay,
+    Leaf(u32),
+    Gone,
+}
+
+/// Moves particles to the leaves that contain them.
+pub struct Migration<const D: usize> {
+    exchange: NeighbourExchange,
+    boxes: Vec<([f64; D], [f64; D])>,
+    rule: Rule,
+}
+
+/// How the destination of a particle is found.
+#[derive(Clone, Copy)]
+struct Rule {
+    leaving: Leaving,
+    root_edge: f64,
+}
+
+/// Particles that left their leaf in one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Moved {
+    /// To another leaf of the same rank.
+    pub local: u64,
+    /// To another rank.
+    pub sent: u64,
+    /// Out of the domain, and removed.
+    pub deleted: u64,
+}
+
+impl<const D: usize> Migration<D> {
+    /// Not collective. `neighbours` must be those of the plan's arena exchange.
+    pub fn new(comm: &Comm, plan: &GridPlan<D>, neighbours: Vec<usize>, leaving: Leaving) -> Self {
+        let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
+        let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
+        let exchange = NeighbourExchange::new(comm, neighbours, TAG);
+        Self { exchange, boxes, rule: Rule { leaving, root_edge: plan.root_edge } }
+    }
+
+    /// Messages and bytes so far.
+    pub fn traffic(&self) -> Traffic {
+        self.exchange.traffic()
+    }
+
+    /// Collective over neighbours. Moves every particle into the leaf that contains it.
+    ///
+    /// # Errors
+    /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
+    /// in any case.
+    pub fn migrate(&mut self, tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) -> Result<Moved, MigrateError> {
+        let (first, rule) = (tree.first_own(), self.rule);
+        let found: Vec<Result<Vec<(u32, Destination)>, MigrateError>> = chunks
+            .par_iter_mut()
+            .zip(&self.boxes)
+            .enumerate()
+            .with_min_len(4)
+            .map(|(leaf, (chunk, bounds))| rule.leavers(tree, first + leaf, chunk, bounds))
+            .collect();
+        let mut error = None;
+        let mut moved = Moved::default();
+        let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
+        let mut staged = Chunk::<D>::new();
+        let mut staged_leaf = Vec::new();
+        let mut leavers = Vec::with_capacity(chunks.len());
+        for (leaf, found) in found.into_iter().enumerate() {
+            let found = found.unwrap_or_else(|found| {
+                error.get_or_insert(found);
+                Vec::new()
+            });
+            for (p, destination) in &found {
+                let Destination::Leaf(to) = destination else {
+                    moved.deleted += 1;
+                    continue;
+                };
+                let to = *to as usize;
+                if let Some(local) = tree.local(to) {
+                    staged.push_from(&chunks[leaf], *p as usize);
+                    staged_leaf.push(local);
+                    moved.local += 1;
+                } else if let Ok(neighbour) = self.exchange.neighbours().binary_search(&tree.owner(to)) {
+                    pack(&mut outgoing[neighbour], tree.leaves()[to].key(), &chunks[leaf], *p as usize);
+                    moved.sent += 1;
+                } else {
+                    error.get_or_insert_with(|| too_far(&chunks[leaf], *p as usize));
+                }
+            }
+            leavers.push(found);
+        }
+        let pending = self.exchange.begin(outgoing);
+        chunks.par_iter_mut().zip(&leavers).filter(|(_, gone)| !gone.is_empty()).for_each(|(chunk, gone)| {
+            let mut gone = gone.iter().map(|(p, _)| *p as usize).peekable();
+            chunk.retain(|p| gone.next_if_eq(&p).is_none());
+        });
+        let rank = chunks.first().map_or(0, |_| tree.owner(first));
+        let messages = pending.finish();
+        let split = self.exchange.neighbours().partition_point(|&neighbour| neighbour < rank);
+        for message in &messages[..split] {
+            unpack(message, tree, chunks);
+        }
+        for (p, leaf) in staged_leaf.into_iter().enumerate() {
+            chunks[leaf].push_from(&staged, p);
+        }
+        for message in &messages[split..] {
+            unpack(message, tree, chunks);
+        }
+        error.map_or(Ok(moved), Err)
+    }
+}
+
+impl Rule {
+    /// Particles of one leaf that are outside it, with their destinations, in order.
+    fn leavers<const D: usize>(
+        self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        (lower, upper): &([f64; D], [f64; D]),
+    ) -> Result<Vec<(u32, Destination)>, MigrateError> {
+        let mut leavers = Vec::new();
+        for p in 0..chunk.len() {
+            let position = chunk.position(p);
+            // Written so that a NaN counts as outside.
+            if (0..D).all(|axis| position[axis] >= lower[axis] && position[axis] < upper[axis]) {
+                continue;
+            }
+            match self.destination(tree, leaf, chunk, p)? {
+                Destination::Stay => {}
+                destination => leavers.push((p as u32, destination)),
+            }
+        }
+        Ok(leavers)
+    }
+
+    fn destination<const D: usize>(
+        self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        p: usize,
+    ) -> Result<Destination, MigrateError> {
+        let mut position = chunk.position(p);
+        if position.iter().any(|x| !x.is_finite()) {
+            return Err(too_far(chunk, p));
+        }
+        let roots = tree.brick().roots;
+        let extent: [f64; D] = std::array::from_fn(|axis| f64::from(roots[axis]) * self.root_edge);
+        if (0..D).any(|axis| position[axis] < 0.0 || position[axis] >= extent[axis]) {
+            match self.leaving {
+                Leaving::Delete => return Ok(Destination::Gone),
+                Leaving::Error => {
+                    return Err(MigrateError::Left { id: chunk.ids()[p], position: position.to_vec() });
+                }
+                Leaving::Clamp => {
+                    for axis in 0..D {
+                        position[axis] = position[axis].clamp(0.0, extent[axis].next_down());
+                        chunk.column_mut(Layout::<D>::POSITION + axis)[p] = position[axis];
+                    }
+                }
+            }
+        }
+        let key = position_key(position, roots, self.root_edge);
+        match tree.locate(key) {
+            Some(to) if to == leaf => Ok(Destination::Stay),
+            Some(to) => Ok(Destination::Leaf(to as u32)),
+            None => Err(too_far(chunk, p)),
+        }
+    }
+}
+
+/// Key of the finest-level octant that contains a position inside the domain. Leaf membership of particles
+/// is defined by this function alone.
+pub fn position_key<const D: usize>(position: [f64; D], roots: [u32; D], root_edge: f64) -> u64 {
+    let scale = f64::from(1u32 << MAX_LEVEL) / root_edge;
+    let coord: [u32; D] = std::array::from_fn(|axis| {
+        let last = (roots[axis] << MAX_LEVEL) - 1;
+        ((position[axis] * scale) as u32).min(last)
+    });
+    Octant { level: MAX_LEVEL, coord }.key()
+}
+
+/// Lower and upper corner of a leaf relative to the domain's lower corner, m.
+pub fn leaf_box<const D: usize>(leaf: &Octant<D>, root_edge: f64) -> ([f64; D], [f64; D]) {
+    let edge = root_edge / f64::from(1u32 << leaf.level);
+    (leaf.coord.map(|c| f64::from(c) * edge), leaf.coord.map(|c| f64::from(c + 1) * edge))
+}
+
+fn too_far<const D: usize>(chunk: &Chunk<D>, p: usize) -> MigrateError {
+    MigrateError::TooFar { id: chunk.ids()[p], position: chunk.position(p).to_vec() }
+}
+
+/// Bytes of one particle in a message: key of its new leaf, columns, id, tag.
+const fn record_bytes<const D: usize>() -> usize {
+    8 * (Layout::<D>::REALS + 3)
+}
+
+fn pack<const D: usize>(message: &mut Vec<u8>, key: u64, chunk: &Chunk<D>, p: usize) {
+    message.extend_from_slice(&key.to_ne_bytes());
+    let (reals, stride) = chunk.reals();
+    for column in 0..Layout::<D>::REALS {
+        message.extend_from_slice(&reals[column * stride + p].to_ne_bytes());
+    }
+    message.extend_from_slice(&chunk.ids()[p].to_ne_bytes());
+    message.extend_from_slice(&chunk.tags()[p].to_ne_bytes());
+}
+
+fn unpack<const D: usize>(message: &[u8], tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) {
+    for record in message.chunks_exact(record_bytes::<D>()) {
+        let mut words = record.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
+        let mut next = || words.next().unwrap_or_default();
+        let leaf = tree.locate(next()).and_then(|known| tree.local(known));
+        let Some(chunk) = leaf.map(|leaf| &mut chunks[leaf]) else { continue };
+        let p = chunk.push_zeroed(0, Tag { material: 0, body: 0, level: 0 });
+        let (reals, stride) = chunk.reals_mut();
+        for column in 0..Layout::<D>::REALS {
+            reals[column * stride + p] = f64::from_bits(next());
+        }
+        chunk.ids_mut()[p] = next();
+        chunk.tags_mut()[p] = next();
+    }
+}

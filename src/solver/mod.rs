@@ -1,0 +1,231 @@
+//! The time integration: one explicit step of the adaptive material point method.
+//!
+//! [`Solver::step`] is the method; the files beside it hold its phases.
+pub mod bins;
+pub mod grid;
+pub mod migrate;
+pub mod phases;
+pub mod rebalance;
+pub mod time_step;
+pub mod totals;
+pub mod transfer;
+pub mod update;
+
+use partition::Forest;
+use partition::comm::{Comm, Disagreement, Traffic};
+
+use self::bins::BinMissing;
+use self::grid::Grid;
+use self::migrate::{MigrateError, Moved};
+use self::phases::{Phase, Phases};
+use self::time_step::StepControl;
+use self::transfer::Reach;
+use crate::boundary::{FaceCondition, Leaving};
+use crate::grid::fields::Part;
+use crate::kernel::{BoxPolicy, Transfer};
+use crate::material::Material;
+use crate::particle::Chunk;
+
+/// What is solved: the same on every rank, constant over a run.
+pub struct Physics<const D: usize> {
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Whether neighbouring leaves differ by one level at most.
+    pub graded: bool,
+    /// Materials by index.
+    pub materials: Vec<Box<dyn Material>>,
+    /// Acceleration of gravity, m/s².
+    pub gravity: [f64; D],
+    /// Conditions on the lower and upper face of the domain along each axis.
+    pub faces: [[FaceCondition; 2]; D],
+    /// What happens to particles that leave the domain.
+    pub leaving: Leaving,
+    /// Transfer of velocities.
+    pub transfer: Transfer,
+    /// How particle boxes follow the deformation.
+    pub boxes: BoxPolicy,
+    /// Choice of the time step.
+    pub control: StepControl,
+}
+
+/// Why a step failed on this rank.
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    /// A particle left the domain or moved too far.
+    #[error(transparent)]
+    Migrate(#[from] MigrateError),
+    /// A particle's box cannot be transferred.
+    #[error(transparent)]
+    Bin(#[from] BinMissing),
+    /// The time step is not a positive number.
+    #[error("the time step became {dt} s; the run has become unstable")]
+    TimeStep {
+        /// The time step, s.
+        dt: f64,
+    },
+}
+
+/// The state of a run between two steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clock {
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Length of the step done last, s; 0 before the first.
+    pub dt: f64,
+    /// Bound on the next step from the state of all particles, s.
+    pub bound: f64,
+}
+
+/// What a step did on this rank.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepReport {
+    /// Particles that changed leaf.
+    pub moved: Moved,
+    /// What any rank asked for.
+    pub granted: Requests,
+}
+
+/// What a rank wants all ranks to do after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Requests {
+    /// Stop.
+    pub stop: bool,
+    /// Write a checkpoint.
+    pub checkpoint: bool,
+}
+
+/// Particles, tree and clock of one rank, and what advances them.
+pub struct Solver<const D: usize> {
+    comm: Comm,
+    /// What is solved.
+    pub physics: Physics<D>,
+    /// The distributed tree.
+    pub forest: Forest<D>,
+    /// Particles of each own leaf.
+    pub chunks: Vec<Chunk<D>>,
+    /// Step and time.
+    pub clock: Clock,
+    /// Wall time by phase since the last report.
+    pub phases: Phases,
+    grid: Grid<D>,
+    /// Per own leaf, the greatest sum of wave speed and particle speed after the last step, m/s.
+    signal: Vec<f64>,
+    /// Particles that this rank deleted because they left the domain.
+    pub deleted: u64,
+    /// What grids of earlier trees and partitions have sent.
+    sent_before: Traffic,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state read
+    /// from a file `clock` is that of the file; for a new run it is the default.
+    pub fn new(
+        comm: &Comm,
+        physics: Physics<D>,
+        forest: Forest<D>,
+        chunks: Vec<Chunk<D>>,
+        clock: Clock,
+    ) -> Self {
+        let grid = Grid::build(comm, &forest, &physics, 0);
+        let mut solver = Self {
+            comm: comm.clone(),
+            signal: vec![0.0; chunks.len()],
+            physics,
+            forest,
+            chunks,
+            clock,
+            phases: Phases::default(),
+            grid,
+            deleted: 0,
+            sent_before: Traffic::default(),
+        };
+        let reach = solver.agreed_reach();
+        if reach > 0 {
+            solver.rebuild_grid(reach);
+        }
+        if clock == Clock::default() {
+            solver.signal = solver.chunks.iter().map(|chunk| solver.signal_at_rest(chunk)).collect();
+            solver.clock.bound = comm.min_f64(solver.local_bound());
+        }
+        solver
+    }
+
+    /// Collective. One time step, not beyond the time `end`. Requests of any rank are granted to all.
+    ///
+    /// # Errors
+    /// On all ranks when any rank failed, with that rank and its reason.
+    pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
+        let left = end - self.clock.time;
+        let dt = self.choose_dt(left);
+
+        let sorted = self.sort_into_bins();
+        self.scatter(dt, Reach::Neighbours);
+        let pending = self.send_arenas();
+        self.scatter(dt, Reach::Own);
+        self.sum_nodes(Part::Interior);
+        self.receive_arenas(pending);
+        self.sum_nodes(Part::Seam);
+        self.restrict();
+        self.update_nodes(dt);
+        self.prolong();
+        self.gather(dt);
+        let moved = self.migrate();
+        let reach = self.local_reach();
+
+        self.clock.step += 1;
+        self.clock.time = if dt < left { self.clock.time + dt } else { end };
+        self.clock.dt = dt;
+        self.close_step(sorted, moved, reach, requests)
+    }
+
+    /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
+    pub(super) fn rebuild_grid(&mut self, reach: u32) {
+        self.sent_before = self.traffic();
+        self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
+    }
+
+    /// Collective. Reach that the boxes of all ranks need.
+    fn agreed_reach(&self) -> u32 {
+        let mut reach = [u64::from(self.local_reach())];
+        self.comm.max_u64(&mut reach);
+        reach[0] as u32
+    }
+
+    /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.
+    fn close_step(
+        &mut self,
+        sorted: Result<(), BinMissing>,
+        moved: Result<Moved, MigrateError>,
+        reach: u32,
+        requests: Requests,
+    ) -> Result<StepReport, Disagreement> {
+        let bound = self.local_bound();
+        let outcome: Result<Moved, StepError> = match (sorted, moved) {
+            (Err(error), _) => Err(error.into()),
+            (_, Err(error)) => Err(error.into()),
+            // Also for NaN: a bound must be positive.
+            _ if !(bound > 0.0) => Err(StepError::TimeStep { dt: bound }),
+            (_, Ok(moved)) => Ok(moved),
+        };
+        let flag = |set: bool| if set { -1.0 } else { 0.0 };
+        let bound = if outcome.is_ok() { bound } else { 0.0 };
+        let mut least = [
+            bound,
+            flag(outcome.is_err()),
+            flag(requests.stop),
+            flag(requests.checkpoint),
+            -f64::from(reach),
+        ];
+        self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
+        let [bound, failed, stop, checkpoint, reach] = least;
+        let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
+        self.clock.bound = bound;
+        if -reach > f64::from(self.grid.plan.tree.reach()) {
+            self.rebuild_grid(-reach as u32);
+        }
+        let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
+        Ok(StepReport { moved, granted })
+    }
+}

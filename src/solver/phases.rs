@@ -1,0 +1,90 @@
+//! Wall time by phase of the step.
+use std::time::{Duration, Instant};
+
+/// Phases of a run whose wall time is reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Sorting particles into bins beside level jumps.
+    Sort,
+    /// Particles to arenas.
+    Scatter,
+    /// Sending and awaiting arenas.
+    Exchange,
+    /// Node sums.
+    Sum,
+    /// Restriction, velocity update, boundary conditions and prolongation.
+    Nodes,
+    /// Arenas to particles, deformation and stress.
+    Gather,
+    /// Particles between leaves and ranks.
+    Migrate,
+    /// The reduction at the end of a step.
+    Reduce,
+    /// Tree, partition and grid plan.
+    Regrid,
+    /// Files, history and reports.
+    Output,
+}
+
+impl Phase {
+    /// All phases, in the order of a step.
+    pub const ALL: [Self; 10] = [
+        Self::Sort,
+        Self::Scatter,
+        Self::Exchange,
+        Self::Sum,
+        Self::Nodes,
+        Self::Gather,
+        Self::Migrate,
+        Self::Reduce,
+        Self::Regrid,
+        Self::Output,
+    ];
+
+    /// Name in telemetry.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sort => "sort",
+            Self::Scatter => "scatter",
+            Self::Exchange => "exchange",
+            Self::Sum => "sum",
+            Self::Nodes => "nodes",
+            Self::Gather => "gather",
+            Self::Migrate => "migrate",
+            Self::Reduce => "reduce",
+            Self::Regrid => "regrid",
+            Self::Output => "output",
+        }
+    }
+}
+
+/// Seconds spent in each phase.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Phases {
+    seconds: [f64; Phase::ALL.len()],
+}
+
+impl Phases {
+    /// Runs `work` and books its wall time.
+    pub fn time<R>(&mut self, phase: Phase, work: impl FnOnce() -> R) -> R {
+        let start = Instant::now();
+        let result = work();
+        self.book(phase, start.elapsed());
+        result
+    }
+
+    /// Books wall time measured elsewhere.
+    pub fn book(&mut self, phase: Phase, time: Duration) {
+        self.seconds[phase as usize] += time.as_secs_f64();
+    }
+
+    /// Seconds booked so far, in the order of [`Phase::ALL`].
+    pub fn seconds(&self) -> [f64; Phase::ALL.len()] {
+        self.seconds
+    }
+
+    /// Forgets what was booked.
+    pub fn clear(&mut self) {
+        self.seconds = Default::default();
+    }
+}

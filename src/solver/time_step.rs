@@ -1,0 +1,51 @@
+//! Choice of the time step.
+use super::Solver;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// Limits on the time step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepControl {
+    /// Courant number: share of a cell that a wave may cross in a step.
+    pub cfl: f64,
+    /// Longest step, s.
+    pub dt_max: Option<f64>,
+    /// Most that a step may exceed the one before, as a factor.
+    pub growth: f64,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
+    pub(super) fn choose_dt(&self, limit: f64) -> f64 {
+        let control = &self.physics.control;
+        let mut dt = self.clock.bound.min(control.dt_max.unwrap_or(f64::INFINITY));
+        if self.clock.dt > 0.0 {
+            dt = dt.min(control.growth * self.clock.dt);
+        }
+        dt.min(limit)
+    }
+
+    /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
+    /// the sum of wave speed and particle speed.
+    pub(super) fn local_bound(&self) -> f64 {
+        let plan = &self.grid.plan;
+        self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
+            f64::INFINITY,
+            |bound, (leaf, signal)| {
+                let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
+                bound.min(self.physics.control.cfl * plan.cell(finest.unwrap_or(0)) / signal)
+            },
+        )
+    }
+
+    /// Greatest sum of wave speed and particle speed in a chunk, from the materials at rest.
+    pub(super) fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
+        (0..chunk.len()).fold(0.0, |signal, p| {
+            let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+            let speed = (0..D)
+                .map(|axis| chunk.column(Layout::<D>::VELOCITY + axis)[p])
+                .fold(0.0, |sum: f64, v| v.mul_add(v, sum))
+                .sqrt();
+            f64::max(signal, self.physics.materials[material].wave_speed() + speed)
+        })
+    }
+}

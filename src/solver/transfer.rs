@@ -1,0 +1,233 @@
+//! The phases of a step between particles and nodes, in parallel over bins and leaves.
+use rayon::prelude::*;
+
+use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
+use super::phases::Phase;
+use super::update::{apply_faces, update_velocity};
+use super::{Physics, Solver};
+use crate::grid::GridPlan;
+use crate::grid::fields::{Part, VelocityArena};
+use crate::grid::plan::Bin;
+use crate::kernel::g2p::{Fields, Gathered, Moments};
+use crate::kernel::p2g::MomentSums;
+use crate::kernel::{BoxPolicy, Frame, Row, Scheme, Select, SubBox, domain, g2p, p2g};
+use crate::particle::Chunk;
+use crate::particle::chunk::Tag;
+
+/// Which bins a scatter treats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// Bins that another rank needs; these come first, so that their exchange can start.
+    Neighbours,
+    /// All others.
+    Own,
+}
+
+impl<const D: usize> Physics<D> {
+    /// What the kernels need to know.
+    pub(super) fn scheme(&self) -> Scheme<'_> {
+        Scheme {
+            boxes: self.boxes,
+            root_cell: self.root_edge / 4.0,
+            transfer: self.transfer,
+            materials: &self.materials,
+        }
+    }
+}
+
+/// Memory that a thread reuses from leaf to leaf.
+struct Scratch<const D: usize> {
+    arena: VelocityArena<D>,
+    gathered: Vec<Gathered<D>>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { arena: VelocityArena::default(), gathered: Vec::new() }
+    }
+}
+
+/// Upper corner of the domain, m.
+fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
+    plan.tree.brick().roots.map(|n| f64::from(n) * plan.root_edge)
+}
+
+/// The block of cells of a bin.
+fn frame<const D: usize>(plan: &GridPlan<D>, bin: &Bin<D>) -> Frame<D> {
+    let cell = plan.cell(bin.block.level);
+    Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: extent(plan) }
+}
+
+/// Half widths as the kernels compute them.
+struct Widths<'a, const D: usize> {
+    scheme: Scheme<'a>,
+    extent: [f64; D],
+}
+
+impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
+    fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>) {
+        domain::full_half_widths(chunk, Select::All, cell, &self.extent, &self.scheme, out);
+    }
+
+    fn bound(&self, chunk: &Chunk<D>) -> f64 {
+        width_bound(chunk, &self.scheme)
+    }
+}
+
+/// A bound on the half widths of all boxes that the particles of a chunk can have, m.
+pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>) -> f64 {
+    match scheme.boxes {
+        BoxPolicy::Fixed => greatest_half(chunk),
+        BoxPolicy::Volume { max_stretch, .. } => max_stretch * greatest_half(chunk),
+        BoxPolicy::Cell => {
+            let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
+            coarsest.map_or(0.0, |level| 0.5 * scheme.root_cell / f64::from(1u32 << level))
+        }
+    }
+}
+
+/// The members of a bin.
+struct Selected<'a, const D: usize> {
+    whole: Option<Select<'a>>,
+    parts: &'a [SubBox<D>],
+}
+
+impl<'a, const D: usize> Selected<'a, D> {
+    /// Members of bin number `number` of leaf `leaf`.
+    fn of(lists: &'a BinLists<D>, leaf: usize, number: usize, chunk: &Chunk<D>) -> Self {
+        let Some(bins) = lists.of_leaf(leaf) else {
+            let whole = (number == 0 && !chunk.is_empty()).then_some(Select::All);
+            return Self { whole, parts: &[] };
+        };
+        let members = &bins.members[number];
+        let whole = (!members.whole.is_empty()).then_some(Select::List(&members.whole));
+        Self { whole, parts: &members.parts }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.whole.is_none() && self.parts.is_empty()
+    }
+}
+
+impl<const D: usize> Solver<D> {
+    /// Lists the particles of each bin in leaves beside finer leaves.
+    pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
+        let (grid, chunks) = (&mut self.grid, &self.chunks);
+        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&grid.plan) };
+        self.phases.time(Phase::Sort, || {
+            let sorted = grid.lists.sort(&grid.plan, chunks, &widths);
+            let (plan, lists) = (&grid.plan, &grid.lists);
+            grid.arenas.occupy(plan, |bin| {
+                let leaf = plan.bins[bin].leaf as usize;
+                let number = bin - plan.leaf_bins(leaf).start;
+                !Selected::of(lists, leaf, number, &chunks[leaf]).is_empty()
+            });
+            sorted
+        })
+    }
+
+    /// P2G: scatters mass, affine momentum and the impulse of stress of the bins in `reach` into their
+    /// arenas.
+    pub(super) fn scatter(&mut self, dt: f64, reach: Reach) {
+        let scheme = self.physics.scheme();
+        let (grid, chunks) = (&mut self.grid, &self.chunks);
+        let (plan, lists) = (&grid.plan, &grid.lists);
+        let mut arenas = grid.arenas.each_mut();
+        arenas.retain(|arena| grid.is_sent[arena.bin] == (reach == Reach::Neighbours));
+        self.phases.time(Phase::Scatter, || {
+            arenas.into_par_iter().for_each(|arena| {
+                let bin = &plan.bins[arena.bin];
+                let leaf = bin.leaf as usize;
+                let chunk = &chunks[leaf];
+                let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
+                let (frame, rows) = (frame(plan, bin), arena.rows);
+                rows.fill(Row([0.0; 4]));
+                let touched = bin.touched.map_or(&[][..], |table| &plan.touched[table as usize]);
+                let mut sums = arena.moments;
+                if let Some(sums) = &mut sums {
+                    sums.fill([Row([0.0; 4]); D]);
+                }
+                if let Some(whole) = selected.whole {
+                    match sums.as_deref_mut() {
+                        None => p2g::scatter(chunk, whole, &frame, &scheme, dt, rows),
+                        Some(sums) => {
+                            let moments = MomentSums { touched, sums };
+                            p2g::scatter_with_moments(chunk, whole, &frame, &scheme, dt, rows, moments);
+                        }
+                    }
+                }
+                if !selected.parts.is_empty() {
+                    let moments = sums.map(|sums| MomentSums { touched, sums });
+                    p2g::scatter_sub_boxes(chunk, selected.parts, &frame, dt, rows, moments);
+                }
+            });
+        });
+    }
+
+    /// Adds up arenas on the nodes of `part`.
+    pub(super) fn sum_nodes(&mut self, part: Part) {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Sum, || {
+            grid.fields.sum(&grid.plan, &grid.arenas, &grid.received, part);
+        });
+    }
+
+    /// Hands sums of constrained nodes to their parents.
+    pub(super) fn restrict(&mut self) {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Nodes, || grid.fields.restrict(&grid.plan));
+    }
+
+    /// Velocities on real nodes: momentum over mass, gravity, boundary conditions.
+    pub(super) fn update_nodes(&mut self, dt: f64) {
+        let (grid, physics) = (&mut self.grid, &self.physics);
+        self.phases.time(Phase::Nodes, || {
+            update_velocity(&mut grid.fields, &grid.plan, physics.gravity, dt);
+            apply_faces(&mut grid.fields, &grid.plan, &physics.faces);
+        });
+    }
+
+    /// Interpolates velocities on constrained nodes from their parents.
+    pub(super) fn prolong(&mut self) {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan));
+    }
+
+    /// G2P: velocity, affine matrix, deformation, stress and position of all particles.
+    pub(super) fn gather(&mut self, dt: f64) {
+        let scheme = self.physics.scheme();
+        let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
+        let (chunks, signal) = (&mut self.chunks, &mut self.signal);
+        self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter_mut().enumerate();
+            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                let Scratch { arena, gathered } = scratch;
+                let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
+                gathered.clear();
+                gathered.resize(cut.len(), Gathered::default());
+                let mut signal: f64 = 0.0;
+                for (number, bin) in plan.leaf_bins(leaf).enumerate() {
+                    let selected = Selected::of(lists, leaf, number, chunk);
+                    if selected.is_empty() {
+                        continue;
+                    }
+                    fields.load(plan, bin, arena);
+                    let bin = &plan.bins[bin];
+                    let frame = frame(plan, bin);
+                    let moments = bin.touched.map(|table| Moments {
+                        touched: &plan.touched[table as usize],
+                        first: &arena.moments,
+                        second: &arena.spread,
+                    });
+                    let nodes = Fields { velocity: &arena.rows, increment: None, moments };
+                    g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
+                    if let Some(whole) = selected.whole {
+                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes));
+                    }
+                }
+                signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
+            });
+            speeds.collect_into_vec(signal);
+        });
+    }
+}

@@ -1,0 +1,76 @@
+#!/usr/bin/env python3
+"""Reads output files with VTK's own reader and prints what it found, one JSON object per file.
+
+    vtk_check.py FILE.vtkhdf ...
+    vtk_check.py NAME.vtkhdf.series    checks that each file of the series opens and has its time
+"""
+import json
+import os
+import sys
+
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+
+def arrays(attributes):
+    found = {}
+    for i in range(attributes.GetNumberOfArrays()):
+        array = attributes.GetArray(i)
+        values = vtk_to_numpy(array)
+        found[array.GetName()] = {
+            "tuples": array.GetNumberOfTuples(),
+            "components": array.GetNumberOfComponents(),
+            "type": array.GetDataTypeAsString(),
+            "sum": float(values.sum()) if values.size else 0.0,
+        }
+    return found
+
+
+def read(path):
+    errors = []
+    reader = vtk.vtkHDFReader()
+    if not reader.CanReadFile(path):
+        raise SystemExit(f"{path}: VTK cannot read this file")
+    observer = lambda *args: errors.append(str(args[-1]))
+    observer.CallDataType = vtk.VTK_STRING
+    reader.AddObserver("ErrorEvent", observer)
+    reader.SetFileName(path)
+    reader.Update()
+    if errors:
+        raise SystemExit(f"{path}: {errors[0]}")
+    grid = reader.GetOutput()
+    types = vtk.vtkCellTypes()
+    grid.GetCellTypes(types)
+    return {
+        "file": path,
+        "vtk": vtk.vtkVersion.GetVTKVersion(),
+        "class": grid.GetClassName(),
+        "points": grid.GetNumberOfPoints(),
+        "cells": grid.GetNumberOfCells(),
+        "cell_types": sorted(types.GetCellType(i) for i in range(types.GetNumberOfTypes())),
+        "bounds": list(grid.GetBounds()) if grid.GetNumberOfPoints() else [],
+        "point_data": arrays(grid.GetPointData()),
+        "cell_data": arrays(grid.GetCellData()),
+        "field_data": arrays(grid.GetFieldData()),
+    }
+
+
+def main():
+    for path in sys.argv[1:]:
+        if not path.endswith(".series"):
+            print(json.dumps(read(path)))
+            continue
+        with open(path) as text:
+            series = json.load(text)
+        times = [entry["time"] for entry in series["files"]]
+        if times != sorted(set(times)):
+            raise SystemExit(f"{path}: times do not increase: {times}")
+        for entry in series["files"]:
+            found = read(os.path.join(os.path.dirname(path), entry["name"]))
+            stated = found["field_data"]["TimeValue"]["sum"]
+            if stated != entry["time"]:
+                raise SystemExit(f"{path}: {entry['name']} has time {stated}, not {entry['time']}")
+        print(json.dumps({"series": path, "times": times}))
+
+
+main()
