@@ -160,6 +160,17 @@ impl<const D: usize> GivenBoxes<D> {
         nodes
     }
 
+    /// Collective. The real nodes of all ranks on rank 0, in lexicographic order of their places, first axis slowest; an empty
+    /// list on the others.
+    pub fn all_real_nodes(&self, comm: &Comm) -> Vec<RealNode<D>> {
+        let words: Vec<u64> = self.real_nodes().iter().flat_map(RealNode::to_words).collect();
+        let gathered = comm.gather_bytes(bytemuck::cast_slice(&words)).unwrap_or_default();
+        let mut nodes: Vec<RealNode<D>> =
+            gathered.iter().flat_map(|bytes| bytes.chunks_exact(8 * (2 * D + 1)).map(RealNode::from_bytes)).collect();
+        nodes.sort_unstable_by_key(|node| node.place);
+        nodes
+    }
+
     /// Not collective. Velocities of all nodes from momentum and mass, without forces and walls.
     pub fn to_velocities(&mut self) {
         let solver = &mut self.solver;
@@ -176,6 +187,22 @@ impl<const D: usize> GivenBoxes<D> {
     /// Not collective. The particles of this rank's leaves.
     pub fn chunks(&self) -> &[Chunk<D>] {
         &self.solver.chunks
+    }
+}
+
+impl<const D: usize> RealNode<D> {
+    fn to_words(&self) -> impl Iterator<Item = u64> {
+        let reals = self.momentum.into_iter().chain([self.mass]).map(f64::to_bits);
+        self.place.into_iter().map(u64::from).chain(reals)
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        let word = |i: usize| u64::from_ne_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
+        Self {
+            place: std::array::from_fn(|axis| word(axis) as u32),
+            momentum: std::array::from_fn(|axis| f64::from_bits(word(D + axis))),
+            mass: f64::from_bits(word(2 * D)),
+        }
     }
 }
 
