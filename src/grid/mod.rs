@@ -6,6 +6,7 @@
 pub mod arena;
 pub mod closure;
 pub mod constraint;
+pub mod direct;
 pub mod exchange;
 pub mod fields;
 pub mod known;

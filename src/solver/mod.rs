@@ -2,6 +2,7 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod given_boxes;
 pub mod grid;
 pub mod migrate;
 pub mod phases;
