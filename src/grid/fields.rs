@@ -28,6 +28,72 @@ pub struct NodeFields<const D: usize> {
     dirty: Vec<bool>,
     /// First moment slot of each level.
     moment_start: Vec<usize>,
+    entries: Entries,
+}
+
+/// Which arenas enter the sum of each block in this step, in canonical order.
+#[derive(Clone, Debug, Default)]
+struct Entries {
+    /// First entry of each block, and the number of entries at the end.
+    start: Vec<u32>,
+    /// Source and place: the offset number of the block from an own bin, or the part of a received bin.
+    list: Vec<(Source, u32)>,
+}
+
+impl Entries {
+    /// Collects the entries of the blocks of `part` from the occupied bins.
+    fn collect<const D: usize>(
+        &mut self,
+        plan: &GridPlan<D>,
+        arenas: &Arenas<D>,
+        received: &ReceivedArenas<D>,
+        part: Part,
+    ) {
+        let seam = part == Part::Seam;
+        let each = |f: &mut dyn FnMut(u32, Source, u32)| {
+            for &source in &plan.sources {
+                match source {
+                    Source::Own(bin) if arenas.is_occupied(bin.0 as usize) => {
+                        let window = arenas.window(bin.0 as usize);
+                        let around = plan.bins[bin.0 as usize].around.iter().zip(0..);
+                        for (&block, place) in around.filter(|(block, _)| **block != NO_BLOCK) {
+                            if plan.is_seam[block as usize] == seam
+                                && plan.blocks[block as usize].sum != 0
+                                && window.reaches(place as usize)
+                            {
+                                f(block, source, place);
+                            }
+                        }
+                    }
+                    Source::Received(bin) if seam && received.is_occupied(bin) => {
+                        let parts = plan.received[bin as usize].parts.iter().zip(0..);
+                        parts.for_each(|(part, place)| f(part.block, source, place));
+                    }
+                    _ => {}
+                }
+            }
+        };
+        self.start.clear();
+        self.start.resize(plan.blocks.len() + 1, 0);
+        each(&mut |block, _, _| self.start[block as usize + 1] += 1);
+        for block in 0..plan.blocks.len() {
+            self.start[block + 1] += self.start[block];
+        }
+        self.list.clear();
+        self.list.resize(self.start[plan.blocks.len()] as usize, (Source::Received(0), 0));
+        each(&mut |block, source, place| {
+            let next = &mut self.start[block as usize];
+            self.list[*next as usize] = (source, place);
+            *next += 1;
+        });
+        // Each start has moved to the end of its block.
+        self.start.rotate_right(1);
+        self.start[0] = 0;
+    }
+
+    fn of(&self, block: usize) -> &[(Source, u32)] {
+        &self.list[self.start[block] as usize..self.start[block + 1] as usize]
+    }
 }
 
 /// Which blocks to sum.
@@ -64,6 +130,7 @@ impl<const D: usize> NodeFields<D> {
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
             moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
+            entries: Entries::default(),
         }
     }
 
@@ -80,6 +147,8 @@ impl<const D: usize> NodeFields<D> {
         received: &ReceivedArenas<D>,
         part: Part,
     ) {
+        self.entries.collect(plan, arenas, received, part);
+        let entries = &self.entries;
         let nodes = block_nodes(D);
         let mut moments = self.moments.chunks_mut(nodes);
         let flags = self.active.iter_mut().zip(&mut self.dirty);
@@ -95,11 +164,8 @@ impl<const D: usize> NodeFields<D> {
             .filter(|&(index, ..)| plan.is_seam[index] == (part == Part::Seam))
             .collect();
         blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block, (active, dirty))| {
-            let contributions = plan.block_contributions(index);
-            *active = contributions.iter().any(|contribution| match contribution.source {
-                Source::Own(bin) => arenas.is_occupied(bin.0 as usize),
-                Source::Received(bin, _) => received.is_occupied(bin),
-            });
+            let entries = entries.of(index);
+            *active = !entries.is_empty();
             if *active || *dirty {
                 block.rows.fill(ZERO);
                 if let Some(moments) = &mut block.moments {
@@ -107,20 +173,16 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             *dirty = *active;
-            if !*active {
-                return;
-            }
-            for contribution in contributions {
-                match contribution.source {
+            for &(source, place) in entries {
+                match source {
                     Source::Own(bin) => {
                         if let Some(arena) = arenas.get(bin.0) {
-                            block.add(arena.rows, arena.moments, &arena.window, contribution.offset);
+                            block.add(arena.rows, arena.moments, &arena.window, place as u8);
                         }
                     }
-                    Source::Received(bin, part) if received.is_occupied(bin) => {
-                        received.add(bin, part, block.rows, block.moments.as_deref_mut());
+                    Source::Received(bin) => {
+                        received.add(bin, place, block.rows, block.moments.as_deref_mut());
                     }
-                    Source::Received(..) => {}
                 }
             }
         });

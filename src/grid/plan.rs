@@ -53,22 +53,13 @@ pub struct Bin<const D: usize> {
     pub touched: Option<u32>,
 }
 
-/// One part of a node sum: nodes of `arena` that fall into the block at `offset` from the bin.
-#[derive(Clone, Copy, Debug)]
-pub struct Contribution {
-    /// The arena: of an own bin, or of a bin received from another rank.
-    pub source: Source,
-    /// Offset number of the block, seen from the bin.
-    pub offset: u8,
-}
-
 /// Where an arena comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// An own bin.
     Own(BinId),
-    /// A received bin: number among the received bins, and its part for this block.
-    Received(u32, u32),
+    /// A received bin: number among [`GridPlan::received`].
+    Received(u32),
 }
 
 /// A link between a constrained node and one of its parents.
@@ -160,8 +151,21 @@ pub struct ReceivedBin<const D: usize> {
     pub leaf: u32,
     /// Level and block coordinate of the arena.
     pub block: Octant<D>,
-    /// Needed nodes by block: `(offset number of the block from the bin, nodes, constrained nodes)`.
-    pub parts: Vec<(u8, u64, u64)>,
+    /// Needed nodes by block.
+    pub parts: Vec<ReceivedNodes>,
+}
+
+/// Nodes of a received bin that fall into one block.
+#[derive(Clone, Copy, Debug)]
+pub struct ReceivedNodes {
+    /// The block.
+    pub block: u32,
+    /// Offset number of the block from the bin.
+    pub offset: u8,
+    /// Needed nodes.
+    pub nodes: u64,
+    /// Those that are constrained.
+    pub constrained: u64,
 }
 
 /// The grid of one rank. Valid for one revision of the forest.
@@ -182,10 +186,9 @@ pub struct GridPlan<const D: usize> {
     pub leaf_start: Vec<u32>,
     /// Bins of other ranks that contribute to sums here, by rank, leaf and bin.
     pub received: Vec<ReceivedBin<D>>,
-    /// Contributions to each block in canonical order (source leaf along the curve, then bin).
-    pub contributions: Vec<Contribution>,
-    /// First contribution of each block, and the number of contributions at the end.
-    pub contribution_start: Vec<u32>,
+    /// All bins whose arenas enter sums here, in canonical order: by source leaf along the curve, level, and
+    /// curve position of the block.
+    pub sources: Vec<Source>,
     /// Per level, restriction into its nodes from constrained nodes one level finer.
     pub restriction: Vec<Links>,
     /// Per level, prolongation into its constrained nodes from one level coarser.
@@ -225,8 +228,7 @@ impl<const D: usize> GridPlan<D> {
             bins: Vec::new(),
             leaf_start: Vec::new(),
             received: Vec::new(),
-            contributions: Vec::new(),
-            contribution_start: Vec::new(),
+            sources: Vec::new(),
             restriction: Vec::new(),
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
@@ -241,22 +243,23 @@ impl<const D: usize> GridPlan<D> {
         let number: HashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.list_bins(&number);
-        plan.list_contributions(comm.rank());
+        plan.list_received(comm.rank());
+        plan.list_sources();
         plan.link_levels(&number);
         plan.find_face_nodes();
-        plan.is_seam = (0..plan.blocks.len())
-            .map(|block| {
-                let contributions = plan.block_contributions(block).iter();
-                contributions.clone().any(|c| matches!(c.source, Source::Received(..)))
-            })
-            .collect();
+        plan.is_seam = vec![false; plan.blocks.len()];
+        for part in plan.received.iter().flat_map(|bin| &bin.parts) {
+            plan.is_seam[part.block as usize] = true;
+        }
         let spread = plan.constraint_spread();
-        plan.second = plan
-            .bins
-            .iter()
-            .filter(|bin| bin.touched.is_some())
-            .map(|bin| plan.arena_of(&bin.around, &spread))
-            .collect();
+        plan.second = vec![Vec::new(); plan.touched.len()];
+        for number in 0..plan.bins.len() {
+            if let Some(table) = plan.bins[number].touched
+                && plan.second[table as usize].is_empty()
+            {
+                plan.second[table as usize] = plan.arena_of(&plan.bins[number].around, &spread);
+            }
+        }
         plan
     }
 
@@ -280,12 +283,6 @@ impl<const D: usize> GridPlan<D> {
         self.leaf_start[leaf] as usize..self.leaf_start[leaf + 1] as usize
     }
 
-    /// Contributions to block `block`.
-    pub fn block_contributions(&self, block: usize) -> &[Contribution] {
-        let range = self.contribution_start[block] as usize..self.contribution_start[block + 1] as usize;
-        &self.contributions[range]
-    }
-
     /// Position of a node relative to the domain's lower corner, m.
     pub fn node_position(&self, node: u32) -> [f64; D] {
         let block = &self.blocks[node as usize / block_nodes(D)];
@@ -299,7 +296,7 @@ impl<const D: usize> GridPlan<D> {
         self.tree.heap_bytes()
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
-            + self.contributions.capacity() * size_of::<Contribution>()
+            + self.sources.capacity() * size_of::<Source>()
             + self.second.iter().map(|table| table.capacity() * size_of::<Row>()).sum::<usize>()
     }
 
@@ -351,9 +348,17 @@ impl<const D: usize> GridPlan<D> {
     fn list_bins(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
         let first = self.tree.first_own();
         let own = self.tree.leaves().len() - self.tree.ghost_len();
+        // Bins of several leaves may have one block; what depends on the block is made once.
+        let mut of_block: HashMap<Octant<D>, u32> = HashMap::new();
         for leaf in 0..own {
             self.leaf_start.push(self.bins.len() as u32);
             for block in potential_bins(&self.tree, first + leaf) {
+                if let Some(&same) = of_block.get(&block) {
+                    let same = self.bins[same as usize].clone();
+                    self.bins.push(Bin { leaf: leaf as u32, ..same });
+                    continue;
+                }
+                of_block.insert(block, self.bins.len() as u32);
                 let mut around = [NO_BLOCK; 27];
                 for (index, slot) in around.iter_mut().enumerate().take(offset_count(D)) {
                     if let Some(coord) = shifted(block.coord, offset::<D>(index))
@@ -401,11 +406,10 @@ impl<const D: usize> GridPlan<D> {
         Some(self.touched.len() as u32 - 1)
     }
 
-    /// Lists the arenas that make up each block's sum, own and received, in canonical order.
-    fn list_contributions(&mut self, rank: usize) {
-        let own_bins = self.own_bins();
-        // (block, source leaf, bin, offset, nodes)
-        let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
+    /// Lists the bins of other ranks that enter sums here, with the nodes needed of each.
+    fn list_received(&mut self, rank: usize) {
+        // (source leaf, bin, part)
+        let mut needed: Vec<(u32, Octant<D>, ReceivedNodes)> = Vec::new();
         let mut feeding: HashMap<Octant<D>, Vec<usize>> = HashMap::new();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
@@ -416,48 +420,39 @@ impl<const D: usize> GridPlan<D> {
                     continue;
                 }
                 let bin = Octant { level: block.level, coord };
-                let leaves =
-                    feeding.entry(bin).or_insert_with(|| bin_sources(&self.tree, bin.level, bin.coord));
-                for &leaf in leaves.iter() {
-                    sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
+                let remote = feeding.entry(bin).or_insert_with(|| {
+                    let mut leaves = bin_sources(&self.tree, bin.level, bin.coord);
+                    leaves.retain(|&leaf| self.tree.owner(leaf) != rank);
+                    leaves
+                });
+                let constrained = nodes & block.constrained;
+                let offset = seen_from_bin as u8;
+                let part = ReceivedNodes { block: index as u32, offset, nodes, constrained };
+                needed.extend(remote.iter().map(|&leaf| (leaf as u32, bin, part)));
+            }
+        }
+        needed.sort_unstable_by_key(|(leaf, bin, part)| (*leaf, bin.level, bin.key(), part.offset));
+        for (leaf, block, part) in needed {
+            match self.received.last_mut() {
+                Some(last) if (last.leaf, last.block) == (leaf, block) => last.parts.push(part),
+                _ => {
+                    let rank = self.tree.owner(leaf as usize);
+                    self.received.push(ReceivedBin { rank, leaf, block, parts: vec![part] });
                 }
             }
         }
-        let mut remote: Vec<_> = sources
-            .iter()
-            .filter(|source| self.tree.owner(source.1 as usize) != rank)
-            .map(|&(block, leaf, bin, offset, nodes)| (leaf, bin, offset, nodes, block))
-            .collect();
-        remote.sort_unstable_by_key(|&(leaf, bin, offset, ..)| (leaf, bin.level, bin.key(), offset));
-        let mut part_of: HashMap<(u32, Octant<D>, u8), (u32, u32)> = HashMap::new();
-        for (leaf, bin, offset, nodes, block) in remote {
-            let constrained = nodes & self.blocks[block as usize].constrained;
-            if self.received.last().is_none_or(|last| (last.leaf, last.block) != (leaf, bin)) {
-                let rank = self.tree.owner(leaf as usize);
-                self.received.push(ReceivedBin { rank, leaf, block: bin, parts: Vec::new() });
-            }
-            let number = self.received.len() as u32 - 1;
-            let parts = &mut self.received[number as usize].parts;
-            part_of.insert((leaf, bin, offset), (number, parts.len() as u32));
-            parts.push((offset, nodes, constrained));
-        }
-        sources.sort_unstable_by_key(|&(block, leaf, bin, offset, _)| (block, leaf, bin.key(), offset));
-        let mut next = 0;
-        for (block, leaf, bin, offset, _) in sources {
-            while next <= block {
-                self.contribution_start.push(self.contributions.len() as u32);
-                next += 1;
-            }
-            let source = match own_bins.get(&(leaf, bin)) {
-                Some(&own) => Source::Own(BinId(own)),
-                None => {
-                    let (number, part) = part_of[&(leaf, bin, offset)];
-                    Source::Received(number, part)
-                }
-            };
-            self.contributions.push(Contribution { source, offset });
-        }
-        self.contribution_start.resize(self.blocks.len() + 1, self.contributions.len() as u32);
+    }
+
+    /// Puts own and received bins into canonical order.
+    fn list_sources(&mut self) {
+        let first = self.tree.first_own() as u32;
+        let own = self.bins.iter().zip(0..);
+        let own = own.map(|(bin, number)| (first + bin.leaf, bin.block, Source::Own(BinId(number))));
+        let received = self.received.iter().zip(0..);
+        let received = received.map(|(bin, number)| (bin.leaf, bin.block, Source::Received(number)));
+        let mut sources: Vec<(u32, Octant<D>, Source)> = own.chain(received).collect();
+        sources.sort_unstable_by_key(|(leaf, block, _)| (*leaf, block.level, block.key()));
+        self.sources = sources.into_iter().map(|(_, _, source)| source).collect();
     }
 
     /// Own bins by known source leaf and block.
