@@ -58,6 +58,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Ok(Outcome::Stopped { checkpoint }) => Err(Failure::Stopped(checkpoint)),
         // All ranks have the same error; one message is enough.
         Err(_) if comm.rank() != 0 => Err(Failure::Elsewhere),
+        Err(error @ RunError::Seed(_)) => Err(Failure::Usage(error.to_string())),
         Err(error) => Err(Failure::Run(error.to_string())),
     }
 }
