@@ -28,7 +28,7 @@ fn explain(failure: &Failure) {
 fn explain_faults(list: &FaultList) {
     let theme =
         if std::io::stderr().is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
-    let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(0);
+    let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
     for fault in &list.faults {
         let mut diagnostic = MietteDiagnostic::new(list.headline(fault))
             .with_label(LabeledSpan::at(fault.span.clone(), "here"));
@@ -39,7 +39,8 @@ fn explain_faults(list: &FaultList) {
         let report = Report::new(diagnostic).with_source_code(source);
         let mut text = String::new();
         match handler.render_report(&mut text, report.as_ref()) {
-            Ok(()) => eprintln!("{text}"),
+            // Without colours the line begins with the file, as editors and scripts like it.
+            Ok(()) => eprintln!("{}", text.strip_prefix("  x ").unwrap_or(&text)),
             Err(_) => eprintln!("{}", list.headline(fault)),
         }
     }

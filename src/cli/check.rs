@@ -2,6 +2,7 @@
 use super::{Failure, bytes, grouped};
 use crate::job::estimate::{Estimate, estimate};
 use crate::job::{self, AnyProblem, Problem};
+use crate::particle::seed::check_counts;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -27,15 +28,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn report<const D: usize>(arguments: &Arguments, problem: &Problem<D>) -> Result<(), Failure> {
-    let path = arguments.job.display().to_string();
-    let estimate = estimate(problem).map_err(|error| Failure::Seed { path: path.clone(), error })?;
-    if let Some(empty) = estimate.particles.iter().position(|count| *count == 0) {
-        return Err(Failure::Usage(format!(
-            "{path}: bodies[{empty}].shape: found no particle in the body \"{}\"; expected a shape larger than \
-             the distance of particles, or finer cells there",
-            problem.bodies[empty].name
-        )));
-    }
+    let estimate = estimate(problem)?;
+    check_counts(problem, &estimate.particles)?;
     write(&mut std::io::stdout().lock(), arguments, problem, &estimate)?;
     Ok(())
 }

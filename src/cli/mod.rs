@@ -50,13 +50,8 @@ pub enum Failure {
     #[error(transparent)]
     Job(#[from] JobError),
     /// The bodies of a job cannot be filled.
-    #[error("{path}: {error}")]
-    Seed {
-        /// The job file.
-        path: String,
-        /// What is wrong.
-        error: SeedError,
-    },
+    #[error(transparent)]
+    Seed(#[from] SeedError),
     /// The command cannot be carried out as given.
     #[error("{0}")]
     Usage(String),
@@ -75,7 +70,7 @@ impl Failure {
     /// 2 for wrong input, 1 for what goes wrong later, 3 after a stop on request.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Job(_) | Self::Seed { .. } | Self::Usage(_) => 2,
+            Self::Job(_) | Self::Seed(_) | Self::Usage(_) => 2,
             Self::Run(_) | Self::Elsewhere => 1,
             Self::Stopped(_) => crate::run::stop::STOPPED,
         }

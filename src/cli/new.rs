@@ -73,7 +73,7 @@ mod tests {
     fn templates_are_valid_jobs_with_titles() {
         for (name, text) in TEMPLATES {
             assert!(!title(text).is_empty(), "{name}");
-            let faults = crate::job::parse(text, name).err().unwrap_or_default();
+            let faults = crate::job::parse(text, name.as_ref()).err().unwrap_or_default();
             assert!(faults.is_empty(), "{name}: {faults:?}");
         }
     }

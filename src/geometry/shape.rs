@@ -129,7 +129,8 @@ impl<const D: usize> Shape<D> {
             Self::HalfSpace { point, normal } => half_space_bounds(point, normal),
             Self::Polygon(points) => points.iter().fold(Aabb::EMPTY, |hull, p| {
                 let mut one = Aabb::EVERYWHERE;
-                (one.lower[..2].copy_from_slice(p), one.upper[..2].copy_from_slice(p));
+                one.lower[..2].copy_from_slice(p);
+                one.upper[..2].copy_from_slice(p);
                 hull.hull(&one)
             }),
             Self::Rotated(shape, placement) => rotated_bounds(&shape.bounds(), placement),

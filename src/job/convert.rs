@@ -1,24 +1,29 @@
-//! From the file's types to a checked problem: everything that the schema cannot say.
-use super::error::{Fault, alternatives, nearest};
+//! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
+//! and bodies.
+use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
 use super::overlap;
 use super::problem::*;
+use super::settings::{digest, faces, numerics, output, report};
 use super::source::{Node, Path};
 use crate::geometry::{Aabb, Shape};
 use partition::{Brick, key::MAX_ROOTS};
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
-/// Most output files of one run.
-const MAX_OUTPUTS: f64 = 100_000.0;
 
-/// Converts and checks; `name` becomes the name of the job.
-pub(super) fn convert(file: &JobFile, tree: &Node, name: &str) -> Result<AnyProblem, Vec<Fault>> {
-    let mut checks = Checks { tree, faults: Vec::new() };
+/// Converts and checks; `text` is what `file` and `tree` were made from.
+pub(super) fn convert(
+    file: &JobFile,
+    tree: &Node,
+    text: &str,
+    path: &std::path::Path,
+) -> Result<AnyProblem, Vec<Fault>> {
+    let mut checks = Checks { tree, text, faults: Vec::new() };
     let problem = if file.dimension == 2 {
-        problem(&mut checks, file, name).map(AnyProblem::Two)
+        problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
-        problem(&mut checks, file, name).map(AnyProblem::Three)
+        problem(&mut checks, file, path).map(AnyProblem::Three)
     };
     match problem {
         Some(problem) if checks.faults.is_empty() => Ok(problem),
@@ -32,6 +37,7 @@ pub(super) fn convert(file: &JobFile, tree: &Node, name: &str) -> Result<AnyProb
 /// Collects faults; knows where the keys of the file stand.
 pub(super) struct Checks<'t> {
     tree: &'t Node,
+    text: &'t str,
     faults: Vec<Fault>,
 }
 
@@ -52,7 +58,12 @@ impl Checks<'_> {
     }
 }
 
-fn problem<const D: usize>(checks: &mut Checks, file: &JobFile, name: &str) -> Option<Problem<D>> {
+fn problem<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    path: &std::path::Path,
+) -> Option<Problem<D>> {
+    let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
     let root = Path::default();
     let (origin, brick) = domain::<D>(checks, &file.domain, &root.key("domain"))?;
     let root_edge = file.domain.root_edge;
@@ -67,13 +78,14 @@ fn problem<const D: usize>(checks: &mut Checks, file: &JobFile, name: &str) -> O
     };
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
-    let output = output(checks, file, name, &root.key("output"));
+    let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
-        Some(report) => Some(self::report(checks, report, &space, &root.key("report"))?),
+        Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
         None => None,
     };
     let problem = Problem {
-        name: name.to_owned(),
+        name,
+        path: path.to_path_buf(),
         title: file.title.clone(),
         digest: digest(file),
         origin,
@@ -306,7 +318,7 @@ fn body<const D: usize>(
     }
     for a in 0..D {
         // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
-        let slack = 1e-9 * space.size[a];
+        let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
         let (low, high) = (bounds.lower[a], bounds.upper[a]);
         let below = low.is_finite() && low < -slack;
         let above = high.is_finite() && high > space.size[a] + slack;
@@ -324,150 +336,12 @@ fn body<const D: usize>(
     }
     Some(Body {
         name: body.name.clone(),
+        place: position(checks.text, checks.tree.locate(&here).start),
         centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
         shape,
         material: material?,
         velocity: velocity?,
         angular_velocity: angular_velocity?,
         particles_per_cell: body.particles_per_cell,
-    })
-}
-
-fn faces<const D: usize>(
-    checks: &mut Checks,
-    boundaries: &file::Boundaries,
-    path: &Path,
-) -> Option<[[FaceCondition; 2]; D]> {
-    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
-    if D == 2 {
-        for (key, face) in [("z_min", z_min), ("z_max", z_max)] {
-            if face.is_some() {
-                checks
-                    .fault(&path.key(key), "found a face along z; expected only x and y in a 2D job".into());
-                return None;
-            }
-        }
-    }
-    let condition = |face: &Option<file::Face>| match face {
-        None | Some(file::Face::Slip {}) => FaceCondition::Slip,
-        Some(file::Face::Sticky {}) => FaceCondition::Sticky,
-        Some(file::Face::Separating { friction }) => FaceCondition::Separating { friction: *friction },
-        Some(file::Face::Symmetric {}) => FaceCondition::Symmetric,
-    };
-    let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
-    Some(std::array::from_fn(|a| all[a].map(condition)))
-}
-
-fn numerics(checks: &mut Checks, numerics: &file::Numerics, path: &Path) -> (Transfer, BoxPolicy) {
-    if let (Some(_), false) = (numerics.flip, numerics.transfer == file::Transfer::Flip) {
-        checks.fault(
-            &path.key("flip"),
-            "found a share of FLIP; expected it only with transfer = \"flip\"".into(),
-        );
-    }
-    let transfer = match numerics.transfer {
-        file::Transfer::Apic => Transfer::Apic,
-        file::Transfer::Flip => Transfer::Flip { blend: numerics.flip.unwrap_or(0.99) },
-        file::Transfer::Tpic => Transfer::Tpic,
-    };
-    let here = path.key("box_stretch");
-    if numerics.box_stretch.is_some() && numerics.boxes != file::Boxes::Volume {
-        checks.fault(&here, "found bounds of the stretch; expected them only with boxes = \"volume\"".into());
-    }
-    let [min_stretch, max_stretch] = numerics.box_stretch.unwrap_or([0.25, 2.0]);
-    if !(min_stretch > 0.0 && min_stretch <= 1.0 && max_stretch >= 1.0 && max_stretch <= 8.0) {
-        checks.fault(
-            &here,
-            format!("found [{min_stretch}, {max_stretch}]; expected a lower bound above 0 and at most 1 and an upper one from 1 to 8"),
-        );
-    }
-    let boxes = match numerics.boxes {
-        file::Boxes::Volume => BoxPolicy::Volume { min_stretch, max_stretch },
-        file::Boxes::Fixed => BoxPolicy::Fixed,
-        file::Boxes::Cell => BoxPolicy::Cell,
-    };
-    (transfer, boxes)
-}
-
-fn output(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> OutputSetup {
-    let output = &file.output;
-    let directory = match output.directory.as_deref() {
-        Some(directory) if directory.trim().is_empty() => {
-            checks.fault(
-                &path.key("directory"),
-                "found an empty text; expected the name of a directory".into(),
-            );
-            String::new()
-        }
-        Some(directory) => directory.to_owned(),
-        None => format!("out/{name}"),
-    };
-    if let Some(every) = output.every.filter(|every| file.time.end / every > MAX_OUTPUTS) {
-        checks.fault(
-            &path.key("every"),
-            format!(
-                "found {every}; expected at least {:e}, for at most {MAX_OUTPUTS} outputs until time.end",
-                file.time.end / MAX_OUTPUTS
-            ),
-        );
-    }
-    for (i, field) in output.fields.iter().enumerate() {
-        if output.fields[..i].contains(field) {
-            checks.fault(
-                &path.key("fields").index(i),
-                "found a field a second time; expected each once".into(),
-            );
-        }
-    }
-    OutputSetup {
-        directory: directory.into(),
-        every: output.every,
-        fields: output.fields.clone(),
-        restart: output.restart,
-    }
-}
-
-fn report<const D: usize>(
-    checks: &mut Checks,
-    report: &file::Report,
-    space: &Space<D>,
-    path: &Path,
-) -> Option<ReportSetup<D>> {
-    let file::Report::ColumnCollapse { base, up, radius, height, law } = report;
-    let base: [f64; D] = checks.vector(base, &path.key("base"))?;
-    let base: [f64; D] = std::array::from_fn(|a| base[a] - space.origin[a]);
-    if (0..D).any(|a| base[a] < -1e-9 * space.size[a] || base[a] > space.size[a] * (1.0 + 1e-9)) {
-        checks.fault(&path.key("base"), "found a point outside the domain; expected one inside".into());
-    }
-    let up = match up {
-        None => D - 1,
-        Some(file::AxisName::X) => 0,
-        Some(file::AxisName::Y) => 1,
-        Some(file::AxisName::Z) => 2,
-    };
-    if up >= D {
-        checks.fault(&path.key("up"), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
-        return None;
-    }
-    if D == 2 && *law == CollapseLaw::Axisymmetric {
-        checks.fault(&path.key("law"), "found \"axisymmetric\"; expected \"planar\" in a 2D job".into());
-    }
-    Some(ReportSetup::ColumnCollapse { base, up, radius: *radius, height: *height, law: *law })
-}
-
-/// Checksum (64-bit FNV-1a) of what changes the state, from the file with all defaults filled in.
-fn digest(file: &JobFile) -> u64 {
-    let mut state = file.clone();
-    state.title.clear();
-    state.output = file::Output::default();
-    state.checkpoint = file::Checkpoint::default();
-    state.history = file::History::default();
-    state.telemetry = file::Telemetry::default();
-    state.report = None;
-    state.time.end = 0.0;
-    // Field order and shortest round-trip numbers make the text canonical.
-    let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })
 }

@@ -47,9 +47,7 @@ pub struct FaultList {
 impl FaultList {
     /// Line and column, both from 1, of a byte position; columns count characters.
     pub fn position(&self, byte: usize) -> (usize, usize) {
-        let before = &self.text[..byte.min(self.text.len())];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+        position(&self.text, byte)
     }
 
     /// `file:line:column: key: message` of one fault.
@@ -71,6 +69,14 @@ impl fmt::Display for FaultList {
     }
 }
 
+/// Line and column, both from 1, of a byte position; columns count characters.
+pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
+    // A place inside a character belongs to its start; one behind the end, to the end.
+    let before = &text[..text.floor_char_boundary(byte)];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
 /// The known word nearest to `word`, if it is near enough to be meant.
 pub(super) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
@@ -89,5 +95,24 @@ pub(super) fn alternatives<'a>(words: impl IntoIterator<Item = &'a str>) -> Stri
         None => "nothing".into(),
         Some((only, [])) => only.clone(),
         Some((last, others)) => format!("{} or {last}", others.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters() {
+        assert_eq!(position("a = 1\nµ = \"é\" # x", 16), (2, 9));
+        assert_eq!(position("", 5), (1, 1));
+    }
+
+    #[test]
+    fn nearest_word_is_near() {
+        let known = ["density", "name", "young"];
+        assert_eq!(nearest("denisty", known), Some("density"));
+        assert_eq!(nearest("Young", known), Some("young"));
+        assert_eq!(nearest("wobble", known), None);
     }
 }

@@ -11,6 +11,7 @@ pub mod file_shape;
 mod overlap;
 pub mod problem;
 mod schema;
+mod settings;
 mod shapes;
 mod source;
 mod structure;
@@ -36,17 +37,22 @@ pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
         let faults = vec![Fault { key: String::new(), message, span: valid..valid, help: None }];
         FaultList { path: path.to_path_buf(), text, faults }
     })?;
-    let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
-    parse(&text, &name).map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
+    parse(&text, path).map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
 }
 
-/// Checks the text of a job file; `name` becomes the name of the job.
+/// Checks the text of a job file. Nothing is read from `path`: its stem becomes the name of the job.
 ///
 /// # Errors
 /// All faults that were found.
-pub fn parse(text: &str, name: &str) -> Result<AnyProblem, Vec<Fault>> {
+pub fn parse(text: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
     let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None }];
-    let tree = source::Node::parse(text).map_err(|(span, message)| alone(span, message))?;
+    let tree = source::Node::parse(text).map_err(|(span, message)| match text.get(span.clone()) {
+        Some(key) if message == "duplicate key" => {
+            let message = "found the key a second time; expected it once".into();
+            vec![Fault { key: key.to_owned(), message, span, help: None }]
+        }
+        _ => alone(span, message),
+    })?;
     let faults = structure::check(&tree, &schema());
     if !faults.is_empty() {
         return Err(faults);
@@ -54,5 +60,8 @@ pub fn parse(text: &str, name: &str) -> Result<AnyProblem, Vec<Fault>> {
     // What the schema accepts, the types accept; should they ever differ, the parser's words count.
     let file: file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
-    convert::convert(&file, &tree, name)
+    convert::convert(&file, &tree, text, path)
 }
+
+#[cfg(test)]
+mod tests;

@@ -22,11 +22,37 @@ pub enum AnyProblem {
     Three(Problem<3>),
 }
 
+impl TryFrom<AnyProblem> for Problem<2> {
+    type Error = Box<Problem<3>>;
+
+    /// The problem, if it is one of plane strain.
+    fn try_from(problem: AnyProblem) -> Result<Self, Self::Error> {
+        match problem {
+            AnyProblem::Two(problem) => Ok(problem),
+            AnyProblem::Three(problem) => Err(problem.into()),
+        }
+    }
+}
+
+impl TryFrom<AnyProblem> for Problem<3> {
+    type Error = Box<Problem<2>>;
+
+    /// The problem, if it is one in space.
+    fn try_from(problem: AnyProblem) -> Result<Self, Self::Error> {
+        match problem {
+            AnyProblem::Two(problem) => Err(problem.into()),
+            AnyProblem::Three(problem) => Ok(problem),
+        }
+    }
+}
+
 /// A checked job in `D` dimensions.
 #[derive(Clone, Debug)]
 pub struct Problem<const D: usize> {
     /// Name of the job: the stem of its file; prefix of output files.
     pub name: String,
+    /// The job file, as given; for messages.
+    pub path: PathBuf,
     /// Title for people; may be empty.
     pub title: String,
     /// Checksum of everything that changes the state (not of outputs, checkpoints or the end time).
@@ -145,6 +171,8 @@ pub struct Body<const D: usize> {
     pub name: String,
     /// Region that it fills.
     pub shape: Shape<D>,
+    /// Line and column of the shape in the job file, both from 1; for messages.
+    pub place: (usize, usize),
     /// Index into [`Problem::materials`].
     pub material: usize,
     /// Velocity of the body's centre, m/s.

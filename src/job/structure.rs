@@ -284,6 +284,11 @@ fn tag_of(option: &Value) -> Option<&str> {
     properties.iter().find(|(_, schema)| schema.get("const").is_some()).map(|(key, _)| key.as_str())
 }
 
+/// A limit as a person would write it.
+fn plain(limit: f64) -> String {
+    if limit.abs() >= 1e7 { format!("{limit:e}") } else { limit.to_string() }
+}
+
 /// "a number above 0 and at most 1".
 fn type_words(name: &str, layers: &Layers<'_>) -> String {
     match name {
@@ -308,7 +313,9 @@ fn type_words(name: &str, layers: &Layers<'_>) -> String {
                 ("maximum", "at most"),
             ]
             .into_iter()
-            .filter_map(|(keyword, words)| layers.number(keyword).map(|limit| format!("{words} {limit}")))
+            .filter_map(|(keyword, words)| {
+                layers.number(keyword).map(|limit| format!("{words} {}", plain(limit)))
+            })
             .collect();
             let noun = if name == "integer" { "an integer" } else { "a number" };
             match (layers.number("minimum"), layers.number("maximum")) {

@@ -13,15 +13,29 @@ use partition::Octant;
 pub enum SeedError {
     /// A lattice point lies in two bodies.
     #[error(
-        "the bodies \"{first}\" and \"{second}\" overlap at {point:?} m; expected bodies that share no point"
+        "{place}: found the body \"{second}\" overlapping \"{first}\" at {point:?} m; expected bodies that \
+         share no point"
     )]
     Overlap {
+        /// File, line, column and key of the second body's shape.
+        place: String,
         /// The body that comes first in the job.
         first: String,
         /// The other one.
         second: String,
         /// The point in the coordinates of the job file, m.
         point: Vec<f64>,
+    },
+    /// A body has no particle at all.
+    #[error(
+        "{place}: found no particle in the body \"{body}\"; expected a shape larger than the distance of \
+         particles, or finer cells there"
+    )]
+    Empty {
+        /// File, line, column and key of the body's shape.
+        place: String,
+        /// The body.
+        body: String,
     },
 }
 
@@ -86,6 +100,24 @@ pub fn count_leaf<const D: usize>(
     visit(problem, octant, |body, points| counts[body] += points.len() as u64)
 }
 
+/// Not collective. Checks the number of particles of each body in all leaves of all ranks together.
+///
+/// # Errors
+/// A body has none.
+pub fn check_counts<const D: usize>(problem: &Problem<D>, counts: &[u64]) -> Result<(), SeedError> {
+    match counts.iter().position(|count| *count == 0) {
+        Some(empty) => {
+            Err(SeedError::Empty { place: place(problem, empty), body: problem.bodies[empty].name.clone() })
+        }
+        None => Ok(()),
+    }
+}
+
+fn place<const D: usize>(problem: &Problem<D>, body: usize) -> String {
+    let (line, column) = problem.bodies[body].place;
+    format!("{}:{line}:{column}: bodies[{body}].shape", problem.path.display())
+}
+
 /// Distance of lattice points of a body in leaves of a level, m.
 fn spacing<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
     problem.cell_edge(level) / body.particles_per_cell
@@ -138,6 +170,7 @@ fn visit<const D: usize>(
             if let Some(x) = overlap {
                 let (first, second) = (index.min(other), index.max(other));
                 return Err(SeedError::Overlap {
+                    place: place(problem, second),
                     first: problem.bodies[first].name.clone(),
                     second: problem.bodies[second].name.clone(),
                     point: (0..D).map(|a| x[a] + problem.origin[a]).collect(),
@@ -193,3 +226,7 @@ fn first_at_or_after(bound: f64, spacing: f64) -> u64 {
     }
     index
 }
+
+#[cfg(test)]
+#[path = "seed_tests.rs"]
+mod tests;

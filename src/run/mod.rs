@@ -273,4 +273,3 @@ fn view<'a, const D: usize>(
         scalars,
     }
 }
-

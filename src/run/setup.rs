@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use crate::job::Problem;
 use crate::material;
-use crate::particle::seed::{SeedError, fill_leaf};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::seed::{SeedError, fill_leaf};
 use crate::solver::rebalance::leaf_weight;
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
