@@ -7,7 +7,7 @@ use partition::comm::{Comm, World};
 use super::{BAD_INPUT, Failure};
 use crate::job::problem::AnyProblem;
 use crate::run::stop::StopRequest;
-use crate::run::{self, Options, Outcome, Summary, restart};
+use crate::run::{self, Options, Outcome, RunError, Summary, restart};
 
 /// Arguments of `agimp run`.
 #[derive(Debug, clap::Args)]
@@ -55,6 +55,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
             return Ok(());
         }
         Ok(Outcome::Stopped { checkpoint }) => Failure::Stopped(checkpoint),
+        Err(error @ RunError::Seed(_)) => Failure::Usage(error.to_string()),
         Err(error) => Failure::Run(error.to_string()),
     };
     // All ranks have the same; one message is enough.

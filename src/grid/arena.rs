@@ -1,5 +1,6 @@
 //! Arenas: what the particles of each bin scattered, before nodes sum it up.
 use super::plan::GridPlan;
+use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
 /// First moments of one node: row `k` is column `k` of the matrix `A_j = Σ w m C` on the way from particles
@@ -18,6 +19,19 @@ pub struct Arenas<const D: usize> {
     slot: Vec<u32>,
     /// Per bin, number of its moments.
     moment_slot: Vec<u32>,
+    /// Per bin, the nodes that its particles touch.
+    windows: Vec<Window<D>>,
+}
+
+/// The arena of one bin.
+#[derive(Clone, Copy, Debug)]
+pub struct Arena<'a, const D: usize> {
+    /// Momentum and mass; values outside the window are left over from earlier steps.
+    pub rows: &'a [Row],
+    /// First moments, for bins that touch constrained nodes.
+    pub moments: Option<&'a [Moments<D>]>,
+    /// The nodes that hold values.
+    pub window: Window<D>,
 }
 
 /// The arena of one bin, to scatter into.
@@ -30,14 +44,29 @@ pub struct ArenaMut<'a, const D: usize> {
     pub moments: Option<&'a mut [Moments<D>]>,
 }
 
+impl<const D: usize> ArenaMut<'_, D> {
+    /// Sets the nodes of a window to zero.
+    pub fn clear(&mut self, window: &Window<D>) {
+        window.for_each_run(|run| {
+            self.rows[run.clone()].fill(Row([0.0; 4]));
+            if let Some(moments) = &mut self.moments {
+                moments[run].fill([Row([0.0; 4]); D]);
+            }
+        });
+    }
+}
+
 impl<const D: usize> Arenas<D> {
-    /// Makes room for the bins that `is_occupied` names. Contents are left over from earlier steps.
-    pub fn occupy(&mut self, plan: &GridPlan<D>, is_occupied: impl Fn(usize) -> bool) {
+    /// Makes room for the bins that `window` gives nodes. Contents are left over from earlier steps.
+    pub fn occupy(&mut self, plan: &GridPlan<D>, window: impl Fn(usize) -> Option<Window<D>>) {
         let (mut slots, mut moment_slots) = (0, 0);
         self.slot.resize(plan.bins.len(), NONE);
         self.moment_slot.resize(plan.bins.len(), NONE);
+        self.windows.resize(plan.bins.len(), Window::EMPTY);
         for (bin, touched) in plan.bins.iter().map(|bin| bin.touched.is_some()).enumerate() {
-            let occupied = is_occupied(bin);
+            let window = window(bin);
+            let occupied = window.is_some();
+            self.windows[bin] = window.unwrap_or(Window::EMPTY);
             self.slot[bin] = if occupied { slots } else { NONE };
             self.moment_slot[bin] = if occupied && touched { moment_slots } else { NONE };
             slots += u32::from(occupied);
@@ -64,16 +93,25 @@ impl<const D: usize> Arenas<D> {
         arenas
     }
 
-    /// Momentum and mass rows of a bin, if it is occupied.
-    pub fn rows(&self, bin: u32) -> Option<&[Row]> {
-        let slot = self.slot[bin as usize];
-        (slot != NONE).then(|| &self.rows[slot as usize * arena_nodes(D)..][..arena_nodes(D)])
+    /// The nodes that the particles of a bin touch.
+    pub fn window(&self, bin: usize) -> Window<D> {
+        self.windows[bin]
     }
 
-    /// First moments of a bin, if it is occupied and touches constrained nodes.
-    pub fn moments(&self, bin: u32) -> Option<&[Moments<D>]> {
-        let slot = self.moment_slot[bin as usize];
-        (slot != NONE).then(|| &self.moments[slot as usize * arena_nodes(D)..][..arena_nodes(D)])
+    /// Whether a bin is occupied.
+    pub fn is_occupied(&self, bin: usize) -> bool {
+        self.slot[bin] != NONE
+    }
+
+    /// The arena of a bin, if it is occupied.
+    pub fn get(&self, bin: u32) -> Option<Arena<'_, D>> {
+        let (slot, moment_slot) = (self.slot[bin as usize], self.moment_slot[bin as usize]);
+        let nodes = arena_nodes(D);
+        (slot != NONE).then(|| Arena {
+            rows: &self.rows[slot as usize * nodes..][..nodes],
+            moments: (moment_slot != NONE).then(|| &self.moments[moment_slot as usize * nodes..][..nodes]),
+            window: self.windows[bin as usize],
+        })
     }
 
     /// Heap bytes held.

@@ -135,11 +135,13 @@ impl<const D: usize> ReceivedArenas<D> {
         }
     }
 
+    /// Whether a received bin is occupied.
+    pub(super) fn is_occupied(&self, bin: u32) -> bool {
+        self.present[bin as usize]
+    }
+
     /// Adds one part of a received arena to a block.
     pub(super) fn add(&self, bin: u32, part: u32, rows: &mut [Row], moments: Option<&mut [Moments<D>]>) {
-        if !self.present[bin as usize] {
-            return;
-        }
         let part = self.parts[bin as usize][part as usize];
         for (bit, from) in bits(part.nodes).zip(&self.rows[part.first_row..]) {
             for lane in 0..4 {
@@ -188,19 +190,20 @@ fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
     let mut bitmap = vec![0u8; 8 * bins.len().div_ceil(64)];
     let mut values: Vec<f64> = Vec::new();
     for (number, sent) in bins.iter().enumerate() {
-        let Some(rows) = arenas.rows(sent.bin) else { continue };
+        let Some(arena) = arenas.get(sent.bin) else { continue };
         bitmap[number / 8] |= 1 << (number % 8);
         for &(offset, nodes, constrained) in &sent.parts {
             for bit in bits(nodes) {
-                let row = &rows[arena_index::<D>(offset as usize, bit)].0;
+                let node = arena_index::<D>(offset as usize, bit);
+                let row = if arena.window.contains(node) { arena.rows[node].0 } else { [0.0; 4] };
                 values.extend_from_slice(&row[..D]);
                 values.push(row[3]);
             }
-            if let Some(moments) = arenas.moments(sent.bin) {
+            if let Some(moments) = arena.moments {
                 for bit in bits(constrained) {
-                    for row in &moments[arena_index::<D>(offset as usize, bit)] {
-                        values.extend_from_slice(&row.0[..D]);
-                    }
+                    let node = arena_index::<D>(offset as usize, bit);
+                    let moments = if arena.window.contains(node) { moments[node] } else { [ZERO; D] };
+                    moments.iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
                 }
             }
         }

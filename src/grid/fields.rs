@@ -1,13 +1,14 @@
 //! Node fields of one time step: sums of arenas, restriction, prolongation.
 //!
 //! Every sum runs in the order that the plan fixes from tree and particles, so its bits do not depend on
-//! ranks or threads.
+//! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
 use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
 use super::exchange::ReceivedArenas;
-use super::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
-use super::plan::{GridPlan, NO_BLOCK, Source, arena_index};
+use super::mask::{block_nodes, offset, offset_count};
+use super::plan::{GridPlan, Links, NO_BLOCK, Source};
+use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
 const ZERO: Row = Row([0.0; 4]);
@@ -19,8 +20,14 @@ pub struct NodeFields<const D: usize> {
     pub rows: Vec<Row>,
     /// First moments of nodes in blocks that hold constrained nodes.
     pub moments: Vec<Moments<D>>,
-    /// Per offset number: `(arena index, node bit)` of the nodes that arena and block share.
-    shared: Vec<Vec<(u32, u32)>>,
+    /// Per block, whether something was summed in it in this step.
+    pub active: Vec<bool>,
+    /// Per block, whether the gather of this step reads it or a block that it is a parent of.
+    needed: Vec<bool>,
+    /// Per block, whether its rows may differ from zero.
+    dirty: Vec<bool>,
+    /// First moment slot of each level.
+    moment_start: Vec<usize>,
 }
 
 /// Which blocks to sum.
@@ -32,21 +39,31 @@ pub enum Part {
     Seam,
 }
 
+/// One block of the fields, mutable.
+struct BlockMut<'a, const D: usize> {
+    rows: &'a mut [Row],
+    moments: Option<&'a mut [Moments<D>]>,
+}
+
+/// One block of the fields.
+#[derive(Clone, Copy)]
+struct BlockRef<'a, const D: usize> {
+    rows: &'a [Row],
+    moments: Option<&'a [Moments<D>]>,
+}
+
 impl<const D: usize> NodeFields<D> {
     /// Fields for the blocks of a plan.
     pub fn new(plan: &GridPlan<D>) -> Self {
         let nodes = block_nodes(D);
-        let shared = (0..offset_count(D))
-            .map(|index| {
-                bits(arena_overlap::<D>(offset(index)))
-                    .map(|bit| (arena_index::<D>(index, bit) as u32, bit))
-                    .collect()
-            })
-            .collect();
+        let with_moments = |end: usize| plan.blocks[..end].iter().filter(|b| b.moments.is_some()).count();
         Self {
             rows: vec![ZERO; plan.blocks.len() * nodes],
             moments: vec![[ZERO; D]; plan.moment_blocks * nodes],
-            shared,
+            active: vec![false; plan.blocks.len()],
+            needed: vec![false; plan.blocks.len()],
+            dirty: vec![false; plan.blocks.len()],
+            moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
         }
     }
 
@@ -56,42 +73,54 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
+    pub fn sum(
+        &mut self,
+        plan: &GridPlan<D>,
+        arenas: &Arenas<D>,
+        received: &ReceivedArenas<D>,
+        part: Part,
+    ) {
         let nodes = block_nodes(D);
-        let shared = &self.shared;
         let mut moments = self.moments.chunks_mut(nodes);
+        let flags = self.active.iter_mut().zip(&mut self.dirty);
         let blocks: Vec<_> = self
             .rows
             .chunks_mut(nodes)
             .zip(&plan.blocks)
+            .zip(flags)
             .enumerate()
-            .map(|(index, (rows, block))| (index, rows, block.moments.and_then(|_| moments.next())))
+            .map(|(index, ((rows, block), flags))| {
+                (index, BlockMut { rows, moments: block.moments.and_then(|_| moments.next()) }, flags)
+            })
+            .filter(|&(index, ..)| plan.is_seam[index] == (part == Part::Seam))
             .collect();
-        blocks.into_par_iter().with_min_len(16).for_each(|(index, rows, mut moments)| {
+        blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block, (active, dirty))| {
             let contributions = plan.block_contributions(index);
-            let is_seam = contributions.iter().any(|c| matches!(c.source, Source::Received(..)));
-            if is_seam != (part == Part::Seam) {
-                return;
+            *active = contributions.iter().any(|contribution| match contribution.source {
+                Source::Own(bin) => arenas.is_occupied(bin.0 as usize),
+                Source::Received(bin, _) => received.is_occupied(bin),
+            });
+            if *active || *dirty {
+                block.rows.fill(ZERO);
+                if let Some(moments) = &mut block.moments {
+                    moments.fill([ZERO; D]);
+                }
             }
-            rows.fill(ZERO);
-            if let Some(moments) = &mut moments {
-                moments.fill([ZERO; D]);
+            *dirty = *active;
+            if !*active {
+                return;
             }
             for contribution in contributions {
                 match contribution.source {
                     Source::Own(bin) => {
-                        let Some(arena) = arenas.rows(bin.0) else { continue };
-                        let shared = &shared[contribution.offset as usize];
-                        add_rows(rows, arena, shared);
-                        if let (Some(to), Some(from)) = (&mut moments, arenas.moments(bin.0)) {
-                            for &(at, bit) in shared {
-                                add_moments(&mut to[bit as usize], &from[at as usize]);
-                            }
+                        if let Some(arena) = arenas.get(bin.0) {
+                            block.add(arena.rows, arena.moments, &arena.window, contribution.offset);
                         }
                     }
-                    Source::Received(bin, part) => {
-                        received.add(bin, part, rows, moments.as_deref_mut());
+                    Source::Received(bin, part) if received.is_occupied(bin) => {
+                        received.add(bin, part, block.rows, block.moments.as_deref_mut());
                     }
+                    Source::Received(..) => {}
                 }
             }
         });
@@ -100,122 +129,239 @@ impl<const D: usize> NodeFields<D> {
     /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:
     /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`.
     pub fn restrict(&mut self, plan: &GridPlan<D>) {
-        for level in (0..plan.levels()).rev() {
+        for level in (0..plan.levels().saturating_sub(1)).rev() {
             let links = &plan.restriction[level];
+            for linked in &links.blocks {
+                if links.others(linked).iter().any(|&other| self.active[other as usize]) {
+                    self.active[linked.block as usize] = true;
+                    self.dirty[linked.block as usize] = true;
+                }
+            }
             let cell = plan.cell(level as u8 + 1);
-            let sums: Vec<(Row, Moments<D>)> = (0..links.nodes.len())
-                .into_par_iter()
-                .with_min_len(256)
-                .map(|i| {
-                    let node = links.nodes[i];
-                    let mut row = self.rows[node as usize].0;
-                    let mut own = self.moments_of(plan, node);
+            let (coarse, fine) = split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
+            for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
+                for i in nodes {
+                    let at = links.nodes[i] as usize - first;
+                    let mut row = to.rows[at].0;
+                    let mut own = to.moments.as_ref().map_or([ZERO; D], |moments| moments[at]);
                     for link in links.of(i) {
-                        let child = self.rows[link.node as usize].0;
-                        let child_moments = self.moments_of(plan, link.node);
+                        let (child, moments) = fine.node(plan, link.node);
                         let delta = offset::<D>(link.offset as usize).map(|o| f64::from(o) * cell);
                         for lane in 0..4 {
-                            let mut a = child[lane];
+                            let mut a = child.0[lane];
                             for axis in 0..D {
-                                a = child_moments[axis].0[lane].mul_add(delta[axis], a);
-                                own[axis].0[lane] =
-                                    link.weight.mul_add(child_moments[axis].0[lane], own[axis].0[lane]);
+                                let moment = moments[axis].0[lane];
+                                a = moment.mul_add(delta[axis], a);
+                                own[axis].0[lane] = link.weight.mul_add(moment, own[axis].0[lane]);
                             }
                             row[lane] = link.weight.mul_add(a, row[lane]);
                         }
                     }
-                    (Row(row), own)
-                })
-                .collect();
-            for (&node, (row, moments)) in links.nodes.iter().zip(sums) {
-                self.rows[node as usize] = row;
-                if let Some(slot) = plan.moment_node(node) {
-                    self.moments[slot] = moments;
+                    to.set(at, Row(row), own);
                 }
-            }
+            });
         }
     }
 
-    /// Not collective. Gives constrained nodes the values of their parents, coarsest level first:
-    /// `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real nodes.
-    pub fn prolong(&mut self, plan: &GridPlan<D>) {
+    /// Not collective. Gives the constrained nodes that the gather reads the values of their parents, coarsest
+    /// level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real nodes.
+    pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
+        self.mark_needed(plan, arenas);
         for level in 1..plan.levels() {
             let links = &plan.prolongation[level];
             let cell = plan.cell(level as u8);
-            let values: Vec<(Row, Moments<D>)> = (0..links.nodes.len())
-                .into_par_iter()
-                .with_min_len(256)
-                .map(|i| {
+            let (coarse, fine) =
+                split(&mut self.rows, &mut self.moments, plan, level, self.moment_start[level]);
+            for_each_linked(fine, plan, links, &self.needed, |mut to, first, nodes| {
+                for i in nodes {
                     let mut row = [0.0; 4];
-                    let mut moments = [ZERO; D];
+                    let mut sums = [ZERO; D];
                     for link in links.of(i) {
-                        let parent = self.rows[link.node as usize].0;
-                        let parent_moments = self.prolonged_moments(plan, link.node);
+                        let (parent, moments) = coarse.prolonged_node(plan, link.node);
                         let delta = offset::<D>(link.offset as usize).map(|o| f64::from(o) * cell);
                         for lane in 0..3 {
-                            row[lane] = link.weight.mul_add(parent[lane], row[lane]);
+                            let value = parent.0[lane];
+                            row[lane] = link.weight.mul_add(value, row[lane]);
                             for axis in 0..D {
-                                let moment = parent[lane].mul_add(delta[axis], parent_moments[axis].0[lane]);
-                                let sum = &mut moments[axis].0[lane];
+                                let moment = value.mul_add(delta[axis], moments[axis].0[lane]);
+                                let sum = &mut sums[axis].0[lane];
                                 *sum = link.weight.mul_add(moment, *sum);
                             }
                         }
                     }
-                    (Row(row), moments)
-                })
-                .collect();
-            for (&node, (row, moments)) in links.nodes.iter().zip(values) {
-                self.rows[node as usize] = row;
-                if let Some(slot) = plan.moment_node(node) {
-                    self.moments[slot] = moments;
+                    to.set(links.nodes[i] as usize - first, Row(row), sums);
+                }
+            });
+            for linked in &links.blocks {
+                self.dirty[linked.block as usize] |= self.needed[linked.block as usize];
+            }
+        }
+    }
+
+    /// Marks the blocks that occupied bins touch, and the blocks of their constraint parents.
+    fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
+        self.needed.fill(false);
+        for (_, bin) in plan.bins.iter().enumerate().filter(|(number, _)| arenas.is_occupied(*number)) {
+            for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
+                self.needed[block as usize] = true;
+            }
+        }
+        for links in plan.prolongation.iter().rev() {
+            for linked in &links.blocks {
+                if self.needed[linked.block as usize] {
+                    links.others(linked).iter().for_each(|&other| self.needed[other as usize] = true);
                 }
             }
         }
     }
 
-    /// Not collective. Copies the nodes around a bin into its arena: velocities, and for bins that touch
-    /// constrained nodes their first moments and second moments of the constraints.
-    pub fn load(&self, plan: &GridPlan<D>, bin: usize, arena: &mut VelocityArena<D>) {
+    /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
+    /// touch constrained nodes their first moments.
+    pub fn load(
+        &self,
+        plan: &GridPlan<D>,
+        bin: usize,
+        window: &Window<D>,
+        arena: &mut VelocityArena<D>,
+    ) {
         let bin = &plan.bins[bin];
-        arena.rows.fill(ZERO);
-        arena.has_moments = bin.touched.is_some();
-        if arena.has_moments {
-            arena.moments.fill([ZERO; D]);
-            arena.spread.fill(ZERO);
-        }
+        let has_moments = bin.touched.is_some();
+        window.for_each_run(|run| {
+            arena.rows[run.clone()].fill(ZERO);
+            if has_moments {
+                arena.moments[run].fill([ZERO; D]);
+            }
+        });
         let nodes = block_nodes(D);
         for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
             if block == NO_BLOCK {
                 continue;
             }
             let rows = &self.rows[block as usize * nodes..][..nodes];
-            let shared = &self.shared[index];
-            for &(at, bit) in shared {
-                arena.rows[at as usize] = rows[bit as usize];
-            }
             let block = &plan.blocks[block as usize];
-            if let Some(slot) = block.moments.filter(|_| arena.has_moments) {
-                let first = slot as usize * nodes;
-                for &(at, bit) in shared.iter().filter(|(_, bit)| block.constrained >> bit & 1 == 1) {
-                    arena.moments[at as usize] = self.moments[first + bit as usize];
-                    arena.spread[at as usize] = plan.spread[first + bit as usize];
+            let moments = block.moments.filter(|_| has_moments);
+            let moments = moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
+            window.for_each_shared(index, |run| {
+                arena.rows[run.arena..][..run.len].copy_from_slice(&rows[run.block..][..run.len]);
+                if let Some(moments) = moments {
+                    for i in (0..run.len).filter(|i| block.constrained >> (run.block + i) & 1 == 1) {
+                        arena.moments[run.arena + i] = moments[run.block + i];
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// The fields of the levels below `level`, whose first moment slot is `slot`, and those of `level` and deeper.
+fn split<'a, const D: usize>(
+    rows: &'a mut [Row],
+    moments: &'a mut [Moments<D>],
+    plan: &GridPlan<D>,
+    level: usize,
+    slot: usize,
+) -> (Half<'a, D>, Half<'a, D>) {
+    let (nodes, block) = (block_nodes(D), plan.level_start[level]);
+    let (coarse_rows, fine_rows) = rows.split_at_mut(block * nodes);
+    let (coarse_moments, fine_moments) = moments.split_at_mut(slot * nodes);
+    (
+        Half { rows: coarse_rows, moments: coarse_moments, first_block: 0, first_slot: 0 },
+        Half { rows: fine_rows, moments: fine_moments, first_block: block, first_slot: slot },
+    )
+}
+
+/// The fields of some levels.
+struct Half<'a, const D: usize> {
+    rows: &'a mut [Row],
+    moments: &'a mut [Moments<D>],
+    first_block: usize,
+    first_slot: usize,
+}
+
+impl<const D: usize> Half<'_, D> {
+    fn block(&self, plan: &GridPlan<D>, block: usize) -> BlockRef<'_, D> {
+        let nodes = block_nodes(D);
+        let slot = plan.blocks[block].moments;
+        BlockRef {
+            rows: &self.rows[(block - self.first_block) * nodes..][..nodes],
+            moments: slot.map(|slot| &self.moments[(slot as usize - self.first_slot) * nodes..][..nodes]),
+        }
+    }
+
+    /// Row and first moments of a node.
+    fn node(&self, plan: &GridPlan<D>, node: u32) -> (Row, Moments<D>) {
+        let nodes = block_nodes(D);
+        let block = self.block(plan, node as usize / nodes);
+        let at = node as usize % nodes;
+        (block.rows[at], block.moments.map_or([ZERO; D], |moments| moments[at]))
+    }
+
+    /// As [`Half::node`], with zero moments on real nodes, whose slots still hold sums.
+    fn prolonged_node(&self, plan: &GridPlan<D>, node: u32) -> (Row, Moments<D>) {
+        let nodes = block_nodes(D);
+        let (row, moments) = self.node(plan, node);
+        let constrained = plan.blocks[node as usize / nodes].constrained >> (node as usize % nodes) & 1 == 1;
+        (row, if constrained { moments } else { [ZERO; D] })
+    }
+}
+
+/// Calls `work` in parallel for every linked block of `half` whose flag is set, with the block, its first node
+/// and the numbers of its linked nodes.
+fn for_each_linked<const D: usize>(
+    half: Half<'_, D>,
+    plan: &GridPlan<D>,
+    links: &Links,
+    flags: &[bool],
+    work: impl Fn(BlockMut<'_, D>, usize, std::ops::Range<usize>) + Sync,
+) {
+    let nodes = block_nodes(D);
+    let Half { mut rows, mut moments, first_block, first_slot } = half;
+    let (mut next_block, mut next_slot) = (first_block, first_slot);
+    let mut tasks = Vec::new();
+    for linked in links.blocks.iter().filter(|linked| flags[linked.block as usize]) {
+        let block = linked.block as usize;
+        let (_, rest) = std::mem::take(&mut rows).split_at_mut((block - next_block) * nodes);
+        let (own, rest) = rest.split_at_mut(nodes);
+        (rows, next_block) = (rest, block + 1);
+        let own_moments = plan.blocks[block].moments.map(|slot| {
+            let (_, rest) = std::mem::take(&mut moments).split_at_mut((slot as usize - next_slot) * nodes);
+            let (own, rest) = rest.split_at_mut(nodes);
+            (moments, next_slot) = (rest, slot as usize + 1);
+            own
+        });
+        tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
+    }
+    tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
+        work(
+            block,
+            linked.block as usize * nodes,
+            linked.nodes.start as usize..linked.nodes.end as usize,
+        );
+    });
+}
+
+impl<const D: usize> BlockMut<'_, D> {
+    fn set(&mut self, at: usize, row: Row, moments: Moments<D>) {
+        self.rows[at] = row;
+        if let Some(slots) = &mut self.moments {
+            slots[at] = moments;
+        }
+    }
+
+    /// Adds the part of an arena that lies in this block.
+    fn add(&mut self, rows: &[Row], moments: Option<&[Moments<D>]>, window: &Window<D>, offset: u8) {
+        window.for_each_shared(offset as usize, |run| {
+            let to = &mut self.rows[run.block..][..run.len];
+            for (to, from) in to.iter_mut().zip(&rows[run.arena..][..run.len]) {
+                for lane in 0..4 {
+                    to.0[lane] += from.0[lane];
                 }
             }
-        }
-    }
-
-    fn moments_of(&self, plan: &GridPlan<D>, node: u32) -> Moments<D> {
-        plan.moment_node(node).map_or([ZERO; D], |slot| self.moments[slot])
-    }
-
-    /// Moments of a parent during prolongation: zero on real nodes, whose slots still hold sums.
-    fn prolonged_moments(&self, plan: &GridPlan<D>, node: u32) -> Moments<D> {
-        let nodes = block_nodes(D);
-        let block = &plan.blocks[node as usize / nodes];
-        match block.constrained >> (node as usize % nodes) & 1 {
-            1 => self.moments_of(plan, node),
-            _ => [ZERO; D],
-        }
+            if let (Some(to), Some(from)) = (&mut self.moments, moments) {
+                let to = &mut to[run.block..][..run.len];
+                to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| add_moments(to, from));
+            }
+        });
     }
 }
 
@@ -226,30 +372,11 @@ pub struct VelocityArena<const D: usize> {
     pub rows: Vec<Row>,
     /// First moments `V_j`; zero at real nodes.
     pub moments: Vec<Moments<D>>,
-    /// Second moments of the constraints `S_j`; zero at real nodes.
-    pub spread: Vec<Row>,
-    /// Whether moments and spread were loaded.
-    pub has_moments: bool,
 }
 
 impl<const D: usize> Default for VelocityArena<D> {
     fn default() -> Self {
-        let nodes = arena_nodes(D);
-        Self {
-            rows: vec![ZERO; nodes],
-            moments: vec![[ZERO; D]; nodes],
-            spread: vec![ZERO; nodes],
-            has_moments: false,
-        }
-    }
-}
-
-fn add_rows(to: &mut [Row], from: &[Row], shared: &[(u32, u32)]) {
-    for &(at, bit) in shared {
-        let (to, from) = (&mut to[bit as usize].0, &from[at as usize].0);
-        for lane in 0..4 {
-            to[lane] += from[lane];
-        }
+        Self { rows: vec![ZERO; arena_nodes(D)], moments: vec![[ZERO; D]; arena_nodes(D)] }
     }
 }
 

@@ -82,9 +82,24 @@ pub struct Link {
     pub weight: f64,
 }
 
+/// The nodes of one block that gather over links.
+#[derive(Clone, Debug)]
+pub struct LinkedBlock {
+    /// The block.
+    pub block: u32,
+    /// Its nodes, as numbers of [`Links::nodes`].
+    pub nodes: std::ops::Range<u32>,
+    /// The blocks at the other ends, as numbers of [`Links::others`].
+    pub others: std::ops::Range<u32>,
+}
+
 /// Links of a list of nodes: `links[start[i]..start[i + 1]]` belong to `nodes[i]`. Nodes ascend.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
+    /// The nodes by block.
+    pub blocks: Vec<LinkedBlock>,
+    /// Blocks at the other ends of the links, block by block.
+    pub others: Vec<u32>,
     /// The nodes that gather.
     pub nodes: Vec<u32>,
     /// Start of each node's links.
@@ -95,18 +110,39 @@ pub struct Links {
 
 impl Links {
     /// Groups `(node, order, link)` by node; `order` fixes the order of a node's links.
-    fn group(mut entries: Vec<(u32, u32, Link)>) -> Self {
+    fn group(mut entries: Vec<(u32, u32, Link)>, block_nodes: u32) -> Self {
         entries.sort_unstable_by_key(|&(node, order, _)| (node, order));
         let mut grouped = Self::default();
-        for (node, _, link) in entries {
-            if grouped.nodes.last() != Some(&node) {
-                grouped.nodes.push(node);
-                grouped.start.push(grouped.links.len() as u32);
-            }
-            grouped.links.push(link);
+        for of_block in entries.chunk_by(|a, b| a.0 / block_nodes == b.0 / block_nodes) {
+            let (first, first_other) = (grouped.nodes.len() as u32, grouped.others.len() as u32);
+            let mut others: Vec<u32> = of_block.iter().map(|entry| entry.2.node / block_nodes).collect();
+            others.sort_unstable();
+            others.dedup();
+            grouped.others.extend(others);
+            grouped.add(of_block);
+            grouped.blocks.push(LinkedBlock {
+                block: of_block[0].0 / block_nodes,
+                nodes: first..grouped.nodes.len() as u32,
+                others: first_other..grouped.others.len() as u32,
+            });
         }
         grouped.start.push(grouped.links.len() as u32);
         grouped
+    }
+
+    fn add(&mut self, entries: &[(u32, u32, Link)]) {
+        for &(node, _, link) in entries {
+            if self.nodes.last() != Some(&node) {
+                self.nodes.push(node);
+                self.start.push(self.links.len() as u32);
+            }
+            self.links.push(link);
+        }
+    }
+
+    /// Blocks at the other ends of a block's links.
+    pub fn others(&self, linked: &LinkedBlock) -> &[u32] {
+        &self.others[linked.others.start as usize..linked.others.end as usize]
     }
 
     /// Links of the `i`-th node.
@@ -158,10 +194,12 @@ pub struct GridPlan<const D: usize> {
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of blocks with first moments.
     pub moment_blocks: usize,
+    /// Per block, whether received arenas contribute to it.
+    pub is_seam: Vec<bool>,
+    /// Per table of [`Bin::touched`], the second moments `S` of the arena's nodes, m².
+    pub second: Vec<Vec<Row>>,
     /// Tables of [`Bin::touched`], each `(BLOCK + 1)^D` long: base `-1..=3` per axis, first axis fastest.
     pub touched: Vec<Vec<bool>>,
-    /// Second moments of the constraints (`S` of the design), one row per moment node: axis by axis, m².
-    pub spread: Vec<Row>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -193,8 +231,9 @@ impl<const D: usize> GridPlan<D> {
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
             moment_blocks: 0,
+            is_seam: Vec::new(),
+            second: Vec::new(),
             touched: Vec::new(),
-            spread: Vec::new(),
             rounds,
             tree,
         };
@@ -205,7 +244,19 @@ impl<const D: usize> GridPlan<D> {
         plan.list_contributions(comm.rank());
         plan.link_levels(&number);
         plan.find_face_nodes();
-        plan.spread = plan.constraint_spread();
+        plan.is_seam = (0..plan.blocks.len())
+            .map(|block| {
+                let contributions = plan.block_contributions(block).iter();
+                contributions.clone().any(|c| matches!(c.source, Source::Received(..)))
+            })
+            .collect();
+        let spread = plan.constraint_spread();
+        plan.second = plan
+            .bins
+            .iter()
+            .filter(|bin| bin.touched.is_some())
+            .map(|bin| plan.arena_of(&bin.around, &spread))
+            .collect();
         plan
     }
 
@@ -249,7 +300,7 @@ impl<const D: usize> GridPlan<D> {
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
             + self.contributions.capacity() * size_of::<Contribution>()
-            + self.spread.capacity() * size_of::<Row>()
+            + self.second.iter().map(|table| table.capacity() * size_of::<Row>()).sum::<usize>()
     }
 
     fn list_blocks(&mut self, needed: &NeededBlocks<D>) {
@@ -355,6 +406,7 @@ impl<const D: usize> GridPlan<D> {
         let own_bins = self.own_bins();
         // (block, source leaf, bin, offset, nodes)
         let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
+        let mut feeding: HashMap<Octant<D>, Vec<usize>> = HashMap::new();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
                 let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
@@ -364,7 +416,9 @@ impl<const D: usize> GridPlan<D> {
                     continue;
                 }
                 let bin = Octant { level: block.level, coord };
-                for leaf in bin_sources(&self.tree, block.level, coord) {
+                let leaves =
+                    feeding.entry(bin).or_insert_with(|| bin_sources(&self.tree, bin.level, bin.coord));
+                for &leaf in leaves.iter() {
                     sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
                 }
             }
@@ -441,8 +495,8 @@ impl<const D: usize> GridPlan<D> {
                 }
             }
         }
-        self.restriction = restriction.into_iter().map(Links::group).collect();
-        self.prolongation = prolongation.into_iter().map(Links::group).collect();
+        self.restriction = restriction.into_iter().map(|entries| Links::group(entries, nodes)).collect();
+        self.prolongation = prolongation.into_iter().map(|entries| Links::group(entries, nodes)).collect();
     }
 
     fn find_face_nodes(&mut self) {
@@ -487,6 +541,22 @@ impl<const D: usize> GridPlan<D> {
             }
         }
         spread
+    }
+
+    /// The rows of moment nodes as they stand in the arena of a bin; zero elsewhere.
+    fn arena_of(&self, around: &[u32; 27], rows: &[Row]) -> Vec<Row> {
+        let mut arena = vec![Row([0.0; 4]); ARENA_EDGE.pow(D as u32)];
+        let nodes = block_nodes(D);
+        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
+            if block == NO_BLOCK {
+                continue;
+            }
+            let Some(slot) = self.blocks[block as usize].moments else { continue };
+            for bit in bits(arena_overlap::<D>(offset(index))) {
+                arena[arena_index::<D>(index, bit)] = rows[slot as usize * nodes + bit as usize];
+            }
+        }
+        arena
     }
 
     /// Place of a node's first moments, if its block has any.

@@ -21,8 +21,6 @@ pub struct Moments<'a, const D: usize> {
     pub touched: &'a [bool],
     /// First moments V: row k of a node is column k, `(V_xk, V_yk, V_zk, unused)`.
     pub first: &'a [[Row; D]],
-    /// Second moments S: `(S_x, S_y, S_z, unused)`.
-    pub second: &'a [Row],
 }
 
 /// What the nodes of an arena offer.
@@ -45,8 +43,6 @@ pub struct Gathered<const D: usize> {
     gradient: [F64x4; D],
     /// Column k is `Σ w (v_j d_k + V_j,k)`.
     affine: [F64x4; D],
-    /// `Σ w (d_k² + S_j,k)` in lane k.
-    spread: F64x4,
     /// `Σ w Δv_j`.
     increment: F64x4,
 }
@@ -54,7 +50,7 @@ pub struct Gathered<const D: usize> {
 impl<const D: usize> Default for Gathered<D> {
     fn default() -> Self {
         let zero = F64x4::splat(0.0);
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], spread: zero, increment: zero }
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
     }
 }
 
@@ -64,7 +60,6 @@ impl<const D: usize> Gathered<D> {
         let share = F64x4::splat(share);
         let add = |to: &mut F64x4, from: F64x4| *to = from.mul_add(share, *to);
         add(&mut self.velocity, other.velocity);
-        add(&mut self.spread, other.spread);
         add(&mut self.increment, other.increment);
         for k in 0..D {
             add(&mut self.gradient[k], other.gradient[k]);
@@ -99,8 +94,7 @@ pub fn gather<const D: usize>(
         for lane in 0..batch.count.min(LANES) {
             sums.gather(&weights, lane, fields, plain);
         }
-        let spread = weights.spread;
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, &spread, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
     }
     largest(greatest)
 }
@@ -117,20 +111,14 @@ pub fn gather_sub_boxes<const D: usize>(
     let (reals, stride) = chunk.reals();
     let mut weights = Weights::new();
     let mut sums = Sums::new();
-    let zero = Lanes::splat(0.0);
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        let mut spread = [zero; 4];
-        spread[..D].copy_from_slice(&weights.spread);
-        let spread = Lanes::rows(spread);
         for (lane, part) in parts.iter().enumerate() {
             sums.gather(&weights, lane, fields, false);
-            let mut one = sums.row(lane);
-            one.spread = one.spread + spread[lane];
-            gathered[part.slot as usize].add(&one, part.fraction);
+            gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }
     }
 }
@@ -152,9 +140,7 @@ pub fn advance_gathered<const D: usize>(
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        // The sums hold the whole spread already.
-        let none = [Lanes::splat(0.0); D];
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, &none, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
     }
     largest(greatest)
 }
@@ -169,16 +155,13 @@ struct Sums<const D: usize> {
     velocity: [F64x4; LANES],
     gradient: [[F64x4; LANES]; D],
     affine: [[F64x4; LANES]; D],
-    spread: [F64x4; LANES],
     increment: [F64x4; LANES],
 }
 
 impl<const D: usize> Sums<D> {
     fn new() -> Self {
         let zero = [F64x4::splat(0.0); LANES];
-        // One keeps 1 / spread finite in lanes never filled.
-        let spread = [F64x4::splat(1.0); LANES];
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], spread, increment: zero }
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
     }
 
     fn row(&self, lane: usize) -> Gathered<D> {
@@ -186,14 +169,12 @@ impl<const D: usize> Sums<D> {
             velocity: self.velocity[lane],
             gradient: std::array::from_fn(|k| self.gradient[k][lane]),
             affine: std::array::from_fn(|k| self.affine[k][lane]),
-            spread: self.spread[lane],
             increment: self.increment[lane],
         }
     }
 
     fn set(&mut self, lane: usize, row: &Gathered<D>) {
         self.velocity[lane] = row.velocity;
-        self.spread[lane] = row.spread;
         self.increment[lane] = row.increment;
         for k in 0..D {
             self.gradient[k][lane] = row.gradient[k];
@@ -201,14 +182,13 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// One lane, with all that the fields offer; the spread holds second moments only. `plain` says
-    /// that there are velocities only.
+    /// One lane, with all that the fields offer. `plain` says that there are velocities
+    /// only.
     #[inline(always)]
     fn gather(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>, plain: bool) {
         let span = super::stencil_span(D);
         let first = weights.first(lane);
         self.contract(weights, lane, &fields.velocity[first..first + span]);
-        self.spread[lane] = F64x4::splat(0.0);
         if !plain {
             self.gather_others(weights, lane, fields);
         }
@@ -222,7 +202,6 @@ impl<const D: usize> Sums<D> {
         if let Some(moments) = &fields.moments
             && moments.touched[weights.base(lane)]
         {
-            self.spread[lane] = mean(weights, lane, |node| moments.second[first + node]);
             for k in 0..D {
                 let moment = mean(weights, lane, |node| moments.first[first + node][k]);
                 self.affine[k][lane] = self.affine[k][lane] + moment;
@@ -280,7 +259,7 @@ fn mean<const D: usize>(weights: &Weights<D>, lane: usize, f: impl Fn(usize) -> 
     sum
 }
 
-/// New state of a batch; returns wave speed plus particle speed. `spread` is added to that of `sums`.
+/// New state of a batch; returns wave speed plus particle speed.
 #[inline(always)]
 fn advance<const D: usize>(
     reals: &mut [f64],
@@ -289,7 +268,6 @@ fn advance<const D: usize>(
     batch: &Batch,
     position: &[Lanes; D],
     sums: &Sums<D>,
-    spread: &[Lanes; D],
     scheme: &Scheme,
     dt: f64,
 ) -> Lanes {
@@ -320,13 +298,11 @@ fn advance<const D: usize>(
         batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
         square = new.mul_add(new, square);
     }
-    let moments = Lanes::columns(sums.spread);
     for k in 0..D {
-        let inverse = Lanes::splat(1.0) / (spread[k] + moments[k]);
         let affine = Lanes::columns(sums.affine[k]);
         for i in 0..D {
             let value = match scheme.transfer {
-                Transfer::Apic => affine[i] * inverse,
+                Transfer::Apic => affine[i],
                 Transfer::Tpic => gradient[i][k],
                 Transfer::Flip { .. } => zero,
             };

@@ -14,6 +14,7 @@ pub mod g2p;
 pub mod math;
 pub mod p2g;
 pub mod simd;
+pub mod spread;
 pub mod stencil;
 #[cfg(test)]
 mod tests;
@@ -128,18 +129,22 @@ pub struct SubBox<const D: usize> {
     pub half: [f64; D],
     /// Share of the particle that the part carries: 1 / number of parts.
     pub fraction: f64,
+    /// D of the whole box, m² (see [`spread`]); the parts' own add up to it.
+    pub spread: [f64; D],
 }
 
 impl<const D: usize> SubBox<D> {
     /// Centres and half widths of up to a batch of parts; lanes beyond repeat the last.
     fn lanes(parts: &[Self]) -> ([Lanes; D], [Lanes; D]) {
-        let lanes = |value: &dyn Fn(&Self) -> f64| {
-            Lanes::new(std::array::from_fn(|lane| value(&parts[lane.min(parts.len() - 1)])))
-        };
         (
-            std::array::from_fn(|axis| lanes(&|part| part.centre[axis])),
-            std::array::from_fn(|axis| lanes(&|part| part.half[axis])),
+            std::array::from_fn(|axis| Self::lane(parts, |part| part.centre[axis])),
+            std::array::from_fn(|axis| Self::lane(parts, |part| part.half[axis])),
         )
+    }
+
+    /// One value of up to a batch of parts.
+    fn lane(parts: &[Self], value: impl Fn(&Self) -> f64) -> Lanes {
+        Lanes::new(std::array::from_fn(|lane| value(&parts[lane.min(parts.len() - 1)])))
     }
 }
 

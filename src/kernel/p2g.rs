@@ -5,6 +5,9 @@
 //! mass      w m
 //! momentum  w m (v + C (x_j - x_p)) - Δt V₀ τ ∇w
 //! ```
+//! where the affine matrix is `C = B D⁻¹` (APIC): the particle keeps B, since that, and not C, carries its
+//! angular momentum when D changes on the way to the next step.
+//!
 //! The tensor product of the weights is factored: with rows q = m (v, 1), C_k = m C e_k,
 //! T_k = -Δt V₀ τ e_k and d = x_j - x_p,
 //! ```text
@@ -14,14 +17,15 @@
 use super::batch::Batch;
 use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
-use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, domain};
+use super::spread::Constraints;
+use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout};
 
 /// First moments `A = Σ w m C` of the nodes, gathered only from stencils that touch a constrained
 /// node.
 pub struct MomentSums<'a, const D: usize> {
-    /// Whether a stencil touches a constrained node; index of [`super::stencil_bases`].
-    pub touched: &'a [bool],
+    /// Whether a stencil touches a constrained node, and their second moments.
+    pub constraints: Constraints<'a>,
     /// Per arena node, row k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
     pub sums: &'a mut [[Row; D]],
 }
@@ -59,6 +63,7 @@ pub fn scatter_sub_boxes<const D: usize>(
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
+    scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
     mut moments: Option<MomentSums<D>>,
@@ -69,7 +74,8 @@ pub fn scatter_sub_boxes<const D: usize>(
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
         prepared.fill_parts(frame, &position, parts);
-        prepared.load(reals, stride, &batch, dt);
+        let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]));
+        prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
         prepared.add(batch.count, arena, moments.as_mut());
     }
@@ -94,7 +100,11 @@ fn scatter_all<const D: usize>(
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
-        prepared.load(reals, stride, &batch, dt);
+        let mut spread = prepared.weights.spread;
+        if let Some(moments) = &moments {
+            moments.constraints.add_spread(&prepared.weights, batch.count, &mut spread);
+        }
+        prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(batch.count, arena, moments.as_mut());
     }
 }
@@ -121,9 +131,17 @@ impl<const D: usize> Prepared<D> {
         self.weights.fill(frame, position, &centre, &half);
     }
 
-    /// Reads the particles' state.
+    /// Reads the particles' state; `spread` is D of [`Transfer::Apic`].
     #[inline(always)]
-    fn load(&mut self, reals: &[f64], stride: usize, batch: &Batch, dt: f64) {
+    fn load(
+        &mut self,
+        reals: &[f64],
+        stride: usize,
+        batch: &Batch,
+        dt: f64,
+        transfer: Transfer,
+        spread: &[Lanes; D],
+    ) {
         let zero = Lanes::splat(0.0);
         let mass = batch.load(reals, stride, Layout::<D>::MASS);
         let width = batch.load(reals, stride, Layout::<D>::HALF) * 2.0;
@@ -138,8 +156,9 @@ impl<const D: usize> Prepared<D> {
         self.momentum = Lanes::rows(column);
         column[3] = zero;
         for k in 0..D {
+            let factor = if transfer == Transfer::Apic { mass / spread[k] } else { mass };
             for i in 0..D {
-                column[i] = batch.load(reals, stride, Layout::<D>::AFFINE + D * i + k) * mass;
+                column[i] = batch.load(reals, stride, Layout::<D>::AFFINE + D * i + k) * factor;
             }
             self.affine[k] = Lanes::rows(column);
         }
@@ -177,7 +196,7 @@ impl<const D: usize> Prepared<D> {
             let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
             if let Some(moments) = moments.as_deref_mut()
-                && moments.touched[self.weights.base(lane)]
+                && moments.constraints.touched[self.weights.base(lane)]
             {
                 self.add_moments(lane, &mut moments.sums[first..first + span]);
             }

@@ -59,6 +59,9 @@ pub struct Summary {
 /// Why a run could not be started or finished; the same on all ranks.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
+    /// The bodies of the job cannot be filled with particles.
+    #[error("{0}")]
+    Seed(Disagreement),
     /// Some rank failed.
     #[error(transparent)]
     Rank(#[from] Disagreement),
@@ -134,7 +137,7 @@ struct Run<'a, const D: usize> {
 impl<'a, const D: usize> Run<'a, D> {
     /// Collective. A new run: directory, first output and first row of the history.
     fn start(comm: &'a Comm, problem: &'a Problem<D>, options: &Options) -> Result<Self, RunError> {
-        let solver = setup::solver(comm, problem)?;
+        let solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
         let mut run = Self::with(comm, problem, options, solver, outputs, None)?;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::seed::{SeedError, fill_leaf};
+use crate::particle::seed::{SeedError, check_counts, fill_leaf};
 use crate::solver::rebalance::leaf_weight;
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
@@ -33,10 +33,16 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
 /// Collective. A solver in the initial state of the job: tree, partition and numbered particles.
 ///
 /// # Errors
-/// Two bodies overlap; the same on all ranks.
+/// Two bodies overlap or one has no particle; the same on all ranks.
 pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solver<D>, Disagreement> {
     let forest = comm.agree(forest(comm, problem))?;
     let mut chunks = comm.agree(seed(&forest, problem))?;
+    let mut counts = vec![0; problem.bodies.len()];
+    for tag in chunks.iter().flat_map(Chunk::tags) {
+        counts[usize::from(Tag::unpack(*tag).body)] += 1;
+    }
+    comm.sum_u64(&mut counts);
+    comm.agree(check_counts(problem, &counts))?;
     let physics = physics(problem);
     let mut id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
     for chunk in &mut chunks {

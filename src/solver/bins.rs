@@ -8,7 +8,8 @@
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
-use crate::grid::GridPlan;
+use crate::grid::plan::Bin;
+use crate::grid::{GridPlan, Window};
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::reach::leaves_around;
@@ -24,12 +25,20 @@ struct NearLeaf<const D: usize> {
 }
 
 /// Particles and parts of boxes in one bin, in canonical order.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Members<const D: usize> {
     /// Particles whose box is transferred whole.
     pub whole: Vec<u32>,
     /// Parts of boxes; their slots count the leaf's particles that are cut.
     pub parts: Vec<SubBox<D>>,
+    /// Nodes that all these touch.
+    pub window: Window<D>,
+}
+
+impl<const D: usize> Default for Members<D> {
+    fn default() -> Self {
+        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY }
+    }
 }
 
 /// Bins of one own leaf whose particles do not all share the leaf's own bin.
@@ -99,6 +108,45 @@ impl<const D: usize> BinLists<D> {
         })
     }
 
+    /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls `each`
+    /// with the number of a part and its D.
+    pub fn spread_parts(
+        &mut self,
+        plan: &GridPlan<D>,
+        chunks: &[Chunk<D>],
+        of_parts: impl Fn(&Bin<D>, &Chunk<D>, &[SubBox<D>], &mut dyn FnMut(usize, [f64; D])) + Sync,
+    ) {
+        let leaves = self.leaves.par_iter_mut().zip(&self.sorted).enumerate().with_min_len(8);
+        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(|(leaf, (bins, _))| {
+            let mut totals = vec![[0.0; D]; bins.cut.len()];
+            for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+                of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
+                    let part = &members.parts[part];
+                    let total = &mut totals[part.slot as usize];
+                    for axis in 0..D {
+                        total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
+                    }
+                });
+            }
+            let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
+            parts.for_each(|part| part.spread = totals[part.slot as usize]);
+        });
+    }
+
+    /// Nodes that the members of a bin touch, or `None` if it has none.
+    pub fn window(&self, leaf: usize, bin: usize, chunk: &Chunk<D>) -> Option<Window<D>> {
+        let is_empty = match self.of_leaf(leaf) {
+            None => bin != 0 || chunk.is_empty(),
+            Some(bins) => bins.members[bin].whole.is_empty() && bins.members[bin].parts.is_empty(),
+        };
+        (!is_empty).then(|| self.window_of(leaf, bin))
+    }
+
+    /// As [`BinLists::window`], for a bin that has members.
+    pub fn window_of(&self, leaf: usize, bin: usize) -> Window<D> {
+        self.of_leaf(leaf).map_or(Window::FULL, |bins| bins.members[bin].window)
+    }
+
     /// The bins of own leaf `leaf`, or `None` if all its particles are whole in its own bin.
     pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
         self.sorted[leaf].then_some(&self.leaves[leaf])
@@ -127,6 +175,7 @@ impl<const D: usize> LeafBins<D> {
         for members in &mut self.members {
             members.whole.clear();
             members.parts.clear();
+            members.window = Window::EMPTY;
         }
         for (p, &half) in halves.iter().enumerate() {
             let centre = chunk.position(p);
@@ -134,11 +183,13 @@ impl<const D: usize> LeafBins<D> {
             if is_narrow(half, plan.cell(level)) {
                 let bin = self.bin(plan, leaf, level, centre).ok_or(BinMissing { id: chunk.ids()[p] })?;
                 self.members[bin].whole.push(p as u32);
+                self.include(plan, leaf, bin, centre, half);
                 continue;
             }
             let slot = self.cut.len() as u32;
             self.cut.push(p as u32);
-            let whole = SubBox { particle: p as u32, slot, centre, half, fraction: 1.0 };
+            let (fraction, spread) = (1.0, [0.0; D]);
+            let whole = SubBox { particle: p as u32, slot, centre, half, fraction, spread };
             self.cut_box(plan, leaf, own, whole).map_err(|()| BinMissing { id: chunk.ids()[p] })?;
         }
         Ok(())
@@ -159,6 +210,7 @@ impl<const D: usize> LeafBins<D> {
         if count == 0 {
             let bin = self.bin(plan, leaf, level, part.centre).ok_or(())?;
             self.members[bin].parts.push(part);
+            self.include(plan, leaf, bin, part.centre, part.half);
             return Ok(());
         }
         let half: [f64; D] = std::array::from_fn(|axis| part.half[axis] * if wide[axis] { 0.5 } else { 1.0 });
@@ -172,6 +224,24 @@ impl<const D: usize> LeafBins<D> {
             self.cut_box(plan, leaf, own, SubBox { centre, half, fraction, ..part })?;
         }
         Ok(())
+    }
+
+    /// Grows the window of a bin to a box.
+    fn include(
+        &mut self,
+        plan: &GridPlan<D>,
+        leaf: usize,
+        bin: usize,
+        centre: [f64; D],
+        half: [f64; D],
+    ) {
+        let block = &plan.bins[plan.leaf_bins(leaf).start + bin].block;
+        let cell = plan.cell(block.level);
+        // The kernel limits half widths to half a cell.
+        let lowest = std::array::from_fn(|axis| {
+            (centre[axis] - half[axis].min(0.5 * cell)) / cell - f64::from(4 * block.coord[axis])
+        });
+        self.members[bin].window.include(lowest);
     }
 
     /// Finest level among the leaves that the open box overlaps.

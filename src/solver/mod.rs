@@ -146,6 +146,8 @@ impl<const D: usize> Solver<D> {
             solver.rebuild_grid(reach);
         }
         if clock == Clock::default() {
+            // A box without a bin stops the first step, which says so.
+            let _ = solver.moments_from_affine();
             solver.signal = solver.chunks.iter().map(|chunk| solver.signal_at_rest(chunk)).collect();
             solver.clock.bound = comm.min_f64(solver.local_bound());
         }
@@ -205,8 +207,7 @@ impl<const D: usize> Solver<D> {
         let outcome: Result<Moved, StepError> = match (sorted, moved) {
             (Err(error), _) => Err(error.into()),
             (_, Err(error)) => Err(error.into()),
-            // Also for NaN: a bound must be positive.
-            _ if !(bound > 0.0) => Err(StepError::TimeStep { dt: bound }),
+            _ if bound.is_nan() || bound <= 0.0 => Err(StepError::TimeStep { dt: bound }),
             (_, Ok(moved)) => Ok(moved),
         };
         let flag = |set: bool| if set { -1.0 } else { 0.0 };

@@ -10,9 +10,10 @@ use crate::grid::fields::{Part, VelocityArena};
 use crate::grid::plan::Bin;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::{BoxPolicy, Frame, Row, Scheme, Select, SubBox, domain, g2p, p2g};
+use crate::kernel::spread::Constraints;
+use crate::kernel::{BoxPolicy, Frame, Scheme, Select, SubBox, Transfer, domain, g2p, p2g, spread};
 use crate::particle::Chunk;
-use crate::particle::chunk::Tag;
+use crate::particle::chunk::{Layout, Tag};
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +87,12 @@ pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>)
     }
 }
 
+/// Constrained nodes in the arena of a bin, if there are any.
+fn constraints<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Option<Constraints<'a>> {
+    let table = bin.touched? as usize;
+    Some(Constraints { touched: &plan.touched[table], second: &plan.second[table] })
+}
+
 /// The members of a bin.
 struct Selected<'a, const D: usize> {
     whole: Option<Select<'a>>,
@@ -116,11 +123,15 @@ impl<const D: usize> Solver<D> {
         let widths = Widths { scheme: self.physics.scheme(), extent: extent(&grid.plan) };
         self.phases.time(Phase::Sort, || {
             let sorted = grid.lists.sort(&grid.plan, chunks, &widths);
-            let (plan, lists) = (&grid.plan, &grid.lists);
+            let plan = &grid.plan;
+            grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
+                spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
+            });
+            let lists = &grid.lists;
             grid.arenas.occupy(plan, |bin| {
                 let leaf = plan.bins[bin].leaf as usize;
                 let number = bin - plan.leaf_bins(leaf).start;
-                !Selected::of(lists, leaf, number, &chunks[leaf]).is_empty()
+                lists.window(leaf, number, &chunks[leaf])
             });
             sorted
         })
@@ -135,33 +146,61 @@ impl<const D: usize> Solver<D> {
         let mut arenas = grid.arenas.each_mut();
         arenas.retain(|arena| grid.is_sent[arena.bin] == (reach == Reach::Neighbours));
         self.phases.time(Phase::Scatter, || {
-            arenas.into_par_iter().for_each(|arena| {
+            arenas.into_par_iter().for_each(|mut arena| {
                 let bin = &plan.bins[arena.bin];
                 let leaf = bin.leaf as usize;
                 let chunk = &chunks[leaf];
                 let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
-                let (frame, rows) = (frame(plan, bin), arena.rows);
-                rows.fill(Row([0.0; 4]));
-                let touched = bin.touched.map_or(&[][..], |table| &plan.touched[table as usize]);
-                let mut sums = arena.moments;
-                if let Some(sums) = &mut sums {
-                    sums.fill([Row([0.0; 4]); D]);
-                }
+                arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
+                let (frame, rows, mut sums) = (frame(plan, bin), arena.rows, arena.moments);
+                let constraints = constraints(plan, bin);
                 if let Some(whole) = selected.whole {
-                    match sums.as_deref_mut() {
+                    match sums.as_deref_mut().zip(constraints) {
                         None => p2g::scatter(chunk, whole, &frame, &scheme, dt, rows),
-                        Some(sums) => {
-                            let moments = MomentSums { touched, sums };
+                        Some((sums, constraints)) => {
+                            let moments = MomentSums { constraints, sums };
                             p2g::scatter_with_moments(chunk, whole, &frame, &scheme, dt, rows, moments);
                         }
                     }
                 }
                 if !selected.parts.is_empty() {
-                    let moments = sums.map(|sums| MomentSums { touched, sums });
-                    p2g::scatter_sub_boxes(chunk, selected.parts, &frame, dt, rows, moments);
+                    let moments =
+                        sums.zip(constraints).map(|(sums, constraints)| MomentSums { constraints, sums });
+                    p2g::scatter_sub_boxes(chunk, selected.parts, &frame, &scheme, dt, rows, moments);
                 }
             });
         });
+    }
+
+    /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps.
+    pub(super) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
+        if self.physics.transfer != Transfer::Apic {
+            return Ok(());
+        }
+        self.sort_into_bins()?;
+        let scheme = self.physics.scheme();
+        let (plan, lists) = (&self.grid.plan, &self.grid.lists);
+        self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
+            let mut spreads = vec![[0.0; D]; chunk.len()];
+            for (number, bin) in plan.leaf_bins(leaf).enumerate() {
+                let selected = Selected::of(lists, leaf, number, chunk);
+                let bin = &plan.bins[bin];
+                if let Some(whole) = selected.whole {
+                    let (frame, constraints) = (frame(plan, bin), constraints(plan, bin));
+                    spread::of_particles(chunk, whole, &frame, &scheme, constraints, |p, spread| {
+                        spreads[p] = spread;
+                    });
+                }
+                selected.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
+            }
+            for i in 0..D {
+                for k in 0..D {
+                    let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
+                    column.iter_mut().zip(&spreads).for_each(|(value, spread)| *value *= spread[k]);
+                }
+            }
+        });
+        Ok(())
     }
 
     /// Adds up arenas on the nodes of `part`.
@@ -190,7 +229,7 @@ impl<const D: usize> Solver<D> {
     /// Interpolates velocities on constrained nodes from their parents.
     pub(super) fn prolong(&mut self) {
         let grid = &mut self.grid;
-        self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan));
+        self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
     }
 
     /// G2P: velocity, affine matrix, deformation, stress and position of all particles.
@@ -211,13 +250,12 @@ impl<const D: usize> Solver<D> {
                     if selected.is_empty() {
                         continue;
                     }
-                    fields.load(plan, bin, arena);
+                    fields.load(plan, bin, &lists.window_of(leaf, number), arena);
                     let bin = &plan.bins[bin];
                     let frame = frame(plan, bin);
                     let moments = bin.touched.map(|table| Moments {
                         touched: &plan.touched[table as usize],
                         first: &arena.moments,
-                        second: &arena.spread,
                     });
                     let nodes = Fields { velocity: &arena.rows, increment: None, moments };
                     g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);

@@ -15,7 +15,8 @@ pub fn update_velocity<const D: usize>(
     dt: f64,
 ) {
     let nodes = block_nodes(D);
-    fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).with_min_len(32).for_each(|(rows, block)| {
+    let blocks = fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).zip(&fields.active);
+    blocks.with_min_len(32).filter(|(_, active)| **active).for_each(|((rows, block), _)| {
         let real = block.value & !block.constrained;
         for (bit, row) in rows.iter_mut().enumerate() {
             let [.., mass] = row.0;
@@ -36,7 +37,7 @@ pub fn apply_faces<const D: usize>(
     plan: &GridPlan<D>,
     faces: &[[FaceCondition; 2]; D],
 ) {
-    for &(node, on) in &plan.face_nodes {
+    for &(node, on) in plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)]) {
         let row = &mut fields.rows[node as usize].0;
         let mut velocity: [f64; D] = std::array::from_fn(|axis| row[axis]);
         for axis in 0..D {

@@ -1,0 +1,143 @@
+//! The part of an arena that the particles of a bin touch.
+//!
+//! Bins beside level jumps often hold a few particles along one face. Clearing, summing, sending and loading
+//! only the nodes that these reach keeps their cost in proportion.
+use super::mask::offset;
+use crate::kernel::ARENA_EDGE;
+
+/// A box of arena nodes, `lower..upper` per axis; what lies outside holds no values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window<const D: usize> {
+    /// First node per axis.
+    pub lower: [u8; D],
+    /// Node after the last per axis.
+    pub upper: [u8; D],
+}
+
+/// Consecutive nodes along x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Run {
+    /// First node in the arena.
+    pub arena: usize,
+    /// First node in the block.
+    pub block: usize,
+    /// Number of nodes.
+    pub len: usize,
+}
+
+impl<const D: usize> Window<D> {
+    /// The whole arena.
+    pub const FULL: Self = Self { lower: [0; D], upper: [ARENA_EDGE as u8; D] };
+    /// No node.
+    pub const EMPTY: Self = Self { lower: [ARENA_EDGE as u8; D], upper: [0; D] };
+
+    /// Grows to the stencil of a box. `lowest` is the box's lower face along each axis, in cells from the
+    /// corner of the bin's block.
+    pub fn include(&mut self, lowest: [f64; D]) {
+        // Wider than rounding can move the kernel's own choice of the lowest node.
+        const SLACK: f64 = 1e-9;
+        for axis in 0..D {
+            let first = (lowest[axis] - SLACK).floor().clamp(-1.0, 3.0) as i32 + 1;
+            let last = (lowest[axis] + SLACK).floor().clamp(-1.0, 3.0) as i32 + 4;
+            self.lower[axis] = self.lower[axis].min(first as u8);
+            self.upper[axis] = self.upper[axis].max(last as u8);
+        }
+    }
+
+    /// Whether an arena node lies inside.
+    pub fn contains(&self, node: usize) -> bool {
+        (0..D).all(|axis| {
+            let at = (node / ARENA_EDGE.pow(axis as u32) % ARENA_EDGE) as u8;
+            (self.lower[axis]..self.upper[axis]).contains(&at)
+        })
+    }
+
+    /// All nodes, run by run.
+    pub fn for_each_run(&self, mut f: impl FnMut(std::ops::Range<usize>)) {
+        let (lower, upper) = (self.lower.map(usize::from), self.upper.map(usize::from));
+        for_each_line(lower, upper, |line| {
+            let start = (0..D).map(|axis| line[axis] * ARENA_EDGE.pow(axis as u32)).sum::<usize>();
+            f(start..start + upper[0].saturating_sub(lower[0]));
+        });
+    }
+
+    /// The nodes that the block at offset number `index` from the bin shares, run by run.
+    pub fn for_each_shared(&self, index: usize, mut f: impl FnMut(Run)) {
+        // Arena nodes 0, 1..5 and 5..7 belong to the blocks below, at and above the bin.
+        let towards = offset::<D>(index);
+        let (mut lower, mut upper, mut first) = ([0; D], [0; D], [0; D]);
+        for axis in 0..D {
+            let (start, end, node) = match towards[axis] {
+                -1 => (0, 1, 3),
+                0 => (1, 5, 0),
+                _ => (5, 7, 0),
+            };
+            lower[axis] = start.max(usize::from(self.lower[axis]));
+            upper[axis] = end.min(usize::from(self.upper[axis]));
+            if lower[axis] >= upper[axis] {
+                return;
+            }
+            first[axis] = node + lower[axis] - start;
+        }
+        for_each_line(lower, upper, |line| {
+            let arena = (0..D).map(|axis| line[axis] * ARENA_EDGE.pow(axis as u32)).sum();
+            let block = (0..D).map(|axis| (first[axis] + line[axis] - lower[axis]) << (2 * axis)).sum();
+            f(Run { arena, block, len: upper[0] - lower[0] });
+        });
+    }
+}
+
+/// Starts of all lines along x in the box `lower..upper`.
+fn for_each_line<const D: usize>(lower: [usize; D], upper: [usize; D], mut f: impl FnMut([usize; D])) {
+    let mut line = lower;
+    let deep = if D == 3 { lower[D - 1]..upper[D - 1] } else { 0..1 };
+    for z in deep {
+        for y in lower[1]..upper[1] {
+            line[D - 1] = z;
+            line[1] = y;
+            f(line);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::mask::{arena_overlap, bits, offset_count};
+    use crate::grid::plan::arena_index;
+
+    fn shared_nodes_equal_the_masks<const D: usize>() {
+        let mut window = Window::<D>::EMPTY;
+        window.include([0.4; D]);
+        window.include([2.9; D]);
+        for window in [Window::FULL, window] {
+            for index in 0..offset_count(D) {
+                let mut found = Vec::new();
+                window.for_each_shared(index, |run| {
+                    found.extend((0..run.len).map(|i| (run.arena + i, run.block + i)));
+                });
+                let expected: Vec<_> = bits(arena_overlap::<D>(offset(index)))
+                    .map(|bit| (arena_index::<D>(index, bit), bit as usize))
+                    .filter(|&(node, _)| window.contains(node))
+                    .collect();
+                assert_eq!(found, expected);
+            }
+        }
+    }
+
+    #[test]
+    fn shared_nodes() {
+        shared_nodes_equal_the_masks::<2>();
+        shared_nodes_equal_the_masks::<3>();
+    }
+
+    #[test]
+    fn window_of_a_box() {
+        let mut window = Window::<3>::EMPTY;
+        window.include([-0.5, 3.2, 1.0]);
+        assert_eq!(window, Window { lower: [0, 4, 1], upper: [3, 7, 5] });
+        let mut nodes = 0;
+        window.for_each_run(|run| nodes += run.len());
+        assert_eq!(nodes, 3 * 3 * 4);
+    }
+}

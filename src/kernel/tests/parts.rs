@@ -1,0 +1,222 @@
+//! Parts of boxes, moments, box policies, other transfers, bits.
+use super::*;
+
+/// A box in 2^D parts gives the sums of the box.
+fn parts_equal_the_whole<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut whole = particles::<D>(23, 8, 1);
+    for k in 0..D {
+        // Parts must have their centres in the block too.
+        for x in whole.column_mut(Layout::<D>::POSITION + k) {
+            *x = CELL * 4.5 + (*x - CELL * 4.0) * 0.75;
+        }
+    }
+    let mut parted = whole.clone();
+    let mut half = Vec::new();
+    domain::half_widths(&whole, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let mut parts = Vec::new();
+    for p in 0..whole.len() {
+        for corner in 0..1usize << D {
+            let side = |k: usize| if corner >> k & 1 == 1 { 0.5 } else { -0.5 };
+            parts.push(SubBox {
+                particle: p as u32,
+                slot: p as u32,
+                centre: std::array::from_fn(|k| whole.position(p)[k] + side(k) * half[p][k]),
+                half: half[p].map(|h| 0.5 * h),
+                fraction: 1.0 / (1 << D) as f64,
+            });
+        }
+    }
+    let mut arena = vec![Row::default(); arena_nodes(D)];
+    let mut other = arena.clone();
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena);
+    scatter_sub_boxes(&parted, &parts, &frame, DT, &mut other, None);
+    for (a, b) in arena.iter().zip(&other) {
+        for i in 0..4 {
+            assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
+        }
+    }
+    let fields = Fields { velocity: &arena, increment: None, moments: None };
+    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields);
+    let mut gathered = vec![Gathered::default(); parted.len()];
+    gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
+    let list: Vec<u32> = (0..parted.len() as u32).collect();
+    advance_gathered(&mut parted, &list, &gathered, &scheme, DT);
+    for column in 0..Layout::<D>::REALS {
+        for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
+            assert!((a - b).abs() <= 1e-11 * a.abs().max(1.0), "column {column}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn parts_of_a_box_equal_the_box() {
+    parts_equal_the_whole::<2>();
+    parts_equal_the_whole::<3>();
+}
+
+/// First moments: scattered ones are `Σ w m C`; moments of zero change nothing, others add up.
+fn moments_follow<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let start = particles::<D>(19, 15, 1);
+    let mut half = Vec::new();
+    domain::half_widths(&start, Select::All, CELL, &frame.extent, &scheme, &mut half);
+    let touched: Vec<bool> = (0..stencil_bases(D)).map(|base| base % 2 == 0).collect();
+    let base = |p: usize| {
+        (0..D).rev().fold(0, |index, k| {
+            let lower = ((start.position(p)[k] - half[p][k]) / CELL - 4.0).floor();
+            index * BASES + (lower + 1.0) as usize
+        })
+    };
+    let nodes = arena_nodes(D);
+    let (mut plain, mut arena) = (vec![Row::default(); nodes], vec![Row::default(); nodes]);
+    let mut sums = vec![[Row::default(); D]; nodes];
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain);
+    let moments = MomentSums { touched: &touched, sums: &mut sums };
+    scatter_with_moments(&start, Select::All, &frame, &scheme, DT, &mut arena, moments);
+    assert_eq!(plain, arena);
+    for node in 0..nodes {
+        for i in 0..D {
+            for k in 0..D {
+                let expected: f64 = (0..start.len())
+                    .filter(|&p| touched[base(p)])
+                    .map(|p| {
+                        let (w, _) = definition(position::<D>(node), start.position(p), half[p]);
+                        let mass = start.column(Layout::<D>::MASS)[p];
+                        w * mass * start.column(Layout::<D>::AFFINE + D * i + k)[p]
+                    })
+                    .sum();
+                assert!((sums[node][k].0[i] - expected).abs() < 1e-13);
+            }
+        }
+    }
+    let zero = (vec![[Row::default(); D]; nodes], vec![Row::default(); nodes]);
+    let one = (vec![[Row([0.5; 4]); D]; nodes], vec![Row([2.0; 4]); nodes]);
+    let run = |moments: Option<Moments<D>>| {
+        let mut chunk = start.clone();
+        let fields = Fields { velocity: &plain, increment: None, moments };
+        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+        chunk
+    };
+    let without = run(None);
+    let with_zero = run(Some(Moments { touched: &touched, first: &zero.0, second: &zero.1 }));
+    let with_one = run(Some(Moments { touched: &touched, first: &one.0, second: &one.1 }));
+    for p in 0..start.len() {
+        assert_eq!(bits(&without, p), bits(&with_zero, p));
+        for i in 0..D {
+            for k in 0..D {
+                let mut spread = 0.0;
+                for node in 0..nodes {
+                    let (w, _) = definition(position::<D>(node), start.position(p), half[p]);
+                    spread += w * (position::<D>(node)[k] - start.position(p)[k]).powi(2);
+                }
+                let column = Layout::<D>::AFFINE + D * i + k;
+                let (plain, moved) = (without.column(column)[p], with_one.column(column)[p]);
+                let expected = if touched[base(p)] { (plain * spread + 0.5) / (spread + 2.0) } else { plain };
+                assert!((moved - expected).abs() < 1e-10 * expected.abs().max(1.0), "{moved} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn moments_are_scattered_and_gathered() {
+    moments_follow::<2>();
+    moments_follow::<3>();
+}
+
+#[test]
+fn boxes_stay_in_the_domain_and_follow_the_policy() {
+    let materials = materials();
+    let extent = [4.0 * CELL; 3];
+    let mut chunk = particles::<3>(40, 2, 3);
+    for k in 0..3 {
+        let mut numbers = Numbers(k as u64 + 1);
+        for x in chunk.column_mut(Layout::<3>::POSITION + k) {
+            *x = 4.0 * CELL * numbers.next();
+        }
+    }
+    chunk.column_mut(Layout::<3>::POSITION)[0] = 0.01 * CELL;
+    let mut half = Vec::new();
+    for boxes in [BoxPolicy::default(), BoxPolicy::Fixed, BoxPolicy::Cell] {
+        let scheme = Scheme { boxes, root_cell: CELL, transfer: Transfer::Apic, materials: &materials };
+        domain::half_widths(&chunk, Select::All, CELL, &extent, &scheme, &mut half);
+        assert_eq!(half[0][0], 0.01 * CELL);
+        for p in 0..chunk.len() {
+            for k in 0..3 {
+                let x = chunk.position(p)[k];
+                let room = x.min(extent[k] - x);
+                let free = match boxes {
+                    BoxPolicy::Fixed => chunk.column(Layout::<3>::HALF)[p],
+                    BoxPolicy::Cell => 0.5 * CELL,
+                    BoxPolicy::Volume { .. } => {
+                        let stretch = chunk.column(Layout::<3>::LEFT_CAUCHY_GREEN + k)[p].sqrt();
+                        if p % 3 != 0 {
+                            continue;
+                        }
+                        chunk.column(Layout::<3>::HALF)[p] * stretch
+                    }
+                };
+                assert_eq!(half[p][k], free.min(0.5 * CELL).min(room).max(1e-6 * CELL));
+            }
+        }
+    }
+}
+
+#[test]
+fn flip_and_tpic() {
+    let (materials, frame) = (materials(), frame::<3>());
+    let start = particles::<3>(11, 31, 1);
+    let velocity = vec![Row([1.0, 2.0, 3.0, 0.0]); arena_nodes(3)];
+    let increment = vec![Row([0.1, 0.2, 0.3, 0.0]); arena_nodes(3)];
+    let fields = Fields { velocity: &velocity, increment: Some(&increment), moments: None };
+    let mut chunk = start.clone();
+    let flip = Transfer::Flip { blend: 0.75 };
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields);
+    for p in 0..start.len() {
+        for i in 0..3 {
+            let old = start.column(Layout::<3>::VELOCITY + i)[p];
+            let (v, dv) = ([1.0, 2.0, 3.0][i], [0.1, 0.2, 0.3][i]);
+            let expected = 0.75 * (old + dv) + 0.25 * v;
+            assert!((chunk.column(Layout::<3>::VELOCITY + i)[p] - expected).abs() < 1e-14);
+            assert_eq!(chunk.column(Layout::<3>::AFFINE + 4 * i)[p], 0.0);
+            assert!((chunk.position(p)[i] - start.position(p)[i] - DT * v).abs() < 1e-15);
+        }
+    }
+    let mut chunk = start.clone();
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, Transfer::Tpic), DT, &fields);
+    assert!(chunk.column(Layout::<3>::AFFINE).iter().all(|c| c.abs() < 1e-9));
+}
+
+/// A checksum of everything that the kernels compute, the same in every build: with and without
+/// AVX2, optimised or not.
+fn checksum<const D: usize>() -> u64 {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut chunk = particles::<D>(203, 99, 5);
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
+    for _ in 0..4 {
+        let mut arena = vec![Row::default(); arena_nodes(D)];
+        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena);
+        for row in &mut arena {
+            row.0.iter().for_each(|&x| add(x));
+            let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
+            row.0 = row.0.map(|x| x * inverse);
+        }
+        let fields = Fields { velocity: &arena, increment: None, moments: None };
+        add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields));
+    }
+    for p in 0..chunk.len() {
+        bits(&chunk, p).into_iter().for_each(|x| add(f64::from_bits(x)));
+    }
+    assert!(chunk.column(Layout::<D>::WORK).iter().any(|&work| work > 0.0));
+    hash
+}
+
+#[test]
+fn bits_do_not_depend_on_the_build() {
+    assert_eq!((checksum::<2>(), checksum::<3>()), (166_303_977_378_101_143, 5_971_827_623_962_156_808));
+}
