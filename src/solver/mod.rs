@@ -208,8 +208,7 @@ impl<const D: usize> Solver<D> {
         let outcome: Result<Moved, StepError> = match (sorted, moved) {
             (Err(error), _) => Err(error.into()),
             (_, Err(error)) => Err(error.into()),
-            // Also for NaN: a bound must be positive.
-            _ if !(bound > 0.0) => Err(StepError::TimeStep { dt: bound }),
+            _ if bound.is_nan() || bound <= 0.0 => Err(StepError::TimeStep { dt: bound }),
             (_, Ok(moved)) => Ok(moved),
         };
         let flag = |set: bool| if set { -1.0 } else { 0.0 };
