@@ -406,6 +406,7 @@ impl<const D: usize> GridPlan<D> {
         let own_bins = self.own_bins();
         // (block, source leaf, bin, offset, nodes)
         let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
+        let mut feeding: HashMap<Octant<D>, Vec<usize>> = HashMap::new();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
                 let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
@@ -415,7 +416,9 @@ impl<const D: usize> GridPlan<D> {
                     continue;
                 }
                 let bin = Octant { level: block.level, coord };
-                for leaf in bin_sources(&self.tree, block.level, coord) {
+                let leaves =
+                    feeding.entry(bin).or_insert_with(|| bin_sources(&self.tree, bin.level, bin.coord));
+                for &leaf in leaves.iter() {
                     sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
                 }
             }

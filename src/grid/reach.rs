@@ -95,11 +95,9 @@ pub fn bin_sources<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; 
     let Some(container) = bin_container(tree, level, coord) else { return Vec::new() };
     let bin = Octant { level, coord };
     let mut sources = SourceSearch::of(tree, bin).near;
-    sources.retain(|&leaf| {
-        leaf == container || Reach::of(tree, leaf).is_some_and(|reach| reach.includes(tree, &bin))
-    });
     sources.sort_unstable();
     sources.dedup();
+    sources.retain(|&leaf| leaf == container || Reach::around(tree, leaf).includes(tree, &bin));
     sources
 }
 
@@ -163,12 +161,15 @@ struct Reach<const D: usize> {
 impl<const D: usize> Reach<D> {
     /// `None` if all boxes of the leaf are transferred whole.
     fn of(tree: &KnownTree<D>, leaf: usize) -> Option<Self> {
+        let reach = Self::around(tree, leaf);
+        (reach.any_box || finer_neighbours(tree, reach.leaf).next().is_some()).then_some(reach)
+    }
+
+    /// As [`Reach::of`], but not empty for leaves whose boxes are transferred whole.
+    fn around(tree: &KnownTree<D>, leaf: usize) -> Self {
         let leaf = tree.leaves()[leaf];
-        let any_box = tree.reach() > 0;
-        if !any_box && finer_neighbours(tree, leaf).next().is_none() {
-            return None;
-        }
-        Some(Self { leaf, region: Extent::grown(&leaf, half_cells(tree), leaf.level), any_box })
+        let region = Extent::grown(&leaf, half_cells(tree), leaf.level);
+        Self { leaf, region, any_box: tree.reach() > 0 }
     }
 
     /// Whether a part can lie in the bin. Decided from leaves at most one block away from the bin, which
