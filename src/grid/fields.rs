@@ -315,6 +315,25 @@ impl<const D: usize> NodeFields<D> {
     }
 }
 
+/// Not collective. Copies the nodes of `window` around a bin from the rows of all blocks into an arena.
+pub fn load_rows<const D: usize>(
+    plan: &GridPlan<D>,
+    bin: usize,
+    window: &Window<D>,
+    rows: &[Row],
+    arena: &mut [Row],
+) {
+    window.for_each_run(|run| arena[run].fill(ZERO));
+    let nodes = block_nodes(D);
+    let around = plan.bins[bin].around.iter().take(offset_count(D)).enumerate();
+    for (index, &block) in around.filter(|(_, block)| **block != NO_BLOCK) {
+        let rows = &rows[block as usize * nodes..][..nodes];
+        window.for_each_shared(index, |run| {
+            arena[run.arena..][..run.len].copy_from_slice(&rows[run.block..][..run.len]);
+        });
+    }
+}
+
 /// The fields of the levels below `level`, whose first moment slot is `slot`, and those of `level` and deeper.
 fn split<'a, const D: usize>(
     rows: &'a mut [Row],
