@@ -114,7 +114,7 @@ pub fn evaluate(comm: &Comm, text: &str, direct: bool) -> Result<Output, Failure
 }
 
 fn fail<T>(comm: &Comm, message: String) -> Result<T, Failure> {
-    Err(if comm.rank() == 0 { Failure::Usage(message) } else { Failure::Elsewhere })
+    Err(if comm.rank() == 0 { Failure::Usage(message) } else { Failure::Elsewhere(2) })
 }
 
 /// Collective. Fails on all ranks if any rank failed; one rank explains it.
