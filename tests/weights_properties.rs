@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use agimp::exact_sum::ExactSum;
 use agimp::grid::{KnownTree, direct};
+use agimp::kernel::Transfer;
+use agimp::particle::chunk::Layout;
 use agimp::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 use common::launch::{Scenario, agrees_for, report, work};
 use common::random::Random;
@@ -17,10 +19,12 @@ use partition::{Brick, Comm, MAX_LEVEL, Octant};
 const EPS: f64 = f64::EPSILON;
 
 const SCENARIOS: &[(&str, Scenario)] = &[
-    ("boxes_2d", |comm| random_boxes::<2>(comm, 24, 12, 5)),
-    ("boxes_3d", |comm| random_boxes::<3>(comm, 8, 8, 3)),
+    ("boxes_2d", |comm| random_boxes::<2>(comm, 14, 9, 5)),
+    ("boxes_3d", |comm| random_boxes::<3>(comm, 6, 7, 3)),
     ("crowd_2d", |comm| crowds::<2>(comm, 12, 300)),
     ("crowd_3d", |comm| crowds::<3>(comm, 4, 200)),
+    ("ghosts_2d", |comm| ghosts::<2>(comm, Brick { roots: [32, 2] }, 12, 5)),
+    ("ghosts_3d", |comm| ghosts::<3>(comm, Brick { roots: [16, 1, 1] }, 5, 3)),
     ("lines_2d", lines::<2>),
     ("lines_3d", lines::<3>),
     ("lattices", |comm| {
@@ -53,6 +57,16 @@ fn mass_reaches_real_nodes_2d() {
 #[test]
 fn mass_reaches_real_nodes_3d() {
     agrees_for("crowd_3d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn far_ranks_2d() {
+    agrees_for("ghosts_2d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn far_ranks_3d() {
+    agrees_for("ghosts_3d", &[1, 3, 4]);
 }
 
 #[test]
@@ -108,16 +122,24 @@ fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64 {
     0.25 * 0.5f64.powi(i32::from(leaf.level))
 }
 
+/// All kinds of boxes.
+const ALL: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 7, 8];
+/// Kinds of boxes at most one cell wide.
+const NARROW: &[u64] = &[0, 1, 2, 5, 7, 8];
+/// Kinds of boxes at most a few cells wide.
+const WIDE: &[u64] = &[0, 1, 2, 3, 4, 5, 7, 8];
+
 /// A box of a random kind inside the brick.
 fn random_box<const D: usize>(
     random: &mut Random,
     brick: Brick<D>,
     leaves: &[Octant<D>],
+    kinds: &[u64],
 ) -> ([f64; D], [f64; D]) {
     let extent = brick.roots.map(f64::from);
     let mut centre: [f64; D] = std::array::from_fn(|a| random.between(0.0, extent[a]));
     let h = cell_at(leaves, centre);
-    let kind = random.below(9);
+    let kind = kinds[random.below(kinds.len() as u64) as usize];
     let factor = |random: &mut Random| match kind {
         0 => 0.25,
         1 => 0.5,
@@ -157,7 +179,8 @@ fn random_tree<const D: usize>(random: &mut Random, number: usize, deepest: u8) 
     let mut roots = [1; D];
     roots[number % D] = 1 + number as u32 % 3 / 2;
     let brick = Brick { roots };
-    let leaves = random_leaves(random, brick, deepest);
+    let points = 2 + random.below(3);
+    let leaves = random_leaves(random, brick, points, deepest);
     (brick, if number % 2 == 0 { leaves } else { graded(leaves) })
 }
 
@@ -171,7 +194,7 @@ fn random_boxes<const D: usize>(comm: &Comm, trees: usize, boxes: usize, deepest
         let tree = KnownTree::whole(brick, leaves.clone());
         let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
         for _ in 0..boxes {
-            let (centre, half) = random_box(&mut random, brick, &leaves);
+            let (centre, half) = random_box(&mut random, brick, &leaves, ALL);
             grid.place(&[unit(centre, half)]);
             grid.to_nodes(-1.0).expect("a box fits its bins");
             let nodes = grid.all_real_nodes(comm);
@@ -255,7 +278,7 @@ fn crowds<const D: usize>(comm: &Comm, trees: usize, boxes: usize) {
         let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
         let particles: Vec<GivenParticle<D>> = (0..boxes)
             .map(|_| {
-                let (centre, half) = random_box(&mut random, brick, &leaves);
+                let (centre, half) = random_box(&mut random, brick, &leaves, ALL);
                 let mass = random.between(0.1, 1.0);
                 let affine = std::array::from_fn(|_| random.point(-1.0, 1.0));
                 GivenParticle { mass, velocity: random.point(-1.0, 1.0), affine, ..unit(centre, half) }
@@ -274,6 +297,47 @@ fn crowds<const D: usize>(comm: &Comm, trees: usize, boxes: usize) {
         }
     }
     report(comm, format!("{worst:.1e} bits {:016x}", digest.0));
+}
+
+/// Trees so large that a rank knows a part only: still the same bits, and all mass on real nodes.
+fn ghosts<const D: usize>(comm: &Comm, brick: Brick<D>, points: u64, deepest: u8) {
+    let mut random = Random::new(61 + D as u64);
+    let mut digest = Digest::default();
+    for (number, kinds) in [NARROW, WIDE, ALL, NARROW, WIDE].into_iter().enumerate() {
+        let leaves = random_leaves::<D>(&mut random, brick, points, deepest);
+        let leaves = if number < 3 { leaves } else { graded(leaves) };
+        let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
+        let particles: Vec<GivenParticle<D>> = (0..400)
+            .map(|_| {
+                let (centre, half) = random_box(&mut random, brick, &leaves, kinds);
+                let affine = std::array::from_fn(|_| random.point(-1.0, 1.0));
+                GivenParticle { velocity: random.point(-1.0, 1.0), affine, ..unit(centre, half) }
+            })
+            .collect();
+        grid.place(&particles);
+        grid.to_nodes(-1.0).expect("boxes fit their bins");
+        assert!(comm.size() < 4 || 4 * grid.ghost_leaves() < 3 * leaves.len(), "the tree is too small");
+        let nodes = grid.all_real_nodes(comm);
+        if comm.rank() == 0 {
+            digest.add(&nodes);
+            let mass = total(nodes.iter().map(|node| node.mass).chain([-(particles.len() as f64)]));
+            assert!(mass.abs() <= 1e-14 * particles.len() as f64, "{mass:e} of the mass is lost");
+        }
+        // Prolongation and G2P too.
+        grid.to_velocities();
+        grid.to_particles(Transfer::Apic);
+        let mut sum = [0u64];
+        for chunk in grid.chunks() {
+            for (p, id) in chunk.ids().iter().enumerate() {
+                let columns = (0..Layout::<D>::REALS).map(|column| chunk.column(column)[p].to_bits());
+                let mixed = columns.fold(*id, |mixed, bits| (mixed ^ bits).wrapping_mul(0x100_0000_01b3));
+                sum[0] = sum[0].wrapping_add(mixed >> 8);
+            }
+        }
+        comm.sum_u64(&mut sum);
+        digest.0 ^= sum[0];
+    }
+    report(comm, format!("bits {:016x}", digest.0));
 }
 
 /// A tree in which some leaves of level 1 touch leaves `jump` levels finer.

@@ -184,6 +184,11 @@ impl<const D: usize> GivenBoxes<D> {
         self.solver.gather(0.0);
     }
 
+    /// Not collective. How many leaves of other ranks this rank knows.
+    pub fn ghost_leaves(&self) -> usize {
+        self.solver.grid.plan.tree.ghost_len()
+    }
+
     /// Not collective. The particles of this rank's leaves.
     pub fn chunks(&self) -> &[Chunk<D>] {
         &self.solver.chunks

@@ -63,6 +63,7 @@ fn launch(scenario: &str, ranks: usize) -> Output {
         .env(SCENARIO, scenario)
         .env("MPIEXEC_TIMEOUT", LIMIT)
         .env("RAYON_NUM_THREADS", "1")
+        .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .env("OMPI_MCA_io", "^ompio")

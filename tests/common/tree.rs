@@ -21,12 +21,17 @@ pub fn octants<const D: usize>(list: &Value) -> Vec<Octant<D>> {
     list.as_array().expect("a list").iter().map(octant).collect()
 }
 
-/// A random tree: leaves around a few points are split down to random levels, at most `deepest`, so that neighbouring
-/// leaves differ by any number of levels.
-pub fn random_leaves<const D: usize>(random: &mut Random, brick: Brick<D>, deepest: u8) -> Vec<Octant<D>> {
+/// A random tree: leaves around `points` points are split down to random levels, at most `deepest`, so that
+/// neighbouring leaves differ by any number of levels.
+pub fn random_leaves<const D: usize>(
+    random: &mut Random,
+    brick: Brick<D>,
+    points: u64,
+    deepest: u8,
+) -> Vec<Octant<D>> {
     let roots = (0..brick.root_count()).map(|index| brick.root_on_curve(index));
     let mut leaves: Vec<Octant<D>> = roots.flat_map(|root| (0..1 << D).map(move |i| root.child(i))).collect();
-    for _ in 0..2 + random.below(3) {
+    for _ in 0..points {
         let at: [f64; D] = std::array::from_fn(|axis| random.between(0.0, f64::from(brick.roots[axis])));
         let level = 2 + random.below(u64::from(deepest) - 1) as u8;
         while let Some(index) = leaves.iter().position(|leaf| leaf.level < level && contains(leaf, at)) {
