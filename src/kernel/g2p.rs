@@ -316,8 +316,7 @@ fn advance<const D: usize>(
             gradient[i][k] = column[i];
         }
     }
-    let increment =
-        if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
+    let increment = if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
     for i in 0..D {
         let moved = velocity[i].mul_add(step, position[i]);
         batch.store(reals, stride, Layout::<D>::POSITION + i, moved);
