@@ -175,7 +175,11 @@ fn random_box<const D: usize>(
 }
 
 /// Bricks and trees in turn, half of them graded.
-fn random_tree<const D: usize>(random: &mut Random, number: usize, deepest: u8) -> (Brick<D>, Vec<Octant<D>>) {
+fn random_tree<const D: usize>(
+    random: &mut Random,
+    number: usize,
+    deepest: u8,
+) -> (Brick<D>, Vec<Octant<D>>) {
     let mut roots = [1; D];
     roots[number % D] = 1 + number as u32 % 3 / 2;
     let brick = Brick { roots };
@@ -343,7 +347,8 @@ fn ghosts<const D: usize>(comm: &Comm, brick: Brick<D>, points: u64, deepest: u8
 /// A tree in which some leaves of level 1 touch leaves `jump` levels finer.
 fn tree_with_jump<const D: usize>(random: &mut Random, jump: u8) -> (Brick<D>, Vec<Octant<D>>) {
     let brick = Brick { roots: [1; D] };
-    let mut leaves: Vec<Octant<D>> = (0..1 << D).map(|i| Octant { level: 0, coord: [0; D] }.child(i)).collect();
+    let mut leaves: Vec<Octant<D>> =
+        (0..1 << D).map(|i| Octant { level: 0, coord: [0; D] }.child(i)).collect();
     // The point lies beside the middle of the domain, where all leaves of level 1 meet.
     let at: [f64; D] = std::array::from_fn(|_| 0.5 + random.between(-1e-3, 1e-3));
     let level = 1 + jump;
@@ -368,8 +373,10 @@ fn lines<const D: usize>(comm: &Comm) {
         let half: [f64; D] = std::array::from_fn(|_| fine * random.between(0.2, 1.2));
         // Through the middle along an axis (a face), in a plane (an edge) or along a diagonal (a corner).
         let along = 1 + number % D;
-        let direction: [f64; D] = std::array::from_fn(|a| if a < along { random.between(0.5, 1.0) } else { 0.0 });
-        let aside: [f64; D] = std::array::from_fn(|a| if a < along { 0.0 } else { random.between(-0.1, 0.1) });
+        let direction: [f64; D] =
+            std::array::from_fn(|a| if a < along { random.between(0.5, 1.0) } else { 0.0 });
+        let aside: [f64; D] =
+            std::array::from_fn(|a| if a < along { 0.0 } else { random.between(-0.1, 0.1) });
         let mut weights = |t: f64| {
             let centre = std::array::from_fn(|a| 0.5 + aside[a] + t * direction[a]);
             grid.place(&[unit(centre, half)]);
@@ -384,13 +391,16 @@ fn lines<const D: usize>(comm: &Comm) {
         for step in 0..steps {
             let t = 3.0 * fine * (2.0 * f64::from(step) / f64::from(steps) - 1.0 + random.between(0.0, 0.01));
             // Also where a face of the box passes a face of the fine leaves.
-            let t = if step % 4 == 0 { half[0] / direction[0] * if step % 8 == 0 { 1.0 } else { -1.0 } } else { t };
+            let t = if step % 4 == 0 {
+                half[0] / direction[0] * if step % 8 == 0 { 1.0 } else { -1.0 }
+            } else {
+                t
+            };
             let (before, after) = (weights(t - delta), weights(t + delta));
             let none = RealNode { place: [0; D], momentum: [0.0; D], mass: 0.0 };
             for place in before.keys().chain(after.keys()) {
                 let (a, b) = (before.get(place).unwrap_or(&none), after.get(place).unwrap_or(&none));
-                let mean: f64 =
-                    (0..D).map(|k| (a.momentum[k] + b.momentum[k]) * delta * direction[k]).sum();
+                let mean: f64 = (0..D).map(|k| (a.momentum[k] + b.momentum[k]) * delta * direction[k]).sum();
                 let bound = curvature * (4.0 * delta * delta) + 64.0 * EPS * (1.0 + steepest);
                 let error = (b.mass - a.mass - mean).abs();
                 assert!(error <= bound, "weight of {place:?} at {t}: {error:e} > {bound:e}");

@@ -83,8 +83,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
     let name = arguments.cases.display();
-    let text = std::fs::read_to_string(&arguments.cases)
-        .map_err(|error| Failure::Usage(format!("{name}: {error}")));
+    let text =
+        std::fs::read_to_string(&arguments.cases).map_err(|error| Failure::Usage(format!("{name}: {error}")));
     let text = agreed(comm, text)?;
     let output = evaluate(comm, &text, arguments.direct).map_err(|failure| match failure {
         Failure::Usage(message) => Failure::Usage(format!("{name}: {message}")),
@@ -133,8 +133,7 @@ fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Resu
         let id = tree.id.clone().unwrap_or_else(|| number.into());
         let mut cases: Vec<usize> = (0..input.cases.len()).filter(|&i| input.cases[i].tree == id).collect();
         used += cases.len();
-        let leaves =
-            tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
+        let leaves = tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
         let leaves = agreed(comm, leaves)?;
         let boxes: Result<Vec<_>, _> = cases.iter().map(|&i| input.cases[i].given::<D>()).collect();
         let boxes = agreed(comm, boxes.map_err(Failure::Usage))?;

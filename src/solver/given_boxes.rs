@@ -165,8 +165,10 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn all_real_nodes(&self, comm: &Comm) -> Vec<RealNode<D>> {
         let words: Vec<u64> = self.real_nodes().iter().flat_map(RealNode::to_words).collect();
         let gathered = comm.gather_bytes(bytemuck::cast_slice(&words)).unwrap_or_default();
-        let mut nodes: Vec<RealNode<D>> =
-            gathered.iter().flat_map(|bytes| bytes.chunks_exact(8 * (2 * D + 1)).map(RealNode::from_bytes)).collect();
+        let mut nodes: Vec<RealNode<D>> = gathered
+            .iter()
+            .flat_map(|bytes| bytes.chunks_exact(8 * (2 * D + 1)).map(RealNode::from_bytes))
+            .collect();
         nodes.sort_unstable_by_key(|node| node.place);
         nodes
     }
