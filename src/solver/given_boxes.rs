@@ -30,7 +30,7 @@ pub struct GivenParticle<const D: usize> {
     pub mass: f64,
     /// Velocity, m/s.
     pub velocity: [f64; D],
-    /// As in the columns [`Layout::AFFINE`].
+    /// As in the columns [`Layout::AFFINE`] with APIC.
     pub affine: [[f64; D]; D],
     /// Isotropic Kirchhoff stress times volume, `V₀ τ = energy I`, J.
     pub energy: f64,
@@ -182,6 +182,7 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn to_particles(&mut self, transfer: Transfer) {
         self.solver.physics.transfer = transfer;
         self.solver.gather(0.0);
+        self.solver.physics.transfer = Transfer::Apic;
     }
 
     /// Not collective. How many leaves of other ranks this rank knows.
