@@ -23,12 +23,14 @@ const SCENARIOS: &[(&str, Scenario)] = &[
     ("direct_2d", |comm| weights(comm, "weights_2d.json", true)),
     ("direct_3d", |comm| weights(comm, "weights_3d.json", true)),
     ("transfers_2d", |comm| {
-        for file in ["transfer_graded_2d", "transfer_nongraded_2d", "affine_graded_2d", "affine_nongraded_2d"] {
+        for file in ["transfer_graded_2d", "transfer_nongraded_2d", "affine_graded_2d", "affine_nongraded_2d"]
+        {
             transfer::<2>(comm, file);
         }
     }),
     ("transfers_3d", |comm| {
-        for file in ["transfer_graded_3d", "transfer_nongraded_3d", "affine_graded_3d", "affine_nongraded_3d"] {
+        for file in ["transfer_graded_3d", "transfer_nongraded_3d", "affine_graded_3d", "affine_nongraded_3d"]
+        {
             transfer::<3>(comm, file);
         }
     }),
@@ -161,7 +163,9 @@ fn weights(comm: &Comm, file: &str, direct: bool) {
     assert!(worst <= 2.0, "{file}: {worst} eps kappa");
     let bits = found.cases.iter().flat_map(|case| &case.nodes);
     let bits = bits.fold(0u64, |sum, node| {
-        node.grad.iter().fold(sum.rotate_left(7) ^ node.w.to_bits(), |sum, g| sum.rotate_left(9) ^ g.to_bits())
+        node.grad
+            .iter()
+            .fold(sum.rotate_left(7) ^ node.w.to_bits(), |sum, g| sum.rotate_left(9) ^ g.to_bits())
     });
     report(comm, format!("{file}: {worst:.3} eps kappa, bits {bits:016x}"));
 }
@@ -210,7 +214,8 @@ impl Errors {
     }
 }
 
-/// Columns `AFFINE` of a particle with affine matrix `c` and second moments `d`: the matrix `B = C D` of APIC.
+/// Columns `AFFINE` of a particle with affine matrix `c` and second moments `d`: the matrix `B = C D` of
+/// APIC.
 fn stored_affine<const D: usize>(c: [[f64; D]; D], d: [f64; D]) -> [[f64; D]; D] {
     c.map(|row| std::array::from_fn(|k| row[k] * d[k]))
 }
@@ -289,9 +294,7 @@ fn check_nodes<const D: usize>(
 }
 
 /// Particles of this rank: chunk, index there and identifier.
-fn particles_of<const D: usize>(
-    boxes: &GivenBoxes<D>,
-) -> impl Iterator<Item = (&Chunk<D>, usize, usize)> {
+fn particles_of<const D: usize>(boxes: &GivenBoxes<D>) -> impl Iterator<Item = (&Chunk<D>, usize, usize)> {
     boxes
         .chunks()
         .iter()

@@ -14,8 +14,8 @@ use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 /// Arguments of `agimp weights`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Trees and boxes (JSON): `dim`, `cells_per_octant_edge`, `trees` with `octants` as `[level, i, j(, k)]` in the
-    /// unit square or cube, and `cases` with `id`, `tree`, `centre` and `half`.
+    /// Trees and boxes (JSON): `dim`, `cells_per_octant_edge`, `trees` with `octants` as `[level, i, j(, k)]`
+    /// in the unit square or cube, and `cases` with `id`, `tree`, `centre` and `half`.
     pub cases: PathBuf,
     /// Evaluate the definition cell by cell instead of scattering with the kernels of a run.
     #[arg(long)]
@@ -83,8 +83,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
     let name = arguments.cases.display();
-    let text = std::fs::read_to_string(&arguments.cases)
-        .map_err(|error| Failure::Usage(format!("{name}: {error}")));
+    let text =
+        std::fs::read_to_string(&arguments.cases).map_err(|error| Failure::Usage(format!("{name}: {error}")));
     let text = agreed(comm, text)?;
     let output = evaluate(comm, &text, arguments.direct).map_err(|failure| match failure {
         Failure::Usage(message) => Failure::Usage(format!("{name}: {message}")),
@@ -133,8 +133,7 @@ fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Resu
         let id = tree.id.clone().unwrap_or_else(|| number.into());
         let mut cases: Vec<usize> = (0..input.cases.len()).filter(|&i| input.cases[i].tree == id).collect();
         used += cases.len();
-        let leaves =
-            tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
+        let leaves = tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
         let leaves = agreed(comm, leaves)?;
         let boxes: Result<Vec<_>, _> = cases.iter().map(|&i| input.cases[i].given::<D>()).collect();
         let boxes = agreed(comm, boxes.map_err(Failure::Usage))?;
