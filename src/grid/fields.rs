@@ -5,9 +5,11 @@
 use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
+use super::entries::Entries;
 use super::exchange::ReceivedArenas;
+use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
-use super::plan::{GridPlan, Links, NO_BLOCK, Source};
+use super::plan::{GridPlan, NO_BLOCK, Source};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
@@ -29,71 +31,6 @@ pub struct NodeFields<const D: usize> {
     /// First moment slot of each level.
     moment_start: Vec<usize>,
     entries: Entries,
-}
-
-/// Which arenas enter the sum of each block in this step, in canonical order.
-#[derive(Clone, Debug, Default)]
-struct Entries {
-    /// First entry of each block, and the number of entries at the end.
-    start: Vec<u32>,
-    /// Source and place: the offset number of the block from an own bin, or the part of a received bin.
-    list: Vec<(Source, u32)>,
-}
-
-impl Entries {
-    /// Collects the entries of the blocks of `part` from the occupied bins.
-    fn collect<const D: usize>(
-        &mut self,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        received: &ReceivedArenas<D>,
-        part: Part,
-    ) {
-        let seam = part == Part::Seam;
-        let each = |f: &mut dyn FnMut(u32, Source, u32)| {
-            for &source in &plan.sources {
-                match source {
-                    Source::Own(bin) if arenas.is_occupied(bin.0 as usize) => {
-                        let window = arenas.window(bin.0 as usize);
-                        let around = plan.bins[bin.0 as usize].around.iter().zip(0..);
-                        for (&block, place) in around.filter(|(block, _)| **block != NO_BLOCK) {
-                            if plan.is_seam[block as usize] == seam
-                                && plan.blocks[block as usize].sum != 0
-                                && window.reaches(place as usize)
-                            {
-                                f(block, source, place);
-                            }
-                        }
-                    }
-                    Source::Received(bin) if seam && received.is_occupied(bin) => {
-                        let parts = plan.received[bin as usize].parts.iter().zip(0..);
-                        parts.for_each(|(part, place)| f(part.block, source, place));
-                    }
-                    _ => {}
-                }
-            }
-        };
-        self.start.clear();
-        self.start.resize(plan.blocks.len() + 1, 0);
-        each(&mut |block, _, _| self.start[block as usize + 1] += 1);
-        for block in 0..plan.blocks.len() {
-            self.start[block + 1] += self.start[block];
-        }
-        self.list.clear();
-        self.list.resize(self.start[plan.blocks.len()] as usize, (Source::Received(0), 0));
-        each(&mut |block, source, place| {
-            let next = &mut self.start[block as usize];
-            self.list[*next as usize] = (source, place);
-            *next += 1;
-        });
-        // Each start has moved to the end of its block.
-        self.start.rotate_right(1);
-        self.start[0] = 0;
-    }
-
-    fn of(&self, block: usize) -> &[(Source, u32)] {
-        &self.list[self.start[block] as usize..self.start[block + 1] as usize]
-    }
 }
 
 /// Which blocks to sum.
@@ -140,13 +77,7 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(
-        &mut self,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        received: &ReceivedArenas<D>,
-        part: Part,
-    ) {
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
         self.entries.collect(plan, arenas, received, part);
         let entries = &self.entries;
         let nodes = block_nodes(D);
@@ -200,7 +131,8 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             let cell = plan.cell(level as u8 + 1);
-            let (coarse, fine) = split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
+            let (coarse, fine) =
+                split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
             for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
                 for i in nodes {
                     let at = links.nodes[i] as usize - first;
@@ -279,13 +211,7 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
     /// touch constrained nodes their first moments.
-    pub fn load(
-        &self,
-        plan: &GridPlan<D>,
-        bin: usize,
-        window: &Window<D>,
-        arena: &mut VelocityArena<D>,
-    ) {
+    pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
         let has_moments = bin.touched.is_some();
         window.for_each_run(|run| {
@@ -413,11 +339,7 @@ fn for_each_linked<const D: usize>(
         tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
     }
     tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
-        work(
-            block,
-            linked.block as usize * nodes,
-            linked.nodes.start as usize..linked.nodes.end as usize,
-        );
+        work(block, linked.block as usize * nodes, linked.nodes.start as usize..linked.nodes.end as usize);
     });
 }
 
