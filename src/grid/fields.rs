@@ -73,13 +73,7 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(
-        &mut self,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        received: &ReceivedArenas<D>,
-        part: Part,
-    ) {
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
         let nodes = block_nodes(D);
         let mut moments = self.moments.chunks_mut(nodes);
         let flags = self.active.iter_mut().zip(&mut self.dirty);
@@ -138,7 +132,8 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             let cell = plan.cell(level as u8 + 1);
-            let (coarse, fine) = split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
+            let (coarse, fine) =
+                split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
             for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
                 for i in nodes {
                     let at = links.nodes[i] as usize - first;
@@ -217,13 +212,7 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
     /// touch constrained nodes their first moments.
-    pub fn load(
-        &self,
-        plan: &GridPlan<D>,
-        bin: usize,
-        window: &Window<D>,
-        arena: &mut VelocityArena<D>,
-    ) {
+    pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
         let has_moments = bin.touched.is_some();
         window.for_each_run(|run| {
@@ -332,11 +321,7 @@ fn for_each_linked<const D: usize>(
         tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
     }
     tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
-        work(
-            block,
-            linked.block as usize * nodes,
-            linked.nodes.start as usize..linked.nodes.end as usize,
-        );
+        work(block, linked.block as usize * nodes, linked.nodes.start as usize..linked.nodes.end as usize);
     });
 }
 

@@ -11,11 +11,11 @@ pub mod fields;
 pub mod known;
 pub mod mask;
 pub mod plan;
-pub mod window;
 pub mod reach;
+pub mod window;
 
 pub use exchange::ArenaExchange;
 pub use fields::NodeFields;
 pub use known::{Cover, KnownTree};
-pub use window::Window;
 pub use plan::{BinId, GridPlan};
+pub use window::Window;

@@ -8,11 +8,11 @@
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
-use crate::grid::plan::Bin;
-use crate::grid::{GridPlan, Window};
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
+use crate::grid::plan::Bin;
 use crate::grid::reach::leaves_around;
+use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::particle::chunk::{Chunk, Layout};
 
@@ -117,20 +117,22 @@ impl<const D: usize> BinLists<D> {
         of_parts: impl Fn(&Bin<D>, &Chunk<D>, &[SubBox<D>], &mut dyn FnMut(usize, [f64; D])) + Sync,
     ) {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).enumerate().with_min_len(8);
-        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(|(leaf, (bins, _))| {
-            let mut totals = vec![[0.0; D]; bins.cut.len()];
-            for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
-                of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
-                    let part = &members.parts[part];
-                    let total = &mut totals[part.slot as usize];
-                    for axis in 0..D {
-                        total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
-                    }
-                });
-            }
-            let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
-            parts.for_each(|part| part.spread = totals[part.slot as usize]);
-        });
+        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(
+            |(leaf, (bins, _))| {
+                let mut totals = vec![[0.0; D]; bins.cut.len()];
+                for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+                    of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
+                        let part = &members.parts[part];
+                        let total = &mut totals[part.slot as usize];
+                        for axis in 0..D {
+                            total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
+                        }
+                    });
+                }
+                let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
+                parts.for_each(|part| part.spread = totals[part.slot as usize]);
+            },
+        );
     }
 
     /// Nodes that the members of a bin touch, or `None` if it has none.
@@ -227,14 +229,7 @@ impl<const D: usize> LeafBins<D> {
     }
 
     /// Grows the window of a bin to a box.
-    fn include(
-        &mut self,
-        plan: &GridPlan<D>,
-        leaf: usize,
-        bin: usize,
-        centre: [f64; D],
-        half: [f64; D],
-    ) {
+    fn include(&mut self, plan: &GridPlan<D>, leaf: usize, bin: usize, centre: [f64; D], half: [f64; D]) {
         let block = &plan.bins[plan.leaf_bins(leaf).start + bin].block;
         let cell = plan.cell(block.level);
         // The kernel limits half widths to half a cell.
