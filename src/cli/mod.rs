@@ -12,6 +12,7 @@ pub mod new;
 pub mod plot;
 pub mod run;
 pub mod schema;
+pub mod weights;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
 #[derive(Debug, Parser)]
@@ -41,6 +42,8 @@ pub enum Command {
     Digest(digest::Arguments),
     /// Tell where the states in two files differ.
     Diff(diff::Arguments),
+    /// Print the weights of given boxes on given trees.
+    Weights(weights::Arguments),
 }
 
 /// Why the program ends without success.
@@ -101,6 +104,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Plot(arguments) => plot::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),
+        Command::Weights(arguments) => weights::execute(&arguments),
     }
 }
 

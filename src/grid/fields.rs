@@ -5,9 +5,11 @@
 use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
+use super::entries::Entries;
 use super::exchange::ReceivedArenas;
+use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
-use super::plan::{GridPlan, Links, NO_BLOCK, Source};
+use super::plan::{GridPlan, NO_BLOCK, Source};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
@@ -28,6 +30,7 @@ pub struct NodeFields<const D: usize> {
     dirty: Vec<bool>,
     /// First moment slot of each level.
     moment_start: Vec<usize>,
+    entries: Entries,
 }
 
 /// Which blocks to sum.
@@ -64,6 +67,7 @@ impl<const D: usize> NodeFields<D> {
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
             moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
+            entries: Entries::default(),
         }
     }
 
@@ -74,6 +78,8 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
     pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
+        self.entries.collect(plan, arenas, received, part);
+        let entries = &self.entries;
         let nodes = block_nodes(D);
         let mut moments = self.moments.chunks_mut(nodes);
         let flags = self.active.iter_mut().zip(&mut self.dirty);
@@ -89,11 +95,8 @@ impl<const D: usize> NodeFields<D> {
             .filter(|&(index, ..)| plan.is_seam[index] == (part == Part::Seam))
             .collect();
         blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block, (active, dirty))| {
-            let contributions = plan.block_contributions(index);
-            *active = contributions.iter().any(|contribution| match contribution.source {
-                Source::Own(bin) => arenas.is_occupied(bin.0 as usize),
-                Source::Received(bin, _) => received.is_occupied(bin),
-            });
+            let entries = entries.of(index);
+            *active = !entries.is_empty();
             if *active || *dirty {
                 block.rows.fill(ZERO);
                 if let Some(moments) = &mut block.moments {
@@ -101,20 +104,16 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             *dirty = *active;
-            if !*active {
-                return;
-            }
-            for contribution in contributions {
-                match contribution.source {
+            for &(source, place) in entries {
+                match source {
                     Source::Own(bin) => {
                         if let Some(arena) = arenas.get(bin.0) {
-                            block.add(arena.rows, arena.moments, &arena.window, contribution.offset);
+                            block.add(arena.rows, arena.moments, &arena.window, place as u8);
                         }
                     }
-                    Source::Received(bin, part) if received.is_occupied(bin) => {
-                        received.add(bin, part, block.rows, block.moments.as_deref_mut());
+                    Source::Received(bin) => {
+                        received.add(bin, place, block.rows, block.moments.as_deref_mut());
                     }
-                    Source::Received(..) => {}
                 }
             }
         });
@@ -239,6 +238,25 @@ impl<const D: usize> NodeFields<D> {
                 }
             });
         }
+    }
+}
+
+/// Not collective. Copies the nodes of `window` around a bin from the rows of all blocks into an arena.
+pub fn load_rows<const D: usize>(
+    plan: &GridPlan<D>,
+    bin: usize,
+    window: &Window<D>,
+    rows: &[Row],
+    arena: &mut [Row],
+) {
+    window.for_each_run(|run| arena[run].fill(ZERO));
+    let nodes = block_nodes(D);
+    let around = plan.bins[bin].around.iter().take(offset_count(D)).enumerate();
+    for (index, &block) in around.filter(|(_, block)| **block != NO_BLOCK) {
+        let rows = &rows[block as usize * nodes..][..nodes];
+        window.for_each_shared(index, |run| {
+            arena[run.arena..][..run.len].copy_from_slice(&rows[run.block..][..run.len]);
+        });
     }
 }
 

@@ -6,9 +6,12 @@
 pub mod arena;
 pub mod closure;
 pub mod constraint;
+pub mod direct;
+mod entries;
 pub mod exchange;
 pub mod fields;
 pub mod known;
+pub mod links;
 pub mod mask;
 pub mod plan;
 pub mod reach;

@@ -273,6 +273,11 @@ pub struct Numerics {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub flip: Option<f64>,
+    /// Order for `transfer = "xpic"`: 1 is PIC, high orders approach FLIP; 2 by default. Each order above the first
+    /// costs one more sweep between particles and nodes with one more exchange between ranks.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 16))]
+    pub xpic_order: Option<u32>,
     /// How the box of a particle follows its deformation.
     #[serde(default)]
     pub boxes: Boxes,
@@ -292,6 +297,8 @@ pub enum Transfer {
     Flip,
     /// Taylor particle-in-cell.
     Tpic,
+    /// Extended particle-in-cell of order `xpic_order`.
+    Xpic,
 }
 
 /// How the box of a particle follows its deformation.

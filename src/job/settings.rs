@@ -41,10 +41,17 @@ pub(super) fn numerics(checks: &mut Checks, numerics: &file::Numerics, path: &Pa
             "found a share of FLIP; expected it only with transfer = \"flip\"".into(),
         );
     }
+    if numerics.xpic_order.is_some() && numerics.transfer != file::Transfer::Xpic {
+        checks.fault(
+            &path.key("xpic_order"),
+            "found an order of XPIC; expected it only with transfer = \"xpic\"".into(),
+        );
+    }
     let transfer = match numerics.transfer {
         file::Transfer::Apic => Transfer::Apic,
         file::Transfer::Flip => Transfer::Flip { blend: numerics.flip.unwrap_or(0.99) },
         file::Transfer::Tpic => Transfer::Tpic,
+        file::Transfer::Xpic => Transfer::Xpic { order: numerics.xpic_order.unwrap_or(2) },
     };
     let here = path.key("box_stretch");
     if numerics.box_stretch.is_some() && numerics.boxes != file::Boxes::Volume {

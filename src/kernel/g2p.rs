@@ -28,7 +28,8 @@ pub struct Moments<'a, const D: usize> {
 pub struct Fields<'a, const D: usize> {
     /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.
     pub velocity: &'a [Row],
-    /// Changes of velocity in this step; needed for [`Transfer::Flip`].
+    /// With [`Transfer::Flip`] the changes of velocity in this step; with [`Transfer::Xpic`] the velocities that
+    /// particles take on.
     pub increment: Option<&'a [Row]>,
     /// Moments, where the block touches constrained nodes.
     pub moments: Option<Moments<'a, D>>,
@@ -55,6 +56,12 @@ impl<const D: usize> Default for Gathered<D> {
 }
 
 impl<const D: usize> Gathered<D> {
+    /// Velocity, m/s.
+    pub fn velocity(&self) -> [f64; D] {
+        let row = self.velocity.to_array();
+        std::array::from_fn(|axis| row[axis])
+    }
+
     /// Adds `share` times `other`.
     fn add(&mut self, other: &Self, share: f64) {
         let share = F64x4::splat(share);
@@ -143,6 +150,33 @@ pub fn advance_gathered<const D: usize>(
         greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
     }
     largest(greatest)
+}
+
+/// Gathers velocities for the selected particles, `Σ w v_j`, and calls `each` with the particle and its velocity.
+/// Changes no particle.
+pub fn interpolate<const D: usize>(
+    chunk: &Chunk<D>,
+    select: Select,
+    frame: &Frame<D>,
+    scheme: &Scheme,
+    velocity: &[Row],
+    mut each: impl FnMut(usize, [f64; D]),
+) {
+    let (reals, stride) = chunk.reals();
+    let (tags, cell) = (chunk.tags(), frame.cell);
+    let mut weights = Weights::new();
+    for i in 0..Batch::number(&select, chunk.len()) {
+        let batch = Batch::of(&select, chunk.len(), i);
+        let position = batch.positions(reals, stride);
+        let half =
+            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        weights.fill(frame, &position, &position, &half);
+        for lane in 0..batch.count.min(LANES) {
+            let first = weights.first(lane);
+            let row = mean(&weights, lane, |node| velocity[first + node]).to_array();
+            each(batch.particle(lane), std::array::from_fn(|axis| row[axis]));
+        }
+    }
 }
 
 fn largest(lanes: Lanes) -> f64 {
@@ -282,18 +316,17 @@ fn advance<const D: usize>(
             gradient[i][k] = column[i];
         }
     }
-    let increment = match scheme.transfer {
-        Transfer::Flip { .. } => Lanes::columns(sums.increment),
-        _ => [zero; 4],
-    };
+    let increment = if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
     for i in 0..D {
         let moved = velocity[i].mul_add(step, position[i]);
         batch.store(reals, stride, Layout::<D>::POSITION + i, moved);
-        let new = if let Transfer::Flip { blend } = scheme.transfer {
-            let flip = batch.load(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
-            (flip - velocity[i]).mul_add(Lanes::splat(blend), velocity[i])
-        } else {
-            velocity[i]
+        let new = match scheme.transfer {
+            Transfer::Apic | Transfer::Tpic => velocity[i],
+            Transfer::Flip { blend } => {
+                let flip = batch.load(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
+                (flip - velocity[i]).mul_add(Lanes::splat(blend), velocity[i])
+            }
+            Transfer::Xpic { .. } => increment[i],
         };
         batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
         square = new.mul_add(new, square);
@@ -304,7 +337,7 @@ fn advance<const D: usize>(
             let value = match scheme.transfer {
                 Transfer::Apic => affine[i],
                 Transfer::Tpic => gradient[i][k],
-                Transfer::Flip { .. } => zero,
+                Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
             };
             batch.store(reals, stride, Layout::<D>::AFFINE + D * i + k, value);
         }

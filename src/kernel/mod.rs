@@ -78,6 +78,19 @@ pub enum Transfer {
         /// Share of FLIP, 0 to 1.
         blend: f64,
     },
+    /// Extended particle-in-cell (Hammerquist & Nairn 2017): increments as with FLIP, while of the particles'
+    /// own velocities only what the grid cannot see is filtered out.
+    Xpic {
+        /// Order, at least 1: 1 is PIC, towards infinity it becomes FLIP.
+        order: u32,
+    },
+}
+
+impl Transfer {
+    /// Whether particles take increments, so that velocities before the impulse of stress are needed.
+    pub fn has_increments(self) -> bool {
+        matches!(self, Self::Flip { .. } | Self::Xpic { .. })
+    }
 }
 
 /// How the half widths of a particle's box follow its deformation.

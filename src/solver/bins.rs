@@ -74,6 +74,11 @@ pub trait BoxWidths<const D: usize>: Sync {
     fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>);
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
+    /// Whether the kernels find the same half widths from the particles' state. If not, every box is
+    /// handed to them, a narrow one as its only part.
+    fn are_known_to_kernels(&self) -> bool {
+        true
+    }
 }
 
 impl<const D: usize> BinLists<D> {
@@ -97,12 +102,13 @@ impl<const D: usize> BinLists<D> {
         widths: &impl BoxWidths<D>,
     ) -> Result<(), BinMissing> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
+        let given = !widths.are_known_to_kernels();
         leaves.with_min_len(8).try_for_each_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
             let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
-            *sorted = bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
+            *sorted = given || bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
             if *sorted {
                 widths.list(chunk, cell, halves);
-                bins.sort(plan, leaf, own, chunk, halves)?;
+                bins.sort(plan, leaf, own, chunk, halves, given)?;
             }
             Ok(())
         })
@@ -172,6 +178,7 @@ impl<const D: usize> LeafBins<D> {
         own: &NearLeaf<D>,
         chunk: &Chunk<D>,
         halves: &[[f64; D]],
+        given: bool,
     ) -> Result<(), BinMissing> {
         self.cut.clear();
         for members in &mut self.members {
@@ -182,7 +189,7 @@ impl<const D: usize> LeafBins<D> {
         for (p, &half) in halves.iter().enumerate() {
             let centre = chunk.position(p);
             let level = self.finest_level(own, centre, half);
-            if is_narrow(half, plan.cell(level)) {
+            if !given && is_narrow(half, plan.cell(level)) {
                 let bin = self.bin(plan, leaf, level, centre).ok_or(BinMissing { id: chunk.ids()[p] })?;
                 self.members[bin].whole.push(p as u32);
                 self.include(plan, leaf, bin, centre, half);

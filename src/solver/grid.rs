@@ -3,6 +3,7 @@ use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
 
 use super::bins::BinLists;
+use super::increment::Increments;
 use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
 use super::transfer::width_bound;
@@ -20,6 +21,7 @@ pub struct Grid<const D: usize> {
     pub plan: GridPlan<D>,
     pub(super) arenas: Arenas<D>,
     pub(super) fields: NodeFields<D>,
+    pub(super) increments: Increments,
     pub(super) exchange: ArenaExchange<D>,
     pub(super) received: ReceivedArenas<D>,
     pub(super) migration: Migration<D>,
@@ -41,6 +43,7 @@ impl<const D: usize> Grid<D> {
         Self {
             arenas: Arenas::default(),
             fields: NodeFields::new(&plan),
+            increments: Increments::default(),
             migration: Migration::new(comm, &plan, neighbours, physics.leaving),
             lists: BinLists::new(&plan),
             is_sent: exchange.sent_bins(plan.bins.len()),
@@ -52,7 +55,10 @@ impl<const D: usize> Grid<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.plan.heap_bytes() + self.arenas.heap_bytes() + self.fields.heap_bytes()
+        self.plan.heap_bytes()
+            + self.arenas.heap_bytes()
+            + self.fields.heap_bytes()
+            + self.increments.heap_bytes()
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.

@@ -2,7 +2,9 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod given_boxes;
 pub mod grid;
+mod increment;
 pub mod migrate;
 pub mod phases;
 pub mod rebalance;
@@ -163,14 +165,10 @@ impl<const D: usize> Solver<D> {
         let dt = self.choose_dt(left);
 
         let sorted = self.sort_into_bins();
-        self.scatter(dt, Reach::Neighbours);
-        let pending = self.send_arenas();
-        self.scatter(dt, Reach::Own);
-        self.sum_nodes(Part::Interior);
-        self.receive_arenas(pending);
-        self.sum_nodes(Part::Seam);
-        self.restrict();
+        self.note_velocities();
+        self.nodes_from_particles(dt);
         self.update_nodes(dt);
+        self.form_increments();
         self.prolong();
         self.gather(dt);
         let moved = self.migrate();
@@ -180,6 +178,18 @@ impl<const D: usize> Solver<D> {
         self.clock.time = if dt < left { self.clock.time + dt } else { end };
         self.clock.dt = dt;
         self.close_step(sorted, moved, reach, requests)
+    }
+
+    /// Collective over neighbours. P2G, exchange, node sums and restriction: momentum with the impulse of stress
+    /// over `dt`, and mass, on real nodes.
+    pub(super) fn nodes_from_particles(&mut self, dt: f64) {
+        self.scatter(dt, Reach::Neighbours);
+        let pending = self.send_arenas();
+        self.scatter(dt, Reach::Own);
+        self.sum_nodes(Part::Interior);
+        self.receive_arenas(pending);
+        self.sum_nodes(Part::Seam);
+        self.restrict();
     }
 
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.

@@ -3,10 +3,8 @@
 //! Every sum is exact before it is rounded once, so it does not depend on ranks, threads or order.
 use partition::comm::Comm;
 
-use super::transfer::Reach;
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
-use crate::grid::fields::Part;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -53,13 +51,7 @@ impl<const D: usize> Solver<D> {
     /// A particle whose box cannot be transferred, on the rank that has it.
     pub fn grid_totals(&mut self) -> Result<GridTotals, StepError> {
         let sorted = self.sort_into_bins();
-        self.scatter(0.0, Reach::Neighbours);
-        let pending = self.send_arenas();
-        self.scatter(0.0, Reach::Own);
-        self.sum_nodes(Part::Interior);
-        self.receive_arenas(pending);
-        self.sum_nodes(Part::Seam);
-        self.restrict();
+        self.nodes_from_particles(0.0);
 
         let mut sums = vec![ExactSum::new(); 7];
         for (index, block) in self.grid.plan.blocks.iter().enumerate() {

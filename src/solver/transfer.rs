@@ -2,16 +2,19 @@
 use rayon::prelude::*;
 
 use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
-use super::phases::Phase;
+use super::grid::Grid;
+use super::phases::{Phase, Phases};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
 use crate::grid::GridPlan;
-use crate::grid::fields::{Part, VelocityArena};
+use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
 use crate::kernel::spread::Constraints;
-use crate::kernel::{BoxPolicy, Frame, Scheme, Select, SubBox, Transfer, domain, g2p, p2g, spread};
+use crate::kernel::{
+    BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
+};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
 
@@ -39,17 +42,19 @@ impl<const D: usize> Physics<D> {
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
     arena: VelocityArena<D>,
+    increments: Vec<Row>,
     gathered: Vec<Gathered<D>>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        Self { arena: VelocityArena::default(), gathered: Vec::new() }
+        let increments = vec![Row([0.0; 4]); arena_nodes(D)];
+        Self { arena: VelocityArena::default(), increments, gathered: Vec::new() }
     }
 }
 
 /// Upper corner of the domain, m.
-fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
+pub(super) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
     plan.tree.brick().roots.map(|n| f64::from(n) * plan.root_edge)
 }
 
@@ -116,25 +121,39 @@ impl<'a, const D: usize> Selected<'a, D> {
     }
 }
 
+/// Lists the particles of each bin and makes room for the arenas of those that have any.
+pub(super) fn sort_with<const D: usize>(
+    grid: &mut Grid<D>,
+    chunks: &[Chunk<D>],
+    phases: &mut Phases,
+    widths: &impl BoxWidths<D>,
+) -> Result<(), BinMissing> {
+    phases.time(Phase::Sort, || {
+        let sorted = grid.lists.sort(&grid.plan, chunks, widths);
+        let plan = &grid.plan;
+        grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
+            spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
+        });
+        let lists = &grid.lists;
+        grid.arenas.occupy(plan, |bin| {
+            let leaf = plan.bins[bin].leaf as usize;
+            let number = bin - plan.leaf_bins(leaf).start;
+            lists.window(leaf, number, &chunks[leaf])
+        });
+        sorted
+    })
+}
+
 impl<const D: usize> Solver<D> {
     /// Lists the particles of each bin in leaves beside finer leaves.
     pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let (grid, chunks) = (&mut self.grid, &self.chunks);
-        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&grid.plan) };
-        self.phases.time(Phase::Sort, || {
-            let sorted = grid.lists.sort(&grid.plan, chunks, &widths);
-            let plan = &grid.plan;
-            grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
-                spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
-            });
-            let lists = &grid.lists;
-            grid.arenas.occupy(plan, |bin| {
-                let leaf = plan.bins[bin].leaf as usize;
-                let number = bin - plan.leaf_bins(leaf).start;
-                lists.window(leaf, number, &chunks[leaf])
-            });
-            sorted
-        })
+        let extent = extent(&self.grid.plan);
+        sort_with(
+            &mut self.grid,
+            &self.chunks,
+            &mut self.phases,
+            &Widths { scheme: self.physics.scheme(), extent },
+        )
     }
 
     /// P2G: scatters mass, affine momentum and the impulse of stress of the bins in `reach` into their
@@ -172,10 +191,19 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps.
+    /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
+    /// keep none.
     pub(super) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
-        if self.physics.transfer != Transfer::Apic {
-            return Ok(());
+        match self.physics.transfer {
+            Transfer::Apic => {}
+            Transfer::Tpic => return Ok(()),
+            Transfer::Flip { .. } | Transfer::Xpic { .. } => {
+                for chunk in &mut self.chunks {
+                    let first = Layout::<D>::AFFINE;
+                    (first..first + D * D).for_each(|column| chunk.column_mut(column).fill(0.0));
+                }
+                return Ok(());
+            }
         }
         self.sort_into_bins()?;
         let scheme = self.physics.scheme();
@@ -236,11 +264,12 @@ impl<const D: usize> Solver<D> {
     pub(super) fn gather(&mut self, dt: f64) {
         let scheme = self.physics.scheme();
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
+        let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal) = (&mut self.chunks, &mut self.signal);
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().enumerate();
             let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                let Scratch { arena, gathered } = scratch;
+                let Scratch { arena, increments, gathered } = scratch;
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
@@ -250,14 +279,19 @@ impl<const D: usize> Solver<D> {
                     if selected.is_empty() {
                         continue;
                     }
-                    fields.load(plan, bin, &lists.window_of(leaf, number), arena);
+                    let window = lists.window_of(leaf, number);
+                    fields.load(plan, bin, &window, arena);
+                    if let Some(changes) = changes {
+                        load_rows(plan, bin, &window, changes, increments);
+                    }
                     let bin = &plan.bins[bin];
                     let frame = frame(plan, bin);
                     let moments = bin.touched.map(|table| Moments {
                         touched: &plan.touched[table as usize],
                         first: &arena.moments,
                     });
-                    let nodes = Fields { velocity: &arena.rows, increment: None, moments };
+                    let increment = changes.map(|_| &increments[..]);
+                    let nodes = Fields { velocity: &arena.rows, increment, moments };
                     g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
                         signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes));
@@ -267,5 +301,40 @@ impl<const D: usize> Solver<D> {
             });
             speeds.collect_into_vec(signal);
         });
+    }
+
+    /// S: velocities of the nodes at all particles, leaf by leaf.
+    pub(super) fn interpolate(&mut self) -> Vec<Vec<[f64; D]>> {
+        let scheme = self.physics.scheme();
+        let (plan, rows, lists) = (&self.grid.plan, &self.grid.fields.rows, &self.grid.lists);
+        let chunks = &self.chunks;
+        self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter().enumerate();
+            let all = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                let Scratch { increments: arena, gathered, .. } = scratch;
+                let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
+                gathered.clear();
+                gathered.resize(cut.len(), Gathered::default());
+                let mut velocities = vec![[0.0; D]; chunk.len()];
+                for (number, bin) in plan.leaf_bins(leaf).enumerate() {
+                    let selected = Selected::of(lists, leaf, number, chunk);
+                    if selected.is_empty() {
+                        continue;
+                    }
+                    load_rows(plan, bin, &lists.window_of(leaf, number), rows, arena);
+                    let frame = frame(plan, &plan.bins[bin]);
+                    let nodes = Fields { velocity: arena, increment: None, moments: None };
+                    g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
+                    if let Some(whole) = selected.whole {
+                        g2p::interpolate(chunk, whole, &frame, &scheme, arena, |p, v| velocities[p] = v);
+                    }
+                }
+                for (&p, gathered) in cut.iter().zip(&*gathered) {
+                    velocities[p as usize] = gathered.velocity();
+                }
+                velocities
+            });
+            all.collect()
+        })
     }
 }

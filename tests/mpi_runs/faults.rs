@@ -85,7 +85,7 @@ fn a_bad_job_is_told_once() {
         let output = Running::start(command).finish_within(SOON);
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
-        assert_eq!(shown.matches("bad.toml:6:1: ").count(), 1, "one message: {shown}");
+        assert_eq!(shown.matches("bad.toml:7:1: ").count(), 1, "one message: {shown}");
         assert!(shown.contains("root_edge"), "{shown}");
         assert!(!directory.join("out").exists());
     }

@@ -77,8 +77,12 @@ fn refused_with_the_reason() {
     refused(1, name, &bad, "not an HDF5 file");
     refused(1, name, &file(directory, name, "_000002.tree.vtkhdf"), "holds no restart state");
     refused(2, "few_leaves", &good, "belongs to another job");
-    refused(1, name, &directory.join("missing.vtkhdf"), "");
-    refused(1, "few_leaves", Path::new("latest"), "");
+    refused(1, name, &directory.join("missing.vtkhdf"), "No such file");
+    let output =
+        Running::start(&mut run(directory, 2, 1, &job("few_leaves"), &["--restart", "latest"])).finish();
+    let shown = text(&output);
+    assert_eq!((output.status.code(), shown.matches("agimp:").count()), (Some(1), 1), "{shown}");
+    assert!(shown.contains("no restart file of `few_leaves` in out/few_leaves"), "{shown}");
 
     assert!(contents(&directory.join("out").join(name)) == before, "a refused restart changed the results");
     assert!(!directory.join("out/few_leaves").exists());
