@@ -84,7 +84,7 @@ pub fn solver<const D: usize>(
 fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<PathBuf, RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {
-        0 => directory::find_latest(directory, &problem.name, Some(problem.digest)),
+        0 if directory.is_dir() => directory::find_latest(directory, &problem.name, Some(problem.digest)),
         _ => Ok(None),
     };
     let found = comm.agree(found)?;

@@ -1,0 +1,234 @@
+//! Starts the program under `mpirun` as a user would, and watches its processes.
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// After this a run counts as hanging.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// A job of `tests/jobs/runs`.
+pub fn job(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/jobs/runs/{name}.toml"))
+}
+
+/// The program, in a directory.
+pub fn agimp(directory: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_agimp"));
+    command.current_dir(directory);
+    command
+}
+
+/// `mpirun` with the settings of a bare machine: what the program needs of Open MPI it has to set itself.
+pub fn mpirun(directory: &Path, ranks: usize) -> Command {
+    let mut command = Command::new("mpirun");
+    command
+        .current_dir(directory)
+        .env_remove("OMPI_MCA_io")
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]);
+    command
+}
+
+/// `agimp run JOB --threads THREADS ARGUMENTS…` on that many ranks; one rank is started without `mpirun`.
+pub fn run(directory: &Path, ranks: usize, threads: usize, job: &Path, arguments: &[&str]) -> Command {
+    let mut command = if ranks == 1 {
+        agimp(directory)
+    } else {
+        let mut command = mpirun(directory, ranks);
+        command.arg(env!("CARGO_BIN_EXE_agimp"));
+        command
+    };
+    command.arg("run").arg(job).args(["--threads", &threads.to_string()]).args(arguments);
+    command
+}
+
+/// A command under way; killed if dropped early.
+pub struct Running {
+    child: Child,
+    what: String,
+}
+
+impl Running {
+    pub fn start(command: &mut Command) -> Self {
+        let what = format!("{command:?}");
+        let child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
+        Self { child, what }
+    }
+
+    /// Process identifiers of the ranks: the process itself, or what `mpirun` has started.
+    pub fn ranks(&self) -> Vec<u32> {
+        let launcher = self.child.id();
+        let found = children(launcher);
+        if found.is_empty() { vec![launcher] } else { found }
+    }
+
+    pub fn launcher(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits until the run in `directory` has reached a step, by its history.
+    pub fn wait_for_step(&mut self, directory: &Path, name: &str, step: u64) {
+        let started = Instant::now();
+        while last_step(directory, name) < step {
+            if let Some(status) = self.child.try_wait().expect("child") {
+                panic!("{} ended ({status}) before step {step}", self.what);
+            }
+            assert!(started.elapsed() < PATIENCE, "{} does not reach step {step}", self.what);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Waits for the end; not longer than `limit`.
+    pub fn finish_within(mut self, limit: Duration) -> Output {
+        let started = Instant::now();
+        // The output is short enough for the pipes, so it can be read at the end.
+        while self.child.try_wait().expect("child").is_none() {
+            assert!(started.elapsed() < limit, "{} has not ended after {limit:?}", self.what);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let mut output = Output { status: self.child.wait().expect("child"), stdout: vec![], stderr: vec![] };
+        for (pipe, text) in [
+            (self.child.stdout.take().map(|p| Box::new(p) as Box<dyn std::io::Read>), &mut output.stdout),
+            (self.child.stderr.take().map(|p| Box::new(p) as Box<dyn std::io::Read>), &mut output.stderr),
+        ] {
+            pipe.expect("piped").read_to_end(text).expect("output");
+        }
+        output
+    }
+
+    pub fn finish(self) -> Output {
+        self.finish_within(PATIENCE)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Already ended in the good case.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Processes whose parent is `parent`.
+fn children(parent: u32) -> Vec<u32> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir("/proc").expect("/proc").flatten() {
+        let Some(process) = entry.file_name().to_str().and_then(|name| name.parse::<u32>().ok()) else {
+            continue;
+        };
+        // pid (name) state parent …; the process may have ended meanwhile.
+        let Ok(stat) = std::fs::read_to_string(format!("/proc/{process}/stat")) else { continue };
+        let after_name = stat.rsplit(')').next().unwrap_or_default();
+        if after_name.split_whitespace().nth(1) == Some(&parent.to_string()) {
+            found.push(process);
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Whether a process is there and not merely waiting to be collected.
+pub fn is_alive(process: u32) -> bool {
+    std::fs::read_to_string(format!("/proc/{process}/stat"))
+        .is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or_default().trim_start().starts_with('Z'))
+}
+
+/// Sends a signal, given as `kill` names it.
+pub fn signal(process: u32, name: &str) {
+    let status = Command::new("kill").args([format!("-{name}"), process.to_string()]).status();
+    assert!(status.expect("kill").success(), "no process {process}");
+}
+
+/// Text of both streams, for messages of tests.
+pub fn text(output: &Output) -> String {
+    format!(
+        "{}\n{}{}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    )
+}
+
+/// Runs to the end, which must be a good one.
+pub fn succeed(command: &mut Command) -> Output {
+    let output = Running::start(command).finish();
+    assert!(output.status.success(), "{command:?}\n{}", text(&output));
+    output
+}
+
+/// Path of a file of the run.
+pub fn file(directory: &Path, name: &str, suffix: &str) -> PathBuf {
+    directory.join(format!("out/{name}/{name}{suffix}"))
+}
+
+/// Step of the last whole row of the history; 0 while there is none.
+pub fn last_step(directory: &Path, name: &str) -> u64 {
+    let history = std::fs::read_to_string(file(directory, name, ".history.csv")).unwrap_or_default();
+    let whole = history.rfind('\n').map_or("", |end| &history[..end]);
+    whole.lines().last().and_then(|row| row.split(',').next()?.parse().ok()).unwrap_or(0)
+}
+
+/// Files of a directory by name, with their contents.
+pub fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(directory).expect("directory").flatten();
+    let read = |path: PathBuf| std::fs::read(&path).expect("file");
+    entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
+}
+
+/// What has to be the same however a run was carried out.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Outcome {
+    /// What `agimp digest --parts` prints of the last output.
+    pub digest: String,
+    /// The whole history.
+    pub history: Vec<u8>,
+    /// The picture of the last state.
+    pub picture: Vec<u8>,
+    /// Names of all files of the run but checkpoints.
+    pub files: Vec<String>,
+}
+
+impl Outcome {
+    /// Reads what a finished run has left.
+    pub fn read(directory: &Path, name: &str) -> Self {
+        let files = contents(&directory.join("out").join(name));
+        let output = |file: &&String| {
+            file.strip_prefix(name)
+                .and_then(|rest| rest.strip_prefix('_'))
+                .is_some_and(|rest| !rest.contains("tree"))
+        };
+        let last = files.keys().rfind(output).expect("an output");
+        let digest = agimp(&directory.join("out").join(name)).args(["digest", "--parts", last]).output();
+        let digest = digest.expect("agimp starts");
+        assert!(digest.status.success(), "{}", text(&digest));
+        Self {
+            digest: String::from_utf8_lossy(&digest.stdout).into_owned(),
+            history: files[&format!("{name}.history.csv")].clone(),
+            picture: files[&format!("{name}.png")].clone(),
+            files: files
+                .into_keys()
+                .filter(|file| !(file.contains("checkpoint") && file.ends_with("vtkhdf")))
+                .collect(),
+        }
+    }
+
+    /// Fails unless both are the same, telling what is not.
+    #[track_caller]
+    pub fn assert_same(&self, other: &Self, what: &str) {
+        assert_eq!(self.digest, other.digest, "{what}: digest");
+        let rows = |result: &Self| String::from_utf8_lossy(&result.history).into_owned();
+        for (ours, theirs) in rows(self).lines().zip(rows(other).lines()) {
+            assert_eq!(ours, theirs, "{what}: history");
+        }
+        assert!(self.history == other.history, "{what}: lengths of the histories");
+        assert!(self.picture == other.picture, "{what}: picture");
+        assert_eq!(self.files, other.files, "{what}: files");
+    }
+}

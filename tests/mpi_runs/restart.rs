@@ -1,0 +1,121 @@
+//! Runs that are stopped and go on elsewhere, and files that no run may go on from.
+use std::path::{Path, PathBuf};
+
+use crate::in_turn;
+use crate::launch::{Outcome, Running, agimp, contents, file, job, run, signal, succeed, text};
+
+/// Exit code of a run that stopped on request.
+const STOPPED: i32 = 3;
+
+/// Stops a run that has reached `step`, checks how it ends, and returns the checkpoint that it names.
+fn stop(mut running: Running, directory: &Path, name: &str, step: u64, stop: impl Fn(&Running)) -> PathBuf {
+    running.wait_for_step(directory, name, step);
+    stop(&running);
+    let output = running.finish();
+    let shown = text(&output);
+    assert_eq!(output.status.code(), Some(STOPPED), "{shown}");
+    let named = shown
+        .lines()
+        .filter_map(|line| line.strip_prefix("agimp: stopped on request; go on with --restart "));
+    let named: Vec<&str> = named.collect();
+    assert_eq!(named.len(), 1, "one message: {shown}");
+    let checkpoint = directory.join(named[0]);
+    assert!(checkpoint.exists(), "{shown}");
+    checkpoint
+}
+
+/// One rank alone is told SIGTERM, as batch systems do; `mpirun` hands SIGUSR1 on to its ranks.
+#[test]
+fn stopped_twice_and_finished_on_other_ranks() {
+    let _turn = in_turn();
+    let name = "collapse_3d";
+    let job = job(name);
+    let whole = tempfile::tempdir().expect("temporary directory");
+    succeed(&mut run(whole.path(), 1, 2, &job, &["--quiet"]));
+
+    let parts = tempfile::tempdir().expect("temporary directory");
+    let directory = parts.path();
+    let running = Running::start(&mut run(directory, 1, 1, &job, &["--quiet"]));
+    let first = stop(running, directory, name, 40, |running| signal(running.launcher(), "TERM"));
+    let running = Running::start(&mut run(directory, 4, 1, &job, &["--restart", "latest"]));
+    let second = stop(running, directory, name, 150, |running| signal(running.launcher(), "USR1"));
+    assert_ne!(first, second);
+    succeed(&mut run(directory, 3, 1, &job, &["--restart", "latest"]));
+
+    Outcome::read(directory, name).assert_same(&Outcome::read(whole.path(), name), "stopped twice");
+    assert!(!second.exists() || first.exists(), "checkpoints beyond `keep` go, oldest first");
+}
+
+/// A file that cannot be trusted, or is not of this job, is refused with the reason; nothing is touched.
+#[test]
+fn refused_with_the_reason() {
+    let _turn = in_turn();
+    let name = "collapse_2d";
+    let home = tempfile::tempdir().expect("temporary directory");
+    let directory = home.path();
+    let output = succeed(&mut run(directory, 2, 1, &job(name), &[]));
+    says_where_results_are(&String::from_utf8_lossy(&output.stdout));
+
+    let good = file(directory, name, "_000002.vtkhdf");
+    let whole = std::fs::read(&good).expect("output");
+    let bad = directory.join("bad.vtkhdf");
+    let before = contents(&directory.join("out").join(name));
+    let refused = |ranks: usize, name: &str, from: &Path, reason: &str| {
+        let from = from.to_str().expect("path");
+        let output = Running::start(&mut run(directory, ranks, 1, &job(name), &["--restart", from])).finish();
+        let shown = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{shown}");
+        assert_eq!(shown.matches("agimp:").count(), 1, "one message: {shown}");
+        assert!(shown.contains(reason) && shown.contains(from), "expected '{reason}': {shown}");
+    };
+
+    std::fs::write(&bad, &whole[..whole.len() * 2 / 3]).expect("written");
+    refused(2, name, &bad, "cut short");
+    std::fs::write(&bad, flipped_in_the_state(directory, &whole)).expect("written");
+    refused(3, name, &bad, "wrong checksum");
+    std::fs::write(&bad, "a text that is not a file of states").expect("written");
+    refused(1, name, &bad, "not an HDF5 file");
+    refused(1, name, &file(directory, name, "_000002.tree.vtkhdf"), "holds no restart state");
+    refused(2, "few_leaves", &good, "belongs to another job");
+    refused(1, name, &directory.join("missing.vtkhdf"), "No such file");
+    let output =
+        Running::start(&mut run(directory, 2, 1, &job("few_leaves"), &["--restart", "latest"])).finish();
+    let shown = text(&output);
+    assert_eq!((output.status.code(), shown.matches("agimp:").count()), (Some(1), 1), "{shown}");
+    assert!(shown.contains("no restart file of `few_leaves` in out/few_leaves"), "{shown}");
+
+    assert!(contents(&directory.join("out").join(name)) == before, "a refused restart changed the results");
+    assert!(!directory.join("out/few_leaves").exists());
+}
+
+/// The file with one bit changed where the digest notices it.
+fn flipped_in_the_state(directory: &Path, whole: &[u8]) -> Vec<u8> {
+    let probe = directory.join("probe.vtkhdf");
+    for part in 1..32 {
+        let mut bytes = whole.to_vec();
+        bytes[whole.len() * part / 32] ^= 0x10;
+        std::fs::write(&probe, &bytes).expect("written");
+        let output = agimp(directory).args(["digest", "probe.vtkhdf"]).output().expect("agimp starts");
+        if text(&output).contains("wrong checksum of state/particles") {
+            return bytes;
+        }
+    }
+    panic!("no changed bit was noticed")
+}
+
+/// The last lines of a run: where its results are, and the evaluation that the job asks for.
+fn says_where_results_are(shown: &str) {
+    let expected = [
+        "outputs  out/collapse_2d/collapse_2d.vtkhdf.series",
+        "picture  out/collapse_2d/collapse_2d.png",
+        "column collapse, aspect ratio",
+        "  run-out radius  ",
+        "  outer edge ",
+        "  final height ",
+    ];
+    let lines: Vec<&str> = shown.lines().collect();
+    assert_eq!(lines.len(), expected.len(), "{shown}");
+    for (line, expected) in lines.iter().zip(expected) {
+        assert!(line.starts_with(expected), "{shown}");
+    }
+}
