@@ -19,7 +19,7 @@ fn main() -> ExitCode {
 fn explain(failure: &Failure) {
     match failure {
         Failure::Job(JobError::Invalid(list)) => explain_faults(list),
-        Failure::Elsewhere => {}
+        Failure::Elsewhere(_) => {}
         other => eprintln!("agimp: {other}"),
     }
 }

@@ -422,14 +422,14 @@ fn outputs_checkpoints_and_the_latest() {
         },
         |directory| {
             let directory = &directory.join("results");
-            let latest = find_latest(directory, "col").expect("listed").expect("found");
+            let latest = find_latest(directory, "col", None).expect("listed").expect("found");
             assert_eq!(latest.path, checkpoint_path(directory, "col", 30));
             assert!(!checkpoint_path(directory, "col", 10).exists());
-            assert!(find_latest(directory, "co").expect("listed").is_none());
+            assert!(find_latest(directory, "co", None).expect("listed").is_none());
             // A damaged newest file is passed over.
             let whole = bytes(&latest.path);
             std::fs::write(&latest.path, &whole[..whole.len() / 2]).expect("cut");
-            let before = find_latest(directory, "col").expect("listed").expect("found");
+            let before = find_latest(directory, "col", None).expect("listed").expect("found");
             assert_eq!((before.header.step, before.damaged.len()), (20, 1));
             let series = directory.join("col.vtkhdf.series");
             let text = std::fs::read_to_string(&series).expect("series");

@@ -12,6 +12,7 @@ pub mod new;
 pub mod plot;
 pub mod run;
 pub mod schema;
+pub mod weights;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
 #[derive(Debug, Parser)]
@@ -41,6 +42,8 @@ pub enum Command {
     Digest(digest::Arguments),
     /// Tell where the states in two files differ.
     Diff(diff::Arguments),
+    /// Print the weights of given boxes on given trees.
+    Weights(weights::Arguments),
 }
 
 /// Why the program ends without success.
@@ -61,17 +64,21 @@ pub enum Failure {
     /// The run was asked to stop and has written a checkpoint.
     #[error("stopped on request; go on with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
-    /// Another rank reports the failure.
+    /// Another rank reports the failure; this one only ends with the same exit code.
     #[error("another rank reports the failure")]
-    Elsewhere,
+    Elsewhere(u8),
 }
+
+/// Exit code for input that cannot be used.
+const BAD_INPUT: u8 = 2;
 
 impl Failure {
     /// 2 for wrong input, 1 for what goes wrong later, 3 after a stop on request.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Job(_) | Self::Seed(_) | Self::Usage(_) => 2,
-            Self::Run(_) | Self::Elsewhere => 1,
+            Self::Job(_) | Self::Seed(_) | Self::Usage(_) => BAD_INPUT,
+            Self::Run(_) => 1,
+            Self::Elsewhere(code) => *code,
             Self::Stopped(_) => crate::run::stop::STOPPED,
         }
     }
@@ -97,6 +104,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Plot(arguments) => plot::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),
+        Command::Weights(arguments) => weights::execute(&arguments),
     }
 }
 

@@ -1,12 +1,13 @@
 //! `agimp run`: runs a job, alone or on the ranks of `mpirun`.
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use partition::comm::{Comm, World};
 
-use super::Failure;
-use crate::job::problem::{AnyProblem, Problem};
+use super::{BAD_INPUT, Failure};
+use crate::job::problem::AnyProblem;
 use crate::run::stop::StopRequest;
-use crate::run::{self, Options, Outcome, RunError, restart};
+use crate::run::{self, Options, Outcome, RunError, Summary, restart};
 
 /// Arguments of `agimp run`.
 #[derive(Debug, clap::Args)]
@@ -32,14 +33,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    let loaded = crate::job::load(&arguments.job);
-    // Every rank reads the same file; should one fail alone, rank 0 cannot tell the place in the file.
-    let failed = comm.any(loaded.is_err());
-    let problem = match loaded {
-        Ok(problem) if !failed => problem,
-        Err(error) if comm.rank() == 0 => return Err(error.into()),
-        _ => return Err(Failure::Elsewhere),
-    };
+    let problem = load(comm, &arguments.job)?;
     let threads = start_threads(comm, arguments.threads)?;
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from {
@@ -50,26 +44,49 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         threads,
     };
     let outcome = match &problem {
-        AnyProblem::Two(problem) => start(comm, problem, &options, &stop),
-        AnyProblem::Three(problem) => start(comm, problem, &options, &stop),
+        AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
+        AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
-    match outcome {
-        Ok(Outcome::Finished) => Ok(()),
-        Ok(Outcome::Stopped { checkpoint }) => Err(Failure::Stopped(checkpoint)),
-        // All ranks have the same error; one message is enough.
-        Err(_) if comm.rank() != 0 => Err(Failure::Elsewhere),
-        Err(error @ RunError::Seed(_)) => Err(Failure::Usage(error.to_string())),
-        Err(error) => Err(Failure::Run(error.to_string())),
+    let failure = match outcome {
+        Ok(Outcome::Finished(summary)) => {
+            if options.speaks {
+                print(&mut std::io::stdout().lock(), &summary)?;
+            }
+            return Ok(());
+        }
+        Ok(Outcome::Stopped { checkpoint }) => Failure::Stopped(checkpoint),
+        Err(error @ RunError::Seed(_)) => Failure::Usage(error.to_string()),
+        Err(error) => Failure::Run(error.to_string()),
+    };
+    // All ranks have the same; one message is enough.
+    Err(if comm.rank() == 0 { failure } else { Failure::Elsewhere(failure.exit_code()) })
+}
+
+/// Collective. Every rank reads the job. If that fails on any of them, the lowest of these tells why.
+fn load(comm: &Comm, path: &Path) -> Result<AnyProblem, Failure> {
+    let loaded = crate::job::load(path);
+    let ranks = comm.size() as u64;
+    let mut lowest = [if loaded.is_err() { comm.rank() as u64 } else { ranks }];
+    comm.min_u64(&mut lowest);
+    match loaded {
+        Ok(problem) if lowest[0] == ranks => Ok(problem),
+        Err(error) if lowest[0] == comm.rank() as u64 => Err(error.into()),
+        _ => Err(Failure::Elsewhere(BAD_INPUT)),
     }
 }
 
-fn start<const D: usize>(
-    comm: &Comm,
-    problem: &Problem<D>,
-    options: &Options,
-    stop: &StopRequest,
-) -> Result<Outcome, RunError> {
-    run::run(comm, problem, options, stop)
+/// What the user wants to know when the run is over.
+fn print(out: &mut impl Write, summary: &Summary) -> std::io::Result<()> {
+    writeln!(out, "outputs  {} (open in ParaView)", summary.series.display())?;
+    match &summary.picture {
+        Ok(Some(path)) => writeln!(out, "picture  {}", path.display())?,
+        Ok(None) => {}
+        Err(reason) => writeln!(out, "no picture: {reason}")?,
+    }
+    if let Some(collapse) = &summary.collapse {
+        writeln!(out, "{collapse}")?;
+    }
+    Ok(())
 }
 
 /// Collective. Starts the threads of this rank and warns when they do not fit the machine.

@@ -5,7 +5,7 @@ use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
 use super::arena::{Arenas, Moments};
 use super::fields::add_moments;
 use super::mask::bits;
-use super::plan::{GridPlan, ReceivedBin, arena_index};
+use super::plan::{GridPlan, ReceivedBin, ReceivedNodes, arena_index};
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -118,7 +118,7 @@ impl<const D: usize> ReceivedArenas<D> {
             .received
             .iter()
             .map(|bin| {
-                let place = |&(_, nodes, constrained): &(u8, u64, u64)| {
+                let place = |&ReceivedNodes { nodes, constrained, .. }: &ReceivedNodes| {
                     let part = ReceivedPart { nodes, constrained, first_row: rows, first_moment: moments };
                     rows += nodes.count_ones() as usize;
                     moments += constrained.count_ones() as usize;
@@ -140,7 +140,7 @@ impl<const D: usize> ReceivedArenas<D> {
         self.present[bin as usize]
     }
 
-    /// Adds one part of a received arena to a block.
+    /// Adds part number `part` of a received arena to its block.
     pub(super) fn add(&self, bin: u32, part: u32, rows: &mut [Row], moments: Option<&mut [Moments<D>]>) {
         let part = self.parts[bin as usize][part as usize];
         for (bit, from) in bits(part.nodes).zip(&self.rows[part.first_row..]) {
@@ -216,8 +216,8 @@ fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>, leaf
     words.push(leaf.key());
     words.push(u64::from(bin.block.level) << 32 | bin.parts.len() as u64);
     words.extend(bin.block.coord.map(u64::from));
-    for &(offset, nodes, constrained) in &bin.parts {
-        words.extend([u64::from(offset), nodes, constrained]);
+    for part in &bin.parts {
+        words.extend([u64::from(part.offset), part.nodes, part.constrained]);
     }
 }
 

@@ -5,9 +5,11 @@
 use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
+use super::entries::Entries;
 use super::exchange::ReceivedArenas;
+use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
-use super::plan::{GridPlan, Links, NO_BLOCK, Source};
+use super::plan::{GridPlan, NO_BLOCK, Source};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
@@ -28,6 +30,7 @@ pub struct NodeFields<const D: usize> {
     dirty: Vec<bool>,
     /// First moment slot of each level.
     moment_start: Vec<usize>,
+    entries: Entries,
 }
 
 /// Which blocks to sum.
@@ -64,6 +67,7 @@ impl<const D: usize> NodeFields<D> {
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
             moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
+            entries: Entries::default(),
         }
     }
 
@@ -73,13 +77,9 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(
-        &mut self,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        received: &ReceivedArenas<D>,
-        part: Part,
-    ) {
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
+        self.entries.collect(plan, arenas, received, part);
+        let entries = &self.entries;
         let nodes = block_nodes(D);
         let mut moments = self.moments.chunks_mut(nodes);
         let flags = self.active.iter_mut().zip(&mut self.dirty);
@@ -95,11 +95,8 @@ impl<const D: usize> NodeFields<D> {
             .filter(|&(index, ..)| plan.is_seam[index] == (part == Part::Seam))
             .collect();
         blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block, (active, dirty))| {
-            let contributions = plan.block_contributions(index);
-            *active = contributions.iter().any(|contribution| match contribution.source {
-                Source::Own(bin) => arenas.is_occupied(bin.0 as usize),
-                Source::Received(bin, _) => received.is_occupied(bin),
-            });
+            let entries = entries.of(index);
+            *active = !entries.is_empty();
             if *active || *dirty {
                 block.rows.fill(ZERO);
                 if let Some(moments) = &mut block.moments {
@@ -107,20 +104,16 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             *dirty = *active;
-            if !*active {
-                return;
-            }
-            for contribution in contributions {
-                match contribution.source {
+            for &(source, place) in entries {
+                match source {
                     Source::Own(bin) => {
                         if let Some(arena) = arenas.get(bin.0) {
-                            block.add(arena.rows, arena.moments, &arena.window, contribution.offset);
+                            block.add(arena.rows, arena.moments, &arena.window, place as u8);
                         }
                     }
-                    Source::Received(bin, part) if received.is_occupied(bin) => {
-                        received.add(bin, part, block.rows, block.moments.as_deref_mut());
+                    Source::Received(bin) => {
+                        received.add(bin, place, block.rows, block.moments.as_deref_mut());
                     }
-                    Source::Received(..) => {}
                 }
             }
         });
@@ -138,7 +131,8 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             let cell = plan.cell(level as u8 + 1);
-            let (coarse, fine) = split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
+            let (coarse, fine) =
+                split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
             for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
                 for i in nodes {
                     let at = links.nodes[i] as usize - first;
@@ -217,13 +211,7 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
     /// touch constrained nodes their first moments.
-    pub fn load(
-        &self,
-        plan: &GridPlan<D>,
-        bin: usize,
-        window: &Window<D>,
-        arena: &mut VelocityArena<D>,
-    ) {
+    pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
         let has_moments = bin.touched.is_some();
         window.for_each_run(|run| {
@@ -351,11 +339,7 @@ fn for_each_linked<const D: usize>(
         tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
     }
     tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
-        work(
-            block,
-            linked.block as usize * nodes,
-            linked.nodes.start as usize..linked.nodes.end as usize,
-        );
+        work(block, linked.block as usize * nodes, linked.nodes.start as usize..linked.nodes.end as usize);
     });
 }
 

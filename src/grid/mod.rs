@@ -6,16 +6,19 @@
 pub mod arena;
 pub mod closure;
 pub mod constraint;
+pub mod direct;
+mod entries;
 pub mod exchange;
 pub mod fields;
 pub mod known;
+pub mod links;
 pub mod mask;
 pub mod plan;
-pub mod window;
 pub mod reach;
+pub mod window;
 
 pub use exchange::ArenaExchange;
 pub use fields::NodeFields;
 pub use known::{Cover, KnownTree};
-pub use window::Window;
 pub use plan::{BinId, GridPlan};
+pub use window::Window;

@@ -5,8 +5,9 @@ use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
-use super::constraint::{block_and_bit, node_coord, parents_of};
+use super::constraint::node_coord;
 use super::known::{Allowance, KnownTree};
+use super::links::Links;
 use super::mask::{
     arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, opposite, shifted,
 };
@@ -53,102 +54,13 @@ pub struct Bin<const D: usize> {
     pub touched: Option<u32>,
 }
 
-/// One part of a node sum: nodes of `arena` that fall into the block at `offset` from the bin.
-#[derive(Clone, Copy, Debug)]
-pub struct Contribution {
-    /// The arena: of an own bin, or of a bin received from another rank.
-    pub source: Source,
-    /// Offset number of the block, seen from the bin.
-    pub offset: u8,
-}
-
 /// Where an arena comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// An own bin.
     Own(BinId),
-    /// A received bin: number among the received bins, and its part for this block.
-    Received(u32, u32),
-}
-
-/// A link between a constrained node and one of its parents.
-#[derive(Clone, Copy, Debug)]
-pub struct Link {
-    /// Node at the other end (block number × nodes per block + bit).
-    pub node: u32,
-    /// Offset number of parent minus constrained node, in cells of the finer level.
-    pub offset: u8,
-    /// Weight.
-    pub weight: f64,
-}
-
-/// The nodes of one block that gather over links.
-#[derive(Clone, Debug)]
-pub struct LinkedBlock {
-    /// The block.
-    pub block: u32,
-    /// Its nodes, as numbers of [`Links::nodes`].
-    pub nodes: std::ops::Range<u32>,
-    /// The blocks at the other ends, as numbers of [`Links::others`].
-    pub others: std::ops::Range<u32>,
-}
-
-/// Links of a list of nodes: `links[start[i]..start[i + 1]]` belong to `nodes[i]`. Nodes ascend.
-#[derive(Clone, Debug, Default)]
-pub struct Links {
-    /// The nodes by block.
-    pub blocks: Vec<LinkedBlock>,
-    /// Blocks at the other ends of the links, block by block.
-    pub others: Vec<u32>,
-    /// The nodes that gather.
-    pub nodes: Vec<u32>,
-    /// Start of each node's links.
-    pub start: Vec<u32>,
-    /// The links.
-    pub links: Vec<Link>,
-}
-
-impl Links {
-    /// Groups `(node, order, link)` by node; `order` fixes the order of a node's links.
-    fn group(mut entries: Vec<(u32, u32, Link)>, block_nodes: u32) -> Self {
-        entries.sort_unstable_by_key(|&(node, order, _)| (node, order));
-        let mut grouped = Self::default();
-        for of_block in entries.chunk_by(|a, b| a.0 / block_nodes == b.0 / block_nodes) {
-            let (first, first_other) = (grouped.nodes.len() as u32, grouped.others.len() as u32);
-            let mut others: Vec<u32> = of_block.iter().map(|entry| entry.2.node / block_nodes).collect();
-            others.sort_unstable();
-            others.dedup();
-            grouped.others.extend(others);
-            grouped.add(of_block);
-            grouped.blocks.push(LinkedBlock {
-                block: of_block[0].0 / block_nodes,
-                nodes: first..grouped.nodes.len() as u32,
-                others: first_other..grouped.others.len() as u32,
-            });
-        }
-        grouped.start.push(grouped.links.len() as u32);
-        grouped
-    }
-
-    fn add(&mut self, entries: &[(u32, u32, Link)]) {
-        for &(node, _, link) in entries {
-            if self.nodes.last() != Some(&node) {
-                self.nodes.push(node);
-                self.start.push(self.links.len() as u32);
-            }
-            self.links.push(link);
-        }
-    }
-
-    /// Blocks at the other ends of a block's links.
-    pub fn others(&self, linked: &LinkedBlock) -> &[u32] {
-        &self.others[linked.others.start as usize..linked.others.end as usize]
-    }
-
-    /// Links of the `i`-th node.
-    pub fn of(&self, i: usize) -> &[Link] {
-        &self.links[self.start[i] as usize..self.start[i + 1] as usize]
-    }
+    /// A received bin: number among [`GridPlan::received`].
+    Received(u32),
 }
 
 /// A bin of another rank that contributes here, with the nodes needed of it.
@@ -160,8 +72,21 @@ pub struct ReceivedBin<const D: usize> {
     pub leaf: u32,
     /// Level and block coordinate of the arena.
     pub block: Octant<D>,
-    /// Needed nodes by block: `(offset number of the block from the bin, nodes, constrained nodes)`.
-    pub parts: Vec<(u8, u64, u64)>,
+    /// Needed nodes by block.
+    pub parts: Vec<ReceivedNodes>,
+}
+
+/// Nodes of a received bin that fall into one block.
+#[derive(Clone, Copy, Debug)]
+pub struct ReceivedNodes {
+    /// The block.
+    pub block: u32,
+    /// Offset number of the block from the bin.
+    pub offset: u8,
+    /// Needed nodes.
+    pub nodes: u64,
+    /// Those that are constrained.
+    pub constrained: u64,
 }
 
 /// The grid of one rank. Valid for one revision of the forest.
@@ -182,10 +107,9 @@ pub struct GridPlan<const D: usize> {
     pub leaf_start: Vec<u32>,
     /// Bins of other ranks that contribute to sums here, by rank, leaf and bin.
     pub received: Vec<ReceivedBin<D>>,
-    /// Contributions to each block in canonical order (source leaf along the curve, then bin).
-    pub contributions: Vec<Contribution>,
-    /// First contribution of each block, and the number of contributions at the end.
-    pub contribution_start: Vec<u32>,
+    /// All bins whose arenas enter sums here, in canonical order: by source leaf along the curve, level, and
+    /// curve position of the block.
+    pub sources: Vec<Source>,
     /// Per level, restriction into its nodes from constrained nodes one level finer.
     pub restriction: Vec<Links>,
     /// Per level, prolongation into its constrained nodes from one level coarser.
@@ -225,8 +149,7 @@ impl<const D: usize> GridPlan<D> {
             bins: Vec::new(),
             leaf_start: Vec::new(),
             received: Vec::new(),
-            contributions: Vec::new(),
-            contribution_start: Vec::new(),
+            sources: Vec::new(),
             restriction: Vec::new(),
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
@@ -241,22 +164,23 @@ impl<const D: usize> GridPlan<D> {
         let number: HashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.list_bins(&number);
-        plan.list_contributions(comm.rank());
+        plan.list_received(comm.rank());
+        plan.list_sources();
         plan.link_levels(&number);
         plan.find_face_nodes();
-        plan.is_seam = (0..plan.blocks.len())
-            .map(|block| {
-                let contributions = plan.block_contributions(block).iter();
-                contributions.clone().any(|c| matches!(c.source, Source::Received(..)))
-            })
-            .collect();
+        plan.is_seam = vec![false; plan.blocks.len()];
+        for part in plan.received.iter().flat_map(|bin| &bin.parts) {
+            plan.is_seam[part.block as usize] = true;
+        }
         let spread = plan.constraint_spread();
-        plan.second = plan
-            .bins
-            .iter()
-            .filter(|bin| bin.touched.is_some())
-            .map(|bin| plan.arena_of(&bin.around, &spread))
-            .collect();
+        plan.second = vec![Vec::new(); plan.touched.len()];
+        for number in 0..plan.bins.len() {
+            if let Some(table) = plan.bins[number].touched
+                && plan.second[table as usize].is_empty()
+            {
+                plan.second[table as usize] = plan.arena_of(&plan.bins[number].around, &spread);
+            }
+        }
         plan
     }
 
@@ -280,12 +204,6 @@ impl<const D: usize> GridPlan<D> {
         self.leaf_start[leaf] as usize..self.leaf_start[leaf + 1] as usize
     }
 
-    /// Contributions to block `block`.
-    pub fn block_contributions(&self, block: usize) -> &[Contribution] {
-        let range = self.contribution_start[block] as usize..self.contribution_start[block + 1] as usize;
-        &self.contributions[range]
-    }
-
     /// Position of a node relative to the domain's lower corner, m.
     pub fn node_position(&self, node: u32) -> [f64; D] {
         let block = &self.blocks[node as usize / block_nodes(D)];
@@ -299,7 +217,7 @@ impl<const D: usize> GridPlan<D> {
         self.tree.heap_bytes()
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
-            + self.contributions.capacity() * size_of::<Contribution>()
+            + self.sources.capacity() * size_of::<Source>()
             + self.second.iter().map(|table| table.capacity() * size_of::<Row>()).sum::<usize>()
     }
 
@@ -351,9 +269,17 @@ impl<const D: usize> GridPlan<D> {
     fn list_bins(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
         let first = self.tree.first_own();
         let own = self.tree.leaves().len() - self.tree.ghost_len();
+        // Bins of several leaves may have one block; what depends on the block is made once.
+        let mut of_block: HashMap<Octant<D>, u32> = HashMap::new();
         for leaf in 0..own {
             self.leaf_start.push(self.bins.len() as u32);
             for block in potential_bins(&self.tree, first + leaf) {
+                if let Some(&same) = of_block.get(&block) {
+                    let same = self.bins[same as usize].clone();
+                    self.bins.push(Bin { leaf: leaf as u32, ..same });
+                    continue;
+                }
+                of_block.insert(block, self.bins.len() as u32);
                 let mut around = [NO_BLOCK; 27];
                 for (index, slot) in around.iter_mut().enumerate().take(offset_count(D)) {
                     if let Some(coord) = shifted(block.coord, offset::<D>(index))
@@ -401,11 +327,10 @@ impl<const D: usize> GridPlan<D> {
         Some(self.touched.len() as u32 - 1)
     }
 
-    /// Lists the arenas that make up each block's sum, own and received, in canonical order.
-    fn list_contributions(&mut self, rank: usize) {
-        let own_bins = self.own_bins();
-        // (block, source leaf, bin, offset, nodes)
-        let mut sources: Vec<(u32, u32, Octant<D>, u8, u64)> = Vec::new();
+    /// Lists the bins of other ranks that enter sums here, with the nodes needed of each.
+    fn list_received(&mut self, rank: usize) {
+        // (source leaf, bin, part)
+        let mut needed: Vec<(u32, Octant<D>, ReceivedNodes)> = Vec::new();
         let mut feeding: HashMap<Octant<D>, Vec<usize>> = HashMap::new();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
@@ -416,87 +341,45 @@ impl<const D: usize> GridPlan<D> {
                     continue;
                 }
                 let bin = Octant { level: block.level, coord };
-                let leaves =
-                    feeding.entry(bin).or_insert_with(|| bin_sources(&self.tree, bin.level, bin.coord));
-                for &leaf in leaves.iter() {
-                    sources.push((index as u32, leaf as u32, bin, seen_from_bin as u8, nodes));
+                let remote = feeding.entry(bin).or_insert_with(|| {
+                    let mut leaves = bin_sources(&self.tree, bin.level, bin.coord);
+                    leaves.retain(|&leaf| self.tree.owner(leaf) != rank);
+                    leaves
+                });
+                let constrained = nodes & block.constrained;
+                let offset = seen_from_bin as u8;
+                let part = ReceivedNodes { block: index as u32, offset, nodes, constrained };
+                needed.extend(remote.iter().map(|&leaf| (leaf as u32, bin, part)));
+            }
+        }
+        needed.sort_unstable_by_key(|(leaf, bin, part)| (*leaf, bin.level, bin.key(), part.offset));
+        for (leaf, block, part) in needed {
+            match self.received.last_mut() {
+                Some(last) if (last.leaf, last.block) == (leaf, block) => last.parts.push(part),
+                _ => {
+                    let rank = self.tree.owner(leaf as usize);
+                    self.received.push(ReceivedBin { rank, leaf, block, parts: vec![part] });
                 }
             }
         }
-        let mut remote: Vec<_> = sources
-            .iter()
-            .filter(|source| self.tree.owner(source.1 as usize) != rank)
-            .map(|&(block, leaf, bin, offset, nodes)| (leaf, bin, offset, nodes, block))
-            .collect();
-        remote.sort_unstable_by_key(|&(leaf, bin, offset, ..)| (leaf, bin.level, bin.key(), offset));
-        let mut part_of: HashMap<(u32, Octant<D>, u8), (u32, u32)> = HashMap::new();
-        for (leaf, bin, offset, nodes, block) in remote {
-            let constrained = nodes & self.blocks[block as usize].constrained;
-            if self.received.last().is_none_or(|last| (last.leaf, last.block) != (leaf, bin)) {
-                let rank = self.tree.owner(leaf as usize);
-                self.received.push(ReceivedBin { rank, leaf, block: bin, parts: Vec::new() });
-            }
-            let number = self.received.len() as u32 - 1;
-            let parts = &mut self.received[number as usize].parts;
-            part_of.insert((leaf, bin, offset), (number, parts.len() as u32));
-            parts.push((offset, nodes, constrained));
-        }
-        sources.sort_unstable_by_key(|&(block, leaf, bin, offset, _)| (block, leaf, bin.key(), offset));
-        let mut next = 0;
-        for (block, leaf, bin, offset, _) in sources {
-            while next <= block {
-                self.contribution_start.push(self.contributions.len() as u32);
-                next += 1;
-            }
-            let source = match own_bins.get(&(leaf, bin)) {
-                Some(&own) => Source::Own(BinId(own)),
-                None => {
-                    let (number, part) = part_of[&(leaf, bin, offset)];
-                    Source::Received(number, part)
-                }
-            };
-            self.contributions.push(Contribution { source, offset });
-        }
-        self.contribution_start.resize(self.blocks.len() + 1, self.contributions.len() as u32);
+    }
+
+    /// Puts own and received bins into canonical order.
+    fn list_sources(&mut self) {
+        let first = self.tree.first_own() as u32;
+        let own = self.bins.iter().zip(0..);
+        let own = own.map(|(bin, number)| (first + bin.leaf, bin.block, Source::Own(BinId(number))));
+        let received = self.received.iter().zip(0..);
+        let received = received.map(|(bin, number)| (bin.leaf, bin.block, Source::Received(number)));
+        let mut sources: Vec<(u32, Octant<D>, Source)> = own.chain(received).collect();
+        sources.sort_unstable_by_key(|(leaf, block, _)| (*leaf, block.level, block.key()));
+        self.sources = sources.into_iter().map(|(_, _, source)| source).collect();
     }
 
     /// Own bins by known source leaf and block.
     pub(super) fn own_bins(&self) -> HashMap<(u32, Octant<D>), u32> {
         let first = self.tree.first_own() as u32;
         self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
-    }
-
-    fn link_levels(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
-        let nodes = block_nodes(D) as u32;
-        let levels = self.levels();
-        let mut restriction: Vec<Vec<(u32, u32, Link)>> = vec![Vec::new(); levels];
-        let mut prolongation = restriction.clone();
-        for (index, block) in self.blocks.iter().enumerate() {
-            let level = block.level as usize;
-            for bit in bits((block.sum | block.value) & block.constrained) {
-                let fine = index as u32 * nodes + bit;
-                for (order, parent) in parents_of::<D>(node_coord(block.coord, bit)).enumerate() {
-                    let (coord, parent_bit) = block_and_bit(parent.node);
-                    let Some(&coarse_block) = number.get(&(block.level - 1, coord)) else { continue };
-                    let coarse = coarse_block * nodes + parent_bit;
-                    let offset = offset_index_u8(parent.offset);
-                    if block.sum >> bit & 1 == 1
-                        && self.blocks[coarse_block as usize].sum >> parent_bit & 1 == 1
-                    {
-                        // A parent meets its children in lexicographic order of their position.
-                        let order = u32::from(opposite(D, offset as usize) as u8);
-                        let link = Link { node: fine, offset, weight: parent.weight };
-                        restriction[level - 1].push((coarse, order, link));
-                    }
-                    if block.value >> bit & 1 == 1 {
-                        let link = Link { node: coarse, offset, weight: parent.weight };
-                        prolongation[level].push((fine, order as u32, link));
-                    }
-                }
-            }
-        }
-        self.restriction = restriction.into_iter().map(|entries| Links::group(entries, nodes)).collect();
-        self.prolongation = prolongation.into_iter().map(|entries| Links::group(entries, nodes)).collect();
     }
 
     fn find_face_nodes(&mut self) {
@@ -516,31 +399,6 @@ impl<const D: usize> GridPlan<D> {
                 }
             }
         }
-    }
-
-    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes.
-    fn constraint_spread(&self) -> Vec<Row> {
-        let nodes = block_nodes(D);
-        let mut spread = vec![Row([0.0; 4]); self.moment_blocks * nodes];
-        for level in 1..self.levels() {
-            let cell_squared = self.cell(level as u8).powi(2);
-            let links = &self.prolongation[level];
-            for (i, &node) in links.nodes.iter().enumerate() {
-                let mut sum = [0.0; 4];
-                for link in links.of(i) {
-                    let parent = self.moment_node(link.node).map_or([0.0; 4], |slot| spread[slot].0);
-                    let delta = offset::<D>(link.offset as usize);
-                    for axis in 0..D {
-                        let squared = f64::from(delta[axis] * delta[axis]) * cell_squared;
-                        sum[axis] += link.weight * (parent[axis] + squared);
-                    }
-                }
-                if let Some(slot) = self.moment_node(node) {
-                    spread[slot] = Row(sum);
-                }
-            }
-        }
-        spread
     }
 
     /// The rows of moment nodes as they stand in the arena of a bin; zero elsewhere.
@@ -577,8 +435,4 @@ pub fn arena_index<const D: usize>(index: usize, bit: u32) -> usize {
             at * ARENA_EDGE.pow(axis as u32)
         })
         .sum()
-}
-
-fn offset_index_u8<const D: usize>(offset: [i32; D]) -> u8 {
-    super::mask::offset_index(offset) as u8
 }

@@ -54,10 +54,7 @@ pub fn leaves_around<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<us
 }
 
 /// Known finer leaves in the same-size neighbours of an octant.
-fn finer_neighbours<const D: usize>(
-    tree: &KnownTree<D>,
-    here: Octant<D>,
-) -> impl Iterator<Item = Octant<D>> {
+fn finer_neighbours<const D: usize>(tree: &KnownTree<D>, here: Octant<D>) -> impl Iterator<Item = Octant<D>> {
     (0..offset_count(D))
         .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
         .filter(move |&beside| beside != here.coord && tree.contains(here.level, beside))

@@ -52,6 +52,16 @@ impl<const D: usize> Window<D> {
         })
     }
 
+    /// Whether the block at offset number `index` from the bin shares a node.
+    pub fn reaches(&self, index: usize) -> bool {
+        let towards = offset::<D>(index);
+        (0..D).all(|axis| match towards[axis] {
+            -1 => self.lower[axis] == 0,
+            0 => self.lower[axis] < 5 && self.upper[axis] > 1,
+            _ => self.upper[axis] > 5,
+        })
+    }
+
     /// All nodes, run by run.
     pub fn for_each_run(&self, mut f: impl FnMut(std::ops::Range<usize>)) {
         let (lower, upper) = (self.lower.map(usize::from), self.upper.map(usize::from));
@@ -120,6 +130,7 @@ mod tests {
                     .map(|bit| (arena_index::<D>(index, bit), bit as usize))
                     .filter(|&(node, _)| window.contains(node))
                     .collect();
+                assert_eq!(window.reaches(index), !expected.is_empty());
                 assert_eq!(found, expected);
             }
         }

@@ -23,13 +23,14 @@ pub struct History {
     file: File,
     path: PathBuf,
     columns: usize,
+    last: Option<u64>,
 }
 
 impl History {
     /// Not collective. Starts a new file, replacing an old one.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, FileError> {
         let file = File::create(path).map_err(|source| system(path, "create", source))?;
-        let mut history = Self { file, path: path.into(), columns: columns.len() };
+        let mut history = Self { file, path: path.into(), columns: columns.len(), last: None };
         history.line(header(columns))?;
         Ok(history)
     }
@@ -44,7 +45,7 @@ impl History {
         let failed = |source| system(path, "resume", source);
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
         let mut lines = BufReader::new(&file);
-        let (mut line, mut kept) = (String::new(), 0);
+        let (mut line, mut kept, mut last) = (String::new(), 0, None);
         loop {
             line.clear();
             let bytes = lines.read_line(&mut line).map_err(failed)?;
@@ -53,20 +54,22 @@ impl History {
                 let reason = "the columns are not those of this run; move the file away or restart elsewhere";
                 return Err(FileError::Refused { path: path.into(), reason: reason.into() });
             }
-            let earlier = kept == 0
-                || line
-                    .split(',')
-                    .next()
-                    .and_then(|cell| cell.parse::<u64>().ok())
-                    .is_some_and(|s| s <= step);
+            let row = line.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
+            let earlier = kept == 0 || row.is_some_and(|row| row <= step);
             if !whole || !earlier {
                 break;
             }
+            last = row;
             kept += bytes as u64;
         }
         file.set_len(kept).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
-        Ok(Self { file, path: path.into(), columns: columns.len() })
+        Ok(Self { file, path: path.into(), columns: columns.len(), last })
+    }
+
+    /// Step of the last row.
+    pub fn last_step(&self) -> Option<u64> {
+        self.last
     }
 
     /// Not collective. Appends the row of a step and hands it to the operating system.
@@ -80,6 +83,7 @@ impl History {
             row.push_str(&format!(",{value:?}"));
         }
         row.push('\n');
+        self.last = Some(step);
         self.line(row)
     }
 

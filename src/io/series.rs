@@ -36,14 +36,22 @@ impl Series {
         Self { path: path.into(), entries: Vec::new() }
     }
 
+    /// Not collective. The entries of an index file, if it can be read.
+    pub fn listed(path: &Path) -> Option<Vec<Entry>> {
+        let text = std::fs::read(path).ok()?;
+        Some(serde_json::from_slice::<Contents>(&text).ok()?.files)
+    }
+
     /// Not collective. The series of an earlier run without the entries after `time`, from which it
     /// is restarted. An unreadable index starts anew: it can be made again from the files.
     pub fn resume(path: &Path, time: f64) -> Self {
-        let entries = std::fs::read(path)
-            .ok()
-            .and_then(|text| serde_json::from_slice::<Contents>(&text).ok())
-            .map_or(Vec::new(), |contents| contents.files);
+        let entries = Self::listed(path).unwrap_or_default();
         Self { path: path.into(), entries: entries.into_iter().filter(|entry| entry.time <= time).collect() }
+    }
+
+    /// The index file.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The entries so far.

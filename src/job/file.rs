@@ -332,11 +332,24 @@ pub struct Output {
     /// Whether each output file carries the complete state, so that a run can restart from it.
     #[serde(default = "yes")]
     pub restart: bool,
+    /// Whether a picture of the last state is drawn when the run ends.
+    #[serde(default = "yes")]
+    pub picture: bool,
+    /// Field that colours the picture; by default the plastic strain if a material has it, else the speed.
+    #[serde(default)]
+    pub picture_field: Option<Field>,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { directory: None, every: None, fields: default_fields(), restart: true }
+        Self {
+            directory: None,
+            every: None,
+            fields: default_fields(),
+            restart: true,
+            picture: true,
+            picture_field: None,
+        }
     }
 }
 

@@ -209,6 +209,10 @@ pub struct OutputSetup {
     pub fields: Vec<Field>,
     /// Whether each output file carries the complete state, so that a run can restart from it.
     pub restart: bool,
+    /// Whether a picture of the last state is drawn.
+    pub picture: bool,
+    /// Field that colours it; `None`: what suits the materials.
+    pub picture_field: Option<Field>,
 }
 
 /// When checkpoints are written, beside the end of the run.

@@ -108,6 +108,8 @@ pub(super) fn output(checks: &mut Checks, file: &JobFile, name: &str, path: &Pat
         every: output.every,
         fields: output.fields.clone(),
         restart: output.restart,
+        picture: output.picture,
+        picture_field: output.picture_field,
     }
 }
 

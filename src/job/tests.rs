@@ -35,13 +35,13 @@ fn digest_is_of_what_changes_the_state() {
 fn coordinates_are_relative_to_the_lower_corner() {
     let Ok(AnyProblem::Three(problem)) = parse(JOB, "job.toml".as_ref()) else { panic!("not a 3D job") };
     assert_eq!(problem.name, "job");
-    assert_eq!(problem.origin, [-0.28, -0.28, 0.0]);
-    assert_eq!(problem.brick.roots, [5, 5, 1]);
-    assert!((problem.bodies[0].centre[0] - 0.28).abs() < 1e-15);
+    assert_eq!(problem.origin, [-0.288, -0.288, 0.0]);
+    assert_eq!(problem.brick.roots, [6, 6, 1]);
+    assert!((problem.bodies[0].centre[0] - 0.288).abs() < 1e-15);
     let Some(problem::ReportSetup::ColumnCollapse { base, up, .. }) = problem.report else {
         panic!("no report")
     };
-    assert_eq!((base, up), ([0.28, 0.28, 0.0], 2));
+    assert_eq!((base, up), ([0.288, 0.288, 0.0], 2));
 }
 
 /// The schema names limits that the tree has.

@@ -16,8 +16,8 @@
 //! ```
 use super::batch::Batch;
 use super::simd::{F64x4, LANES, Lanes};
-use super::weights::Weights;
 use super::spread::Constraints;
+use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout};
 

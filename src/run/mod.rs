@@ -12,11 +12,13 @@ use std::path::PathBuf;
 use partition::comm::{Comm, Disagreement};
 
 use self::record::Recorder;
+use self::report::Collapse;
 use self::restart::From;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::hdf5_file::FileError;
-use crate::io::snapshot::{Outputs, Scalars, View};
+use crate::io::picture;
+use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
 use crate::solver::{Requests, Solver};
 
@@ -35,12 +37,23 @@ pub struct Options {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// At its end time.
-    Finished,
+    Finished(Box<Summary>),
     /// On request, after writing this checkpoint.
     Stopped {
         /// The checkpoint.
         checkpoint: PathBuf,
     },
+}
+
+/// What a finished run leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Index of the output files, for ParaView.
+    pub series: PathBuf,
+    /// Picture of the last state, or why there is none; `Ok(None)` if the job wants none.
+    pub picture: Result<Option<PathBuf>, String>,
+    /// Evaluation that the job asks for.
+    pub collapse: Option<Collapse>,
 }
 
 /// Why a run could not be started or finished; the same on all ranks.
@@ -104,8 +117,7 @@ pub fn run<const D: usize>(
         }
         run.balance();
     }
-    run.finish()?;
-    Ok(Outcome::Finished)
+    Ok(Outcome::Finished(Box::new(run.finish()?)))
 }
 
 /// A run under way.
@@ -118,6 +130,8 @@ struct Run<'a, const D: usize> {
     recorder: Recorder,
     materials: Vec<String>,
     histories: Vec<String>,
+    /// Step of the last output.
+    output_step: Option<u64>,
 }
 
 impl<'a, const D: usize> Run<'a, D> {
@@ -126,7 +140,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
-        let mut run = Self::with(comm, problem, options, solver, outputs)?;
+        let mut run = Self::with(comm, problem, options, solver, outputs, None)?;
         run.recorder.write(comm, &mut run.solver, true, true)?;
         run.write_output()?;
         Ok(run)
@@ -149,7 +163,13 @@ impl<'a, const D: usize> Run<'a, D> {
             next,
             solver.clock.time,
         )?;
-        Self::with(comm, problem, options, solver, outputs)
+        let output_step = scalars.count(restart::OUTPUT_STEP);
+        let mut run = Self::with(comm, problem, options, solver, outputs, output_step)?;
+        if run.solver.clock.step == 0 {
+            // The history starts anew as well.
+            run.recorder.write(comm, &mut run.solver, true, true)?;
+        }
+        Ok(run)
     }
 
     fn with(
@@ -158,6 +178,7 @@ impl<'a, const D: usize> Run<'a, D> {
         options: &Options,
         solver: Solver<D>,
         outputs: Outputs,
+        output_step: Option<u64>,
     ) -> Result<Self, RunError> {
         let mut recorder = Recorder::open(comm, problem, options, &solver)?;
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
@@ -184,6 +205,7 @@ impl<'a, const D: usize> Run<'a, D> {
             recorder,
             materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
             histories,
+            output_step,
         })
     }
 
@@ -217,30 +239,53 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Collective. Last row, last output, report.
-    fn finish(&mut self) -> Result<(), RunError> {
-        let row = !self.solver.clock.step.is_multiple_of(self.problem.history_every);
+    /// Collective. Last row, last output, picture, evaluation.
+    fn finish(&mut self) -> Result<Summary, RunError> {
+        let step = self.solver.clock.step;
+        let row = self.recorder.row_step() != Some(step);
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
-        self.write_output()?;
-        self.recorder.finish(&self.solver);
-        if let Some(setup) = &self.problem.report {
-            let mass = self.solver.particle_totals().mass;
-            let size = self.problem.size();
-            let collapse = report::evaluate(self.comm, setup, size, &self.solver.chunks, mass);
-            self.recorder.message(&collapse.to_string());
+        // Unless it was due at this very step.
+        if self.output_step != Some(step) {
+            self.write_output()?;
         }
-        Ok(())
+        self.recorder.finish(&self.solver);
+        let picture = self.picture();
+        let collapse = self.problem.report.as_ref().map(|setup| {
+            let mass = self.solver.particle_totals().mass;
+            report::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
+        });
+        Ok(Summary { series: self.outputs.series().to_owned(), picture, collapse })
+    }
+
+    /// Collective. Draws the last state. All results are on disk by now, so a failure is only told.
+    fn picture(&self) -> Result<Option<PathBuf>, String> {
+        let problem = self.problem;
+        if !problem.output.picture {
+            return Ok(None);
+        }
+        let plastic = self.solver.physics.materials.iter().any(|material| material.is_plastic());
+        let usual = if plastic { PointField::PlasticStrain } else { PointField::Speed };
+        let field = problem.output.picture_field.unwrap_or(usual);
+        let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
+        let path = problem.output.directory.join(format!("{}.png", problem.name));
+        let scalars = Scalars::default();
+        let view = view(problem, &self.solver, &self.materials, &self.histories, &scalars);
+        picture::draw(self.comm, &view, &picture::Settings::new(title, field), &path)
+            .map_err(|error| error.to_string())?;
+        Ok(Some(path))
     }
 
     fn write_output(&mut self) -> Result<(), RunError> {
-        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1);
+        let step = Some(self.solver.clock.step);
+        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         self.outputs.write(self.comm, &view)?;
+        self.output_step = step;
         Ok(())
     }
 
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
-        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next());
+        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next(), self.output_step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         self.schedule.checkpoint_written(self.solver.clock.time);
         Ok(self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?)

@@ -132,6 +132,11 @@ impl Recorder {
         record
     }
 
+    /// Not collective. Step of the last row of the history; known on rank 0 only.
+    pub fn row_step(&self) -> Option<u64> {
+        self.history.as_ref().and_then(History::last_step)
+    }
+
     /// Not collective. Shows a line to the user.
     pub fn message(&mut self, text: &str) {
         self.progress.message(text);

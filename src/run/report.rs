@@ -41,6 +41,7 @@ pub fn evaluate<const D: usize>(
     // Counts by distance, and the top per distance, so that one small reduction is enough.
     let mut mass = vec![0u64; bins];
     let mut top = vec![0.0f64; bins];
+    let mut covered = vec![0u64; bins];
     for chunk in chunks {
         for p in 0..chunk.len() {
             let x = chunk.position(p);
@@ -54,10 +55,14 @@ pub fn evaluate<const D: usize>(
             // Integers add exactly in any order.
             mass[bin] += (particle / total_mass * (1u64 << 50) as f64) as u64;
             top[bin] = top[bin].max(x[up] - base[up] + half);
+            // Particles may be farther apart than bins are wide.
+            let [from, to] = [distance - half, distance + half].map(|edge| (edge.max(0.0) / width) as usize);
+            covered[from.min(bins - 1)..=to.min(bins - 1)].fill(1);
         }
     }
     comm.sum_u64(&mut mass);
     comm.max_f64s(&mut top);
+    comm.max_u64(&mut covered);
 
     let total: u64 = mass.iter().sum();
     let mut inside = 0;
@@ -65,7 +70,7 @@ pub fn evaluate<const D: usize>(
         inside += m;
         inside as f64 >= FRONT_SHARE * total as f64
     });
-    let edge = mass.iter().position(|&m| m == 0).unwrap_or(bins);
+    let edge = covered.iter().position(|&c| c == 0).unwrap_or(bins);
     let aspect = height / radius;
     let (law_edge, law_height) = fits(law, aspect, radius, height);
     // The centre is a tenth of the initial radius, where a bin alone may be empty.

@@ -21,6 +21,8 @@ pub enum From {
 
 /// Name of the counter that holds the number of the next output.
 pub const NEXT_OUTPUT: &str = "next_output";
+/// Name of the counter that holds the step of the last output.
+pub const OUTPUT_STEP: &str = "output_step";
 const BOUND: &str = "time_step_bound";
 const DELETED: &str = "deleted";
 
@@ -31,14 +33,17 @@ pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
 }
 
 /// Collective. Scalars that a restart needs beside those in every header.
-pub fn scalars<const D: usize>(comm: &Comm, solver: &Solver<D>, next_output: u64) -> Scalars {
+pub fn scalars<const D: usize>(
+    comm: &Comm,
+    solver: &Solver<D>,
+    next_output: u64,
+    output_step: Option<u64>,
+) -> Scalars {
     let mut deleted = [solver.deleted];
     comm.sum_u64(&mut deleted);
-    Scalars {
-        reals: vec![(BOUND.into(), solver.clock.bound)],
-        counts: vec![(NEXT_OUTPUT.into(), next_output), (DELETED.into(), deleted[0])],
-        exact: Vec::new(),
-    }
+    let mut counts = vec![(NEXT_OUTPUT.into(), next_output), (DELETED.into(), deleted[0])];
+    counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
+    Scalars { reals: vec![(BOUND.into(), solver.clock.bound)], counts, exact: Vec::new() }
 }
 
 /// Collective. Reads the state and spreads it over the ranks.
@@ -79,7 +84,7 @@ pub fn solver<const D: usize>(
 fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<PathBuf, RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {
-        0 => directory::find_latest(directory, &problem.name),
+        0 => directory::find_latest(directory, &problem.name, Some(problem.digest)),
         _ => Ok(None),
     };
     let found = comm.agree(found)?;

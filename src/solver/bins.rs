@@ -8,11 +8,11 @@
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
-use crate::grid::plan::Bin;
-use crate::grid::{GridPlan, Window};
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
+use crate::grid::plan::Bin;
 use crate::grid::reach::leaves_around;
+use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::particle::chunk::{Chunk, Layout};
 
@@ -74,6 +74,11 @@ pub trait BoxWidths<const D: usize>: Sync {
     fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>);
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
+    /// Whether the kernels find the same half widths from the particles' state. If not, every box is
+    /// handed to them, a narrow one as its only part.
+    fn are_known_to_kernels(&self) -> bool {
+        true
+    }
 }
 
 impl<const D: usize> BinLists<D> {
@@ -97,12 +102,13 @@ impl<const D: usize> BinLists<D> {
         widths: &impl BoxWidths<D>,
     ) -> Result<(), BinMissing> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
+        let given = !widths.are_known_to_kernels();
         leaves.with_min_len(8).try_for_each_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
             let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
-            *sorted = bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
+            *sorted = given || bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
             if *sorted {
                 widths.list(chunk, cell, halves);
-                bins.sort(plan, leaf, own, chunk, halves)?;
+                bins.sort(plan, leaf, own, chunk, halves, given)?;
             }
             Ok(())
         })
@@ -117,20 +123,22 @@ impl<const D: usize> BinLists<D> {
         of_parts: impl Fn(&Bin<D>, &Chunk<D>, &[SubBox<D>], &mut dyn FnMut(usize, [f64; D])) + Sync,
     ) {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).enumerate().with_min_len(8);
-        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(|(leaf, (bins, _))| {
-            let mut totals = vec![[0.0; D]; bins.cut.len()];
-            for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
-                of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
-                    let part = &members.parts[part];
-                    let total = &mut totals[part.slot as usize];
-                    for axis in 0..D {
-                        total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
-                    }
-                });
-            }
-            let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
-            parts.for_each(|part| part.spread = totals[part.slot as usize]);
-        });
+        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(
+            |(leaf, (bins, _))| {
+                let mut totals = vec![[0.0; D]; bins.cut.len()];
+                for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+                    of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
+                        let part = &members.parts[part];
+                        let total = &mut totals[part.slot as usize];
+                        for axis in 0..D {
+                            total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
+                        }
+                    });
+                }
+                let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
+                parts.for_each(|part| part.spread = totals[part.slot as usize]);
+            },
+        );
     }
 
     /// Nodes that the members of a bin touch, or `None` if it has none.
@@ -170,6 +178,7 @@ impl<const D: usize> LeafBins<D> {
         own: &NearLeaf<D>,
         chunk: &Chunk<D>,
         halves: &[[f64; D]],
+        given: bool,
     ) -> Result<(), BinMissing> {
         self.cut.clear();
         for members in &mut self.members {
@@ -180,7 +189,7 @@ impl<const D: usize> LeafBins<D> {
         for (p, &half) in halves.iter().enumerate() {
             let centre = chunk.position(p);
             let level = self.finest_level(own, centre, half);
-            if is_narrow(half, plan.cell(level)) {
+            if !given && is_narrow(half, plan.cell(level)) {
                 let bin = self.bin(plan, leaf, level, centre).ok_or(BinMissing { id: chunk.ids()[p] })?;
                 self.members[bin].whole.push(p as u32);
                 self.include(plan, leaf, bin, centre, half);
@@ -227,14 +236,7 @@ impl<const D: usize> LeafBins<D> {
     }
 
     /// Grows the window of a bin to a box.
-    fn include(
-        &mut self,
-        plan: &GridPlan<D>,
-        leaf: usize,
-        bin: usize,
-        centre: [f64; D],
-        half: [f64; D],
-    ) {
+    fn include(&mut self, plan: &GridPlan<D>, leaf: usize, bin: usize, centre: [f64; D], half: [f64; D]) {
         let block = &plan.bins[plan.leaf_bins(leaf).start + bin].block;
         let cell = plan.cell(block.level);
         // The kernel limits half widths to half a cell.

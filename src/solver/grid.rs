@@ -55,7 +55,10 @@ impl<const D: usize> Grid<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.plan.heap_bytes() + self.arenas.heap_bytes() + self.fields.heap_bytes() + self.increments.heap_bytes()
+        self.plan.heap_bytes()
+            + self.arenas.heap_bytes()
+            + self.fields.heap_bytes()
+            + self.increments.heap_bytes()
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.

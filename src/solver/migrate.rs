@@ -158,10 +158,19 @@ impl Rule {
         (lower, upper): &([f64; D], [f64; D]),
     ) -> Result<Vec<(u32, Destination)>, MigrateError> {
         let mut leavers = Vec::new();
+        // Nearly all particles stay; one pass per axis over a column finds out cheaply. Written so that a NaN
+        // counts as outside.
+        let is_inside = |axis: usize, x: f64| (x >= lower[axis]) & (x < upper[axis]);
+        let all_inside = (0..D).all(|axis| {
+            let column = chunk.column(Layout::<D>::POSITION + axis);
+            column.iter().fold(true, |all, &x| all & is_inside(axis, x))
+        });
+        if all_inside {
+            return Ok(leavers);
+        }
         for p in 0..chunk.len() {
             let position = chunk.position(p);
-            // Written so that a NaN counts as outside.
-            if (0..D).all(|axis| position[axis] >= lower[axis] && position[axis] < upper[axis]) {
+            if (0..D).all(|axis| is_inside(axis, position[axis])) {
                 continue;
             }
             match self.destination(tree, leaf, chunk, p)? {

@@ -2,6 +2,7 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod given_boxes;
 pub mod grid;
 mod increment;
 pub mod migrate;
@@ -216,8 +217,7 @@ impl<const D: usize> Solver<D> {
         let outcome: Result<Moved, StepError> = match (sorted, moved) {
             (Err(error), _) => Err(error.into()),
             (_, Err(error)) => Err(error.into()),
-            // Also for NaN: a bound must be positive.
-            _ if !(bound > 0.0) => Err(StepError::TimeStep { dt: bound }),
+            _ if bound.is_nan() || bound <= 0.0 => Err(StepError::TimeStep { dt: bound }),
             (_, Ok(moved)) => Ok(moved),
         };
         let flag = |set: bool| if set { -1.0 } else { 0.0 };

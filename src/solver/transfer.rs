@@ -2,7 +2,8 @@
 use rayon::prelude::*;
 
 use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
-use super::phases::Phase;
+use super::grid::Grid;
+use super::phases::{Phase, Phases};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
 use crate::grid::GridPlan;
@@ -53,7 +54,7 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 /// Upper corner of the domain, m.
-fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
+pub(super) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
     plan.tree.brick().roots.map(|n| f64::from(n) * plan.root_edge)
 }
 
@@ -120,25 +121,39 @@ impl<'a, const D: usize> Selected<'a, D> {
     }
 }
 
+/// Lists the particles of each bin and makes room for the arenas of those that have any.
+pub(super) fn sort_with<const D: usize>(
+    grid: &mut Grid<D>,
+    chunks: &[Chunk<D>],
+    phases: &mut Phases,
+    widths: &impl BoxWidths<D>,
+) -> Result<(), BinMissing> {
+    phases.time(Phase::Sort, || {
+        let sorted = grid.lists.sort(&grid.plan, chunks, widths);
+        let plan = &grid.plan;
+        grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
+            spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
+        });
+        let lists = &grid.lists;
+        grid.arenas.occupy(plan, |bin| {
+            let leaf = plan.bins[bin].leaf as usize;
+            let number = bin - plan.leaf_bins(leaf).start;
+            lists.window(leaf, number, &chunks[leaf])
+        });
+        sorted
+    })
+}
+
 impl<const D: usize> Solver<D> {
     /// Lists the particles of each bin in leaves beside finer leaves.
     pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let (grid, chunks) = (&mut self.grid, &self.chunks);
-        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&grid.plan) };
-        self.phases.time(Phase::Sort, || {
-            let sorted = grid.lists.sort(&grid.plan, chunks, &widths);
-            let plan = &grid.plan;
-            grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
-                spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
-            });
-            let lists = &grid.lists;
-            grid.arenas.occupy(plan, |bin| {
-                let leaf = plan.bins[bin].leaf as usize;
-                let number = bin - plan.leaf_bins(leaf).start;
-                lists.window(leaf, number, &chunks[leaf])
-            });
-            sorted
-        })
+        let extent = extent(&self.grid.plan);
+        sort_with(
+            &mut self.grid,
+            &self.chunks,
+            &mut self.phases,
+            &Widths { scheme: self.physics.scheme(), extent },
+        )
     }
 
     /// P2G: scatters mass, affine momentum and the impulse of stress of the bins in `reach` into their

@@ -37,7 +37,9 @@ pub fn apply_faces<const D: usize>(
     plan: &GridPlan<D>,
     faces: &[[FaceCondition; 2]; D],
 ) {
-    for &(node, on) in plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)]) {
+    for &(node, on) in
+        plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)])
+    {
         let row = &mut fields.rows[node as usize].0;
         let mut velocity: [f64; D] = std::array::from_fn(|axis| row[axis]);
         for axis in 0..D {

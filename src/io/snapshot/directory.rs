@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::header::Header;
 use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::series::{Entry, Series};
 
 /// Path of output number `number` of the run `name`.
 pub fn output_path(directory: &Path, name: &str, number: u64) -> PathBuf {
@@ -13,6 +14,11 @@ pub fn output_path(directory: &Path, name: &str, number: u64) -> PathBuf {
 /// Path of the tree that belongs to an output.
 pub fn tree_path(directory: &Path, name: &str, number: u64) -> PathBuf {
     directory.join(format!("{name}_{number:06}.tree.vtkhdf"))
+}
+
+/// Path of the index of the outputs.
+pub fn series_path(directory: &Path, name: &str) -> PathBuf {
+    directory.join(format!("{name}.vtkhdf.series"))
 }
 
 /// Path of the checkpoint of a step.
@@ -33,9 +39,20 @@ pub struct Latest {
 
 /// Not collective. The file of the latest step among the checkpoints and outputs of the run `name` that
 /// hold a restart state and look whole. `Ok(None)` if there is none and nothing was damaged.
-pub fn find_latest(directory: &Path, name: &str) -> Result<Option<Latest>, FileError> {
+///
+/// A directory may still hold files of an earlier run of that name. Outputs that the index of the run does not
+/// list are such files, as are files of a job with another digest if `job_digest` is given; neither counts.
+pub fn find_latest(
+    directory: &Path,
+    name: &str,
+    job_digest: Option<u64>,
+) -> Result<Option<Latest>, FileError> {
     let mut best: Option<(PathBuf, Header)> = None;
-    let mut damaged = Vec::new();
+    let (mut damaged, mut other) = (Vec::new(), None);
+    let listed = Series::listed(&series_path(directory, name));
+    let is_listed = |name: &str| {
+        listed.as_ref().is_none_or(|entries: &Vec<Entry>| entries.iter().any(|entry| entry.name == name))
+    };
     for path in files(directory)? {
         let Some(rest) = file_name(&path).strip_prefix(name) else { continue };
         let number = rest
@@ -44,8 +61,14 @@ pub fn find_latest(directory: &Path, name: &str) -> Result<Option<Latest>, FileE
         if !number.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())) {
             continue;
         }
+        if rest.starts_with('_') && !is_listed(file_name(&path)) {
+            continue;
+        }
         match ParallelFile::open_alone(&path).and_then(|file| Header::read(&file)) {
             Ok(header) if !header.restart => {}
+            Ok(header) if job_digest.is_some_and(|ours| ours != header.job_digest) => {
+                other.get_or_insert((path, header));
+            }
             Ok(header) => {
                 if best.as_ref().is_none_or(|(_, found)| found.step < header.step) {
                     best = Some((path, header));
@@ -54,24 +77,27 @@ pub fn find_latest(directory: &Path, name: &str) -> Result<Option<Latest>, FileE
             Err(error) => damaged.push(error),
         }
     }
-    match best {
+    // Only files of another job: reading one tells why it cannot be used.
+    match best.or(other.filter(|_| damaged.is_empty())) {
         Some((path, header)) => Ok(Some(Latest { path, header, damaged })),
         None => damaged.into_iter().next().map_or(Ok(None), Err),
     }
 }
 
-/// Not collective. Removes all but the `keep` checkpoints of the latest steps of the run `name`. Temporary files of
-/// checkpoints that were never finished go as well.
-pub fn remove_old_checkpoints(directory: &Path, name: &str, keep: usize) -> Result<(), FileError> {
+/// Not collective. Of the checkpoints of the run `name`, keeps the `keep` latest up to step `step`, which was just
+/// written. Those of later steps were left by an earlier run, and go too, as do temporary files of checkpoints
+/// that were never finished.
+pub fn remove_old_checkpoints(directory: &Path, name: &str, step: u64, keep: usize) -> Result<(), FileError> {
     let prefix = format!("{name}.checkpoint_");
     let mut finished: Vec<(u64, PathBuf)> = Vec::new();
     let mut remove = Vec::new();
     for path in files(directory)? {
         let Some(rest) = file_name(&path).strip_prefix(&prefix) else { continue };
-        if let Some(step) = rest.strip_suffix(".vtkhdf").and_then(|digits| digits.parse().ok()) {
-            finished.push((step, path));
-        } else if rest.ends_with(".vtkhdf.part") {
-            remove.push(path);
+        match rest.strip_suffix(".vtkhdf").and_then(|digits| digits.parse().ok()) {
+            Some(at) if at <= step => finished.push((at, path)),
+            Some(_) => remove.push(path),
+            None if rest.ends_with(".vtkhdf.part") => remove.push(path),
+            None => {}
         }
     }
     finished.sort();

@@ -64,6 +64,11 @@ impl Outputs {
         Ok(Self { directory, name, options, next: from.map_or(0, |(next, _)| next), particles, tree })
     }
 
+    /// Index of the particle files, for ParaView.
+    pub fn series(&self) -> &Path {
+        self.particles.path()
+    }
+
     /// Number of the next output.
     pub fn next(&self) -> u64 {
         self.next
@@ -90,7 +95,8 @@ impl Outputs {
         Ok(particles)
     }
 
-    /// Collective. Writes a checkpoint and removes all but the last `keep` (at least one).
+    /// Collective. Writes a checkpoint and removes older ones but for the last `keep` (at least one,
+    /// with this), as well as those of later steps: they are of an earlier run.
     pub fn checkpoint<const D: usize>(
         &self,
         comm: &Comm,
@@ -106,7 +112,7 @@ impl Outputs {
         };
         write(comm, &path, view, &options)?;
         let removed = match comm.rank() {
-            0 => remove_old_checkpoints(&self.directory, &self.name, keep.max(1)),
+            0 => remove_old_checkpoints(&self.directory, &self.name, view.step, keep.max(1)),
             _ => Ok(()),
         };
         comm.agree(removed)?;

@@ -1,0 +1,267 @@
+//! `agimp weights`: the weights of given boxes on given trees, as a run would use them or by definition.
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use partition::comm::{Comm, World};
+use partition::{Brick, Forest, MAX_LEVEL, Octant};
+use serde::{Deserialize, Serialize};
+
+use super::Failure;
+use crate::grid::direct;
+use crate::grid::known::KnownTree;
+use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
+
+/// Arguments of `agimp weights`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Trees and boxes (JSON): `dim`, `cells_per_octant_edge`, `trees` with `octants` as `[level, i, j(, k)]` in the
+    /// unit square or cube, and `cases` with `id`, `tree`, `centre` and `half`.
+    pub cases: PathBuf,
+    /// Evaluate the definition cell by cell instead of scattering with the kernels of a run.
+    #[arg(long)]
+    pub direct: bool,
+}
+
+/// Trees and boxes.
+#[derive(Debug, Deserialize)]
+struct Input {
+    dim: u64,
+    cells_per_octant_edge: u64,
+    trees: Vec<Tree>,
+    cases: Vec<Case>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Tree {
+    id: Option<serde_json::Value>,
+    /// Positions of nodes are `ijk / 2^node_lattice_level`; the finest cells of the tree if absent.
+    node_lattice_level: Option<u32>,
+    octants: Vec<Vec<u32>>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Case {
+    id: serde_json::Value,
+    /// `id` of a tree, or its number in the list where trees have none.
+    tree: serde_json::Value,
+    centre: Vec<f64>,
+    half: Vec<f64>,
+}
+
+/// What the command prints.
+#[derive(Debug, Default, Serialize)]
+pub struct Output {
+    /// One entry per case, in the order of the input.
+    pub cases: Vec<CaseWeights>,
+}
+
+/// Weights of one box.
+#[derive(Debug, Serialize)]
+pub struct CaseWeights {
+    /// As in the input.
+    pub id: serde_json::Value,
+    /// Real nodes with a weight or gradient other than zero, in lexicographic order.
+    pub nodes: Vec<NodeWeights>,
+}
+
+/// Weight of one node.
+#[derive(Debug, Serialize)]
+pub struct NodeWeights {
+    /// Position on the lattice of the tree.
+    pub ijk: Vec<u64>,
+    /// Weight.
+    pub w: f64,
+    /// Gradient of the weight with respect to the box's centre.
+    pub grad: Vec<f64>,
+}
+
+/// Carries out `agimp weights`.
+///
+/// # Errors
+/// The file cannot be read, or asks for something that makes no sense.
+pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
+    let comm = world.comm();
+    let name = arguments.cases.display();
+    let text =
+        std::fs::read_to_string(&arguments.cases).map_err(|error| Failure::Usage(format!("{name}: {error}")));
+    let text = agreed(comm, text)?;
+    let output = evaluate(comm, &text, arguments.direct).map_err(|failure| match failure {
+        Failure::Usage(message) => Failure::Usage(format!("{name}: {message}")),
+        other => other,
+    })?;
+    if comm.rank() == 0 {
+        let text = serde_json::to_string(&output).map_err(|error| Failure::Run(error.to_string()))?;
+        writeln!(std::io::stdout(), "{text}")?;
+    }
+    Ok(())
+}
+
+/// Collective. Weights of all cases in `text`, on rank 0; by definition if `direct`.
+///
+/// # Errors
+/// The same kind on all ranks; only rank 0 explains it.
+pub fn evaluate(comm: &Comm, text: &str, direct: bool) -> Result<Output, Failure> {
+    let input: Result<Input, _> =
+        serde_json::from_str(text).map_err(|error| Failure::Usage(error.to_string()));
+    let input = agreed(comm, input)?;
+    match (input.dim, input.cells_per_octant_edge) {
+        (2, 4) => evaluate_in::<2>(comm, &input, direct),
+        (3, 4) => evaluate_in::<3>(comm, &input, direct),
+        (2 | 3, cells) => fail(comm, format!("octants have 4 cells along an edge, not {cells}")),
+        (dim, _) => fail(comm, format!("`dim` is {dim}; it must be 2 or 3")),
+    }
+}
+
+fn fail<T>(comm: &Comm, message: String) -> Result<T, Failure> {
+    Err(if comm.rank() == 0 { Failure::Usage(message) } else { Failure::Elsewhere(2) })
+}
+
+/// Collective. Fails on all ranks if any rank failed; one rank explains it.
+fn agreed<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
+    let text = result.as_ref().err().map(ToString::to_string);
+    match comm.agree(text.map_or(Ok(()), Err)) {
+        Ok(()) => result,
+        Err(disagreement) => fail(comm, disagreement.message),
+    }
+}
+
+fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Result<Output, Failure> {
+    let mut found: Vec<Option<CaseWeights>> = input.cases.iter().map(|_| None).collect();
+    let mut used = 0;
+    for (number, tree) in input.trees.iter().enumerate() {
+        let id = tree.id.clone().unwrap_or_else(|| number.into());
+        let mut cases: Vec<usize> = (0..input.cases.len()).filter(|&i| input.cases[i].tree == id).collect();
+        used += cases.len();
+        let leaves = tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
+        let leaves = agreed(comm, leaves)?;
+        let boxes: Result<Vec<_>, _> = cases.iter().map(|&i| input.cases[i].given::<D>()).collect();
+        let boxes = agreed(comm, boxes.map_err(Failure::Usage))?;
+        let forest = spread(comm, &leaves)
+            .map_err(|error| Failure::Usage(format!("tree {id} is not a tree: {error}")));
+        let forest = agreed(comm, forest)?;
+        let level = tree.lattice_level(&leaves);
+        let mut evaluator = Evaluator::new(comm, forest, leaves, direct);
+        for (i, given) in cases.drain(..).zip(boxes) {
+            let case_id = input.cases[i].id.clone();
+            let nodes = agreed(comm, evaluator.nodes(comm, &given))?;
+            let nodes: Result<Vec<_>, _> = nodes.iter().map(|node| on_lattice(node, level)).collect();
+            let nodes = nodes.map_err(|message| Failure::Usage(format!("case {case_id}: {message}")));
+            found[i] = Some(CaseWeights { id: case_id, nodes: agreed(comm, nodes)? });
+        }
+    }
+    if used < input.cases.len() {
+        return fail(comm, "a case names a tree that is not in the file".into());
+    }
+    Ok(Output { cases: found.into_iter().flatten().collect() })
+}
+
+impl Tree {
+    /// Octants along the curve.
+    fn leaves<const D: usize>(&self) -> Result<Vec<Octant<D>>, String> {
+        let octant = |numbers: &Vec<u32>| match numbers[..] {
+            [level, ref coord @ ..] if coord.len() == D && level <= u32::from(MAX_LEVEL) => {
+                let coord: [u32; D] = std::array::from_fn(|axis| coord[axis]);
+                let is_inside = coord.iter().all(|c| c >> level == 0);
+                is_inside.then_some(Octant { level: level as u8, coord })
+            }
+            _ => None,
+        };
+        let found: Option<Vec<_>> = self.octants.iter().map(octant).collect();
+        let mut leaves = found.ok_or_else(|| {
+            format!("octants must be [level, {} coordinates] inside the unit cell, level <= {MAX_LEVEL}", D)
+        })?;
+        leaves.sort_unstable();
+        Ok(leaves)
+    }
+
+    fn lattice_level<const D: usize>(&self, leaves: &[Octant<D>]) -> u32 {
+        let finest = leaves.iter().map(|leaf| u32::from(leaf.level)).max().unwrap_or(0);
+        self.node_lattice_level.unwrap_or(finest + 2)
+    }
+}
+
+impl Case {
+    fn given<const D: usize>(&self) -> Result<GivenParticle<D>, String> {
+        let numbers = |list: &[f64]| <[f64; D]>::try_from(list).ok();
+        let (Some(centre), Some(half)) = (numbers(&self.centre), numbers(&self.half)) else {
+            return Err(format!("case {}: `centre` and `half` must have {D} numbers", self.id));
+        };
+        // Rounding may put the face of a box that touches a wall a little outside.
+        let slack = 1e-12;
+        let is_inside = (0..D).all(|a| {
+            half[a] > 0.0
+                && centre[a] > 0.0
+                && centre[a] < 1.0
+                && centre[a] - half[a] >= -slack
+                && centre[a] + half[a] <= 1.0 + slack
+        });
+        if !is_inside {
+            return Err(format!("case {}: the box must have a volume and lie in the unit cell", self.id));
+        }
+        // With V₀ τ = I and Δt = -1 the impulse of stress is the gradient of the weight.
+        let still = [0.0; D];
+        let affine = [[0.0; D]; D];
+        Ok(GivenParticle { position: centre, half, mass: 1.0, velocity: still, affine, energy: 1.0 })
+    }
+}
+
+/// Collective. A forest in equal shares.
+fn spread<const D: usize>(comm: &Comm, leaves: &[Octant<D>]) -> Result<Forest<D>, partition::ForestError> {
+    let cut = |rank: usize| rank * leaves.len() / comm.size();
+    let own = leaves[cut(comm.rank())..cut(comm.rank() + 1)].to_vec();
+    Forest::from_leaves(comm, Brick { roots: [1; D] }, own)
+}
+
+/// Finds weights on one tree.
+enum Evaluator<const D: usize> {
+    Direct(KnownTree<D>),
+    Production(Box<GivenBoxes<D>>),
+}
+
+impl<const D: usize> Evaluator<D> {
+    fn new(comm: &Comm, forest: Forest<D>, leaves: Vec<Octant<D>>, direct: bool) -> Self {
+        match direct {
+            true => Self::Direct(KnownTree::whole(*forest.brick(), leaves)),
+            false => Self::Production(Box::new(GivenBoxes::new(comm, forest, 1.0))),
+        }
+    }
+
+    /// Collective. Real nodes in lexicographic order, on rank 0: mass is the weight, momentum its gradient.
+    fn nodes(&mut self, comm: &Comm, given: &GivenParticle<D>) -> Result<Vec<RealNode<D>>, Failure> {
+        match self {
+            Self::Direct(tree) if comm.rank() == 0 => {
+                let nodes = direct::weights(tree, 1.0, given.position, given.half);
+                let as_real = |node: direct::DirectNode<D>| RealNode {
+                    place: node.place,
+                    momentum: node.gradient,
+                    mass: node.weight,
+                };
+                Ok(nodes.into_iter().map(as_real).collect())
+            }
+            Self::Direct(_) => Ok(Vec::new()),
+            Self::Production(boxes) => {
+                boxes.place(&[*given]);
+                let scattered = boxes.to_nodes(-1.0).map_err(|error| Failure::Run(error.to_string()));
+                agreed(comm, scattered)?;
+                Ok(boxes.all_real_nodes(comm))
+            }
+        }
+    }
+}
+
+/// The node on the lattice of the input.
+fn on_lattice<const D: usize>(node: &RealNode<D>, level: u32) -> Result<NodeWeights, String> {
+    let finest = u32::from(MAX_LEVEL) + 2;
+    let ijk: Option<Vec<u64>> = node
+        .place
+        .iter()
+        .map(|&x| {
+            let (up, down) = (level.saturating_sub(finest), finest.saturating_sub(level));
+            let x = u64::from(x).checked_shl(up)?;
+            (x >> down << down == x).then_some(x >> down)
+        })
+        .collect();
+    let ijk = ijk.ok_or_else(|| format!("a node does not lie on the lattice of level {level}"))?;
+    Ok(NodeWeights { ijk, w: node.mass, grad: node.momentum.to_vec() })
+}

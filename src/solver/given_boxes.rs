@@ -1,0 +1,234 @@
+//! Transfers of particles whose boxes are given one by one, through the phases of a step.
+//!
+//! In a run half widths follow from a particle's state. To look at the weights of any box, and to hold transfers
+//! against references, they are given here instead; all else is the same code on the same grid.
+use partition::comm::Comm;
+use partition::{Forest, MAX_LEVEL};
+
+use super::bins::{BinMissing, BoxWidths, greatest_half};
+use super::migrate::position_key;
+use super::time_step::StepControl;
+use super::transfer::{Reach, extent, sort_with};
+use super::update::update_velocity;
+use super::{Clock, Physics, Solver};
+use crate::boundary::{FaceCondition, Leaving};
+use crate::grid::constraint::node_coord;
+use crate::grid::fields::Part;
+use crate::grid::mask::{bits, block_nodes};
+use crate::kernel::{BoxPolicy, Transfer};
+use crate::material::{self, parameters};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// A particle with its box. Lengths in m, relative to the domain's lower corner.
+#[derive(Clone, Copy, Debug)]
+pub struct GivenParticle<const D: usize> {
+    /// Centre.
+    pub position: [f64; D],
+    /// Half widths.
+    pub half: [f64; D],
+    /// Mass, kg.
+    pub mass: f64,
+    /// Velocity, m/s.
+    pub velocity: [f64; D],
+    /// As in the columns [`Layout::AFFINE`].
+    pub affine: [[f64; D]; D],
+    /// Isotropic Kirchhoff stress times volume, `V₀ τ = energy I`, J.
+    pub energy: f64,
+}
+
+/// What a real node has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RealNode<const D: usize> {
+    /// Position in cells of the finest level, `2^-(MAX_LEVEL + 2)` root edges.
+    pub place: [u32; D],
+    /// Momentum, kg m/s.
+    pub momentum: [f64; D],
+    /// Mass, kg.
+    pub mass: f64,
+}
+
+/// Particles with given boxes on a tree.
+pub struct GivenBoxes<const D: usize> {
+    solver: Solver<D>,
+    halves: Halves<D>,
+}
+
+/// Half widths by identifier of the particle.
+struct Halves<const D: usize> {
+    halves: Vec<[f64; D]>,
+    /// Whether the kernels find them from the particles' state.
+    are_cubes: bool,
+}
+
+impl<const D: usize> BoxWidths<D> for Halves<D> {
+    fn list(&self, chunk: &Chunk<D>, _cell: f64, out: &mut Vec<[f64; D]>) {
+        out.clear();
+        out.extend(chunk.ids().iter().map(|&id| self.halves[id as usize]));
+    }
+
+    fn bound(&self, chunk: &Chunk<D>) -> f64 {
+        greatest_half(chunk)
+    }
+
+    fn are_known_to_kernels(&self) -> bool {
+        self.are_cubes
+    }
+}
+
+impl<const D: usize> GivenBoxes<D> {
+    /// Collective. No particles yet.
+    pub fn new(comm: &Comm, forest: Forest<D>, root_edge: f64) -> Self {
+        let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
+        let physics = Physics {
+            root_edge,
+            graded: forest.is_balanced(comm),
+            materials: vec![material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)],
+            gravity: [0.0; D],
+            faces: [[FaceCondition::Slip; 2]; D],
+            leaving: Leaving::default(),
+            transfer: Transfer::Apic,
+            boxes: BoxPolicy::Fixed,
+            control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
+        };
+        let chunks = vec![Chunk::new(); forest.leaves().len()];
+        let solver = Solver::new(comm, physics, forest, chunks, Clock::default());
+        Self { solver, halves: Halves { halves: Vec::new(), are_cubes: true } }
+    }
+
+    /// Collective. Replaces the particles; each rank takes those in its leaves, with their numbers as identifiers. All
+    /// ranks give the same. A box is cut at the domain's walls as in a run.
+    pub fn place(&mut self, particles: &[GivenParticle<D>]) {
+        let (forest, root_edge) = (&self.solver.forest, self.solver.physics.root_edge);
+        let roots = forest.brick().roots;
+        let extent = extent(&self.solver.grid.plan);
+        self.solver.chunks = vec![Chunk::new(); forest.leaves().len()];
+        self.halves.halves = particles
+            .iter()
+            .map(|p| std::array::from_fn(|a| p.half[a].min(p.position[a]).min(extent[a] - p.position[a])))
+            .collect();
+        let is_cube = |half: &[f64; D]| half.iter().all(|&h| h == half[0]);
+        self.halves.are_cubes = self.halves.halves.iter().all(is_cube);
+        for (id, particle) in particles.iter().enumerate() {
+            let Some(leaf) = forest.find(position_key(particle.position, roots, root_edge)) else { continue };
+            let tag = Tag { material: 0, body: 0, level: forest.leaves()[leaf].level };
+            let chunk = &mut self.solver.chunks[leaf];
+            let p = chunk.push_zeroed(id as u64, tag);
+            particle.write(self.halves.halves[id], chunk, p);
+        }
+        let reach = self.solver.agreed_reach();
+        if reach != self.solver.grid.plan.tree.reach() {
+            self.solver.rebuild_grid(reach);
+        }
+    }
+
+    /// Collective. P2G with the impulse of stress over `dt`, node sums, and restriction to real nodes.
+    ///
+    /// # Errors
+    /// On the rank that has a box which fits no bin; all ranks complete the exchange.
+    pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
+        let solver = &mut self.solver;
+        let sorted = sort_with(&mut solver.grid, &solver.chunks, &mut solver.phases, &self.halves);
+        solver.scatter(dt, Reach::Neighbours);
+        let pending = solver.send_arenas();
+        solver.scatter(dt, Reach::Own);
+        solver.sum_nodes(Part::Interior);
+        solver.receive_arenas(pending);
+        solver.sum_nodes(Part::Seam);
+        solver.restrict();
+        sorted
+    }
+
+    /// Not collective. This rank's share of the real nodes that received anything, in no particular order; each
+    /// node has one owner.
+    pub fn real_nodes(&self) -> Vec<RealNode<D>> {
+        let grid = &self.solver.grid;
+        let rows = grid.fields.rows.chunks(block_nodes(D));
+        let mut nodes = Vec::new();
+        for (block, rows) in grid.plan.blocks.iter().zip(rows) {
+            for bit in bits(block.owned) {
+                let row = rows[bit as usize].0;
+                if row.iter().any(|&x| x != 0.0) {
+                    let place = node_coord(block.coord, bit).map(|c| c << (MAX_LEVEL - block.level));
+                    nodes.push(RealNode {
+                        place,
+                        momentum: std::array::from_fn(|axis| row[axis]),
+                        mass: row[3],
+                    });
+                }
+            }
+        }
+        nodes
+    }
+
+    /// Collective. The real nodes of all ranks on rank 0, in lexicographic order of their places, first axis slowest; an empty
+    /// list on the others.
+    pub fn all_real_nodes(&self, comm: &Comm) -> Vec<RealNode<D>> {
+        let words: Vec<u64> = self.real_nodes().iter().flat_map(RealNode::to_words).collect();
+        let gathered = comm.gather_bytes(bytemuck::cast_slice(&words)).unwrap_or_default();
+        let mut nodes: Vec<RealNode<D>> = gathered
+            .iter()
+            .flat_map(|bytes| bytes.chunks_exact(8 * (2 * D + 1)).map(RealNode::from_bytes))
+            .collect();
+        nodes.sort_unstable_by_key(|node| node.place);
+        nodes
+    }
+
+    /// Not collective. Velocities of all nodes from momentum and mass, without forces and walls.
+    pub fn to_velocities(&mut self) {
+        let solver = &mut self.solver;
+        update_velocity(&mut solver.grid.fields, &solver.grid.plan, [0.0; D], 0.0);
+        solver.prolong();
+    }
+
+    /// Not collective. G2P without moving anything: particles take velocity and affine state of the nodes.
+    pub fn to_particles(&mut self, transfer: Transfer) {
+        self.solver.physics.transfer = transfer;
+        self.solver.gather(0.0);
+    }
+
+    /// Not collective. How many leaves of other ranks this rank knows.
+    pub fn ghost_leaves(&self) -> usize {
+        self.solver.grid.plan.tree.ghost_len()
+    }
+
+    /// Not collective. The particles of this rank's leaves.
+    pub fn chunks(&self) -> &[Chunk<D>] {
+        &self.solver.chunks
+    }
+}
+
+impl<const D: usize> RealNode<D> {
+    fn to_words(&self) -> impl Iterator<Item = u64> {
+        let reals = self.momentum.into_iter().chain([self.mass]).map(f64::to_bits);
+        self.place.into_iter().map(u64::from).chain(reals)
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        let word = |i: usize| u64::from_ne_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
+        Self {
+            place: std::array::from_fn(|axis| word(axis) as u32),
+            momentum: std::array::from_fn(|axis| f64::from_bits(word(D + axis))),
+            mass: f64::from_bits(word(2 * D)),
+        }
+    }
+}
+
+impl<const D: usize> GivenParticle<D> {
+    fn write(&self, half: [f64; D], chunk: &mut Chunk<D>, p: usize) {
+        let widest = half.into_iter().fold(0.0, f64::max);
+        let volume = (0..D).fold(1.0, |volume, _| volume * (2.0 * widest));
+        chunk.column_mut(Layout::<D>::MASS)[p] = self.mass;
+        chunk.column_mut(Layout::<D>::HALF)[p] = widest;
+        for i in 0..D {
+            chunk.column_mut(Layout::<D>::POSITION + i)[p] = self.position[i];
+            chunk.column_mut(Layout::<D>::VELOCITY + i)[p] = self.velocity[i];
+            for k in 0..D {
+                chunk.column_mut(Layout::<D>::AFFINE + D * i + k)[p] = self.affine[i][k];
+            }
+        }
+        for normal in 0..3 {
+            chunk.column_mut(Layout::<D>::LEFT_CAUCHY_GREEN + normal)[p] = 1.0;
+            chunk.column_mut(Layout::<D>::STRESS + normal)[p] = self.energy / volume;
+        }
+    }
+}

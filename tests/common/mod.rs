@@ -1,0 +1,5 @@
+//! What tests on several ranks share.
+#![allow(dead_code, reason = "each test uses its part")]
+pub mod launch;
+pub mod random;
+pub mod tree;

@@ -1,0 +1,469 @@
+//! Properties of the weights on random trees with random boxes, on 1 to 4 ranks.
+//!
+//! Each test launches this binary under `mpirun`, once per number of ranks. All ranks draw the same random
+//! numbers, and the bits of all weights must not depend on the number of ranks.
+mod common;
+
+use std::collections::BTreeMap;
+
+use agimp::exact_sum::ExactSum;
+use agimp::grid::{KnownTree, direct};
+use agimp::kernel::Transfer;
+use agimp::particle::chunk::Layout;
+use agimp::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
+use common::launch::{Scenario, agrees_for, report, work};
+use common::random::Random;
+use common::tree::{contains, forest_of, graded, random_leaves};
+use partition::{Brick, Comm, MAX_LEVEL, Octant};
+
+const EPS: f64 = f64::EPSILON;
+
+const SCENARIOS: &[(&str, Scenario)] = &[
+    ("boxes_2d", |comm| random_boxes::<2>(comm, 14, 9, 5)),
+    ("boxes_3d", |comm| random_boxes::<3>(comm, 6, 7, 3)),
+    ("crowd_2d", |comm| crowds::<2>(comm, 12, 300)),
+    ("crowd_3d", |comm| crowds::<3>(comm, 4, 200)),
+    ("ghosts_2d", |comm| ghosts::<2>(comm, Brick { roots: [32, 2] }, 12, 5)),
+    ("ghosts_3d", |comm| ghosts::<3>(comm, Brick { roots: [16, 1, 1] }, 5, 3)),
+    ("lines_2d", lines::<2>),
+    ("lines_3d", lines::<3>),
+    ("lattices", |comm| {
+        lattices::<2>(comm);
+        lattices::<3>(comm);
+    }),
+];
+
+#[test]
+#[ignore = "started by the other tests under mpirun"]
+fn worker() {
+    work(SCENARIOS);
+}
+
+#[test]
+fn boxes_on_trees_2d() {
+    agrees_for("boxes_2d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn boxes_on_trees_3d() {
+    agrees_for("boxes_3d", &[1, 2, 4]);
+}
+
+#[test]
+fn mass_reaches_real_nodes_2d() {
+    agrees_for("crowd_2d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn mass_reaches_real_nodes_3d() {
+    agrees_for("crowd_3d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn far_ranks_2d() {
+    agrees_for("ghosts_2d", &[1, 2, 3, 4]);
+}
+
+#[test]
+fn far_ranks_3d() {
+    agrees_for("ghosts_3d", &[1, 3, 4]);
+}
+
+#[test]
+fn smooth_through_level_jumps_2d() {
+    agrees_for("lines_2d", &[1]);
+}
+
+#[test]
+fn smooth_through_level_jumps_3d() {
+    agrees_for("lines_3d", &[1]);
+}
+
+#[test]
+fn lattices_of_boxes_give_no_spurious_force() {
+    agrees_for("lattices", &[1, 3]);
+}
+
+/// Mixes values into a number that tells sequences of bits apart.
+#[derive(Default)]
+struct Digest(u64);
+
+impl Digest {
+    fn add<const D: usize>(&mut self, nodes: &[RealNode<D>]) {
+        for node in nodes {
+            let words = node.place.into_iter().map(u64::from);
+            let reals = node.momentum.into_iter().chain([node.mass]).map(f64::to_bits);
+            for word in words.chain(reals) {
+                self.0 = (self.0 ^ word).wrapping_mul(0x100_0000_01b3).rotate_left(29);
+            }
+        }
+    }
+}
+
+/// Position of a node, root edges.
+fn position<const D: usize>(place: [u32; D]) -> [f64; D] {
+    place.map(|x| f64::from(x) / f64::from(1u32 << (MAX_LEVEL + 2)))
+}
+
+/// A particle of mass 1 whose nodal mass is its weight, and nodal momentum the weight's gradient for a step of -1.
+fn unit<const D: usize>(centre: [f64; D], half: [f64; D]) -> GivenParticle<D> {
+    let (velocity, affine) = ([0.0; D], [[0.0; D]; D]);
+    GivenParticle { position: centre, half, mass: 1.0, velocity, affine, energy: 1.0 }
+}
+
+/// Errors of double arithmetic grow with this number of a box (see the README of the golden data).
+fn kappa<const D: usize>(centre: [f64; D], half: [f64; D]) -> f64 {
+    (0..D).map(|a| ((centre[a].abs() + 1.0) / half[a]).max(1.0)).sum()
+}
+
+/// Edge of the cells of the leaf that holds a position.
+fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64 {
+    let leaf = leaves.iter().find(|leaf| contains(leaf, at)).expect("the tree fills its brick");
+    0.25 * 0.5f64.powi(i32::from(leaf.level))
+}
+
+/// All kinds of boxes.
+const ALL: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 7, 8];
+/// Kinds of boxes at most one cell wide.
+const NARROW: &[u64] = &[0, 1, 2, 5, 7, 8];
+/// Kinds of boxes at most a few cells wide.
+const WIDE: &[u64] = &[0, 1, 2, 3, 4, 5, 7, 8];
+
+/// A box of a random kind inside the brick.
+fn random_box<const D: usize>(
+    random: &mut Random,
+    brick: Brick<D>,
+    leaves: &[Octant<D>],
+    kinds: &[u64],
+) -> ([f64; D], [f64; D]) {
+    let extent = brick.roots.map(f64::from);
+    let mut centre: [f64; D] = std::array::from_fn(|a| random.between(0.0, extent[a]));
+    let h = cell_at(leaves, centre);
+    let kind = kinds[random.below(kinds.len() as u64) as usize];
+    let factor = |random: &mut Random| match kind {
+        0 => 0.25,
+        1 => 0.5,
+        2 => random.between(0.1, 0.5),
+        3 => random.between(0.5, 2.5),
+        4 => 2.0 * random.between(0.05, 1.6),
+        5 => 1e-3,
+        6 => random.between(4.0, 6.0),
+        _ => 0.5,
+    };
+    let same = factor(random);
+    let mut half = [0.0; D];
+    for axis in 0..D {
+        // Kind 4 is a box of unlike widths.
+        half[axis] = (h * if kind == 4 { factor(random) } else { same }).min(0.45 * extent[axis]);
+        match kind {
+            // Faces of the box on faces of cells, or the centre on a node.
+            7 => centre[axis] = ((centre[axis] / h).floor() + 0.5) * h,
+            8 => centre[axis] = (centre[axis] / h).round() * h,
+            _ => {}
+        }
+    }
+    // Some boxes at walls, edges and corners.
+    for axis in 0..D {
+        let wall = [half[axis], extent[axis] - half[axis]];
+        centre[axis] = match random.below(8) {
+            0 => wall[0],
+            1 => wall[1],
+            _ => centre[axis].clamp(wall[0], wall[1]),
+        };
+    }
+    (centre, half)
+}
+
+/// Bricks and trees in turn, half of them graded.
+fn random_tree<const D: usize>(
+    random: &mut Random,
+    number: usize,
+    deepest: u8,
+) -> (Brick<D>, Vec<Octant<D>>) {
+    let mut roots = [1; D];
+    roots[number % D] = 1 + number as u32 % 3 / 2;
+    let brick = Brick { roots };
+    let points = 2 + random.below(3);
+    let leaves = random_leaves(random, brick, points, deepest);
+    (brick, if number % 2 == 0 { leaves } else { graded(leaves) })
+}
+
+/// Each box alone: sums, signs, linear reproduction, and agreement with the definition.
+fn random_boxes<const D: usize>(comm: &Comm, trees: usize, boxes: usize, deepest: u8) {
+    let mut random = Random::new(17 + D as u64);
+    let mut worst = Worst::default();
+    let mut digest = Digest::default();
+    for number in 0..trees {
+        let (brick, leaves) = random_tree::<D>(&mut random, number, deepest);
+        let tree = KnownTree::whole(brick, leaves.clone());
+        let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
+        for _ in 0..boxes {
+            let (centre, half) = random_box(&mut random, brick, &leaves, ALL);
+            grid.place(&[unit(centre, half)]);
+            grid.to_nodes(-1.0).expect("a box fits its bins");
+            let nodes = grid.all_real_nodes(comm);
+            if comm.rank() == 0 {
+                digest.add(&nodes);
+                let exact = direct::weights(&tree, 1.0, centre, half);
+                worst.check(&nodes, &exact, centre, half, cell_at(&leaves, centre));
+            }
+        }
+    }
+    report(comm, format!("{worst:.3?} bits {:016x}", digest.0));
+}
+
+fn total(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sum = ExactSum::new();
+    values.for_each(|value| sum.add(value));
+    sum.to_f64()
+}
+
+/// Greatest errors in units of `eps κ`.
+#[derive(Debug, Default)]
+struct Worst {
+    sum: f64,
+    gradient_sum: f64,
+    position: f64,
+    definition: f64,
+    definition_gradient: f64,
+}
+
+impl Worst {
+    fn check<const D: usize>(
+        &mut self,
+        nodes: &[RealNode<D>],
+        exact: &[direct::DirectNode<D>],
+        centre: [f64; D],
+        half: [f64; D],
+        cell: f64,
+    ) {
+        let unit = EPS * kappa(centre, half);
+        let note = |worst: &mut f64, error: f64, what: &str| {
+            assert!(error <= 2.0 * unit, "{what}: {error:e} for the box {centre:?}, {half:?}");
+            *worst = worst.max(error / unit);
+        };
+        assert!(nodes.iter().all(|node| node.mass >= 0.0), "a weight is negative: {centre:?} {half:?}");
+        // Exact sums: the errors of the weights count here, not those of adding them up.
+        let one = total(nodes.iter().map(|node| node.mass).chain([-1.0]));
+        note(&mut self.sum, one.abs(), "sum of weights");
+        for axis in 0..D {
+            let gradient = total(nodes.iter().map(|node| node.momentum[axis]));
+            note(&mut self.gradient_sum, cell * gradient.abs(), "sum of gradients");
+            // About the centre, so that the products are small.
+            let arm = |node: &RealNode<D>| node.mass * (position(node.place)[axis] - centre[axis]);
+            note(&mut self.position, total(nodes.iter().map(arm)).abs(), "mean of positions");
+        }
+        // Rounding may give either a node with next to no weight that the other does not have.
+        let mut both: BTreeMap<[u32; D], [(f64, [f64; D]); 2]> = BTreeMap::new();
+        for node in nodes {
+            both.entry(node.place).or_insert([(0.0, [0.0; D]); 2])[0] = (node.mass, node.momentum);
+        }
+        for node in exact {
+            both.entry(node.place).or_insert([(0.0, [0.0; D]); 2])[1] = (node.weight, node.gradient);
+        }
+        for [found, exact] in both.values() {
+            note(&mut self.definition, (found.0 - exact.0).abs(), "weight against its definition");
+            for axis in 0..D {
+                let error = cell * (found.1[axis] - exact.1[axis]).abs();
+                note(&mut self.definition_gradient, error, "gradient against its definition");
+            }
+        }
+    }
+}
+
+/// Many boxes of all kinds at once, on trees with known jumps: all mass arrives on real nodes.
+fn crowds<const D: usize>(comm: &Comm, trees: usize, boxes: usize) {
+    let mut random = Random::new(41 + D as u64);
+    let mut digest = Digest::default();
+    let mut worst: f64 = 0.0;
+    for number in 0..trees {
+        let jump = 1 + number % 4;
+        let (brick, leaves) = tree_with_jump::<D>(&mut random, jump as u8);
+        let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
+        let particles: Vec<GivenParticle<D>> = (0..boxes)
+            .map(|_| {
+                let (centre, half) = random_box(&mut random, brick, &leaves, ALL);
+                let mass = random.between(0.1, 1.0);
+                let affine = std::array::from_fn(|_| random.point(-1.0, 1.0));
+                GivenParticle { mass, velocity: random.point(-1.0, 1.0), affine, ..unit(centre, half) }
+            })
+            .collect();
+        grid.place(&particles);
+        grid.to_nodes(-1.0).expect("boxes fit their bins");
+        let nodes = grid.all_real_nodes(comm);
+        if comm.rank() == 0 {
+            digest.add(&nodes);
+            let mass: f64 = particles.iter().map(|p| p.mass).sum();
+            let found: f64 = nodes.iter().map(|node| node.mass).sum();
+            let error = (found / mass - 1.0).abs();
+            assert!(error <= 1e-14, "jump of {jump} levels: {error:e} of the mass is lost");
+            worst = worst.max(error);
+        }
+    }
+    report(comm, format!("{worst:.1e} bits {:016x}", digest.0));
+}
+
+/// Trees so large that a rank knows a part only: still the same bits, and all mass on real nodes.
+fn ghosts<const D: usize>(comm: &Comm, brick: Brick<D>, points: u64, deepest: u8) {
+    let mut random = Random::new(61 + D as u64);
+    let mut digest = Digest::default();
+    for (number, kinds) in [NARROW, WIDE, ALL, NARROW, WIDE].into_iter().enumerate() {
+        let leaves = random_leaves::<D>(&mut random, brick, points, deepest);
+        let leaves = if number < 3 { leaves } else { graded(leaves) };
+        let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
+        let particles: Vec<GivenParticle<D>> = (0..400)
+            .map(|_| {
+                let (centre, half) = random_box(&mut random, brick, &leaves, kinds);
+                let affine = std::array::from_fn(|_| random.point(-1.0, 1.0));
+                GivenParticle { velocity: random.point(-1.0, 1.0), affine, ..unit(centre, half) }
+            })
+            .collect();
+        grid.place(&particles);
+        grid.to_nodes(-1.0).expect("boxes fit their bins");
+        assert!(comm.size() < 4 || 4 * grid.ghost_leaves() < 3 * leaves.len(), "the tree is too small");
+        let nodes = grid.all_real_nodes(comm);
+        if comm.rank() == 0 {
+            digest.add(&nodes);
+            let mass = total(nodes.iter().map(|node| node.mass).chain([-(particles.len() as f64)]));
+            assert!(mass.abs() <= 1e-14 * particles.len() as f64, "{mass:e} of the mass is lost");
+        }
+        // Prolongation and G2P too.
+        grid.to_velocities();
+        grid.to_particles(Transfer::Apic);
+        let mut sum = [0u64];
+        for chunk in grid.chunks() {
+            for (p, id) in chunk.ids().iter().enumerate() {
+                let columns = (0..Layout::<D>::REALS).map(|column| chunk.column(column)[p].to_bits());
+                let mixed = columns.fold(*id, |mixed, bits| (mixed ^ bits).wrapping_mul(0x100_0000_01b3));
+                sum[0] = sum[0].wrapping_add(mixed >> 8);
+            }
+        }
+        comm.sum_u64(&mut sum);
+        digest.0 ^= sum[0];
+    }
+    report(comm, format!("bits {:016x}", digest.0));
+}
+
+/// A tree in which some leaves of level 1 touch leaves `jump` levels finer.
+fn tree_with_jump<const D: usize>(random: &mut Random, jump: u8) -> (Brick<D>, Vec<Octant<D>>) {
+    let brick = Brick { roots: [1; D] };
+    let mut leaves: Vec<Octant<D>> =
+        (0..1 << D).map(|i| Octant { level: 0, coord: [0; D] }.child(i)).collect();
+    // The point lies beside the middle of the domain, where all leaves of level 1 meet.
+    let at: [f64; D] = std::array::from_fn(|_| 0.5 + random.between(-1e-3, 1e-3));
+    let level = 1 + jump;
+    while let Some(index) = leaves.iter().position(|leaf| leaf.level < level && contains(leaf, at)) {
+        let leaf = leaves.swap_remove(index);
+        leaves.extend((0..1 << D).map(|child| leaf.child(child)));
+    }
+    (brick, leaves)
+}
+
+/// A box of fixed size on lines through faces, edges and corners of level jumps: weights and gradients are
+/// continuous, and the gradients are the derivatives of the weights.
+fn lines<const D: usize>(comm: &Comm) {
+    let mut random = Random::new(97 + D as u64);
+    let (lines, steps) = if D == 2 { (12, 40) } else { (6, 24) };
+    let mut worst: f64 = 0.0;
+    for number in 0..lines {
+        let jump = 1 + number as u8 % 4;
+        let (brick, leaves) = tree_with_jump::<D>(&mut random, jump.min(if D == 2 { 4 } else { 3 }));
+        let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves), 1.0);
+        let fine = 0.125 * 0.5f64.powi(i32::from(jump));
+        let half: [f64; D] = std::array::from_fn(|_| fine * random.between(0.2, 1.2));
+        // Through the middle along an axis (a face), in a plane (an edge) or along a diagonal (a corner).
+        let along = 1 + number % D;
+        let direction: [f64; D] =
+            std::array::from_fn(|a| if a < along { random.between(0.5, 1.0) } else { 0.0 });
+        let aside: [f64; D] =
+            std::array::from_fn(|a| if a < along { 0.0 } else { random.between(-0.1, 0.1) });
+        let mut weights = |t: f64| {
+            let centre = std::array::from_fn(|a| 0.5 + aside[a] + t * direction[a]);
+            grid.place(&[unit(centre, half)]);
+            grid.to_nodes(-1.0).expect("a box fits its bins");
+            let nodes = grid.all_real_nodes(comm).into_iter();
+            nodes.map(|node| (node.place, node)).collect::<BTreeMap<_, _>>()
+        };
+        let steepest = (0..D).map(|a| 1.0 / half[a].min(fine)).fold(0.0, f64::max);
+        // Curvature of a weight, twice over for boxes astride cells of both sizes.
+        let curvature = 2.0 * D as f64 * steepest * steepest;
+        let delta = 1e-6 * fine;
+        for step in 0..steps {
+            let t = 3.0 * fine * (2.0 * f64::from(step) / f64::from(steps) - 1.0 + random.between(0.0, 0.01));
+            // Also where a face of the box passes a face of the fine leaves.
+            let t = if step % 4 == 0 {
+                half[0] / direction[0] * if step % 8 == 0 { 1.0 } else { -1.0 }
+            } else {
+                t
+            };
+            let (before, after) = (weights(t - delta), weights(t + delta));
+            let none = RealNode { place: [0; D], momentum: [0.0; D], mass: 0.0 };
+            for place in before.keys().chain(after.keys()) {
+                let (a, b) = (before.get(place).unwrap_or(&none), after.get(place).unwrap_or(&none));
+                let mean: f64 = (0..D).map(|k| (a.momentum[k] + b.momentum[k]) * delta * direction[k]).sum();
+                let bound = curvature * (4.0 * delta * delta) + 64.0 * EPS * (1.0 + steepest);
+                let error = (b.mass - a.mass - mean).abs();
+                assert!(error <= bound, "weight of {place:?} at {t}: {error:e} > {bound:e}");
+                worst = worst.max(error / bound);
+                for k in 0..D {
+                    let change = (b.momentum[k] - a.momentum[k]).abs();
+                    let bound = 4.0 * curvature * delta + 1e-12 * steepest;
+                    assert!(change <= bound, "gradient of {place:?} at {t}: {change:e} > {bound:e}");
+                    worst = worst.max(change / bound);
+                }
+            }
+        }
+    }
+    report(comm, format!("at most {worst:.2} of the bounds"));
+}
+
+/// Boxes of equal size that tile the domain, 1 to 4 and a broken number per cell, under uniform stress: no
+/// force inside, and none along the walls.
+fn lattices<const D: usize>(comm: &Comm) {
+    let mut random = Random::new(5);
+    let (brick, leaves) = tree_with_jump::<D>(&mut random, 2);
+    let tree = KnownTree::whole(brick, leaves.clone());
+    let mut grid = GivenBoxes::new(comm, forest_of(comm, brick, leaves.clone()), 1.0);
+    // Along an edge of the domain there are 8 cells of the coarsest leaves.
+    let counts: &[u32] = if D == 2 { &[8, 16, 24, 32, 20, 11] } else { &[8, 16, 12] };
+    for &count in counts {
+        let spacing = 1.0 / f64::from(count);
+        let particles: Vec<GivenParticle<D>> = (0..count.pow(D as u32))
+            .map(|index| {
+                let at = |axis: usize| f64::from(index / count.pow(axis as u32) % count) + 0.5;
+                let volume = spacing.powi(D as i32);
+                let centre = std::array::from_fn(|axis| at(axis) * spacing);
+                GivenParticle { mass: volume, energy: volume, ..unit(centre, [0.5 * spacing; D]) }
+            })
+            .collect();
+        grid.place(&particles);
+        grid.to_nodes(-1.0).expect("boxes fit their bins");
+        let nodes = grid.all_real_nodes(comm);
+        if comm.rank() != 0 {
+            continue;
+        }
+        let mut absolute: BTreeMap<[u32; D], f64> = BTreeMap::new();
+        for particle in &particles {
+            for node in direct::weights(&tree, 1.0, particle.position, particle.half) {
+                let length = node.gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+                // A box around the whole support of a node has no gradient by cancellation inside it.
+                let inside = node.weight / cell_at(&leaves, position(node.place).map(|x| x.min(0.999)));
+                *absolute.entry(node.place).or_insert(0.0) += particle.mass * (length + inside);
+            }
+        }
+        let mut worst: f64 = 0.0;
+        for node in &nodes {
+            for axis in 0..D {
+                let x = position(node.place)[axis];
+                // Stress pushes against the walls, and only there.
+                if x > 0.0 && x < 1.0 {
+                    let error = node.momentum[axis].abs() / (EPS * absolute[&node.place]);
+                    assert!(error <= 64.0, "{count} boxes: {error} eps at {:?}", node.place);
+                    worst = worst.max(error);
+                }
+            }
+        }
+        println!("{D}D, {count} boxes along an edge: {worst:.1} eps");
+    }
+    report(comm, format!("{D}D"));
+}
