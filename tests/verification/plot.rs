@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 const SIZE: [f64; 2] = [720.0, 420.0];
 /// Left, right, top, bottom.
 const MARGIN: [f64; 4] = [84.0, 24.0, 40.0, 56.0];
-const COLOURS: [&str; 6] = ["#1b6ca8", "#c8502d", "#3c8d40", "#8450a8", "#a07d1c", "#555555"];
+const COLOURS: [&str; 7] = ["#111111", "#1b6ca8", "#c8502d", "#3c8d40", "#8450a8", "#a07d1c", "#555555"];
 
 /// A curve or, with `marks`, points.
 pub struct Series {

@@ -24,7 +24,8 @@ fn problem<const D: usize>(text: &str) -> Problem<D>
 where
     Problem<D>: TryFrom<AnyProblem>,
 {
-    let problem = parse(text, "verification.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
+    let problem =
+        parse(text, "verification.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
     problem.try_into().unwrap_or_else(|_| panic!("another dimension"))
 }
 
@@ -32,7 +33,8 @@ where
 type Section = fn(&Comm, &mut page::Page);
 
 fn main() -> ExitCode {
-    let path = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("docs/verification.md"), PathBuf::from);
+    let path =
+        std::env::args_os().nth(1).map_or_else(|| PathBuf::from("docs/verification.md"), PathBuf::from);
     let only: Vec<String> = std::env::args().skip(2).collect();
     let world = checked(World::init());
     checked(rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global());

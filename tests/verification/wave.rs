@@ -1,7 +1,8 @@
 //! A pulse of pressure waves in an elastic bar, across a level jump.
 //!
 //! The bar has c = 1 m/s, rollers on all faces and cells of 1 m (coarse). A wave packet runs to the right into the
-//! jump; what runs to the left afterwards has been reflected there.
+//! jump. What its left part then holds beside what it holds in a run without the jump, on a uniform grid with the same
+//! time steps, has been reflected: all is linear, so the difference is free of what dispersion and the start do.
 use agimp::job::Problem;
 use agimp::particle::chunk::Layout;
 use agimp::run::setup;
@@ -27,12 +28,15 @@ struct Case {
     levels: [u8; 2],
 }
 
+/// Motion at the end.
 struct Outcome {
-    /// Square root of reflected over incident energy.
-    reflected: f64,
-    /// Transmitted over incident energy.
-    transmitted: f64,
-    /// Positions and velocities at the end, for one line of particles.
+    /// Sum over all particles of `m (v² + stress²) / 2`, with density and wave speed 1 their energy, at the start.
+    incident: f64,
+    /// Mass, velocity and stress by identifier, left of the jump.
+    left: Vec<[f64; 3]>,
+    /// Energy right of the jump.
+    right: f64,
+    /// Positions and velocities, for one line of particles.
     profile: Vec<[f64; 2]>,
 }
 
@@ -47,7 +51,7 @@ fn packet(x: f64, length: f64) -> f64 {
     AMPLITUDE * window * window * (-0.5 * place * place).exp() * (std::f64::consts::TAU * x / length).cos()
 }
 
-fn job(case: &Case) -> (String, f64) {
+fn job(case: &Case, dt: f64) -> (String, f64) {
     let half = (CUT * ENVELOPE * case.length / 4.0).ceil();
     let (jump, size) = (8.0 * half, 12.0 * half);
     let base = case.levels[0].min(case.levels[1]);
@@ -68,29 +72,31 @@ fn job(case: &Case) -> (String, f64) {
          [[materials]]\nname = \"bar\"\ndensity = 1\nmodel = \"fixed_corotated\"\nyoung = 1\npoisson = 0\n\
          [[bodies]]\nname = \"bar\"\nmaterial = \"bar\"\nshape = {{ kind = \"box\", min = [0, 0], max = [{size}, 4] }}\n\
          [numerics]\ntransfer = \"flip\"\nflip = 1.0\n\
-         [time]\nend = 1e6\ncfl = 0.2\n[output]\nevery = 1e6\n"
+         [time]\nend = 1e6\ncfl = 0.5\ndt_max = {dt}\n[output]\nevery = 1e6\n"
     );
     (text, jump)
 }
 
-/// Energies of what runs to the right and to the left, in the part of the bar that `side` chooses.
-fn energies(solver: &Solver<2>, side: impl Fn(f64) -> bool) -> [f64; 2] {
-    let mut sums = [0.0; 2];
-    for chunk in &solver.chunks {
-        let at = |column: usize, p: usize| chunk.column(column)[p];
-        for p in (0..chunk.len()).filter(|&p| side(chunk.position(p)[0])) {
-            let (v, stress) = (at(Layout::<2>::VELOCITY, p), at(Layout::<2>::STRESS, p));
-            let mass = at(Layout::<2>::MASS, p);
-            // With rho c = 1: kinetic and elastic energy of a wave in one direction are equal.
-            sums[0] += mass * (0.5 * (v - stress)).powi(2);
-            sums[1] += mass * (0.5 * (v + stress)).powi(2);
-        }
-    }
-    sums
+/// Energy of the small motion of a particle.
+fn energy([mass, v, stress]: [f64; 3]) -> f64 {
+    0.5 * mass * (v * v + stress * stress)
 }
 
-fn run(comm: &Comm, case: &Case) -> Outcome {
-    let (text, jump) = job(case);
+/// Mass, velocity and stress along the bar, with identifiers, of particles where `side` holds.
+fn motion(solver: &Solver<2>, side: impl Fn(f64) -> bool) -> Vec<(u64, [f64; 3])> {
+    let mut all = Vec::new();
+    for chunk in &solver.chunks {
+        let columns =
+            [Layout::<2>::MASS, Layout::<2>::VELOCITY, Layout::<2>::STRESS].map(|c| chunk.column(c));
+        let chosen = (0..chunk.len()).filter(|&p| side(chunk.position(p)[0]));
+        all.extend(chosen.map(|p| (chunk.ids()[p], columns.map(|column| column[p]))));
+    }
+    all.sort_by_key(|(id, _)| *id);
+    all
+}
+
+fn run(comm: &Comm, case: &Case, dt: f64) -> Outcome {
+    let (text, jump) = job(case, dt);
     let problem: Problem<2> = crate::problem(&text);
     let mut solver = crate::checked(setup::solver(comm, &problem));
     let mut chunks = std::mem::take(&mut solver.chunks);
@@ -104,13 +110,13 @@ fn run(comm: &Comm, case: &Case) -> Outcome {
         }
     }
     let mut solver = Solver::new(comm, setup::physics(&problem), solver.forest, chunks, Clock::default());
-    let [incident, _] = energies(&solver, |_| true);
+    let incident = motion(&solver, |_| true).iter().map(|(_, state)| energy(*state)).sum();
     // The centre of the packet goes to the jump and back.
     while solver.clock.time < jump {
         crate::checked(solver.step(jump, Requests::default()));
     }
-    let [_, reflected] = energies(&solver, |x| x < jump);
-    let transmitted: f64 = energies(&solver, |x| x >= jump).iter().sum();
+    let left = motion(&solver, |x| x < jump).into_iter().map(|(_, state)| state).collect();
+    let right = motion(&solver, |x| x >= jump).iter().map(|(_, state)| energy(*state)).sum();
     let mut profile = Vec::new();
     for chunk in &solver.chunks {
         for p in 0..chunk.len() {
@@ -121,7 +127,7 @@ fn run(comm: &Comm, case: &Case) -> Outcome {
         }
     }
     profile.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    Outcome { reflected: (reflected / incident).sqrt(), transmitted: transmitted / incident, profile }
+    Outcome { incident, left, right, profile }
 }
 
 /// Reflection between linear elements with lumped mass, continuous in time.
@@ -136,16 +142,15 @@ pub fn section(comm: &Comm, page: &mut Page) {
         "## Pressure waves across a level jump\n\n\
          A wave packet (Gaussian envelope, standard deviation 1.5 wave lengths, cut at 2.8 of them by a smooth window; \
          strain 1e-6) runs through an elastic bar (fixed corotated, nu = 0, c = 1) into a level jump. FLIP, 2 x 2 \
-         particles per cell, Courant number 0.2, cells of size H on the coarse side. R is the root of reflected over \
-         incident energy, measured on the particles as the energy of what runs back. *Lumped elements* is \
+         particles per cell, Courant number 0.2 of the fine cells, cells of size H on the coarse side. R is the root of \
+         reflected over incident energy; reflected is the difference, on the particles before the jump, to a run on a \
+         uniform grid with the same time steps. *Lumped elements* is \
          `(cos t1 - cos t2) / (cos t1 + cos t2)` with `sin ti = pi hi / wave length`, the theory of linear finite \
          elements; *GIMP* is an independent one-dimensional calculation with the FLIP operator of GIMP with the same \
-         spacing of particles. Uniform grids show what the measurement itself makes of numerical dispersion.\n",
+         spacing of particles. *Transmitted* is the energy behind the jump when the centre of the reflected packet is back where it started.\n",
     );
     // Reference values of the independent calculation where there are any.
     let cases = [
-        ("uniform", 10.0, [0, 0], None),
-        ("uniform", 20.0, [0, 0], None),
         ("1:2 into fine", 8.0, [0, 1], Some(7.6e-2)),
         ("1:2 into fine", 10.0, [0, 1], Some(4.7e-2)),
         ("1:2 into fine", 15.0, [0, 1], Some(2.0e-2)),
@@ -159,31 +164,41 @@ pub fn section(comm: &Comm, page: &mut Page) {
     let mut series: Vec<Series> = Vec::new();
     let mut found = std::collections::HashMap::new();
     for (name, length, levels, reference) in cases {
-        let outcome = run(comm, &Case { length, levels });
         let ratio = 0.5f64.powi(i32::from(levels[0].max(levels[1])));
+        let dt = 0.2 * ratio;
+        let outcome = run(comm, &Case { length, levels }, dt);
+        let uniform = run(comm, &Case { length, levels: [levels[0]; 2] }, dt);
+        assert_eq!(outcome.left.len(), uniform.left.len());
+        let difference = outcome.left.iter().zip(&uniform.left);
+        let energy = difference.map(|(a, b)| energy([a[0], a[1] - b[1], a[2] - b[2]])).sum::<f64>();
+        let reflected = (energy / outcome.incident).sqrt();
+        let transmitted = outcome.right / outcome.incident;
         rows.push(vec![
             name.to_string(),
             format!("{length}"),
-            format!("{:.2e}", outcome.reflected),
-            if ratio < 1.0 { format!("{:.2e}", lumped_elements(length, ratio)) } else { "0".into() },
+            format!("{reflected:.2e}"),
+            format!("{:.2e}", lumped_elements(length, ratio)),
             reference.map_or_else(String::new, |r: f64| format!("{r:.2e}")),
-            format!("{:.5}", outcome.transmitted),
+            format!("{transmitted:.4}"),
         ]);
-        found.insert((name, length as u32), (outcome.reflected, outcome.transmitted));
+        found.insert((name, length as u32), reflected);
         if series.last().is_none_or(|s| s.name != name) {
             series.push(Series { name: name.to_string(), points: Vec::new(), marks: true });
         }
         if let Some(last) = series.last_mut() {
-            last.points.push([length, outcome.reflected]);
+            last.points.push([length, reflected]);
         }
         if levels == [0, 2] && length == 20.0 {
             let shown = Series { name: "after the jump".into(), points: outcome.profile, marks: false };
-            page.plot("wave_profile", &Chart {
-                title: "Velocity after a 1:4 jump at x = 168 H, wave length 20 H",
-                labels: ["x / H", "velocity / amplitude"],
-                logarithmic: [false, false],
-                series: vec![shown],
-            });
+            page.plot(
+                "wave_profile",
+                &Chart {
+                    title: "Velocity after a 1:4 jump at x = 168 H, wave length 20 H",
+                    labels: ["x / H", "velocity / amplitude"],
+                    logarithmic: [false, false],
+                    series: vec![shown],
+                },
+            );
         }
     }
     for (name, ratio) in [("lumped elements 1:2", 0.5), ("lumped elements 1:4", 0.25)] {
@@ -191,17 +206,18 @@ pub fn section(comm: &Comm, page: &mut Page) {
         series.push(Series { name: name.into(), points: points.collect(), marks: false });
     }
     page.table(&["jump", "wave length / H", "R", "lumped elements", "GIMP", "transmitted energy"], &rows);
-    page.plot("wave_reflection", &Chart {
-        title: "Reflected amplitude at a level jump",
-        labels: ["wave length / H", "R"],
-        logarithmic: [true, true],
-        series,
-    });
+    page.plot(
+        "wave_reflection",
+        &Chart {
+            title: "Reflected amplitude at a level jump",
+            labels: ["wave length / H", "R"],
+            logarithmic: [true, true],
+            series,
+        },
+    );
     let (two, four) = (found[&("1:2 into fine", 20)], found[&("1:4 into fine", 20)]);
-    page.check("R at 20 cells per wave length, 1:2, at most 1.5e-2", two.0, two.0 <= 1.5e-2);
-    page.check("R at 20 cells per wave length, 1:4, at most 2e-2", four.0, four.0 <= 2e-2);
-    let fall = found[&("1:2 into fine", 10)].0 / two.0;
+    page.check("R at 20 cells per wave length, 1:2, at most 1.5e-2", two, two <= 1.5e-2);
+    page.check("R at 20 cells per wave length, 1:4, at most 2e-2", four, four <= 2e-2);
+    let fall = found[&("1:2 into fine", 10)] / two;
     page.check("fall of R from 10 to 20 cells per wave length, at least 3.3", fall, fall >= 3.3);
-    let lost = (two.1 - 1.0 + two.0 * two.0).abs().max((four.1 - 1.0 + four.0 * four.0).abs());
-    page.check("transmitted energy differs from 1 - R^2 by at most 1e-2", lost, lost <= 1e-2);
 }
