@@ -166,7 +166,7 @@ pub fn section(comm: &Comm, page: &mut Page) {
          particles carry in their affine part is included; with the other transfers the angular momentum is that of \
          points. The start without stress sets the bodies swinging; the loss of kinetic energy of the first turn \
          contains what goes into this. The square on half the cells is shown for one turn only: over 10,000 steps \
-         (4.6 turns) it came apart and hit the walls, since particles of coarse leaves, which nobody splits here, turn \
+         (4.6 turns) it came apart and hit the walls, presumably since particles of coarse leaves, which nobody splits here, turn \
          into cells half or a quarter of theirs.\n",
     );
     let with = |transfer: &str| SQUARE.replace("transfer = \"apic\"", transfer);
