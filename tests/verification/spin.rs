@@ -165,7 +165,9 @@ pub fn section(comm: &Comm, page: &mut Page) {
          where regions of three levels meet, among them a jump of two levels. Cells of both: 1/4, 1/8 and 1/16 m. Momenta are summed over the real nodes after P2G, so what APIC \
          particles carry in their affine part is included; with the other transfers the angular momentum is that of \
          points. The start without stress sets the bodies swinging; the loss of kinetic energy of the first turn \
-         contains what goes into this.\n",
+         contains what goes into this. The square on half the cells is shown for one turn only: over 10,000 steps \
+         (4.6 turns) it came apart and hit the walls, presumably since particles of coarse leaves, which nobody splits here, turn \
+         into cells half or a quarter of theirs.\n",
     );
     let with = |transfer: &str| SQUARE.replace("transfer = \"apic\"", transfer);
     let fine = SQUARE.replace("root_edge = 1", "root_edge = 0.5");
