@@ -43,7 +43,7 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
             .expect("mpirun starts");
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
-        let now: Vec<String> = text.split("same: ").skip(1).map(|rest| first_word(rest)).collect();
+        let now: Vec<String> = text.split("same: ").skip(1).map(first_word).collect();
         let before = same.get_or_insert_with(|| now.clone());
         assert_eq!(*before, now, "{test}: {n} ranks against {}", ranks[0]);
         println!("{n} ranks: {text}");
