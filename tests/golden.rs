@@ -74,6 +74,48 @@ fn uniform_stress_gives_no_force() {
     agrees_for("patches", &[1, 2]);
 }
 
+#[test]
+fn command_prints_weights_or_the_reason() {
+    let run = |text: &str, arguments: &[&str]| {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        std::fs::write(file.path(), text).expect("a file");
+        let mut command = assert_cmd::Command::cargo_bin("agimp").expect("the program");
+        let command = command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+        let output = command.arg("weights").arg(file.path()).args(arguments).output().expect("it runs");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    };
+    // The least that a file must have.
+    let tree = r#""dim": 2, "cells_per_octant_edge": 4, "trees": [{"id": 7, "octants": [[0, 0, 0]]}]"#;
+    let case = |tree: u32, half: f64| {
+        format!(r#"{{"id": "a", "tree": {tree}, "centre": [0.375, 0.5], "half": [{half}, 0.125]}}"#)
+    };
+    let input = |case: String| format!("{{{tree}, \"cases\": [{case}]}}");
+    for arguments in [&[][..], &["--direct"]] {
+        let (code, stdout, stderr) = run(&input(case(7, 0.125)), arguments);
+        assert_eq!((code, &stderr[..]), (Some(0), ""));
+        let found = parse(&stdout);
+        assert_eq!(found["cases"][0]["id"], "a");
+        let nodes = list(&found["cases"][0]["nodes"]);
+        let places: Vec<Vec<u64>> = nodes.iter().map(|node| lattice(&node["ijk"])).collect();
+        assert_eq!(places, [[1, 1], [1, 2], [1, 3], [2, 1], [2, 2], [2, 3]]);
+        assert_eq!(number(&nodes[1]["w"]), 0.375);
+        assert_eq!(vector::<2>(&nodes[1]["grad"]), [-3.0, 0.0]);
+    }
+    for (text, reason) in [
+        (input(case(8, 0.125)), "a case names a tree that is not in the file"),
+        (input(case(7, 0.5)), "the box must have a volume and lie in the unit cell"),
+        (input(case(7, 0.125)).replace("[0, 0, 0]", "[1, 0, 0]"), "is not a tree"),
+        (input(case(7, 0.125)).replace("[0, 0, 0]", "[1, 2, 0]"), "octants must be"),
+        (input(case(7, 0.125)).replace("\"dim\": 2", "\"dim\": 4"), "`dim` is 4"),
+        ("{".into(), "EOF"),
+    ] {
+        let (code, stdout, stderr) = run(&text, &[]);
+        assert_eq!((code, &stdout[..]), (Some(2), ""), "{stderr}");
+        assert!(stderr.contains(reason) && stderr.lines().count() == 1, "{reason:?} in {stderr:?}");
+    }
+}
+
 fn read(file: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden").join(file);
     std::fs::read_to_string(path).expect("golden data")
@@ -172,19 +214,15 @@ impl Errors {
     }
 }
 
-/// Columns `AFFINE` of a particle with affine matrix `c` and second moments `d`, as particles hold them.
-fn stored_affine<const D: usize>(c: [[f64; D]; D], _d: [f64; D]) -> [[f64; D]; D] {
-    c
+/// Columns `AFFINE` of a particle with affine matrix `c` and second moments `d`: the matrix `B = C D` of
+/// APIC.
+fn stored_affine<const D: usize>(c: [[f64; D]; D], d: [f64; D]) -> [[f64; D]; D] {
+    c.map(|row| std::array::from_fn(|k| row[k] * d[k]))
 }
 
-/// The matrix C from the columns `AFFINE`.
-fn affine_of<const D: usize>(chunk: &Chunk<D>, p: usize, _d: [f64; D]) -> [[f64; D]; D] {
+/// Columns `AFFINE`: B after an APIC transfer, the velocity gradient after a TPIC transfer.
+fn columns<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
     std::array::from_fn(|i| std::array::from_fn(|k| chunk.column(Layout::<D>::AFFINE + D * i + k)[p]))
-}
-
-/// The velocity gradient that the columns `AFFINE` hold after a TPIC transfer.
-fn gradient_of<const D: usize>(chunk: &Chunk<D>, p: usize, d: [f64; D]) -> [[f64; D]; D] {
-    affine_of(chunk, p, d)
 }
 
 /// P2G, and G2P of the nodal velocities.
@@ -217,21 +255,20 @@ fn transfer<const D: usize>(comm: &Comm, name: &str) {
     for (chunk, p, id) in particles_of(&boxes) {
         let after = &gathered[id];
         let d: [f64; D] = vector(&after["D"]);
-        let (c, c_exact) = (affine_of(chunk, p, d), matrix::<D>(&after["C"]));
-        let b_exact = matrix::<D>(&after["B"]);
+        let b = columns(chunk, p);
+        let (b_exact, c_exact) = (matrix::<D>(&after["B"]), matrix::<D>(&after["C"]));
         for i in 0..D {
             let v = chunk.column(Layout::<D>::VELOCITY + i)[p];
             errors.add("v", v, number(&after["v"][i]));
             for k in 0..D {
-                errors.add("C", c[i][k], c_exact[i][k]);
-                errors.add("B", c[i][k] * d[k], b_exact[i][k]);
+                errors.add("B", b[i][k], b_exact[i][k]);
+                errors.add("C", b[i][k] / d[k], c_exact[i][k]);
             }
         }
     }
     boxes.to_particles(Transfer::Tpic);
     for (chunk, p, id) in particles_of(&boxes) {
-        let d = vector(&gathered[id]["D"]);
-        let (found, exact) = (gradient_of(chunk, p, d), matrix::<D>(&gathered[id]["gradv"]));
+        let (found, exact) = (columns(chunk, p), matrix::<D>(&gathered[id]["gradv"]));
         (0..D * D).for_each(|i| errors.add("gradv", found[i / D][i % D], exact[i / D][i % D]));
     }
     errors.check(comm, name);

@@ -11,7 +11,12 @@ use agimp::run::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::{Comm, World};
 
-/// Runs `body` on each number of ranks. Each is a new process group, as MPI starts once per process.
+/// Up to the first space.
+fn first_word(text: &str) -> String {
+    text.split_whitespace().next().unwrap_or_default().to_string()
+}
+
+/// Runs `body` on each number of ranks; what it prints after `same: ` must not depend on that number. Each is a new process group, as MPI starts once per process.
 fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
     if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
         let world = World::init().expect("MPI starts");
@@ -24,6 +29,7 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
     // One launch at a time: more would only compete for the same cores.
     static ONE_LAUNCH: Mutex<()> = Mutex::new(());
     let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let mut same: Option<Vec<String>> = None;
     for n in ranks {
         let output = Command::new("mpirun")
             .env("OMPI_MCA_mpi_yield_when_idle", "1")
@@ -37,6 +43,9 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
             .expect("mpirun starts");
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
+        let now: Vec<String> = text.split("same: ").skip(1).map(|rest| first_word(rest)).collect();
+        let before = same.get_or_insert_with(|| now.clone());
+        assert_eq!(*before, now, "{test}: {n} ranks against {}", ranks[0]);
         println!("{n} ranks: {text}");
     }
 }
@@ -305,6 +314,33 @@ fn first_order_xpic_is_pic() {
                     // Stress is of the order of 1e4 Pa.
                     assert!((a - b).abs() <= 1e-9 * b.abs().max(1.0), "column {column}: {a} {b}");
                 }
+            }
+        }
+    });
+}
+
+/// The bits of all particles do not depend on the number of ranks, with sweeps of increments as without.
+#[test]
+fn bits_do_not_depend_on_ranks() {
+    on_ranks("bits_do_not_depend_on_ranks", &[1, 2, 3], |comm| {
+        for transfer in ["'apic'", "'tpic'", "'flip'", "'xpic'\nxpic_order = 3"] {
+            let mut solver = solver::<2>(comm, &with(SQUARE, &format!("transfer = {transfer}")));
+            advance(&mut solver, 30);
+            let mut sum = [0u64];
+            for chunk in &solver.chunks {
+                for p in 0..chunk.len() {
+                    let mut hash = chunk.ids()[p];
+                    for column in 0..Layout::<2>::REALS {
+                        let bits = chunk.column(column)[p].to_bits();
+                        hash = (hash ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+                    }
+                    // Shorter, so that the sum over all particles does not overflow.
+                    sum[0] += hash >> 16;
+                }
+            }
+            comm.sum_u64(&mut sum);
+            if comm.rank() == 0 {
+                println!("same: {:x} ", sum[0]);
             }
         }
     });

@@ -14,8 +14,8 @@ use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 /// Arguments of `agimp weights`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Trees and boxes (JSON): `dim`, `cells_per_octant_edge`, `trees` with `octants` as `[level, i, j(, k)]` in the
-    /// unit square or cube, and `cases` with `id`, `tree`, `centre` and `half`.
+    /// Trees and boxes (JSON): `dim`, `cells_per_octant_edge`, `trees` with `octants` as `[level, i, j(, k)]`
+    /// in the unit square or cube, and `cases` with `id`, `tree`, `centre` and `half`.
     pub cases: PathBuf,
     /// Evaluate the definition cell by cell instead of scattering with the kernels of a run.
     #[arg(long)]

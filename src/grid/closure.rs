@@ -255,8 +255,8 @@ impl<const D: usize> Builder<'_, D> {
         unknown
     }
 
-    /// Looks for all leaves that may feed the bins around sum nodes. In graded trees with boxes up to two cells
-    /// wide they lie within two blocks of the sum node, where everything is known.
+    /// Looks for all leaves that may feed the bins around sum nodes. In graded trees with boxes up to two
+    /// cells wide they lie within two blocks of the sum node, where everything is known.
     fn look_for_sources(&self, missing: &mut Vec<Region<D>>) {
         if self.tree.sources_are_near() {
             return;

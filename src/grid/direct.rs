@@ -2,9 +2,9 @@
 //!
 //! The box is cut by the leaf cells. Each cell gives its corners the integral of its own multilinear hat
 //! functions over its share of the box, divided by the volume of the box. What a hanging node collects
-//! goes to the corners of the coarse cell on whose surface it lies, with the weights of multilinear interpolation
-//! there, again and again until only real nodes are left (Gao et al. 2017, section 4). Nothing here is shared with bins, arenas
-//! and constraints; it is slow and needs the whole tree.
+//! goes to the corners of the coarse cell on whose surface it lies, with the weights of multilinear
+//! interpolation there, again and again until only real nodes are left (Gao et al. 2017, section 4). Nothing
+//! here is shared with bins, arenas and constraints; it is slow and needs the whole tree.
 use std::collections::BTreeMap;
 
 use partition::{MAX_LEVEL, Octant};
@@ -26,8 +26,8 @@ pub struct DirectNode<const D: usize> {
 /// Weight and gradient on the way to a real node.
 type Share<const D: usize> = (f64, [f64; D]);
 
-/// Weights of the box with `centre` and half widths `half` (m, relative to the domain's lower corner), by node in
-/// lexicographic order, first axis slowest. Parts outside the domain give nothing.
+/// Weights of the box with `centre` and half widths `half` (m, relative to the domain's lower corner), by
+/// node in lexicographic order, first axis slowest. Parts outside the domain give nothing.
 pub fn weights<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
@@ -94,8 +94,8 @@ fn in_leaf<const D: usize>(
     shares
 }
 
-/// The cells of a leaf along one axis that a box overlaps. Everything is evaluated relative to the cell, so that
-/// a tiny box far from the origin loses no digits.
+/// The cells of a leaf along one axis that a box overlaps. Everything is evaluated relative to the cell, so
+/// that a tiny box far from the origin loses no digits.
 fn intervals(leaf: u32, cell: f64, centre: f64, half: f64) -> Vec<Interval> {
     let first = BLOCK as u32 * leaf;
     (first..first + BLOCK as u32)

@@ -141,9 +141,10 @@ impl<const D: usize> KnownTree<D> {
 
     /// Coarsest level of leaves whose boxes can have parts in a bin of `level`.
     ///
-    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf: at a distance of
-    /// `e (1 - 2^-k)` from a leaf of edge `e` the leaves are at most `k + 1` levels finer, and bins one level more. Parts of
-    /// that leaf's boxes come as far as `e reach / 4`.
+    /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf: at a distance
+    /// of
+    /// `e (1 - 2^-k)` from a leaf of edge `e` the leaves are at most `k + 1` levels finer, and bins one level
+    /// more. Parts of that leaf's boxes come as far as `e reach / 4`.
     pub fn coarsest_reaching(&self, level: u8) -> u8 {
         match self.reach {
             _ if !self.graded => 0,

@@ -1,6 +1,7 @@
-//! Bins, and how far the boxes of a leaf's particles reach: which bins a leaf feeds, and which leaves feed a bin.
+//! Bins, and how far the boxes of a leaf's particles reach: which bins a leaf feeds, and which leaves feed a
+//! bin.
 //!
-//! The two answers come from different ranks and must agree. Both rest on [`Reach`], which a rank can decide
+//! The two answers come from different ranks and must agree. Both rest on `Reach`, which a rank can decide
 //! from the leaves near the bin.
 use partition::{MAX_LEVEL, Octant, Region};
 
@@ -36,8 +37,8 @@ pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<O
     bins
 }
 
-/// Known leaves in the octants of the leaf's size around it, itself included, as far as boxes can reach; along
-/// the curve.
+/// Known leaves in the octants of the leaf's size around it, itself included, as far as boxes can reach;
+/// along the curve.
 pub fn leaves_around<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<usize> {
     let here = tree.leaves()[leaf];
     let mut around = Vec::new();
@@ -147,8 +148,8 @@ fn half_cells<const D: usize>(tree: &KnownTree<D>) -> u32 {
 /// Where parts of the boxes of a leaf's particles can lie outside the leaf.
 ///
 /// A box at most one own cell wide is cut into parts only if it overlaps a finer leaf; its parts then lie
-/// within half a cell of its leaf and within a cell of the finer leaf. If boxes wider than a cell occur anywhere,
-/// every leaf may have them, up to [`KnownTree::reach`] cells.
+/// within half a cell of its leaf and within a cell of the finer leaf. If boxes wider than a cell occur
+/// anywhere, every leaf may have them, up to [`KnownTree::reach`] cells.
 struct Reach<const D: usize> {
     leaf: Octant<D>,
     region: Extent<D>,
@@ -170,8 +171,9 @@ impl<const D: usize> Reach<D> {
     }
 
     /// Whether a part can lie in the bin. Decided from leaves at most one block away from the bin, which
-    /// every rank knows that needs the bin's sums. Beyond two levels a cell of the leaf is wider than a block of the bin; since the
-    /// bin lies beside a leaf of its level, there is then a finer leaf near enough anyway.
+    /// every rank knows that needs the bin's sums. Beyond two levels a cell of the leaf is wider than a block
+    /// of the bin; since the bin lies beside a leaf of its level, there is then a finer leaf near enough
+    /// anyway.
     fn includes(&self, tree: &KnownTree<D>, bin: &Octant<D>) -> bool {
         if !self.region.overlaps(bin) {
             return false;

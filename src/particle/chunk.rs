@@ -233,24 +233,24 @@ impl<const D: usize> Chunk<D> {
         chunk
     }
 
-    /// Keeps the particles for which `keep(p)` holds, in their order.
-    pub fn retain(&mut self, mut keep: impl FnMut(usize) -> bool) {
-        let kept: Vec<u32> = (0..self.len).filter(|&p| keep(p)).map(|p| p as u32).collect();
-        if kept.len() == self.len {
-            return;
-        }
-        let first_gap = kept.iter().enumerate().take_while(|&(to, &from)| to == from as usize).count();
+    /// Removes the particles `gone` (ascending). The last of those that stay fill the gaps in order, so that the cost
+    /// depends on the number removed and the new order on nothing else.
+    pub fn remove(&mut self, gone: &[u32]) {
+        let len = self.len - gone.len();
+        let gaps = gone.iter().copied().take_while(|&p| (p as usize) < len);
+        let mut leaving = gone[gaps.clone().count()..].iter().copied().peekable();
+        let fillers = (len as u32..self.len as u32).filter(|&p| leaving.next_if_eq(&p).is_none());
+        let moves: Vec<(usize, usize)> =
+            gaps.zip(fillers).map(|(to, from)| (to as usize, from as usize)).collect();
         for column in 0..Layout::<D>::REALS {
             let values = &mut self.reals[column * self.capacity..][..self.len];
-            for (to, &from) in kept.iter().enumerate().skip(first_gap) {
-                values[to] = values[from as usize];
-            }
+            moves.iter().for_each(|&(to, from)| values[to] = values[from]);
         }
-        for (to, &from) in kept.iter().enumerate().skip(first_gap) {
-            self.ids[to] = self.ids[from as usize];
-            self.tags[to] = self.tags[from as usize];
+        for (to, from) in moves {
+            self.ids[to] = self.ids[from];
+            self.tags[to] = self.tags[from];
         }
-        self.len = kept.len();
+        self.len = len;
     }
 
     /// Makes room for exactly `capacity` particles (rounded up to an odd multiple of 8) if there is less.
@@ -315,16 +315,20 @@ mod tests {
     }
 
     #[test]
-    fn retain_keeps_order_and_columns() {
+    fn the_last_fill_the_gaps() {
         let mut chunk = Chunk::<2>::new();
-        for id in 0..20 {
+        for id in 0..10 {
             let p = chunk.push_zeroed(id, Tag { material: id as u16, body: 0, level: 0 });
             chunk.column_mut(Layout::<2>::MASS)[p] = id as f64;
         }
-        chunk.retain(|p| p % 3 != 1);
-        let expected: Vec<u64> = (0..20).filter(|p| p % 3 != 1).collect();
+        chunk.remove(&[0, 2, 3, 7, 9]);
+        let expected = [5, 1, 6, 8, 4];
         assert_eq!(chunk.ids(), expected);
-        assert!(chunk.column(Layout::<2>::MASS).iter().zip(&expected).all(|(m, id)| *m == *id as f64));
-        assert!(chunk.tags().iter().zip(&expected).all(|(t, id)| u64::from(Tag::unpack(*t).material) == *id));
+        assert!(chunk.column(Layout::<2>::MASS).iter().zip(expected).all(|(m, id)| *m == id as f64));
+        assert!(chunk.tags().iter().zip(expected).all(|(t, id)| u64::from(Tag::unpack(*t).material) == id));
+        chunk.remove(&[]);
+        assert_eq!(chunk.len(), 5);
+        chunk.remove(&[0, 1, 2, 3, 4]);
+        assert!(chunk.is_empty());
     }
 }

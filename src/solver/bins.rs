@@ -3,8 +3,8 @@
 //! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
 //! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
 //! beside finer leaves, or where boxes are wider than a cell, each box is held against the leaves around.
-//! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the same way;
-//! its weights are the mean of theirs.
+//! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
+//! same way; its weights are the mean of theirs.
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
@@ -114,8 +114,8 @@ impl<const D: usize> BinLists<D> {
         })
     }
 
-    /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls `each`
-    /// with the number of a part and its D.
+    /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
+    /// `each` with the number of a part and its D.
     pub fn spread_parts(
         &mut self,
         plan: &GridPlan<D>,

@@ -1,7 +1,7 @@
 //! Transfers of particles whose boxes are given one by one, through the phases of a step.
 //!
-//! In a run half widths follow from a particle's state. To look at the weights of any box, and to hold transfers
-//! against references, they are given here instead; all else is the same code on the same grid.
+//! In a run half widths follow from a particle's state. To look at the weights of any box, and to hold
+//! transfers against references, they are given here instead; all else is the same code on the same grid.
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
@@ -30,7 +30,7 @@ pub struct GivenParticle<const D: usize> {
     pub mass: f64,
     /// Velocity, m/s.
     pub velocity: [f64; D],
-    /// As in the columns [`Layout::AFFINE`].
+    /// As in the columns [`Layout::AFFINE`] with APIC.
     pub affine: [[f64; D]; D],
     /// Isotropic Kirchhoff stress times volume, `V₀ τ = energy I`, J.
     pub energy: f64,
@@ -95,8 +95,8 @@ impl<const D: usize> GivenBoxes<D> {
         Self { solver, halves: Halves { halves: Vec::new(), are_cubes: true } }
     }
 
-    /// Collective. Replaces the particles; each rank takes those in its leaves, with their numbers as identifiers. All
-    /// ranks give the same. A box is cut at the domain's walls as in a run.
+    /// Collective. Replaces the particles; each rank takes those in its leaves, with their numbers as
+    /// identifiers. All ranks give the same. A box is cut at the domain's walls as in a run.
     pub fn place(&mut self, particles: &[GivenParticle<D>]) {
         let (forest, root_edge) = (&self.solver.forest, self.solver.physics.root_edge);
         let roots = forest.brick().roots;
@@ -138,8 +138,8 @@ impl<const D: usize> GivenBoxes<D> {
         sorted
     }
 
-    /// Not collective. This rank's share of the real nodes that received anything, in no particular order; each
-    /// node has one owner.
+    /// Not collective. This rank's share of the real nodes that received anything, in no particular order;
+    /// each node has one owner.
     pub fn real_nodes(&self) -> Vec<RealNode<D>> {
         let grid = &self.solver.grid;
         let rows = grid.fields.rows.chunks(block_nodes(D));
@@ -160,10 +160,10 @@ impl<const D: usize> GivenBoxes<D> {
         nodes
     }
 
-    /// Collective. The real nodes of all ranks on rank 0, in lexicographic order of their places, first axis slowest; an empty
-    /// list on the others.
+    /// Collective. The real nodes of all ranks on rank 0, in lexicographic order of their places, first axis
+    /// slowest; an empty list on the others.
     pub fn all_real_nodes(&self, comm: &Comm) -> Vec<RealNode<D>> {
-        let words: Vec<u64> = self.real_nodes().iter().flat_map(RealNode::to_words).collect();
+        let words: Vec<u64> = self.real_nodes().into_iter().flat_map(RealNode::words).collect();
         let gathered = comm.gather_bytes(bytemuck::cast_slice(&words)).unwrap_or_default();
         let mut nodes: Vec<RealNode<D>> = gathered
             .iter()
@@ -184,6 +184,7 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn to_particles(&mut self, transfer: Transfer) {
         self.solver.physics.transfer = transfer;
         self.solver.gather(0.0);
+        self.solver.physics.transfer = Transfer::Apic;
     }
 
     /// Not collective. How many leaves of other ranks this rank knows.
@@ -198,7 +199,7 @@ impl<const D: usize> GivenBoxes<D> {
 }
 
 impl<const D: usize> RealNode<D> {
-    fn to_words(&self) -> impl Iterator<Item = u64> {
+    fn words(self) -> impl Iterator<Item = u64> {
         let reals = self.momentum.into_iter().chain([self.mass]).map(f64::to_bits);
         self.place.into_iter().map(u64::from).chain(reals)
     }

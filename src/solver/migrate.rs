@@ -1,6 +1,6 @@
 //! Particles change leaves, and with them ranks.
 //!
-//! Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order
+//! The last particles of a leaf fill the gaps of those that left. Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order
 //! they had there. Ranks hold contiguous segments of the curve, so appending the messages of lower ranks,
 //! then the own moves, then the messages of higher ranks gives that order on every partition.
 use partition::comm::{Comm, NeighbourExchange, Traffic};
@@ -129,8 +129,7 @@ impl<const D: usize> Migration<D> {
         }
         let pending = self.exchange.begin(outgoing);
         chunks.par_iter_mut().zip(&leavers).filter(|(_, gone)| !gone.is_empty()).for_each(|(chunk, gone)| {
-            let mut gone = gone.iter().map(|(p, _)| *p as usize).peekable();
-            chunk.retain(|p| gone.next_if_eq(&p).is_none());
+            chunk.remove(&gone.iter().map(|(p, _)| *p).collect::<Vec<u32>>());
         });
         let rank = chunks.first().map_or(0, |_| tree.owner(first));
         let messages = pending.finish();
