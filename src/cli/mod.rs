@@ -31,7 +31,7 @@ pub enum Command {
     /// Check a job file and tell its size and cost, without running it.
     Check(check::Arguments),
     /// Print the JSON schema of job files.
-    Schema,
+    Schema(schema::Arguments),
     /// Write a commented job file to start from.
     New(new::Arguments),
     /// Tell what is in an output or checkpoint file.
@@ -98,7 +98,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Run(arguments) => run::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
-        Command::Schema => schema::execute(),
+        Command::Schema(arguments) => schema::execute(&arguments),
         Command::New(arguments) => new::execute(&arguments),
         Command::Info(arguments) => info::execute(&arguments),
         Command::Plot(arguments) => plot::execute(&arguments),

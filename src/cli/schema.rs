@@ -2,13 +2,26 @@
 use super::Failure;
 use std::io::Write as _;
 
+/// Arguments of `agimp schema`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Print the reference for people instead, in Markdown.
+    #[arg(long)]
+    markdown: bool,
+}
+
 /// Prints the schema.
 ///
 /// # Errors
 /// Standard output cannot be written.
-pub fn execute() -> Result<(), Failure> {
+pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    if arguments.markdown {
+        write!(out, "{}", crate::job::reference::reference())?;
+        return Ok(());
+    }
     let text = serde_json::to_string_pretty(&crate::job::schema())
         .map_err(|error| Failure::Run(format!("the schema cannot be printed: {error}")))?;
-    writeln!(std::io::stdout().lock(), "{text}")?;
+    writeln!(out, "{text}")?;
     Ok(())
 }

@@ -358,7 +358,8 @@ fn default_fields() -> Vec<Field> {
     vec![Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain]
 }
 
-/// Checkpoints. With no interval, one is written only when the run ends or is told to stop.
+/// Checkpoints. With no interval, one is written only when the run is told to stop, and when it ends if the
+/// output files carry no state.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {

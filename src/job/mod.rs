@@ -10,6 +10,7 @@ pub mod file;
 pub mod file_shape;
 mod overlap;
 pub mod problem;
+pub mod reference;
 mod schema;
 mod settings;
 mod shapes;

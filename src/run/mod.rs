@@ -248,6 +248,10 @@ impl<'a, const D: usize> Run<'a, D> {
         if self.output_step != Some(step) {
             self.write_output()?;
         }
+        if !self.problem.output.restart {
+            // The end state, to compare it or to go on from with a later end time.
+            self.checkpoint()?;
+        }
         self.recorder.finish(&self.solver);
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
