@@ -31,7 +31,10 @@ pub fn reference() -> String {
         }
         for variant in variants {
             let _ = write!(out, "\n### {}\n\n{}\n", word(variant), sentence(variant));
-            if variant["properties"].as_object().is_some_and(|all| all.values().any(|p| p.get("const").is_none())) {
+            if variant["properties"]
+                .as_object()
+                .is_some_and(|all| all.values().any(|p| p.get("const").is_none()))
+            {
                 out.push('\n');
                 keys(&mut out, variant);
             }
@@ -65,7 +68,8 @@ fn value(property: &Value) -> String {
     if let Some(name) = property["$ref"].as_str().and_then(|path| path.rsplit('/').next()) {
         let definitions = &super::schema()["$defs"][name];
         return if is_choice_of_words(definitions) {
-            let words: Vec<String> = definitions["oneOf"].as_array().into_iter().flatten().map(word).collect();
+            let words: Vec<String> =
+                definitions["oneOf"].as_array().into_iter().flatten().map(word).collect();
             words.join(", ")
         } else {
             format!("[{name}](#{})", name.to_lowercase())
@@ -92,7 +96,8 @@ fn value(property: &Value) -> String {
         "string" => "text".to_owned(),
         kind => {
             let bound = |key: &str, sign: &str| property[key].as_f64().map(|limit| format!("{sign} {limit}"));
-            let limits = [("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<")];
+            let limits =
+                [("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<")];
             let limits: Vec<String> = limits.iter().filter_map(|(key, sign)| bound(key, sign)).collect();
             [vec![kind.to_owned()], limits].concat().join(" ").replace(" <", ", <").replace(" ≤", ", ≤")
         }
@@ -110,7 +115,9 @@ fn word(choice: &Value) -> String {
         return format!("`\"{word}\"`");
     }
     let tagged = choice["properties"].as_object().into_iter().flatten();
-    let tag = tagged.into_iter().find_map(|(key, value)| Some(format!("`{key} = \"{}\"`", value["const"].as_str()?)));
+    let tag = tagged
+        .into_iter()
+        .find_map(|(key, value)| Some(format!("`{key} = \"{}\"`", value["const"].as_str()?)));
     tag.unwrap_or_default()
 }
 
