@@ -11,6 +11,8 @@ pub mod ids;
 mod merge;
 mod mix;
 mod split;
+#[cfg(test)]
+mod tests;
 
 pub use merge::{Limits, Merged, merge};
 pub use split::{Split, split};
