@@ -71,11 +71,11 @@ fn particles<const D: usize>(seed: u64, level: u8, per_edge: usize, kind: Option
             p,
             &[half / per_edge as f64 * (1.0 - 0.02 * numbers.next().abs())],
         );
-        write(&mut chunk, Layout::<D>::WORK, p, &[1.0 + numbers.next()]);
+        write(&mut chunk, Layout::<D>::WORK, p, &[1e3 * (1.0 + numbers.next())]);
         let elastic: [f64; 6] = std::array::from_fn(|c| match c {
             2 if D == 2 => 1.0,
-            0..3 => 1.0 + 0.05 * numbers.next(),
-            4.. if D == 2 => 0.0,
+            0..=2 => 1.0 + 0.05 * numbers.next(),
+            4 | 5 if D == 2 => 0.0,
             _ => 0.03 * numbers.next(),
         });
         let history = if material == 0 { [0.0; 2] } else { [0.05 + 0.04 * numbers.next(), 0.0] };
@@ -185,12 +185,14 @@ fn merge_all<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, limits:
     (report, energy)
 }
 
-/// Compares all particles; columns to `tolerance` of their greatest value, identifiers and tags exactly.
+/// Compares all particles; columns to `tolerance` of their greatest value (stress: of the modulus), identifiers and tags
+/// exactly.
 fn assert_same<const D: usize>(a: &Chunk<D>, b: &Chunk<D>, tolerance: f64) {
     assert_eq!(a.ids(), b.ids());
     assert_eq!(a.tags(), b.tags());
     for column in 0..Layout::<D>::REALS {
-        let scale = a.column(column).iter().fold(0.0_f64, |scale, value| scale.max(value.abs()));
+        let least = if (Layout::<D>::STRESS..Layout::<D>::MASS).contains(&column) { 1e6 } else { 0.0 };
+        let scale = a.column(column).iter().fold(least, |scale: f64, value| scale.max(value.abs()));
         for (a, b) in a.column(column).iter().zip(b.column(column)) {
             assert!((a - b).abs() <= tolerance * scale, "column {column}: {a} became {b}");
         }
@@ -210,8 +212,9 @@ fn splitting_conserves<const D: usize>(seed: u64) {
     for p in 0..original.len() {
         // Mass and centre of each family are those of the parent to the last bit.
         let family = p << D..(p + 1) << D;
-        let mass: f64 = chunk.column(Layout::<D>::MASS)[family.clone()].iter().sum();
-        assert!((mass - original.column(Layout::<D>::MASS)[p]).abs() <= f64::EPSILON * mass);
+        let mass = original.column(Layout::<D>::MASS)[p];
+        let is_share = |part: &f64| part * f64::from(1 << D) == mass;
+        assert!(chunk.column(Layout::<D>::MASS)[family.clone()].iter().all(is_share));
         for axis in 0..D {
             let x = &chunk.column(Layout::<D>::POSITION + axis)[family.clone()];
             let opposite = 0.5 * x[0] + 0.5 * x[(1 << D) - 1];
@@ -234,7 +237,8 @@ fn merging_undoes_splitting<const D: usize>(seed: u64, transfer: Transfer) {
     let number = original.len() as u64;
     assert_eq!((report.merged, report.families, &report.unnamed), (number, number, &vec![]));
     assert!((added - removed).abs() <= 1e-13 * added, "{added} {removed}");
-    assert_same(&original, &chunk, 1e-13);
+    // TPIC's gradient comes from differences of velocities over the small distance of children.
+    assert_same(&original, &chunk, if transfer == Transfer::Tpic { 1e-12 } else { 1e-13 });
 }
 
 fn three_generations_return<const D: usize>(seed: u64) {
