@@ -42,6 +42,16 @@ pub struct Criterion<const D: usize> {
     pub coarsen: f64,
 }
 
+/// What a criterion finds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Value {
+    /// In the leaf.
+    pub leaf: f64,
+    /// In the leaf's parent, as far as it is known without the parent's other children. A leaf becomes coarser only
+    /// if that would not make the parent finer again.
+    pub parent: f64,
+}
+
 /// What a criterion looks at.
 #[derive(Clone, Debug)]
 pub enum Kind<const D: usize> {
@@ -85,27 +95,30 @@ impl<const D: usize> Criterion<D> {
         matches!(self.kind, Kind::Region { .. } | Kind::Collider(_))
     }
 
-    /// What a value asks for.
-    pub fn want(&self, value: f64) -> Want {
+    /// What the values of a leaf ask for.
+    pub fn want(&self, value: Value) -> Want {
         // A sign makes large values the urgent ones.
         let sign = if self.is_distance() { -1.0 } else { 1.0 };
-        match sign * value {
-            value if value >= sign * self.refine => Want::Refine,
-            value if value >= sign * self.coarsen => Want::Hold,
-            _ => Want::Nothing,
+        if sign * value.leaf >= sign * self.refine {
+            Want::Refine
+        } else if sign * value.parent >= sign * self.coarsen {
+            Want::Hold
+        } else {
+            Want::Nothing
         }
     }
 
-    /// Level wanted for a leaf of `level` with this value; 0 if none.
-    pub fn wanted_level(&self, value: f64, level: u8) -> u8 {
+    /// Level wanted for a leaf of `level` with these values; 0 if none. One level finer than the leaf at most: only
+    /// its children know which of them need more.
+    pub fn wanted_level(&self, value: Value, level: u8) -> u8 {
         match self.want(value) {
-            Want::Refine => self.level,
+            Want::Refine => self.level.min(level + 1),
             Want::Hold => self.level.min(level),
             Want::Nothing => 0,
         }
     }
 
-    /// How urgent a value is, for people: 1 where refinement begins, larger where there is more reason. Distances
+    /// How urgent the value of a leaf is, for people: 1 where refinement begins, larger where there is more reason. Distances
     /// give 1 within the refinement distance and fall to 0 at twice that.
     pub fn urgency(&self, value: f64) -> f64 {
         match self.is_distance() {
@@ -125,11 +138,14 @@ mod tests {
     #[test]
     fn hysteresis() {
         let shear = Criterion::<2> { kind: Kind::VelocityGradient, level: 4, refine: 10.0, coarsen: 2.0 };
-        assert_eq!([11.0, 10.0, 5.0, 1.0].map(|v| shear.wanted_level(v, 3)), [4, 4, 3, 0]);
-        assert_eq!(shear.wanted_level(5.0, 6), 4);
+        let same = |v: f64| Value { leaf: v, parent: v };
+        assert_eq!([11.0, 10.0, 5.0, 1.0].map(|v| shear.wanted_level(same(v), 3)), [4, 4, 3, 0]);
+        assert_eq!(shear.wanted_level(same(5.0), 6), 4);
+        assert_eq!(shear.wanted_level(same(11.0), 1), 2);
         let near = Criterion::<2> { kind: Kind::Collider(0), level: 5, refine: 0.1, coarsen: 0.3 };
-        assert_eq!([-1.0, 0.1, 0.2, 0.4].map(|v| near.wanted_level(v, 5)), [5, 5, 5, 0]);
-        assert_eq!(near.wanted_level(0.2, 2), 2);
+        assert_eq!([-1.0, 0.1, 0.2, 0.4].map(|v| near.wanted_level(same(v), 5)), [5, 5, 5, 0]);
+        assert_eq!(near.wanted_level(same(0.2), 2), 2);
+        assert_eq!(near.wanted_level(Value { leaf: 0.4, parent: 0.25 }, 5), 5);
         assert_eq!(near.urgency(0.05), 1.0);
     }
 }

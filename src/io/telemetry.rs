@@ -275,6 +275,7 @@ mod tests {
             imbalance: 1.01,
             memory: spread,
             mass_error: 1e-16,
+            resampled: None,
             ranks: 2,
             threads: 1,
         };

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::migrate::leaf_box;
 use super::transfer::extent;
 use super::{Physics, Solver};
-use crate::adaptivity::{Criterion, Kind};
+use crate::adaptivity::{Criterion, Kind, Value};
 use crate::boundary::ColliderState;
 use crate::geometry::Aabb;
 use crate::grid::{GridPlan, NodeFields};
@@ -35,21 +35,46 @@ struct State<'a, const D: usize> {
 }
 
 impl<const D: usize> State<'_, D> {
+    fn value(&self, criterion: &Criterion<D>, leaf: usize) -> Value {
+        let of = |octant: &Octant<D>| self.distance(criterion, octant);
+        let here = &self.leaves[leaf];
+        match of(here) {
+            Some(distance) => {
+                let parent = here.parent().and_then(|parent| of(&parent)).unwrap_or(distance);
+                Value { leaf: distance, parent }
+            }
+            None => {
+                let value = self.indicator(criterion, leaf);
+                Value { leaf: value, parent: value }
+            }
+        }
+    }
+
+    /// Distance of an octant's box, if that is what the criterion looks at, m.
+    fn distance(&self, criterion: &Criterion<D>, octant: &Octant<D>) -> Option<f64> {
+        let (lower, upper) = leaf_box(octant, self.physics.root_edge);
+        let octant_box = Aabb::new(lower, upper);
+        match &criterion.kind {
+            Kind::Region { shape, motion } => {
+                let (way, _) = motion.place(self.time);
+                let centre = octant_box.centre();
+                let centre = std::array::from_fn(|axis| centre[axis] - way[axis]);
+                Some(shape.distance(&centre) - octant_box.half_diagonal())
+            }
+            Kind::Collider(index) => {
+                let (collider, state) = (&self.physics.colliders[*index], &self.colliders[*index]);
+                Some(collider.distance_to_box(&octant_box, &state.pose))
+            }
+            _ => None,
+        }
+    }
+
+    /// The value of a criterion that looks at the content of the leaf.
     fn indicator(&self, criterion: &Criterion<D>, leaf: usize) -> f64 {
         let chunk = &self.chunks[leaf];
         let greatest = |column: usize| chunk.column(column).iter().copied().fold(0.0, f64::max);
         match &criterion.kind {
-            Kind::Region { shape, motion } => {
-                let (way, _) = motion.place(self.time);
-                let leaf_box = self.leaf_aabb(leaf);
-                let centre = leaf_box.centre();
-                let centre = std::array::from_fn(|axis| centre[axis] - way[axis]);
-                shape.distance(&centre) - leaf_box.half_diagonal()
-            }
-            Kind::Collider(index) => {
-                let (collider, state) = (&self.physics.colliders[*index], &self.colliders[*index]);
-                collider.distance_to_box(&self.leaf_aabb(leaf), &state.pose)
-            }
+            Kind::Region { .. } | Kind::Collider(_) => f64::INFINITY,
             Kind::FreeSurface => f64::from(u8::from(self.is_exposed(leaf))),
             Kind::VelocityGradient => self.velocity_gradient(leaf),
             Kind::PlasticStrain => greatest(Layout::<D>::HISTORY),
@@ -60,11 +85,6 @@ impl<const D: usize> State<'_, D> {
                 f64::from(u8::from(found))
             }
         }
-    }
-
-    fn leaf_aabb(&self, leaf: usize) -> Aabb<D> {
-        let (lower, upper) = leaf_box(&self.leaves[leaf], self.physics.root_edge);
-        Aabb::new(lower, upper)
     }
 
     /// Number of the leaf's own block of nodes.
@@ -162,13 +182,13 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. The value of each criterion (inner) in each own leaf (outer); empty for leaves without particles.
-    pub(super) fn indicators(&self, criteria: &[Criterion<D>]) -> Vec<Vec<f64>> {
+    pub(super) fn indicators(&self, criteria: &[Criterion<D>]) -> Vec<Vec<Value>> {
         let state = self.state();
         let leaves = (0..self.chunks.len()).into_par_iter().with_min_len(16);
         leaves
             .map(|leaf| match state.chunks[leaf].is_empty() {
                 true => Vec::new(),
-                false => criteria.iter().map(|criterion| state.indicator(criterion, leaf)).collect(),
+                false => criteria.iter().map(|criterion| state.value(criterion, leaf)).collect(),
             })
             .collect()
     }

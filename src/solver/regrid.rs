@@ -119,8 +119,11 @@ impl<const D: usize> Solver<D> {
                 continue;
             }
             // Material must not leave the buffer before the next time.
-            let ahead = self.node_speeds(number).map(|speed| (speed * interval / unit).ceil() as u32);
+            let speeds = self.node_speeds(number);
             for level in levels {
+                // Children that need more get it one level at a time.
+                let times = f64::from(level.saturating_sub(leaf.level).max(1));
+                let ahead = speeds.map(|speed| (times * speed * interval / unit).ceil() as u32);
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
                 let (lower, upper) = (leaf.lower(), leaf.upper());
                 // Without its surface the region meets only leaves that overlap it.
@@ -217,7 +220,7 @@ impl<const D: usize> Solver<D> {
         let (mut urgency, mut wanted) = (Vec::new(), Vec::new());
         for (values, leaf) in self.indicators(&adaptivity.criteria).iter().zip(self.forest.leaves()) {
             let each = || adaptivity.criteria.iter().zip(values);
-            urgency.push(each().map(|(c, &value)| c.urgency(value)).fold(0.0, f64::max));
+            urgency.push(each().map(|(c, &value)| c.urgency(value.leaf)).fold(0.0, f64::max));
             let levels = each().map(|(c, &value)| c.wanted_level(value, leaf.level));
             wanted.push(f64::from(levels.max().unwrap_or(0)));
         }
