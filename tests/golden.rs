@@ -346,9 +346,14 @@ fn tiling<const D: usize>(comm: &Comm, patch: &Value) {
             let bound = EPS * transferred[&node.place];
             assert!(error <= 64.0 * bound, "{}: {error:e} at {:?}", patch["name"], node.place);
             worst = worst.max(error / bound);
-            beyond += usize::from(error > 64.0 * EPS * whole[&node.place]);
+            // Over the boxes as given it holds as well, but where that sum is itself no more than round-off: at nodes
+            // whose whole support lies in one box.
+            if error > 64.0 * EPS * whole[&node.place] {
+                assert!(whole[&node.place] < 1e-13 * transferred[&node.place], "{:?}", node.place);
+                beyond += 1;
+            }
         }
     }
-    println!("{} {D}D: {beyond} components beyond the bound over uncut boxes", patch["name"]);
-    report(comm, format!("{} {D}D: {worst:.1} eps sum V|grad w|", patch["name"]));
+    let text = format!("{} {D}D: {worst:.1} eps sum V|grad w|", patch["name"]);
+    report(comm, format!("{text}; {beyond} components at nodes inside one box"));
 }
