@@ -15,7 +15,7 @@ use common::launch::{Scenario, agrees_for, report, work};
 use partition::Comm;
 
 const SCENARIOS: &[(&str, Scenario)] = &[
-    ("rest_2d", |comm| rest::<2>(comm, &[1.0, 2.0, 3.0, 4.0, 1.5, 2.5], 40)),
+    ("rest_2d", |comm| rest::<2>(comm, &[1.0, 2.0, 3.0, 4.0, 1.5, 2.5, 2.75], 40)),
     ("rest_3d", |comm| rest::<3>(comm, &[1.0, 2.0, 1.5, 3.0, 4.0], 3)),
     ("origin", |comm| {
         origin::<2>(comm);

@@ -248,10 +248,12 @@ impl<const D: usize> LeafBins<D> {
         self.members[bin].window.include(lowest);
     }
 
-    /// Finest level among the leaves that the open box overlaps.
+    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
+    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
     fn finest_level(&self, own: &NearLeaf<D>, centre: [f64; D], half: [f64; D]) -> u8 {
-        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis]);
-        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis]);
+        let slack = own.upper.map(|x| 16.0 * f64::EPSILON * x);
+        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis] - slack[axis]);
+        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis] + slack[axis]);
         if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
             return own.level;
         }
