@@ -110,6 +110,7 @@ pub fn run<const D: usize>(
     while run.solver.clock.time < problem.time.end {
         let requests = Requests { stop: stop.is_set(), checkpoint: run.schedule.wall_due() };
         let granted = run.step(requests)?;
+        run.solver.regrid().map_err(|source| run.step_error(source))?;
         run.write_due(granted.checkpoint)?;
         if granted.stop {
             let checkpoint = run.checkpoint()?;
@@ -215,6 +216,10 @@ impl<'a, const D: usize> Run<'a, D> {
         Ok(report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })?.granted)
     }
 
+    fn step_error(&self, source: Disagreement) -> RunError {
+        RunError::Step { step: self.solver.clock.step, time: self.solver.clock.time, source }
+    }
+
     /// Collective. Writes what is due after a step.
     fn write_due(&mut self, checkpoint: bool) -> Result<(), RunError> {
         self.recorder.after_step(self.comm, &mut self.solver)?;
@@ -282,10 +287,23 @@ impl<'a, const D: usize> Run<'a, D> {
     fn write_output(&mut self) -> Result<(), RunError> {
         let step = Some(self.solver.clock.step);
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
+        let fields = self.leaf_fields();
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let view = View { leaf_fields: &fields, ..view };
         self.outputs.write(self.comm, &view)?;
         self.output_step = step;
         Ok(())
+    }
+
+    /// Collective. Fields of leaves for the file of the tree.
+    fn leaf_fields(&mut self) -> Vec<(String, Vec<f64>)> {
+        let refinement = self.solver.refinement();
+        refinement.map_or_else(Vec::new, |refinement| {
+            vec![
+                ("refinement_indicator".into(), refinement.urgency),
+                ("wanted_level".into(), refinement.wanted),
+            ]
+        })
     }
 
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {

@@ -152,6 +152,16 @@ impl<const D: usize> BinLists<D> {
         (!is_empty).then(|| self.window_of(leaf, bin))
     }
 
+    /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
+    pub fn is_finer_within(&self, leaf: usize, x: &[f64; D], distance: f64) -> bool {
+        let own = self.bounds[leaf].level;
+        self.leaves[leaf]
+            .near
+            .iter()
+            .filter(|near| near.level > own)
+            .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
+    }
+
     /// As [`BinLists::window`], for a bin that has members.
     pub fn window_of(&self, leaf: usize, bin: usize) -> Window<D> {
         self.of_leaf(leaf).map_or(Window::FULL, |bins| bins.members[bin].window)
