@@ -1,7 +1,7 @@
 //! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
 //! and bodies.
-use super::colliders::colliders;
 use super::adaptivity::{Context, adaptivity};
+use super::colliders::colliders;
 use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
 use super::overlap;

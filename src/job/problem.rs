@@ -2,8 +2,8 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
-use crate::boundary::Collider;
 use crate::adaptivity::Adaptivity;
+use crate::boundary::Collider;
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;

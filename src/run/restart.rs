@@ -58,7 +58,9 @@ pub fn scalars<const D: usize>(
         let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
         let numbers = [splits, merges, removed, solver.books.next_root];
         counts.extend(BOOKS.iter().map(|name| String::from(*name)).zip(numbers));
-        exact.extend(ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())));
+        exact.extend(
+            ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())),
+        );
     }
     for (index, state) in solver.contacts.states.iter().enumerate() {
         // Prescribed motions follow from the time.

@@ -1,6 +1,6 @@
 //! From a job to the first state: tree, partition and particles.
-use partition::{Forest, MAX_LEVEL};
 use partition::comm::{Comm, Disagreement};
+use partition::{Forest, MAX_LEVEL};
 use rayon::prelude::*;
 
 use crate::job::Problem;

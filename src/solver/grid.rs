@@ -74,7 +74,7 @@ impl<const D: usize> Grid<D> {
 pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
     let cells = width_bound(chunk, scheme) / cell;
     // Rounding must not make a box that is exactly one cell wide a wide one.
-    if cells <= 0.5 * (1.0 + 1e-12) { 0 } else { cells.ceil() as u32 }
+    if cells <= 0.5 * (1.0 + 4.0 * f64::EPSILON) { 0 } else { cells.ceil() as u32 }
 }
 
 impl<const D: usize> Solver<D> {

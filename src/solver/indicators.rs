@@ -11,9 +11,9 @@ use super::{Physics, Solver};
 use crate::adaptivity::{Criterion, Kind, Value};
 use crate::boundary::ColliderState;
 use crate::geometry::Aabb;
-use crate::grid::{GridPlan, NodeFields};
 use crate::grid::mask::{arena_overlap, bits, block_nodes, node_of_bit, offset, offset_count};
 use crate::grid::plan::NO_BLOCK;
+use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::{Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -214,7 +214,8 @@ impl<const D: usize> Solver<D> {
         let after = self.plastic_strain_sums();
         let Some((before, after)) = before.zip(after) else { return };
         let each = self.chunks.iter().zip(before.iter().zip(&after));
-        self.plastic_rate =
-            each.map(|(chunk, (before, after))| (after - before) / (dt * chunk.len().max(1) as f64)).collect();
+        self.plastic_rate = each
+            .map(|(chunk, (before, after))| (after - before) / (dt * chunk.len().max(1) as f64))
+            .collect();
     }
 }

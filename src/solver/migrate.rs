@@ -104,7 +104,9 @@ impl<const D: usize> Migration<D> {
             .zip(&self.boxes)
             .enumerate()
             .with_min_len(4)
-            .map(|(leaf, (chunk, bounds))| rule.leavers_resampled(tree, first + leaf, chunk, bounds, resampling))
+            .map(|(leaf, (chunk, bounds))| {
+                rule.leavers_resampled(tree, first + leaf, chunk, bounds, resampling)
+            })
             .collect();
         let mut error = None;
         let mut moved = Moved::default();

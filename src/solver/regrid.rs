@@ -127,8 +127,10 @@ impl<const D: usize> Solver<D> {
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
                 let (lower, upper) = (leaf.lower(), leaf.upper());
                 // Without its surface the region meets only leaves that overlap it.
-                let lo = std::array::from_fn(|a| (lower[a] + 1).saturating_sub(buffer.saturating_add(ahead[a])));
-                let hi = std::array::from_fn(|a| (upper[a] - 1).saturating_add(buffer).saturating_add(ahead[a]));
+                let lo =
+                    std::array::from_fn(|a| (lower[a] + 1).saturating_sub(buffer.saturating_add(ahead[a])));
+                let hi =
+                    std::array::from_fn(|a| (upper[a] - 1).saturating_add(buffer).saturating_add(ahead[a]));
                 requests.push((Region { lo, hi }, u32::from(level)));
             }
         }
@@ -168,7 +170,8 @@ impl<const D: usize> Solver<D> {
 
     /// Least level of each own leaf.
     fn wanted_levels(&self, requests: &[Request<D>]) -> Vec<u8> {
-        let mut wanted: Vec<u8> = self.forest.leaves().iter().map(|leaf| self.permanent_level(leaf)).collect();
+        let mut wanted: Vec<u8> =
+            self.forest.leaves().iter().map(|leaf| self.permanent_level(leaf)).collect();
         for (region, level) in requests {
             self.forest.own_leaves_in(region, &mut |leaf| wanted[leaf] = wanted[leaf].max(*level as u8));
         }
