@@ -82,9 +82,12 @@ impl Recorder {
         let clock = solver.clock;
         // What this takes counts as output, not as steps.
         let start = Instant::now();
-        let phases = solver.phases;
+        let (phases, before) = (solver.phases, solver.traffic());
         let grid = solver.grid_totals();
         solver.phases = phases;
+        let after = solver.traffic();
+        self.since_traffic.messages += after.messages - before.messages;
+        self.since_traffic.bytes += after.bytes - before.bytes;
         let grid = comm.agree(grid)?;
         let particles = solver.particle_totals();
         solver.phases.book(Phase::Output, start.elapsed());
@@ -123,6 +126,7 @@ impl Recorder {
                 },
                 leaves: solver.forest.leaves(),
                 chunks: &solver.chunks,
+                census: solver.census(),
                 imbalance: solver.imbalance().0,
                 mass_error,
             },
