@@ -54,6 +54,16 @@ impl<const D: usize> Grid<D> {
         }
     }
 
+    /// What the particles scattered last.
+    pub fn arenas(&self) -> &Arenas<D> {
+        &self.arenas
+    }
+
+    /// What other ranks have sent of theirs.
+    pub fn received(&self) -> &ReceivedArenas<D> {
+        &self.received
+    }
+
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         self.plan.heap_bytes()
