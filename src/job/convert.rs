@@ -1,5 +1,6 @@
 //! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
 //! and bodies.
+use super::colliders::colliders;
 use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
 use super::overlap;
@@ -72,6 +73,7 @@ fn problem<const D: usize>(
     let tree = tree(checks, &file.tree, &brick, &space, &root.key("tree"));
     let materials = materials(checks, &file.materials, &root.key("materials"));
     let bodies = bodies(checks, file, &space, &root.key("bodies"));
+    let colliders = colliders(checks, &file.colliders, &space, &root.key("colliders"));
     let gravity = match &file.gravity {
         Some(gravity) => checks.vector(gravity, &root.key("gravity")),
         None => Some([0.0; D]),
@@ -96,6 +98,7 @@ fn problem<const D: usize>(
         bodies: bodies?,
         gravity: gravity?,
         faces: faces?,
+        colliders: colliders?,
         leaving: match file.boundaries.leaving {
             file::Leaving::Error => LeavingPolicy::Error,
             file::Leaving::Delete => LeavingPolicy::Delete,

@@ -2,6 +2,7 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
+use crate::boundary::Collider;
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
@@ -73,6 +74,8 @@ pub struct Problem<const D: usize> {
     pub gravity: [f64; D],
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
+    /// Rigid bodies that act on the material, in the order in which they act.
+    pub colliders: Vec<Collider<D>>,
     /// What happens to particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.

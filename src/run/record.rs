@@ -4,7 +4,7 @@ use std::time::Instant;
 use partition::comm::{Comm, Traffic};
 
 use super::{Options, RunError, history};
-use crate::io::history::History;
+use crate::io::history::{Column, History};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Telemetry};
 use crate::job::Problem;
@@ -16,6 +16,8 @@ pub struct Recorder {
     history: Option<History>,
     telemetry: Option<Telemetry>,
     progress: Progress,
+    /// Lower corner of the domain, m.
+    origin: Vec<f64>,
     history_every: u64,
     telemetry_every: u64,
     since: Instant,
@@ -34,10 +36,12 @@ impl Recorder {
         let step = solver.clock.step;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
+        let named = history::columns(&solver.physics.colliders);
+        let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), step) {
-            (0, 0) => History::create(&rows, &history::COLUMNS)
+            (0, 0) => History::create(&rows, &columns)
                 .and_then(|history| Ok(Some((history, Telemetry::create(&lines)?)))),
-            (0, _) => History::resume(&rows, &history::COLUMNS, step)
+            (0, _) => History::resume(&rows, &columns, step)
                 .and_then(|history| Ok(Some((history, Telemetry::resume(&lines)?)))),
             _ => Ok(None),
         };
@@ -47,6 +51,7 @@ impl Recorder {
             history,
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
+            origin: problem.origin.to_vec(),
             history_every: problem.history_every,
             telemetry_every: problem.telemetry_every,
             since: Instant::now(),
@@ -90,10 +95,20 @@ impl Recorder {
         self.since_traffic.bytes += after.bytes - before.bytes;
         let grid = comm.agree(grid)?;
         let particles = solver.particle_totals();
+        let reactions = solver.reactions();
         solver.phases.book(Phase::Output, start.elapsed());
         let mut written = Ok(());
         if row && let Some(history) = &mut self.history {
-            written = history.row(clock.step, &history::row(clock.time, clock.dt, &particles, &grid));
+            let mut values = history::row(clock.time, clock.dt, &particles, &grid);
+            let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
+            for ((collider, state), reaction) in all {
+                values.extend(history::collider_values(collider, state, reaction, &self.origin));
+            }
+            written = history.row(clock.step, &values);
+        }
+        if row {
+            // Where the row of this step has been written already, there is nothing to forget.
+            solver.forget_reactions();
         }
         if record {
             let record = self.record(comm, solver, (grid.mass - particles.mass) / particles.mass);

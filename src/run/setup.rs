@@ -19,6 +19,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
         gravity: problem.gravity,
         faces: problem.faces,
+        colliders: problem.colliders.clone(),
         leaving: problem.leaving,
         transfer: problem.transfer,
         boxes: problem.boxes,

@@ -2,6 +2,7 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod contact;
 pub mod cost;
 pub mod given_boxes;
 pub mod grid;
@@ -18,6 +19,7 @@ use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
 use self::bins::BinMissing;
+use self::contact::Contacts;
 use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
@@ -25,7 +27,7 @@ use self::phases::{Phase, Phases};
 use self::rebalance::LastPartition;
 use self::time_step::StepControl;
 use self::transfer::Reach;
-use crate::boundary::{FaceCondition, Leaving};
+use crate::boundary::{Collider, FaceCondition, Leaving};
 use crate::grid::fields::Part;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
@@ -43,6 +45,8 @@ pub struct Physics<const D: usize> {
     pub gravity: [f64; D],
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
+    /// Rigid bodies that act on the material, in the order in which they act.
+    pub colliders: Vec<Collider<D>>,
     /// What happens to particles that leave the domain.
     pub leaving: Leaving,
     /// Transfer of velocities.
@@ -112,6 +116,8 @@ pub struct Solver<const D: usize> {
     pub chunks: Vec<Chunk<D>>,
     /// Step and time.
     pub clock: Clock,
+    /// Where the colliders are, and their reactions.
+    pub contacts: Contacts<D>,
     /// Wall time by phase since the last report.
     pub phases: Phases,
     grid: Grid<D>,
@@ -143,6 +149,7 @@ impl<const D: usize> Solver<D> {
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
+            contacts: Contacts::new(&physics, clock.time),
             physics,
             forest,
             chunks,
@@ -177,11 +184,12 @@ impl<const D: usize> Solver<D> {
         self.costs.begin_step(self.clock.step, self.chunks.len());
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
+        let rates = self.collider_rates(dt);
 
         let sorted = self.sort_into_bins();
         self.note_velocities();
         self.nodes_from_particles(dt);
-        self.update_nodes(dt);
+        let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
         self.gather(dt);
@@ -191,6 +199,7 @@ impl<const D: usize> Solver<D> {
         self.clock.step += 1;
         self.clock.time = if dt < left { self.clock.time + dt } else { end };
         self.clock.dt = dt;
+        self.advance_colliders(&rates, impulses, dt);
         self.close_step(sorted, moved, reach, requests)
     }
 
