@@ -49,16 +49,17 @@ pub fn surface_bytes<const D: usize>(comm: &Comm, plan: &GridPlan<D>, arenas: &A
         words
             .extend(bin.parts.iter().flat_map(|part| [u64::from(part.offset), part.nodes, part.constrained]));
     }
-    let own = plan.own_bins();
+    let bins = plan.own_bins();
+    let own = |leaf, block| bins.get(&(leaf, block)).copied();
     let asked = comm.sparse_exchange(questions);
-    asked.iter().map(|(_, words)| bytes_for(words, plan, &own, arenas)).sum()
+    asked.iter().map(|(_, words)| bytes_for(words, plan, own, arenas)).sum()
 }
 
 /// Bytes for one receiver, which asks for parts of bins.
 fn bytes_for<const D: usize>(
     words: &[u64],
     plan: &GridPlan<D>,
-    own: &HashMap<(u32, Octant<D>), u32>,
+    own: impl Fn(u32, Octant<D>) -> Option<u32>,
     arenas: &Arenas<D>,
 ) -> u64 {
     let mut needed: HashMap<Octant<D>, Needed> = HashMap::new();
@@ -69,7 +70,7 @@ fn bytes_for<const D: usize>(
         rest = tail;
         let block = Octant { level: *level as u8, coord: std::array::from_fn(|axis| coord[axis] as u32) };
         let leaf = plan.tree.locate(*key).unwrap_or_default() as u32;
-        let Some(arena) = own.get(&(leaf, block)).and_then(|&bin| arenas.get(bin)) else { continue };
+        let Some(arena) = own(leaf, block).and_then(|bin| arenas.get(bin)) else { continue };
         for part in parts.chunks_exact(3) {
             let (towards, nodes, constrained) = (part[0] as usize, part[1], part[2]);
             let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };

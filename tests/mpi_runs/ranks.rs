@@ -45,7 +45,7 @@ fn check_counts(ranks: usize) {
     }
     if ranks > 1 {
         let ratio = arenas[1] / surface[1];
-        assert!(ratio >= 1.0 && ratio <= MOST_BYTES, "{ratio} times the bytes of the surface");
+        assert!((1.0..=MOST_BYTES).contains(&ratio), "{ratio} times the bytes of the surface");
     }
 }
 
