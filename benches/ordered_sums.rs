@@ -24,7 +24,14 @@ const D: usize = 3;
 fn main() {
     let world = World::init().expect("MPI starts");
     let text = include_str!("../jobs/scaling/block.toml");
-    let words = [("SIZE_X", "1.0"), ("SIZE_Y", "1.0"), ("LEVEL", "3"), ("FINER", "4"), ("PER_CELL", "2")];
+    let words = [
+        ("SIZE_X", "1.0"),
+        ("SIZE_Y", "1.0"),
+        ("LEVEL", "3"),
+        ("FINER", "4"),
+        ("PER_CELL", "2"),
+        ("BOXES", "volume"),
+    ];
     let text = words.iter().fold(text.to_owned(), |text, (word, value)| text.replace(word, value));
     let text = text.replace("END", "1").replace("EVERY", "1000");
     let AnyProblem::Three(problem) = job::parse(&text, "block.toml".as_ref()).expect("a good job") else {

@@ -91,101 +91,154 @@ fn surface_terms(count: &Count) -> [f64; 2] {
 /// Bytes of a particle.
 const PARTICLE: f64 = 272.0;
 
-/// Runs both series and writes the page.
+/// Leaves in a cube of `n` with a layer of `thickness` leaves around, without the cube.
+fn layer(leaves: f64, thickness: f64) -> f64 {
+    (leaves.cbrt() + 2.0 * thickness).powi(3) - leaves
+}
+
+/// One run of the page: kind, block, ranks.
+type Case = (&'static str, Block, usize);
+
+fn cases() -> Vec<Case> {
+    let block = Block { roots: [1, 1], level: 4, per_cell: 1, steps: 4, every: 2 };
+    let strong = [1, 2, 4, 8, 16, 32, 64].map(|ranks| ("strong", block, ranks));
+    let fine = [16, 64].map(|ranks| ("fine", Block { level: 5, ..block }, ranks));
+    let weak =
+        [1, 4, 16, 64].map(|ranks| ("weak", Block { roots: Block::roots(ranks), level: 2, ..block }, ranks));
+    strong.into_iter().chain(fine).chain(weak).collect()
+}
+
+/// Runs all cases and writes the page.
 pub fn write_page(page: &Path) -> Result<(), Failure> {
-    let strong = Block { roots: [2, 2], level: 3, per_cell: 2, steps: 8, every: 4 };
     let mut counts = Vec::new();
-    let mut tables = Vec::new();
-    for (kind, ranks) in [("strong", &[1, 2, 4, 8, 16, 32, 64][..]), ("weak", &[1, 4, 16, 64])] {
-        let mut rows = Vec::new();
-        for &ranks in ranks {
-            let block = match kind {
-                "strong" => strong,
-                _ => Block { roots: Block::roots(ranks), level: 2, ..strong },
-            };
-            let records = run(&block, &format!("counts_{kind}_{ranks}"), ranks, 1)?;
-            // The last that follows on steps; the end of a run writes one more.
-            let last = records.iter().rfind(|record| number(record, "/steps") > 0.0);
-            let count = Count::read(last.ok_or("a run without records")?);
-            println!("{kind} {ranks}: {}", count.row().join(" | "));
-            rows.push(count.row());
-            counts.push(count);
-        }
-        tables.push(markdown(&HEADS, &rows));
+    for (kind, block, ranks) in cases() {
+        let records = run(&block, &format!("counts_{kind}_{ranks}"), ranks, 1)?;
+        // The last that follows on steps; the end of a run writes one more.
+        let last = records.iter().rfind(|record| number(record, "/steps") > 0.0);
+        let count = Count::read(last.ok_or("a run without records")?);
+        println!("{kind} {ranks}: {}", count.row().join(" | "));
+        counts.push((kind, count));
     }
-    let text = page_text(page, &counts, &tables)? + &curves()?;
+    let text = page_text(page, &counts)? + &curves()?;
     std::fs::write(page, text).map_err(|error| format!("{}: {error}", page.display()))?;
     println!("{} written", page.display());
     Ok(())
 }
 
-fn page_text(page: &Path, counts: &[Count], tables: &[String]) -> Result<String, Failure> {
-    // Pieces of few ranks lie at walls on most sides.
-    let inner: Vec<&Count> = counts.iter().filter(|count| count.ranks >= 8.0).collect();
-    let rows: Vec<[f64; 2]> = inner.iter().map(|count| surface_terms(count)).collect();
-    let fitted = |value: fn(&Count) -> f64| {
-        let values: Vec<f64> = inner.iter().map(|count| value(count)).collect();
-        let c = fit::least_squares(&rows, &values);
-        (c, fit::worst(&c, &rows, &values))
-    };
-    let (ghosts, ghosts_off) = fitted(|count| count.ghosts);
-    let (bytes, bytes_off) = fitted(|count| count.arena_bytes);
-    let memory_rows: Vec<[f64; 3]> =
-        counts.iter().map(|count| [1.0, count.leaves + count.ghosts, count.ranks]).collect();
-    let beside: Vec<f64> = counts.iter().map(|count| count.memory - PARTICLE * count.particles).collect();
-    let memory = fit::least_squares(&memory_rows, &beside);
-    let memory_off = fit::worst(&memory, &memory_rows, &beside);
-    let at = |c: &[f64; 2], leaves: f64| c[0] * leaves.powf(2.0 / 3.0) + c[1] * leaves.cbrt();
+/// The functions that describe the counts.
+struct Fits {
+    /// Ghost leaves as a layer of this thickness.
+    thickness: f64,
+    /// Bytes per step: surface and edges.
+    bytes: [f64; 2],
+    bytes_off: f64,
+    /// Memory beside particles: fixed, and per leaf or ghost leaf.
+    memory: [f64; 2],
+    memory_off: f64,
+    /// Memory for each rank of the job.
+    per_rank: f64,
+    neighbours: f64,
+}
 
-    plot(page, &inner, &bytes)?;
-    let neighbours = counts.iter().map(|count| count.neighbours).fold(0.0, f64::max);
-    let mut large = Vec::new();
-    for (ranks, particles) in [(64.0, 64e6), (1e3, 1e9), (1e4, 1e10)] {
-        // Eight particles per cell, and as many empty leaves around as filled ones.
+impl Fits {
+    fn of(counts: &[(&str, Count)]) -> Self {
+        let cubes: Vec<&Count> = counts
+            .iter()
+            .filter(|(kind, count)| *kind != "weak" && count.ranks >= 8.0)
+            .map(|(_, c)| c)
+            .collect();
+        let mut thickness: Vec<f64> = cubes
+            .iter()
+            .map(|count| 0.5 * ((count.ghosts + count.leaves).cbrt() - count.leaves.cbrt()))
+            .collect();
+        thickness.sort_by(f64::total_cmp);
+        let rows: Vec<[f64; 2]> = cubes.iter().map(|count| surface_terms(count)).collect();
+        let values: Vec<f64> = cubes.iter().map(|count| count.arena_bytes).collect();
+        let bytes = fit::positive(&rows, &values);
+        let all: Vec<&Count> = counts.iter().map(|(_, count)| count).collect();
+        let memory_rows: Vec<[f64; 2]> = all.iter().map(|count| [1.0, count.leaves + count.ghosts]).collect();
+        let beside: Vec<f64> = all.iter().map(|count| count.memory - PARTICLE * count.particles).collect();
+        let memory = fit::positive(&memory_rows, &beside);
+        let weak = |ranks: f64| counts.iter().find(|(kind, count)| *kind == "weak" && count.ranks == ranks);
+        let per_rank = match (weak(16.0), weak(64.0)) {
+            (Some((_, few)), Some((_, many))) => (many.memory - few.memory) / (many.ranks - few.ranks),
+            _ => f64::NAN,
+        };
+        Self {
+            thickness: thickness.get(thickness.len() / 2).copied().unwrap_or(f64::NAN),
+            bytes_off: fit::worst(&bytes, &rows, &values),
+            bytes,
+            memory_off: fit::worst(&memory, &memory_rows, &beside),
+            memory,
+            per_rank: per_rank.max(0.0),
+            neighbours: all.iter().map(|count| count.neighbours).fold(0.0, f64::max),
+        }
+    }
+
+    fn bytes_at(&self, leaves: f64) -> f64 {
+        self.bytes[0] * leaves.powf(2.0 / 3.0) + self.bytes[1] * leaves.cbrt()
+    }
+
+    /// A row of the extrapolation: eight particles per cell, every second leaf empty.
+    fn row(&self, ranks: f64, particles: f64) -> Vec<String> {
         let leaves = particles / ranks / 512.0 * 2.0;
-        let ghost_leaves = at(&ghosts, leaves);
-        let rest = memory[0] + memory[1] * (leaves + ghost_leaves) + memory[2] * ranks;
-        large.push(vec![
+        let ghosts = layer(leaves, self.thickness);
+        let grid = self.memory[0] + self.memory[1] * (leaves + ghosts);
+        vec![
             format!("{ranks:.0}"),
             format!("{particles:.0e}"),
             format!("{leaves:.0}"),
-            format!("{ghost_leaves:.0}"),
-            format!("{:.0}", 2.0 * neighbours + ranks.log2().ceil()),
-            format!("{:.2}", at(&bytes, leaves) / 1e6),
-            format!("{:.0}", (PARTICLE * particles / ranks + rest) / 1e6),
-            format!("{:.2}", memory[2] * ranks / 1e6),
+            format!("{ghosts:.0}"),
+            format!("{:.0}", 2.0 * self.neighbours + ranks.log2().ceil()),
+            format!("{:.1}", self.bytes_at(leaves) / 1e6),
+            format!("{:.0}", PARTICLE * particles / ranks / 1e6),
+            format!("{:.0}", grid / 1e6),
+            format!("{:.0}", self.per_rank * ranks / 1e6),
             format!("{:.2}", particles * PARTICLE / 1e12),
-        ]);
+        ]
     }
+}
+
+fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
+    let fits = Fits::of(counts);
+    plot(page, counts, &fits)?;
+    let table = |kinds: &[&str]| {
+        let rows = counts.iter().filter(|(kind, _)| kinds.contains(kind)).map(|(_, count)| count.row());
+        markdown(&HEADS, &rows.collect::<Vec<_>>())
+    };
     let heads = [
         "ranks",
         "particles",
         "leaves per rank",
         "ghost leaves",
         "messages per step, at most",
-        "MB per step",
-        "memory per rank, MB",
-        "of that for P ranks, MB",
+        "MB sent per step",
+        "particles, MB",
+        "grid and program, MB",
+        "tables of P ranks, MB",
         "checkpoint, TB",
     ];
+    let large = [(64.0, 64e6), (1e3, 1e9), (1e4, 1e10)].map(|(ranks, particles)| fits.row(ranks, particles));
     Ok(format!(
         "# Scaling\n\n\
          Written by `jobs/scaling/run counts`: counts, not times. Ranks share the cores of one machine, which changes \
-         no count. The job is `jobs/scaling/block.toml`, a box half full of sand over a floor of cells half as wide \
-         (eight particles per cell). Bytes are those of one exchange of arenas; `bytes / surface` divides them by the \
-         bytes of the distinct nodes that cross between each pair of ranks. Times are in [performance.md](performance.md).\n\n\
-         ## One tree on more and more ranks\n\n{}\n\
-         ## A tree that grows with the ranks\n\n{}\n\
+         no count. The job is `jobs/scaling/block.toml`, a box full of sand with a floor of cells half as wide, one particle \
+         per cell. Bytes are those of one exchange of arenas; `bytes / surface` divides them by the bytes of the distinct \
+         nodes that cross between each pair of ranks. Measured times are in [performance.md](performance.md).\n\n\
+         ## One cube on more and more ranks\n\n\
+         4096 leaves and a finer floor; in the last two rows eight times as many.\n\n{}\n\
+         ## A box that grows with the ranks\n\n\
+         Boxes one root octant high.\n\n{}\n\
          ![Bytes per step](scaling/bytes.svg)\n\n\
          ## Fits\n\n\
-         With n leaves per rank (own, filled and empty) and P ranks, for the rank with most; fitted to the runs on 8 ranks \
-         and more (memory: to all), with the greatest relative error in brackets:\n\n\
-         - ghost leaves: {:.2} n^(2/3) {:+.2} n^(1/3) ({:.0} %)\n\
-         - bytes per step: {:.0} n^(2/3) {:+.0} n^(1/3) ({:.0} %)\n\
+         With n leaves per rank (own) and P ranks, for the rank with most; fitted to the cube on 8 ranks and more (memory: to \
+         all runs), with the greatest relative error in brackets:\n\n\
+         - ghost leaves: a layer of {:.1} leaves around a cube of n, (n^(1/3) + {:.1})^3 - n\n\
+         - bytes per step: {:.0} n^(2/3) + {:.0} n^(1/3) ({:.0} %)\n\
          - messages per step: 2 for each neighbour, one with arenas and one with particles, and one reduction \
          (log2 P messages); at most {:.0} neighbours were seen\n\
-         - memory: 272 B per particle + {:.1} MB + {:.1} kB per leaf or ghost leaf + {:.1} kB per rank of the job \
-         ({:.0} %)\n\n\
+         - memory: 272 B per particle + {:.0} MB + {:.1} kB per leaf or ghost leaf ({:.0} %); from 16 to 64 ranks with \
+         the same leaves {:.0} kB more for each rank of the job, which holds MPI's memory shared on one machine too\n\n\
          ## 10,000 ranks and 10^10 particles\n\n\
          From the fits, with 8 particles per cell and every second leaf empty:\n\n{}\n\
          No message and no table grows with the whole tree. What grows with P is 8 bytes per rank and table (the markers \
@@ -198,31 +251,32 @@ fn page_text(page: &Path, counts: &[Count], tables: &[String]) -> Result<String,
          the operating system, costs more than the reduction itself (14 stages at P = 10,000).\n\
          4. **Exact sums for the history.** A row reduces 15 exact accumulators; with `history.every_steps = 1` this is the \
          largest reduction of a step.\n\
-         5. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Nodes and leaves of one rank are \
-         counted in 32 bits: 6.7e7 blocks per rank. Identifiers of particles have 64 bits.\n\n",
-        tables[0],
-        tables[1],
-        ghosts[0],
-        ghosts[1],
-        100.0 * ghosts_off,
-        bytes[0],
-        bytes[1],
-        100.0 * bytes_off,
-        neighbours,
-        memory[0] / 1e6,
-        memory[1] / 1e3,
-        memory[2] / 1e3,
-        100.0 * memory_off,
+         5. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Nodes of one rank are counted in 32 \
+         bits: 6.7e7 blocks. Identifiers of particles have 64 bits.\n\n",
+        table(&["strong", "fine"]),
+        table(&["weak"]),
+        fits.thickness,
+        2.0 * fits.thickness,
+        fits.bytes[0],
+        fits.bytes[1],
+        100.0 * fits.bytes_off,
+        fits.neighbours,
+        fits.memory[0] / 1e6,
+        fits.memory[1] / 1e3,
+        100.0 * fits.memory_off,
+        fits.per_rank / 1e3,
         markdown(&heads, &large),
     ))
 }
 
-fn plot(page: &Path, counts: &[&Count], bytes: &[f64; 2]) -> Result<(), Failure> {
+fn plot(page: &Path, counts: &[(&str, Count)], fits: &Fits) -> Result<(), Failure> {
+    let counts: Vec<&Count> =
+        counts.iter().filter(|(kind, count)| *kind != "weak" && count.ranks >= 8.0).map(|(_, c)| c).collect();
     let measured = |value: fn(&Count) -> f64| counts.iter().map(|c| [c.leaves, value(c) / 1e3]).collect();
     let (low, high) = counts.iter().fold((f64::MAX, 0.0_f64), |(l, h), c| (l.min(c.leaves), h.max(c.leaves)));
     let curve = (0..=40).map(|i| {
         let n = low * (high / low).powf(f64::from(i) / 40.0);
-        [n, (bytes[0] * n.powf(2.0 / 3.0) + bytes[1] * n.cbrt()) / 1e3]
+        [n, fits.bytes_at(n) / 1e3]
     });
     let chart = Chart {
         title: "Bytes of arenas per rank and step, 8 to 64 ranks",

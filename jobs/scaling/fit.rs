@@ -37,6 +37,22 @@ pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> [f64;
     c
 }
 
+/// As [`least_squares`], of two terms that cannot be negative: one that would be is left out.
+pub fn positive(rows: &[[f64; 2]], values: &[f64]) -> [f64; 2] {
+    let both = least_squares(rows, values);
+    if both.iter().all(|c| *c >= 0.0) {
+        return both;
+    }
+    let alone = |term: usize| {
+        let rows: Vec<[f64; 1]> = rows.iter().map(|row| [row[term]]).collect();
+        let mut c = [0.0; 2];
+        [c[term]] = least_squares(&rows, values);
+        c
+    };
+    let (first, second) = (alone(0), alone(1));
+    if worst(&first, rows, values) <= worst(&second, rows, values) { first } else { second }
+}
+
 /// Greatest relative error of a fit.
 pub fn worst<const N: usize>(c: &[f64; N], rows: &[[f64; N]], values: &[f64]) -> f64 {
     let value = |row: &[f64; N]| row.iter().zip(c).map(|(x, c)| x * c).sum::<f64>();

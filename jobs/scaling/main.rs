@@ -69,6 +69,8 @@ impl Block {
             .replace("LEVEL", &self.level.to_string())
             .replace("FINER", &(self.level + 1).to_string())
             .replace("PER_CELL", &self.per_cell.to_string())
+            // With one particle per cell stretched boxes would be wider than a cell.
+            .replace("BOXES", if self.per_cell == 1 { "fixed" } else { "volume" })
             .replace("END", &format!("{:e}", f64::from(self.steps) * 1e-6))
             .replace("EVERY", &self.every.to_string());
         text.replace("[output]\n", &format!("[output]\ndirectory = {:?}\n", directory.display().to_string()))

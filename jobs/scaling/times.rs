@@ -6,13 +6,13 @@ use serde_json::Value;
 use crate::plot::{Chart, Series};
 use crate::{Block, Failure, markdown, number, records, run};
 
-/// The block for so many ranks: large for a cluster (two million particles per rank), small for a
+/// The block for so many ranks: large for a cluster (three million particles per rank), small for a
 /// workstation.
 pub fn block(ranks: usize, large: bool) -> Block {
     let roots = Block::roots(ranks);
     match large {
         true => Block { roots, level: 4, per_cell: 2, steps: 200, every: 20 },
-        false => Block { roots, level: 3, per_cell: 2, steps: 24, every: 4 },
+        false => Block { roots, level: 3, per_cell: 2, steps: 20, every: 2 },
     }
 }
 
@@ -74,7 +74,7 @@ pub fn measure(ways: &[&str]) -> Result<(), Failure> {
     // Twice, in turn: what else the machine does shall not fall on one of them alone.
     for _ in 0..2 {
         for &(ranks, threads) in &parsed {
-            for (kind, size) in [("strong", most.max(4)), ("weak", 2 * ranks * threads)] {
+            for (kind, size) in [("strong", most.max(2)), ("weak", ranks * threads)] {
                 let name = format!("{kind}_{ranks}x{threads}");
                 let records = run(&block(size, false), &name, ranks, threads)?;
                 found.extend(Time::read(kind, &records));

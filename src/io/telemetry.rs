@@ -114,6 +114,8 @@ pub struct Record {
     pub levels: Vec<LevelCount>,
     /// Largest cost of a rank over the mean cost.
     pub imbalance: f64,
+    /// The same for the best cuts of the curve that keep families of leaves whole.
+    pub possible_imbalance: f64,
     /// What single ranks hold and send.
     pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
@@ -151,6 +153,8 @@ pub struct Contribution<'a, const D: usize> {
     pub census: Census,
     /// Largest cost of a rank over the mean cost (the same on all ranks).
     pub imbalance: f64,
+    /// The same for new cuts.
+    pub possible_imbalance: f64,
     /// Relative mass error (the same on all ranks).
     pub mass_error: f64,
 }
@@ -220,6 +224,7 @@ impl Record {
             particles,
             levels: (0..LEVELS).filter(|&l| counts[l] > 0).map(level).collect(),
             imbalance: mine.imbalance,
+            possible_imbalance: mine.possible_imbalance,
             per_rank: PerRank {
                 leaves: rest[0],
                 ghost_leaves: rest[1],
@@ -308,6 +313,7 @@ mod tests {
             particles: 200_000,
             levels: vec![LevelCount { level: 3, leaves: 8, particles: 200_000 }],
             imbalance: 1.01,
+            possible_imbalance: 1.005,
             per_rank: PerRank {
                 leaves: spread,
                 ghost_leaves: spread,

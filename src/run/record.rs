@@ -143,6 +143,7 @@ impl Recorder {
                 chunks: &solver.chunks,
                 census: solver.census(),
                 imbalance: solver.imbalance().0,
+                possible_imbalance: solver.possible_imbalance().0,
                 mass_error,
             },
         );

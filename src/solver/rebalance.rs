@@ -65,6 +65,11 @@ impl<const D: usize> Solver<D> {
         Imbalance(greatest[0] as f64 * self.comm.size() as f64 / total[0].max(1) as f64)
     }
 
+    /// Collective. Imbalance that a new partition would have.
+    pub fn possible_imbalance(&self) -> Imbalance {
+        Imbalance(self.forest.plan_partition(&self.comm, &self.leaf_costs()).imbalance())
+    }
+
     /// Collective. Measures costs and partitions anew if that is expected to pay. Changes no bit of the state.
     /// Returns whether leaves have moved.
     pub fn balance(&mut self) -> bool {
