@@ -71,7 +71,7 @@ pub fn bit_of_node<const D: usize>(node: [u32; D]) -> u32 {
 pub fn product<const D: usize>(sets: [u8; D]) -> u64 {
     let full = if D == 2 { 0xffff } else { u64::MAX };
     sets.iter().enumerate().fold(full, |mask, (axis, &set)| {
-        let repeated = (0..4).map(|k| u64::from(set >> k & 1) * SLICE[axis] << (k << (2 * axis)));
+        let repeated = (0..4).map(|k| (u64::from(set >> k & 1) * SLICE[axis]) << (k << (2 * axis)));
         mask & repeated.fold(0, |slices, slice| slices | slice)
     })
 }

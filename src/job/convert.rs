@@ -1,5 +1,6 @@
 //! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
 //! and bodies.
+use super::adaptivity::{Context, adaptivity};
 use super::colliders::colliders;
 use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
@@ -80,6 +81,9 @@ fn problem<const D: usize>(
     };
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
+    let (tree, bodies) = (tree?, bodies?);
+    let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
+    let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
     let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
@@ -93,9 +97,10 @@ fn problem<const D: usize>(
         origin,
         root_edge,
         brick,
-        tree: tree?,
+        tree,
+        adaptivity,
         materials,
-        bodies: bodies?,
+        bodies,
         gravity: gravity?,
         faces: faces?,
         colliders: colliders?,

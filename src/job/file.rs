@@ -1,6 +1,7 @@
 //! The job file as it is written: the types that parse it and from which its JSON schema is made.
 //!
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
+pub use super::file_adaptivity::Adaptivity;
 pub use super::file_colliders::Collider;
 pub use super::file_output::{Checkpoint, History, Output, Report, Telemetry};
 use super::file_shape::Shape;
@@ -36,6 +37,9 @@ pub struct JobFile {
     /// Levels of the tree.
     #[serde(default)]
     pub tree: Tree,
+    /// Dynamic refinement; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adaptivity: Option<Adaptivity>,
     /// Materials.
     pub materials: Vec<Material>,
     /// Bodies.

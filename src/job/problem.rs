@@ -2,6 +2,7 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
+use crate::adaptivity::Adaptivity;
 use crate::boundary::Collider;
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
@@ -66,6 +67,8 @@ pub struct Problem<const D: usize> {
     pub brick: Brick<D>,
     /// Levels of the tree.
     pub tree: TreeSetup<D>,
+    /// Dynamic refinement, if wanted.
+    pub adaptivity: Option<Adaptivity<D>>,
     /// Materials.
     pub materials: Vec<MaterialSetup>,
     /// Bodies, in the order of the job file.

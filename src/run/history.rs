@@ -3,6 +3,7 @@ use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::io::history::Column;
 use crate::solver::contact::Reaction;
+use crate::solver::resample::BooksTotal;
 use crate::solver::totals::{GridTotals, ParticleTotals};
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -28,11 +29,14 @@ const COLUMNS: [Column<'static>; 15] = [
     column("particles", ""),
 ];
 
-/// Names and units of the columns after the step: for each collider those of its force, its torque and, if it moves, of
+/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each collider those of its force, its torque and, if it moves, of
 /// its place follow the others.
-pub fn columns<const D: usize>(colliders: &[Collider<D>]) -> Vec<(String, &'static str)> {
+pub fn columns<const D: usize>(colliders: &[Collider<D>], is_adaptive: bool) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
+    if is_adaptive {
+        columns.extend(BOOKS.map(|(name, unit)| (name.to_owned(), unit)));
+    }
     for collider in colliders {
         let mut add = |what: &str, axis: &str, unit| {
             columns.push((format!("{what}_{}{axis}", collider.name), unit));
@@ -47,6 +51,16 @@ pub fn columns<const D: usize>(colliders: &[Collider<D>]) -> Vec<(String, &'stat
         }
     }
     columns
+}
+
+/// Columns of runs with dynamic refinement: sums since the start.
+const BOOKS: [(&str, &str); 5] =
+    [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
+
+/// The values of a row that are of splits and merges.
+pub fn book_values(books: &BooksTotal) -> [f64; BOOKS.len()] {
+    let count = |n: u64| n as f64;
+    [count(books.splits), count(books.merges), count(books.removed), books.split_energy, books.merge_energy]
 }
 
 const AXES: [&str; 3] = ["_x", "_y", "_z"];

@@ -54,6 +54,14 @@ pub fn scalars<const D: usize>(
         ExactSum::sum_over_ranks(comm, &mut sums);
         exact = sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())).collect();
     }
+    if solver.physics.adaptivity.is_some() {
+        let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
+        let numbers = [splits, merges, removed, solver.books.next_root];
+        counts.extend(BOOKS.iter().map(|name| String::from(*name)).zip(numbers));
+        exact.extend(
+            ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())),
+        );
+    }
     for (index, state) in solver.contacts.states.iter().enumerate() {
         // Prescribed motions follow from the time.
         if solver.physics.colliders[index].free().is_some() {
@@ -63,6 +71,28 @@ pub fn scalars<const D: usize>(
         }
     }
     Scalars { reals, counts, exact }
+}
+
+/// Names of the counters of splits and merges.
+const BOOKS: [&str; 4] = ["splits", "merges", "particles_merged_away", "next_root"];
+/// Names of the energies booked by splits and merges.
+const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
+
+/// Takes over the books of splits and merges; the sums are on rank 0. `None` if the file lacks one.
+fn restore_books<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    if solver.physics.adaptivity.is_none() {
+        return Some(());
+    }
+    let energy = |name: &str| ExactSum::from_words(scalars.exact(name)?);
+    let (split_energy, merge_energy) = (energy(ENERGIES[0])?, energy(ENERGIES[1])?);
+    let [splits, merges, removed, next_root] = BOOKS.map(|name| scalars.count(name));
+    let books = &mut solver.books;
+    books.next_root = next_root?;
+    if rank == 0 {
+        (books.splits, books.merges, books.removed) = (splits?, merges?, removed?);
+        (books.split_energy, books.merge_energy) = (split_energy, merge_energy);
+    }
+    Some(())
 }
 
 /// Name of the time since which impulses on colliders are summed.
@@ -134,6 +164,10 @@ pub fn solver<const D: usize>(
     if restore_colliders(comm.rank(), &mut solver, &header.scalars).is_none() {
         // Every rank has read the same header.
         let reason = "the state of a collider is missing".into();
+        return Err(FileError::Refused { path, reason }.into());
+    }
+    if restore_books(comm.rank(), &mut solver, &header.scalars).is_none() {
+        let reason = "the books of splits and merges are missing".into();
         return Err(FileError::Refused { path, reason }.into());
     }
     if comm.rank() == 0 {

@@ -1,6 +1,6 @@
 //! From a job to the first state: tree, partition and particles.
-use partition::Forest;
 use partition::comm::{Comm, Disagreement};
+use partition::{Forest, MAX_LEVEL};
 use rayon::prelude::*;
 
 use crate::job::Problem;
@@ -20,6 +20,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         gravity: problem.gravity,
         faces: problem.faces,
         colliders: problem.colliders.clone(),
+        adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
         transfer: problem.transfer,
         boxes: problem.boxes,
@@ -36,14 +37,33 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
 /// # Errors
 /// Two bodies overlap or one has no particle; the same on all ranks.
 pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solver<D>, Disagreement> {
-    let forest = comm.agree(forest(comm, problem))?;
-    let mut chunks = comm.agree(seed(&forest, problem))?;
+    let mut forest = first_forest(comm, problem);
+    comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+    let mut solver = seeded(comm, problem, forest)?;
+    // Criteria look at particles, and finer leaves have other particles: until the tree stays.
+    let mut passes = 0;
+    while passes < MAX_LEVEL && solver.regrid_before_start() {
+        let mut forest = solver.forest;
+        comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+        solver = seeded(comm, problem, forest)?;
+        passes += 1;
+    }
     let mut counts = vec![0; problem.bodies.len()];
-    for tag in chunks.iter().flat_map(Chunk::tags) {
+    for tag in solver.chunks.iter().flat_map(Chunk::tags) {
         counts[usize::from(Tag::unpack(*tag).body)] += 1;
     }
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts))?;
+    Ok(solver)
+}
+
+/// Collective. Fills the leaves of a tree with numbered particles.
+fn seeded<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    forest: Forest<D>,
+) -> Result<Solver<D>, Disagreement> {
+    let mut chunks = comm.agree(seed(&forest, problem))?;
     let physics = physics(problem);
     let mut id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
     for chunk in &mut chunks {
@@ -60,23 +80,32 @@ pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solve
     Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 
-/// Collective. The tree that the job asks for, partitioned by the particles that its leaves will hold.
-///
-/// # Errors
-/// Two bodies overlap; on the rank that found it.
-fn forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Forest<D>, SeedError> {
+/// Collective. The tree that the job asks for before its criteria are looked at.
+fn first_forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Forest<D> {
     let mut forest = Forest::uniform(comm, problem.brick, problem.tree.base_level);
     forest.refine_where(comm, |leaf| problem.wants_refinement(leaf));
     if problem.tree.graded {
         forest.balance(comm);
     }
-    let counted = seed(&forest, problem);
+    forest
+}
+
+/// Collective. Partitions a tree by the particles that its leaves will hold.
+///
+/// # Errors
+/// Two bodies overlap; on the rank that found it.
+fn partition_by_seeds<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    forest: &mut Forest<D>,
+) -> Result<(), SeedError> {
+    let counted = seed(forest, problem);
     let weights: Vec<u64> = match &counted {
         Ok(chunks) => chunks.iter().map(leaf_weight).collect(),
         Err(_) => vec![1; forest.leaves().len()],
     };
     forest.partition(comm, &weights);
-    counted.map(|_| forest)
+    counted.map(|_| ())
 }
 
 /// Not collective. The particles of the own leaves, ids not yet given.

@@ -125,6 +125,10 @@ impl<const D: usize> Solver<D> {
     /// How the boxes of an own leaf were transferred last.
     fn kind(&self, leaf: usize) -> Kind {
         let grid = &self.grid;
+        if grid.plan.revision != self.forest.revision() {
+            // The tree has just changed; nothing was transferred on it yet.
+            return Kind::Plain;
+        }
         match grid.lists.of_leaf(leaf) {
             Some(bins) if !bins.cut.is_empty() => Kind::Cut,
             Some(_) => Kind::Jump,

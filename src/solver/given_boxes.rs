@@ -86,6 +86,7 @@ impl<const D: usize> GivenBoxes<D> {
             gravity: [0.0; D],
             faces: [[FaceCondition::Slip; 2]; D],
             colliders: Vec::new(),
+            adaptivity: None,
             leaving: Leaving::default(),
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,

@@ -7,9 +7,12 @@ pub mod cost;
 pub mod given_boxes;
 pub mod grid;
 mod increment;
+mod indicators;
 pub mod migrate;
 pub mod phases;
 pub mod rebalance;
+pub mod regrid;
+pub mod resample;
 pub mod time_step;
 pub mod totals;
 pub mod transfer;
@@ -25,8 +28,10 @@ use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
 use self::rebalance::LastPartition;
+use self::resample::Books;
 use self::time_step::StepControl;
 use self::transfer::Reach;
+use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
 use crate::grid::fields::Part;
 use crate::kernel::{BoxPolicy, Transfer};
@@ -47,6 +52,8 @@ pub struct Physics<const D: usize> {
     pub faces: [[FaceCondition; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
+    /// Dynamic refinement; `None`: tree and particles keep their sizes.
+    pub adaptivity: Option<Adaptivity<D>>,
     /// What happens to particles that leave the domain.
     pub leaving: Leaving,
     /// Transfer of velocities.
@@ -125,6 +132,12 @@ pub struct Solver<const D: usize> {
     signal: Vec<f64>,
     /// Particles that this rank deleted because they left the domain.
     pub deleted: u64,
+    /// Splits and merges of particles so far.
+    pub books: Books,
+    /// Changes of the tree since the start of this process.
+    pub regrids: u64,
+    /// Mean plastic strain rate in each own leaf in the last step, 1/s, where a criterion asked for it.
+    plastic_rate: Vec<f64>,
     /// What grids of earlier trees and partitions have sent.
     sent_before: Traffic,
     /// Bytes of the last exchange of arenas.
@@ -157,11 +170,15 @@ impl<const D: usize> Solver<D> {
             phases: Phases::default(),
             grid,
             deleted: 0,
+            books: Books::default(),
+            regrids: 0,
+            plastic_rate: Vec::new(),
             sent_before: Traffic::default(),
             arena_bytes: 0,
             costs: Costs::new(clock.step),
             partitioned,
         };
+        solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
         if reach > 0 {
             solver.rebuild_grid(reach);
@@ -192,7 +209,9 @@ impl<const D: usize> Solver<D> {
         let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
+        let plastic = self.plastic_strain_sums();
         self.gather(dt);
+        self.note_plastic_rate(plastic, dt);
         let moved = self.migrate();
         let reach = self.local_reach();
 

@@ -91,7 +91,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
-    /// grid. Changes no bit of the state.
+    /// grid where tree or partition have changed. Changes no bit of the state.
     pub fn rebalance(&mut self) {
         let cuts = self.forest.plan_partition(&self.comm, &self.leaf_costs());
         self.move_leaves(cuts);
@@ -105,6 +105,9 @@ impl<const D: usize> Solver<D> {
             let payload = std::mem::take(&mut self.chunks).iter().map(Chunk::to_bytes).collect();
             let arrived: Vec<Vec<u8>> = shipment.move_payload(&self.comm, payload);
             self.chunks = arrived.iter().map(|bytes| Chunk::from_bytes(bytes)).collect();
+        }
+        // The tree may have changed before, even if no leaf moves now.
+        if self.grid.plan.revision != self.forest.revision() {
             self.signal = vec![0.0; self.chunks.len()];
             self.costs.forget(self.chunks.len());
             self.rebuild_grid(self.grid.plan.tree.reach());

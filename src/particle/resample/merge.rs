@@ -47,6 +47,8 @@ pub struct Merged {
 /// uses on the next coarser level, in the order of the chunk, as many as fill the volume of an undeformed particle of
 /// that level. Only groups within the `limits` merge, and only where `may_merge` allows it for their centre of mass.
 ///
+/// Strangers that fill less than half of that volume become one particle of the level they have.
+///
 /// A merged particle takes the place of the first of its group; all others keep their order. Mass, volume and plastic
 /// work are kept, momentum and, with APIC, angular momentum to round-off; the current volume is kept and the stress is
 /// admissible. `book` gets the kinetic energy that each merge removes, J, which is not negative.

@@ -78,6 +78,12 @@ pub(super) fn mixtures<const D: usize>(
         if half.iter().chain(&reaches[number]).any(|&half| half > greatest) {
             out.energy[number] = None;
         }
+        // Strangers that fill less than half of a particle of the level are still one of the finer level, which may
+        // merge again; else it would split into crumbs as soon as it meets finer cells.
+        let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
+        if !groups[number].is_family && volume(&out.chunk, number) < 0.5 * whole * (1.0 - 1e-9) {
+            out.chunk.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
+        }
     }
     out
 }
