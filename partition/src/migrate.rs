@@ -5,7 +5,8 @@ use std::ops::Range;
 use bytemuck::Pod;
 
 use crate::forest::owner;
-use crate::{Comm, Forest, Octant, weight};
+use crate::weight::{self, Cuts};
+use crate::{Comm, Forest, Octant};
 
 /// Which leaves a [`Forest::partition`] has moved, so that what belongs to them can follow.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,7 +29,26 @@ impl<const D: usize> Forest<D> {
     /// # Panics
     /// If there is not one weight per leaf or the sum of all weights exceeds 64 bits.
     pub fn partition(&mut self, comm: &Comm, weights: &[u64]) -> Shipment {
-        let markers = weight::cuts(self, comm, weights);
+        let cuts = self.plan_partition(comm, weights);
+        self.partition_at(comm, cuts)
+    }
+
+    /// Collective. Where [`Forest::partition`] would cut the curve. Changes nothing, so that a caller can see what a
+    /// new partition would bring.
+    ///
+    /// # Panics
+    /// As [`Forest::partition`].
+    pub fn plan_partition(&self, comm: &Comm, weights: &[u64]) -> Cuts {
+        weight::cuts(self, comm, weights)
+    }
+
+    /// Collective. Moves the cuts between ranks to the given places, and the leaves accordingly. The tree stays.
+    ///
+    /// # Panics
+    /// If the forest has changed since the cuts were planned.
+    pub fn partition_at(&mut self, comm: &Comm, cuts: Cuts) -> Shipment {
+        assert_eq!(cuts.revision, self.revision, "cuts of an earlier forest");
+        let markers = cuts.markers;
         let old_len = self.leaves.len();
         let rank = comm.rank();
         let mut sends = Vec::new();

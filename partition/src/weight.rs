@@ -14,14 +14,37 @@ struct Boundary {
 /// What every rank tells about its leaves, as five integers.
 const SUMMARY: usize = 5;
 
-/// Collective. Markers that share out the weight: cut `r` is the boundary nearest to `r / ranks` of
+/// Where the curve is to be cut, and what each rank then gets. The same on all ranks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cuts {
+    /// Rank `r` gets the keys `markers[r]..markers[r + 1]`.
+    pub(crate) markers: Vec<u64>,
+    /// Weight before each marker.
+    before: Vec<u64>,
+    /// Revision of the forest they were made for.
+    pub(crate) revision: u64,
+}
+
+impl Cuts {
+    /// Not collective. Greatest weight of a rank over the mean; 1 if there is no weight.
+    pub fn imbalance(&self) -> f64 {
+        let ranks = self.before.len() - 1;
+        let greatest = self.before.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+        match self.before[ranks] {
+            0 => 1.0,
+            total => greatest as f64 * ranks as f64 / total as f64,
+        }
+    }
+}
+
+/// Collective. Cuts that share out the weight: cut `r` is the boundary nearest to `r / ranks` of
 /// the total weight (the earlier one of two equally near; next to the ideal place along the curve if
 /// leaves without weight leave a choice). Boundaries lie between leaves that are
 /// not siblings, so families stay whole. Depends on the leaves, their weights and the number of
 /// ranks only, not on the present partition. If all weights are 0, all count the same.
 ///
-/// One gather of five integers per rank and one reduction of one integer per rank.
-pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u64]) -> Vec<u64> {
+/// One gather of five integers per rank and one reduction of two integers per rank.
+pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u64]) -> Cuts {
     assert_eq!(weights.len(), forest.leaves.len(), "one weight per leaf");
     let leaves = &forest.leaves;
     let mut before = Vec::with_capacity(leaves.len());
@@ -75,21 +98,23 @@ pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u
         .map(|i| Boundary { before: rank_before[rank] + before[i], key: forest.keys[i] });
 
     // Each cut lies between two consecutive boundaries, of which exactly one rank owns the first.
-    let mut markers = vec![0u64; comm.size() + 1];
+    let mut markers = vec![0u64; 2 * (comm.size() + 1)];
     let mut lower: Option<Boundary> = None;
     for upper in own.chain([after_own]) {
         if let Some(lower) = lower {
-            place_cuts(&mut markers, total, lower, upper);
+            let (markers, before) = markers.split_at_mut(comm.size() + 1);
+            place_cuts(markers, before, total, lower, upper);
         }
         lower = Some(upper);
     }
-    markers[comm.size()] = Brick::<D>::KEY_END;
     comm.max_u64(&mut markers);
-    markers
+    let mut before = markers.split_off(comm.size() + 1);
+    (markers[comm.size()], before[comm.size()]) = (Brick::<D>::KEY_END, total);
+    Cuts { markers, before, revision: forest.revision }
 }
 
-/// Sets the markers of all cuts whose ideal place lies at `lower` or after it and before `upper`.
-fn place_cuts(markers: &mut [u64], total: u64, lower: Boundary, upper: Boundary) {
+/// Sets the markers of all cuts, and the weight before them, whose ideal place lies at `lower` or after it and before `upper`.
+fn place_cuts(markers: &mut [u64], before: &mut [u64], total: u64, lower: Boundary, upper: Boundary) {
     let ranks = (markers.len() - 1) as u128;
     // Everything times `ranks`, so that ideal places are integers.
     let (low, high) = (u128::from(lower.before) * ranks, u128::from(upper.before) * ranks);
@@ -97,6 +122,6 @@ fn place_cuts(markers: &mut [u64], total: u64, lower: Boundary, upper: Boundary)
     for cut in low.div_ceil(total).max(1)..high.div_ceil(total).min(ranks) {
         let ideal = cut * total;
         let nearest = if ideal - low <= high - ideal { lower } else { upper };
-        markers[cut as usize] = nearest.key;
+        (markers[cut as usize], before[cut as usize]) = (nearest.key, nearest.before);
     }
 }

@@ -4,6 +4,7 @@
 //! The grid of one rank is described by a [`GridPlan`], which depends on tree and partition only, and
 //! filled each time step in a [`NodeFields`]. See `ARCHITECTURE.md`, "Node sums".
 pub mod arena;
+pub mod census;
 pub mod closure;
 pub mod constraint;
 pub mod direct;

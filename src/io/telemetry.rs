@@ -9,6 +9,7 @@ use partition::{MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
 use super::hdf5_file::FileError;
+use crate::grid::census::Census;
 use crate::particle::chunk::Chunk;
 
 /// A quantity over the ranks.
@@ -63,6 +64,29 @@ pub struct LevelCount {
     pub particles: u64,
 }
 
+/// What single ranks hold and send.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PerRank {
+    /// Own leaves.
+    pub leaves: Spread,
+    /// Leaves of other ranks that a rank knows.
+    pub ghost_leaves: Spread,
+    /// Particles.
+    pub particles: Spread,
+    /// Ranks with which a rank exchanges messages.
+    pub neighbours: Spread,
+    /// Messages that a rank sent per step since the last record, one reduction per step not counted.
+    pub messages_per_step: Spread,
+    /// Bytes that a rank sent per step since the last record.
+    pub bytes_per_step: Spread,
+    /// Bytes of a rank's arenas in one exchange, at the time of the record.
+    pub arena_bytes: Spread,
+    /// Bytes of the distinct nodes in them that the receivers need.
+    pub surface_bytes: Spread,
+    /// Heap bytes of grid plan, arenas and node fields.
+    pub grid_bytes: Spread,
+}
+
 /// What dynamic refinement has done since the start of the run, changes of the tree since that of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Resampled {
@@ -109,6 +133,10 @@ pub struct Record {
     pub levels: Vec<LevelCount>,
     /// Largest cost of a rank over the mean cost.
     pub imbalance: f64,
+    /// The same for the best cuts of the curve that keep families of leaves whole.
+    pub possible_imbalance: f64,
+    /// What single ranks hold and send.
+    pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
     pub memory: Spread,
     /// Relative difference between the mass on the real nodes and that of the particles.
@@ -143,12 +171,36 @@ pub struct Contribution<'a, const D: usize> {
     pub leaves: &'a [Octant<D>],
     /// Their particles.
     pub chunks: &'a [Chunk<D>],
+    /// What this rank holds and sends.
+    pub census: Census,
     /// Largest cost of a rank over the mean cost (the same on all ranks).
     pub imbalance: f64,
+    /// The same for new cuts.
+    pub possible_imbalance: f64,
     /// Relative mass error (the same on all ranks).
     pub mass_error: f64,
     /// Dynamic refinement (the same on all ranks).
     pub resampled: Option<Resampled>,
+}
+
+impl<const D: usize> Contribution<'_, D> {
+    /// The entries of [`PerRank`], in their order.
+    fn counts(&self) -> [f64; 9] {
+        let Census { leaves, ghost_leaves, neighbours, arena_bytes, surface_bytes, grid_bytes } = self.census;
+        let particles: u64 = self.chunks.iter().map(|chunk| chunk.len() as u64).sum();
+        let per_step = |count: u64| count as f64 / self.steps.max(1) as f64;
+        [
+            leaves as f64,
+            ghost_leaves as f64,
+            particles as f64,
+            neighbours as f64,
+            per_step(self.traffic.messages),
+            per_step(self.traffic.bytes),
+            arena_bytes as f64,
+            surface_bytes as f64,
+            grid_bytes as f64,
+        ]
+    }
 }
 
 impl Record {
@@ -166,9 +218,10 @@ impl Record {
 
         let mut values: Vec<f64> = mine.phases.iter().map(|&(_, seconds)| seconds).collect();
         values.extend([mine.wall_seconds, resident_bytes().unwrap_or(0) as f64]);
+        values.extend(mine.counts());
         let spreads = Spread::over_ranks(comm, &values);
         let (phases, rest) = spreads.split_at(mine.phases.len());
-        let (wall_seconds, memory) = (rest[0].max, rest[1]);
+        let (wall_seconds, memory, rest) = (rest[0].max, rest[1], &rest[2..]);
 
         let particles: u64 = counts[LEVELS..2 * LEVELS].iter().sum();
         let level = |level: usize| LevelCount {
@@ -195,6 +248,18 @@ impl Record {
             particles,
             levels: (0..LEVELS).filter(|&l| counts[l] > 0).map(level).collect(),
             imbalance: mine.imbalance,
+            possible_imbalance: mine.possible_imbalance,
+            per_rank: PerRank {
+                leaves: rest[0],
+                ghost_leaves: rest[1],
+                particles: rest[2],
+                neighbours: rest[3],
+                messages_per_step: rest[4],
+                bytes_per_step: rest[5],
+                arena_bytes: rest[6],
+                surface_bytes: rest[7],
+                grid_bytes: rest[8],
+            },
             memory,
             mass_error: mine.mass_error,
             resampled: mine.resampled,
@@ -273,6 +338,18 @@ mod tests {
             particles: 200_000,
             levels: vec![LevelCount { level: 3, leaves: 8, particles: 200_000 }],
             imbalance: 1.01,
+            possible_imbalance: 1.005,
+            per_rank: PerRank {
+                leaves: spread,
+                ghost_leaves: spread,
+                particles: spread,
+                neighbours: spread,
+                messages_per_step: spread,
+                bytes_per_step: spread,
+                arena_bytes: spread,
+                surface_bytes: spread,
+                grid_bytes: spread,
+            },
             memory: spread,
             mass_error: 1e-16,
             resampled: None,

@@ -20,7 +20,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
-use crate::solver::{Requests, Solver};
+use crate::solver::{Clock, Requests, Solver};
 
 /// How a run is started.
 #[derive(Clone, Debug)]
@@ -75,6 +75,16 @@ pub enum RunError {
         /// Rank and reason.
         source: Disagreement,
     },
+    /// Something failed after a step, while files were written.
+    #[error("step {step}, time {time} s: {source}")]
+    After {
+        /// Number of steps done.
+        step: u64,
+        /// Time, s.
+        time: f64,
+        /// What failed.
+        source: Box<RunError>,
+    },
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -88,10 +98,18 @@ pub enum RunError {
     },
 }
 
+impl RunError {
+    /// The same with step and time, if it does not name them yet.
+    fn after(self, clock: Clock) -> Self {
+        match self {
+            Self::Step { .. } | Self::After { .. } => self,
+            other => Self::After { step: clock.step, time: clock.time, source: Box::new(other) },
+        }
+    }
+}
+
 /// Steps between looks at the imbalance.
 const BALANCE_EVERY: u64 = 20;
-/// Imbalance above which leaves are partitioned anew.
-const IMBALANCE_LIMIT: f64 = 1.05;
 
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///
@@ -107,18 +125,7 @@ pub fn run<const D: usize>(
         None => Run::start(comm, problem, options)?,
         Some(from) => Run::resume(comm, problem, options, from)?,
     };
-    while run.solver.clock.time < problem.time.end {
-        let requests = Requests { stop: stop.is_set(), checkpoint: run.schedule.wall_due() };
-        let granted = run.step(requests)?;
-        run.solver.regrid().map_err(|source| run.step_error(source))?;
-        run.write_due(granted.checkpoint)?;
-        if granted.stop {
-            let checkpoint = run.checkpoint()?;
-            return Ok(Outcome::Stopped { checkpoint });
-        }
-        run.balance();
-    }
-    Ok(Outcome::Finished(Box::new(run.finish()?)))
+    run.advance(stop).map_err(|error| error.after(run.solver.clock))
 }
 
 /// A run under way.
@@ -210,6 +217,22 @@ impl<'a, const D: usize> Run<'a, D> {
         })
     }
 
+    /// Collective. Steps to the end time, or until it is asked to stop.
+    fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
+        while self.solver.clock.time < self.problem.time.end {
+            let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
+            let granted = self.step(requests)?;
+            self.solver.regrid().map_err(|source| self.step_error(source))?;
+            self.write_due(granted.checkpoint)?;
+            if granted.stop {
+                let checkpoint = self.checkpoint()?;
+                return Ok(Outcome::Stopped { checkpoint });
+            }
+            self.balance();
+        }
+        Ok(Outcome::Finished(Box::new(self.finish()?)))
+    }
+
     fn step(&mut self, requests: Requests) -> Result<Requests, RunError> {
         let clock = self.solver.clock;
         let report = self.solver.step(self.problem.time.end, requests);
@@ -235,12 +258,8 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Collective. Partitions anew if ranks have become unequal.
     fn balance(&mut self) {
-        let step = self.solver.clock.step;
-        if self.comm.size() > 1
-            && step.is_multiple_of(BALANCE_EVERY)
-            && self.solver.imbalance().0 > IMBALANCE_LIMIT
-        {
-            self.solver.rebalance();
+        if self.comm.size() > 1 && self.solver.clock.step.is_multiple_of(BALANCE_EVERY) {
+            self.solver.balance();
         }
     }
 

@@ -88,9 +88,12 @@ impl Recorder {
         let clock = solver.clock;
         // What this takes counts as output, not as steps.
         let start = Instant::now();
-        let phases = solver.phases;
+        let (phases, before) = (solver.phases, solver.traffic());
         let grid = solver.grid_totals();
         solver.phases = phases;
+        let after = solver.traffic();
+        self.since_traffic.messages += after.messages - before.messages;
+        self.since_traffic.bytes += after.bytes - before.bytes;
         let grid = comm.agree(grid)?;
         let particles = solver.particle_totals();
         let reactions = solver.reactions();
@@ -150,7 +153,9 @@ impl Recorder {
                 },
                 leaves: solver.forest.leaves(),
                 chunks: &solver.chunks,
+                census: solver.census(),
                 imbalance: solver.imbalance().0,
+                possible_imbalance: solver.possible_imbalance().0,
                 mass_error,
                 resampled: books.map(|books| Resampled {
                     regrids: solver.regrids,

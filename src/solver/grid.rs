@@ -10,6 +10,7 @@ use super::resample::Resampling;
 use super::transfer::{extent, width_bound};
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
+use crate::grid::census::{Census, surface_bytes};
 use crate::grid::exchange::ReceivedArenas;
 use crate::grid::known::Allowance;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields};
@@ -52,6 +53,16 @@ impl<const D: usize> Grid<D> {
             received,
             plan,
         }
+    }
+
+    /// What the particles scattered last.
+    pub fn arenas(&self) -> &Arenas<D> {
+        &self.arenas
+    }
+
+    /// What other ranks have sent of theirs.
+    pub fn received(&self) -> &ReceivedArenas<D> {
+        &self.received
     }
 
     /// Heap bytes held.
@@ -106,7 +117,23 @@ impl<const D: usize> Solver<D> {
     /// Starts sending the arenas that neighbours need.
     pub(super) fn send_arenas(&mut self) -> Pending {
         let grid = &mut self.grid;
-        self.phases.time(Phase::Exchange, || grid.exchange.begin(&grid.arenas))
+        let before = grid.exchange.traffic().bytes;
+        let pending = self.phases.time(Phase::Exchange, || grid.exchange.begin(&grid.arenas));
+        self.arena_bytes = grid.exchange.traffic().bytes - before;
+        pending
+    }
+
+    /// Collective. What this rank holds of the tree and sends in the exchange of arenas done last.
+    pub fn census(&self) -> Census {
+        let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
+        Census {
+            leaves: self.forest.leaves().len() as u64,
+            ghost_leaves: tree.ghost_len() as u64,
+            neighbours: exchange.neighbours().len() as u64,
+            arena_bytes: self.arena_bytes,
+            surface_bytes: surface_bytes(&self.comm, &self.grid.plan, &self.grid.arenas),
+            grid_bytes: self.grid.heap_bytes() as u64,
+        }
     }
 
     /// Waits for the arenas of neighbours.

@@ -3,6 +3,7 @@
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
 pub mod contact;
+pub mod cost;
 pub mod given_boxes;
 pub mod grid;
 mod increment;
@@ -22,9 +23,11 @@ use partition::comm::{Comm, Disagreement, Traffic};
 
 use self::bins::BinMissing;
 use self::contact::Contacts;
+use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
+use self::rebalance::LastPartition;
 use self::resample::Books;
 use self::time_step::StepControl;
 use self::transfer::Reach;
@@ -137,6 +140,10 @@ pub struct Solver<const D: usize> {
     plastic_rate: Vec<f64>,
     /// What grids of earlier trees and partitions have sent.
     sent_before: Traffic,
+    /// Bytes of the last exchange of arenas.
+    arena_bytes: u64,
+    costs: Costs,
+    partitioned: LastPartition,
 }
 
 impl<const D: usize> Solver<D> {
@@ -149,7 +156,9 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
+        let start = std::time::Instant::now();
         let grid = Grid::build(comm, &forest, &physics, 0);
+        let partitioned = LastPartition::at_start(clock.step, start.elapsed());
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -165,6 +174,9 @@ impl<const D: usize> Solver<D> {
             regrids: 0,
             plastic_rate: Vec::new(),
             sent_before: Traffic::default(),
+            arena_bytes: 0,
+            costs: Costs::new(clock.step),
+            partitioned,
         };
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
@@ -185,6 +197,8 @@ impl<const D: usize> Solver<D> {
     /// # Errors
     /// On all ranks when any rank failed, with that rank and its reason.
     pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
+        self.comm.begin_step(self.clock.step);
+        self.costs.begin_step(self.clock.step, self.chunks.len());
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
         let rates = self.collider_rates(dt);

@@ -62,6 +62,7 @@ impl Phase {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Phases {
     seconds: [f64; Phase::ALL.len()],
+    total: [f64; Phase::ALL.len()],
 }
 
 impl Phases {
@@ -76,6 +77,7 @@ impl Phases {
     /// Books wall time measured elsewhere.
     pub fn book(&mut self, phase: Phase, time: Duration) {
         self.seconds[phase as usize] += time.as_secs_f64();
+        self.total[phase as usize] += time.as_secs_f64();
     }
 
     /// Seconds booked so far, in the order of [`Phase::ALL`].
@@ -83,7 +85,12 @@ impl Phases {
         self.seconds
     }
 
-    /// Forgets what was booked.
+    /// Seconds booked for some phases since the start; [`Phases::clear`] does not touch them.
+    pub fn total(&self, phases: &[Phase]) -> f64 {
+        phases.iter().map(|&phase| self.total[phase as usize]).sum()
+    }
+
+    /// Begins a new report.
     pub fn clear(&mut self) {
         self.seconds = Default::default();
     }

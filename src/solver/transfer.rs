@@ -10,6 +10,7 @@ use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
+use crate::grid::arena::ArenaMut;
 use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
@@ -163,12 +164,12 @@ impl<const D: usize> Solver<D> {
     /// arenas.
     pub(super) fn scatter(&mut self, dt: f64, reach: Reach) {
         let scheme = self.physics.scheme();
-        let (grid, chunks) = (&mut self.grid, &self.chunks);
+        let (grid, chunks, costs) = (&mut self.grid, &self.chunks, &self.costs);
         let (plan, lists) = (&grid.plan, &grid.lists);
         let mut arenas = grid.arenas.each_mut();
         arenas.retain(|arena| grid.is_sent[arena.bin] == (reach == Reach::Neighbours));
         self.phases.time(Phase::Scatter, || {
-            arenas.into_par_iter().for_each(|mut arena| {
+            let scatter_bin = |mut arena: ArenaMut<'_, D>| {
                 let bin = &plan.bins[arena.bin];
                 let leaf = bin.leaf as usize;
                 let chunk = &chunks[leaf];
@@ -190,6 +191,9 @@ impl<const D: usize> Solver<D> {
                         sums.zip(constraints).map(|(sums, constraints)| MomentSums { constraints, sums });
                     p2g::scatter_sub_boxes(chunk, selected.parts, &frame, &scheme, dt, rows, moments);
                 }
+            };
+            arenas.into_par_iter().for_each(|arena| {
+                costs.time(plan.bins[arena.bin].leaf as usize, || scatter_bin(arena));
             });
         });
     }
@@ -273,10 +277,10 @@ impl<const D: usize> Solver<D> {
         let scheme = self.physics.scheme();
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
-        let (chunks, signal) = (&mut self.chunks, &mut self.signal);
+        let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().enumerate();
-            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+            let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
                 let Scratch { arena, increments, gathered } = scratch;
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
@@ -306,6 +310,9 @@ impl<const D: usize> Solver<D> {
                     }
                 }
                 signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
+            };
+            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                costs.time(leaf, || gather_leaf(scratch, leaf, chunk))
             });
             speeds.collect_into_vec(signal);
         });

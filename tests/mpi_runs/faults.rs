@@ -1,54 +1,145 @@
 //! When one rank fails, all end, soon and with one message; what is on disk stays good.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::in_turn;
 use crate::launch::{
-    Outcome, Running, agimp, file, is_alive, job, last_step, mpirun, run, signal, succeed, text,
+    Outcome, Running, agimp, contents, file, is_alive, job, last_step, mpirun, run, signal, succeed, text,
 };
 
 /// All ranks must have ended this long after one has failed or was killed.
 const SOON: Duration = Duration::from_secs(10);
 
-/// Ranks are killed one after another, most of them while a checkpoint is written; each time the run goes on from the
-/// latest. Besides, the directory holds the later checkpoints of an earlier run with other sand.
+/// A few moments, chosen by a fixed seed; see [`killed_at_twenty_moments`].
 #[test]
 fn killed_ranks_leave_no_hang_and_no_damage() {
     let _turn = in_turn();
+    kill_at_random_moments(4, 0x5eed, |_| {});
+}
+
+/// Takes about two minutes:
+/// `cargo test --release --test mpi_runs -- --ignored --nocapture killed_at_twenty_moments`.
+/// `AGIMP_TEST_SEED` chooses other moments.
+#[test]
+#[ignore = "long; the short form runs always"]
+fn killed_at_twenty_moments() {
+    let _turn = in_turn();
+    let seed = std::env::var("AGIMP_TEST_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
+    let mut kills = Vec::new();
+    kill_at_random_moments(20, seed, |kill| {
+        println!("{kill}");
+        kills.push(kill);
+    });
+    let while_writing = kills.iter().filter(|kill| kill.while_writing).count();
+    let slowest = kills.iter().map(|kill| kill.ended_after).max().unwrap_or_default();
+    println!("{while_writing} of {} while a file was written; slowest end after {slowest:?}", kills.len());
+    assert!(while_writing > 0, "no moment fell into the writing of a checkpoint; try another seed");
+}
+
+/// One rank killed.
+struct Kill {
+    rank: usize,
+    ranks: usize,
+    step: u64,
+    while_writing: bool,
+    ended_after: Duration,
+}
+
+impl std::fmt::Display for Kill {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { rank, ranks, step, while_writing, ended_after } = self;
+        let doing = if *while_writing { ", while a file was written" } else { "" };
+        write!(f, "rank {rank} of {ranks} killed after step {step}{doing}; all ended after {ended_after:.1?}")
+    }
+}
+
+/// Ranks are killed one after another, in a run that writes a checkpoint after every step; each time the run goes on
+/// from the latest. Besides, the directory holds the later checkpoints of an earlier run with other sand.
+fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
     let name = "collapse_2d";
     let home = tempfile::tempdir().expect("temporary directory");
     let directory = home.path();
-    let text_of_job = std::fs::read_to_string(job(name)).expect("job");
-    let variant = |file: &str, from: &str, to: &str| -> PathBuf {
-        assert!(text_of_job.contains(from));
-        let path = directory.join(file).join(format!("{name}.toml"));
-        std::fs::create_dir_all(path.parent().expect("a directory")).expect("made");
-        std::fs::write(&path, text_of_job.replace(from, to)).expect("written");
-        path
-    };
-    let other = variant("other", "friction_angle = 29.5", "friction_angle = 35");
-    let often = variant("often", "every_steps = 20", "every_steps = 1");
+    let other = variant(directory, "other", ("friction_angle = 29.5", "friction_angle = 35"));
+    let often = variant(directory, "often", ("every_steps = 20", "every_steps = 1"));
     succeed(&mut run(directory, 1, 2, &other, &["--quiet"]));
     let reference = tempfile::tempdir().expect("temporary directory");
     succeed(&mut run(reference.path(), 1, 1, &job(name), &["--quiet"]));
 
     // Steps are counted in the history, which must not be that of the other sand.
     std::fs::remove_file(file(directory, name, ".history.csv")).expect("history");
-    for (kill, ranks) in [3, 2, 4, 3].into_iter().enumerate() {
-        let step = last_step(directory, name) + 20;
+    let mut random = Random(seed);
+    for kill in 0..kills {
+        let ranks = 2 + random.below(3) as usize;
+        let (steps, victim) = (3 + random.below(15), random.below(ranks as u64) as usize);
         let from: &[&str] = if kill == 0 { &["--quiet"] } else { &["--quiet", "--restart", "latest"] };
         let mut running = Running::start(&mut run(directory, ranks, 1, &often, from));
-        running.wait_for_step(directory, name, step);
-        std::thread::sleep(Duration::from_millis(7 * kill as u64));
+        running.wait_for_step(directory, name, last_step(directory, name) + steps);
+        std::thread::sleep(Duration::from_micros(random.below(40_000)));
         let processes = running.ranks();
         assert_eq!(processes.len(), ranks);
-        signal(processes[kill % ranks], "KILL");
+        signal(processes[victim], "KILL");
+        let killed = Instant::now();
         let output = running.finish_within(SOON);
         assert!(!output.status.success(), "{}", text(&output));
         all_ended(&processes);
+        let ended_after = killed.elapsed();
+        assert!(ended_after < SOON, "ranks were there for {ended_after:?}");
+        let left = contents(&directory.join("out").join(name));
+        tell(Kill {
+            rank: victim,
+            ranks,
+            step: last_step(directory, name),
+            while_writing: left.keys().any(|file| file.ends_with(".part")),
+            ended_after,
+        });
     }
     succeed(&mut run(directory, 2, 1, &often, &["--quiet", "--restart", "latest"]));
-    Outcome::read(directory, name).assert_same(&Outcome::read(reference.path(), name), "killed four times");
+    Outcome::read(directory, name)
+        .assert_same(&Outcome::read(reference.path(), name), "killed again and again");
+}
+
+/// The small collapse with one text of its job replaced, in a directory of its own.
+fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> PathBuf {
+    let text = std::fs::read_to_string(job("collapse_2d")).expect("job");
+    assert!(text.contains(from));
+    let path = directory.join(folder).join("collapse_2d.toml");
+    std::fs::create_dir_all(directory.join(folder)).expect("made");
+    std::fs::write(&path, text.replace(from, to)).expect("written");
+    path
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (x ^ x >> 31) % limit
+    }
+}
+
+/// The directory of the results vanishes under a run.
+#[test]
+fn a_failure_while_writing_names_the_step() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let (directory, name) = (home.path(), "collapse_2d");
+    let often = variant(directory, "often", ("every_steps = 20", "every_steps = 1"));
+    let mut running = Running::start(&mut run(directory, 3, 1, &often, &["--quiet"]));
+    running.wait_for_step(directory, name, 9);
+    let results = directory.join("out").join(name);
+    std::fs::rename(&results, directory.join("out/elsewhere")).expect("renamed");
+    let output = running.finish_within(SOON);
+    let shown = text(&output);
+    assert_eq!(output.status.code(), Some(1), "{shown}");
+    let messages: Vec<&str> = shown.lines().filter(|line| line.starts_with("agimp:")).collect();
+    assert_eq!(messages.len(), 1, "one message: {shown}");
+    for part in ["step ", "time ", "out/collapse_2d/collapse_2d.checkpoint_"] {
+        assert!(messages[0].contains(part), "'{part}' is missing: {}", messages[0]);
+    }
 }
 
 /// A particle is lost on one rank.

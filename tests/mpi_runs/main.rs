@@ -2,6 +2,7 @@
 //! ranks when one fails.
 mod faults;
 mod launch;
+mod ranks;
 mod restart;
 mod same_bits;
 

@@ -3,6 +3,8 @@
 use std::cell::Cell;
 use std::panic::PanicHookInfo;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 
 use mpi::Threading;
 use mpi::environment::Universe;
@@ -14,6 +16,17 @@ pub type RawComm = mpi::ffi::MPI_Comm;
 
 /// Exit code of a job that ended by a panic (the one Rust uses for a panic in `main`).
 const PANIC_CODE: i32 = 101;
+
+/// The step that this process works on, for the message of a panic; [`NO_STEP`] before the first.
+static STEP: AtomicU64 = AtomicU64::new(NO_STEP);
+const NO_STEP: u64 = u64::MAX;
+
+/// Set by the first panic of this process: threads that share a bug shall not repeat the message.
+static TOLD: AtomicBool = AtomicBool::new(false);
+
+/// Ranks that share a bug shall not all tell of it: the others give rank 0 this long to end the job first. Longer than
+/// Open MPI takes between SIGTERM, which the program may catch, and SIGKILL (1 s).
+const RANK_0_FIRST: Duration = Duration::from_millis(1500);
 
 /// Why MPI could not be started.
 #[derive(Debug, thiserror::Error)]
@@ -39,8 +52,8 @@ impl World {
     /// Collective. Starts MPI and installs a panic hook.
     ///
     /// Works without `mpirun` too, as a world of one rank. A panic on any thread of any rank
-    /// prints `agimp: rank R: <message> (<file>:<line>)` and ends all ranks; with one rank it
-    /// prints the same line and unwinds as usual.
+    /// prints `agimp: rank R, step S: <message> (<file>:<line>)` and ends all ranks; with one rank it
+    /// prints the same line and unwinds as usual. See [`Comm::begin_step`] for the step.
     ///
     /// To be called before the program starts threads, since it may set an environment variable.
     pub fn init() -> Result<World, CommError> {
@@ -110,6 +123,11 @@ impl Comm {
         self.communicator().barrier();
     }
 
+    /// Not collective. From now on a panic of this process names this step.
+    pub fn begin_step(&self, step: u64) {
+        STEP.store(step, Ordering::Relaxed);
+    }
+
     /// Not collective. Ends all ranks at once with this exit code.
     pub fn abort(&self, code: i32) -> ! {
         self.communicator().abort(code)
@@ -161,6 +179,16 @@ fn prefer_romio() {
 
 /// The panic hook: one line, then the end of all ranks. Without it the others would wait forever.
 fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
+    if size > 1 && TOLD.swap(true, Ordering::Relaxed) {
+        // Another thread is about to end the process; this one must not unwind into the end of MPI meanwhile.
+        loop {
+            std::thread::park();
+        }
+    }
+    let running = mpi::environment::is_initialized() && !mpi::environment::is_finalized();
+    if rank > 0 && running {
+        std::thread::sleep(RANK_0_FIRST);
+    }
     let payload = panic.payload();
     let message = payload
         .downcast_ref::<&str>()
@@ -168,8 +196,11 @@ fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
         .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("panic without a message");
     let place = panic.location().map(|l| format!(" ({}:{})", l.file(), l.line())).unwrap_or_default();
-    eprintln!("agimp: rank {rank}: {message}{place}");
-    let running = mpi::environment::is_initialized() && !mpi::environment::is_finalized();
+    let step = match STEP.load(Ordering::Relaxed) {
+        NO_STEP => String::new(),
+        step => format!(", step {step}"),
+    };
+    eprintln!("agimp: rank {rank}{step}: {message}{place}");
     if size > 1 && running {
         // Possibly not the main thread. The process ends either way, and waiting for the main
         // thread to notice could take forever if that one waits for a message.

@@ -160,6 +160,18 @@ pub fn neighbours(comm: &Comm) {
     assert_eq!(NeighbourExchange::new(comm, lopsided, 3).is_valid(), size == 1);
 }
 
+pub fn panic_in_a_step(comm: &Comm) {
+    comm.begin_step(17);
+    panic_on_last(comm);
+}
+
+/// On all ranks, on two threads each.
+pub fn panic_everywhere(_: &Comm) {
+    let threads = [(); 2].map(|()| std::thread::spawn(|| panic!("deliberate")));
+    threads.into_iter().for_each(|thread| drop(thread.join()));
+    std::thread::sleep(Duration::from_secs(20));
+}
+
 pub fn panic_on_last(comm: &Comm) {
     if comm.rank() == comm.size() - 1 {
         panic!("deliberate");

@@ -23,6 +23,8 @@ const SCENARIOS: &[(&str, Scenario)] = &[
     ("sparse", comm::sparse),
     ("neighbours", comm::neighbours),
     ("panic", comm::panic_on_last),
+    ("panic_in_a_step", comm::panic_in_a_step),
+    ("panic_everywhere", comm::panic_everywhere),
     ("tree_2d", tree::random_trees::<2>),
     ("tree_3d", tree::random_trees::<3>),
     ("uniform", tree::uniform),
@@ -70,8 +72,10 @@ fn neighbour_exchange() {
 
 #[test]
 fn a_panic_ends_all_ranks() {
-    fails("panic", 1);
-    fails("panic", 3);
+    fails("panic", 1, "rank 0: deliberate");
+    fails("panic", 3, "rank 2: deliberate");
+    fails("panic_in_a_step", 3, "rank 2, step 17: deliberate");
+    fails("panic_everywhere", 3, "rank 0: deliberate");
 }
 
 #[test]

@@ -118,7 +118,10 @@ fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracl
     let old = forest.leaves().to_vec();
     let weights: Vec<u64> = old.iter().map(|leaf| weight(seed, leaf)).collect();
     let (revision, checksum) = (forest.revision(), forest.checksum(comm));
-    let shipment = forest.partition(comm, &weights);
+    let cuts = forest.plan_partition(comm, &weights);
+    assert_eq!(cuts, forest.plan_partition(comm, &weights));
+    let imbalance = cuts.imbalance();
+    let shipment = forest.partition_at(comm, cuts);
     assert_same(comm, forest, oracle, "partition");
     assert_eq!(forest.checksum(comm), checksum);
     assert_eq!(forest.revision(), revision + u64::from(shipment.changed()));
@@ -130,6 +133,13 @@ fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracl
         for after in all[rank + 1..].iter().filter_map(|l| l.first()).take(1) {
             assert!(leaves.last().is_none_or(|last| !last.is_sibling(after)), "a family is torn");
         }
+    }
+
+    let mut load = [forest.leaves().iter().map(|leaf| weight(seed, leaf)).sum::<u64>(); 2];
+    comm.max_u64(&mut load[..1]);
+    comm.sum_u64(&mut load[1..]);
+    if load[1] > 0 {
+        assert_eq!(imbalance, load[0] as f64 * comm.size() as f64 / load[1] as f64);
     }
 
     let moved = shipment.move_payload(comm, old.iter().map(payload).collect());

@@ -1,0 +1,218 @@
+//! What leaves cost: integers from measured time, the same on all ranks.
+//!
+//! In some steps the time of scatter and gather is taken leaf by leaf. It is shared out to classes: the material of the
+//! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class. Steps
+//! in which nodes are summed and updated give the cost of a leaf. Costs steer the partition, which changes no bit
+//! of the state.
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use super::Solver;
+use super::phases::Phase;
+use crate::particle::Chunk;
+use crate::particle::chunk::Tag;
+
+/// Time is taken in one of so many steps.
+const MEASURE_EVERY: u64 = 4;
+/// Cost of a leaf with particles before anything is measured, in particles.
+const LEAF_COST: u64 = 8;
+/// Unit of measured costs, s.
+const UNIT: f64 = 1e-11;
+/// A class needs so many measured particles to have a cost of its own.
+const FEW: u64 = 500;
+
+/// How the boxes of a leaf are transferred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// All in one bin without constrained nodes.
+    Plain,
+    /// Beside a change of level.
+    Jump,
+    /// Some boxes are cut into parts.
+    Cut,
+}
+
+const KINDS: usize = 3;
+
+/// Costs of leaves and what they are measured from.
+#[derive(Debug, Default)]
+pub struct Costs {
+    /// Cost of a particle by material and kind; empty before the first measurement.
+    particle: Vec<[u64; KINDS]>,
+    /// Cost of a leaf with particles beside them.
+    leaf: u64,
+    /// Measured nanoseconds per own leaf.
+    nanoseconds: Vec<AtomicU64>,
+    measuring: bool,
+    measured_steps: u64,
+    /// Steps and seconds of node work up to the last agreement.
+    agreed_step: u64,
+    agreed_seconds: f64,
+}
+
+/// Cost of a leaf in particles, as long as no time is measured.
+pub fn leaf_weight<const D: usize>(chunk: &Chunk<D>) -> u64 {
+    if chunk.is_empty() { 1 } else { LEAF_COST + chunk.len() as u64 }
+}
+
+impl Costs {
+    /// No costs yet, in a run that starts or goes on at a step.
+    pub(super) fn new(step: u64) -> Self {
+        Self { agreed_step: step, ..Self::default() }
+    }
+
+    /// Not collective. Begins a step of `leaves` own leaves.
+    pub(super) fn begin_step(&mut self, step: u64, leaves: usize) {
+        if self.nanoseconds.len() != leaves {
+            self.forget(leaves);
+        }
+        self.measuring = step % MEASURE_EVERY == MEASURE_EVERY - 1;
+        self.measured_steps += u64::from(self.measuring);
+    }
+
+    /// Not collective. Forgets times that belong to other leaves.
+    pub(super) fn forget(&mut self, leaves: usize) {
+        self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
+        self.measured_steps = 0;
+    }
+
+    /// Runs work on the particles of a leaf, on any thread.
+    pub(super) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
+        if !self.measuring {
+            return work();
+        }
+        let start = Instant::now();
+        let result = work();
+        self.nanoseconds[leaf].fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        result
+    }
+
+    /// Cost of a leaf.
+    fn of<const D: usize>(&self, chunk: &Chunk<D>, kind: Kind) -> u64 {
+        if self.particle.is_empty() {
+            return leaf_weight(chunk);
+        }
+        if chunk.is_empty() {
+            return (self.leaf / LEAF_COST).max(1);
+        }
+        let particles = counts(chunk, self.particle.len());
+        let cost = particles.iter().zip(&self.particle).map(|(count, cost)| count * cost[kind as usize]);
+        self.leaf + cost.sum::<u64>()
+    }
+}
+
+/// Particles of a chunk by material.
+fn counts<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
+    let mut counts = vec![0; materials];
+    match materials {
+        1 => counts[0] = chunk.len() as u64,
+        _ => chunk.tags().iter().for_each(|&tag| counts[usize::from(Tag::unpack(tag).material)] += 1),
+    }
+    counts
+}
+
+/// New cost of a class: `new` mixed with what was found before.
+fn smoothed(old: u64, new: u64) -> u64 {
+    if old == 0 { new } else { (3 * old + new).div_ceil(4) }.max(1)
+}
+
+/// Time of a class and the particles that took it, over all ranks, in units of cost per particle.
+fn per_particle(units: u64, particles: u64) -> Option<u64> {
+    (particles >= FEW).then(|| (units / particles).max(1))
+}
+
+impl<const D: usize> Solver<D> {
+    /// How the boxes of an own leaf were transferred last.
+    fn kind(&self, leaf: usize) -> Kind {
+        let grid = &self.grid;
+        if grid.plan.revision != self.forest.revision() {
+            // The tree has just changed; nothing was transferred on it yet.
+            return Kind::Plain;
+        }
+        match grid.lists.of_leaf(leaf) {
+            Some(bins) if !bins.cut.is_empty() => Kind::Cut,
+            Some(_) => Kind::Jump,
+            None if grid.plan.bins[grid.plan.leaf_bins(leaf).start].touched.is_some() => Kind::Jump,
+            None => Kind::Plain,
+        }
+    }
+
+    /// Not collective. Costs of the own leaves in a step, in units that are the same on all ranks.
+    pub(super) fn leaf_costs(&self) -> Vec<u64> {
+        let leaves = self.chunks.iter().enumerate();
+        leaves.map(|(leaf, chunk)| self.costs.of(chunk, self.kind(leaf))).collect()
+    }
+
+    /// Collective. Turns what all ranks have measured since the last call into costs.
+    pub(super) fn agree_on_costs(&mut self) {
+        let materials = self.physics.materials.len();
+        let seconds = self.phases.total(&[Phase::Sort, Phase::Sum, Phase::Nodes]);
+        let steps = self.clock.step - self.costs.agreed_step;
+        let units = |seconds: f64| (seconds / UNIT) as u64;
+        // By material and kind: time, particles; then time and number of leaves in node work.
+        let mut sums = vec![0u64; 2 * KINDS * materials + 2];
+        let (times, rest) = sums.split_at_mut(KINDS * materials);
+        let (particles, nodes) = rest.split_at_mut(KINDS * materials);
+        for (leaf, chunk) in self.chunks.iter().enumerate().filter(|(_, chunk)| !chunk.is_empty()) {
+            nodes[1] += steps;
+            let (kind, len) = (self.kind(leaf) as usize, chunk.len() as u64);
+            let time = self.costs.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
+            for (material, count) in counts(chunk, materials).into_iter().enumerate() {
+                let share = time as f64 * count as f64 / len as f64;
+                times[KINDS * material + kind] += units(share * 1e-9);
+                particles[KINDS * material + kind] += count * self.costs.measured_steps;
+            }
+        }
+        let threads = rayon::current_num_threads() as f64;
+        nodes[0] = units((seconds - self.costs.agreed_seconds).max(0.0) * threads);
+        (self.costs.agreed_seconds, self.costs.agreed_step) = (seconds, self.clock.step);
+        self.costs.forget(self.chunks.len());
+        self.comm.sum_u64(&mut sums);
+        self.costs.take_in(&sums, materials);
+    }
+
+    /// Not collective. Wall seconds of this rank in steps so far, waiting for others included; without files and new
+    /// partitions.
+    pub(super) fn seconds_in_steps(&self) -> f64 {
+        let phases: Vec<Phase> =
+            Phase::ALL.into_iter().filter(|phase| !matches!(phase, Phase::Regrid | Phase::Output)).collect();
+        self.phases.total(&phases)
+    }
+}
+
+impl Costs {
+    /// Takes in sums over all ranks, as [`Solver::agree_on_costs`] lays them out.
+    fn take_in(&mut self, sums: &[u64], materials: usize) {
+        let (times, rest) = sums.split_at(KINDS * materials);
+        let (particles, nodes) = rest.split_at(KINDS * materials);
+        let Some(mean) = per_particle(times.iter().sum(), particles.iter().sum()) else { return };
+        self.particle.resize(materials, [0; KINDS]);
+        for (class, cost) in self.particle.as_flattened_mut().iter_mut().enumerate() {
+            // A class of few particles costs little in any case; what is measured of it may be noise.
+            let new = per_particle(times[class], particles[class]).unwrap_or(mean);
+            *cost = smoothed(*cost, new);
+        }
+        if let Some(new) = nodes[0].checked_div(nodes[1]) {
+            self.leaf = smoothed(self.leaf, new);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn costs_follow_what_is_measured() {
+        let mut costs = Costs::default();
+        // One material: plain leaves at 10 units a particle, jumps at 30, hardly any cut ones.
+        costs.take_in(&[10_000, 30_000, 900, 1000, 1000, 3, 5000, 50], 1);
+        assert_eq!(costs.particle, [[10, 30, 20]]);
+        assert_eq!(costs.leaf, 100);
+        costs.take_in(&[50_000, 30_000, 0, 1000, 1000, 0, 5000, 50], 1);
+        assert_eq!(costs.particle, [[20, 30, 25]]);
+        // Nothing was measured: everything stays.
+        costs.take_in(&[0; 8], 1);
+        assert_eq!((costs.particle[0], costs.leaf), ([20, 30, 25], 100));
+    }
+}

@@ -1,0 +1,86 @@
+//! What single ranks hold and send when there are many, and how evenly they share the work.
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::in_turn;
+use crate::launch::{file, job, run, succeed};
+
+/// The records of a run.
+fn telemetry(directory: &Path, name: &str) -> Vec<Value> {
+    let lines = std::fs::read_to_string(file(directory, name, ".telemetry.jsonl")).expect("telemetry");
+    lines.lines().map(|line| serde_json::from_str(line).expect("a record per line")).collect()
+}
+
+/// Least, mean and greatest value of a rank.
+fn spread(record: &Value, name: &str) -> [f64; 3] {
+    ["min", "mean", "max"].map(|key| record["per_rank"][name][key].as_f64().expect(name))
+}
+
+/// Runs the job on `ranks` ranks and checks the counts of its last record.
+fn check_counts(ranks: usize) {
+    let name = "many_leaves";
+    let home = tempfile::tempdir().expect("temporary directory");
+    succeed(&mut run(home.path(), ranks, 1, &job(name), &["--quiet"]));
+    let records = telemetry(home.path(), name);
+    // The last that follows on steps; the end of a run writes one more.
+    let record = records.iter().rfind(|record| record["steps"] != 0).expect("a record");
+    let of = |name: &str| spread(record, name);
+    let levels = record["levels"].as_array().expect("levels");
+    let total: f64 = levels.iter().map(|level| level["leaves"].as_f64().expect("leaves")).sum();
+    let (leaves, ghosts, neighbours) = (of("leaves"), of("ghost_leaves"), of("neighbours"));
+    let (messages, arenas, surface) = (of("messages_per_step"), of("arena_bytes"), of("surface_bytes"));
+    println!(
+        "{ranks} ranks, {total} leaves: own {leaves:?}, ghosts {ghosts:?}, neighbours {neighbours:?}, \
+         messages per step {messages:?}, bytes of arenas {arenas:?}, of the surface {surface:?}"
+    );
+
+    assert!((leaves[1] * ranks as f64 - total).abs() < 1e-3 * total, "every leaf has one owner");
+    // Own leaves and a layer around them, at most four leaves thick.
+    let layer = (leaves[2].cbrt() + 8.0).powi(3) - leaves[2];
+    assert!(ghosts[2] <= layer, "{} ghosts around {} leaves", ghosts[2], leaves[2]);
+    let collective = (ranks as f64).log2();
+    for (messages, neighbours) in messages.into_iter().zip(neighbours) {
+        assert!(messages <= 2.0 * neighbours + collective, "{messages} messages, {neighbours} neighbours");
+    }
+    if ranks > 1 {
+        let ratio = arenas[1] / surface[1];
+        assert!((1.0..=MOST_BYTES).contains(&ratio), "{ratio} times the bytes of the surface");
+    }
+}
+
+/// Bytes sent over the bytes that the surface between ranks needs.
+const MOST_BYTES: f64 = 6.0;
+
+#[test]
+fn counts_on_16_ranks() {
+    let _turn = in_turn();
+    check_counts(1);
+    check_counts(16);
+}
+
+#[test]
+#[ignore = "64 ranks on few cores take long; 16 run always"]
+fn counts_on_1_to_64_ranks() {
+    let _turn = in_turn();
+    [1, 2, 4, 8, 16, 32, 64].into_iter().for_each(check_counts);
+}
+
+/// Sand falls out of the ranks that had it; cuts follow. About 100 leaves with sand per rank.
+#[test]
+fn work_stays_even_on_4_ranks() {
+    let _turn = in_turn();
+    let name = "many_leaves_2d";
+    let home = tempfile::tempdir().expect("temporary directory");
+    succeed(&mut run(home.path(), 4, 1, &job(name), &["--quiet"]));
+    let records = telemetry(home.path(), name);
+    let imbalance = |record: &Value| record["imbalance"].as_f64().expect("imbalance");
+    let all: Vec<f64> = records.iter().map(imbalance).collect();
+    println!("imbalance from record to record: {all:.3?}");
+    // The first partition is by particles alone, without any measurement.
+    assert!(all[0] <= 1.05, "from the first step: {}", all[0]);
+    // Measured costs jump where cores are shared with others; half of all records is not concerned.
+    let mut sorted = all.clone();
+    sorted.sort_by(f64::total_cmp);
+    assert!(sorted[sorted.len() / 2] <= 1.05, "{all:.3?}");
+}
