@@ -5,7 +5,7 @@
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
 
-use self::simd::Lanes;
+use self::simd::{F64x4, Lanes};
 use crate::material::Material;
 
 mod batch;
@@ -44,6 +44,14 @@ pub const fn stencil_bases(d: usize) -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Row(pub [f64; 4]);
+
+impl Row {
+    /// Adds another row.
+    #[inline(always)]
+    pub fn add(&mut self, other: &Self) {
+        self.0 = (F64x4::new(self.0) + F64x4::new(other.0)).to_array();
+    }
+}
 
 /// The block of cells that a call works on. Lengths in m, relative to the lower corner of the domain.
 #[derive(Clone, Copy, Debug)]

@@ -30,7 +30,8 @@ pub struct MomentSums<'a, const D: usize> {
     pub sums: &'a mut [[Row; D]],
 }
 
-/// Adds the selected particles to the arena of their block: rows (momentum, mass).
+/// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also first
+/// moments where a stencil touches a constrained node.
 ///
 /// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
 /// the arena, which holds when its centre lies in the block.
@@ -41,21 +42,13 @@ pub fn scatter<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
+    moments: Option<MomentSums<D>>,
 ) {
-    scatter_all(chunk, select, frame, scheme, dt, arena, None);
-}
-
-/// As [`scatter`], and adds first moments where a stencil touches a constrained node.
-pub fn scatter_with_moments<const D: usize>(
-    chunk: &Chunk<D>,
-    select: Select,
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    arena: &mut [Row],
-    moments: MomentSums<D>,
-) {
-    scatter_all(chunk, select, frame, scheme, dt, arena, Some(moments));
+    // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
+    match moments {
+        None => scatter_all(chunk, select, frame, scheme, dt, arena, None),
+        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments),
+    }
 }
 
 /// Adds parts of boxes to the arena of their block; the affine term is relative to the particle.

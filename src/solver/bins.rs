@@ -14,6 +14,7 @@ use crate::grid::plan::Bin;
 use crate::grid::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
+use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout};
 
 /// A leaf near a leaf.
@@ -297,5 +298,9 @@ fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) 
 
 /// Greatest half width without deformation in a chunk, m.
 pub fn greatest_half<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    chunk.column(Layout::<D>::HALF).iter().copied().fold(0.0, f64::max)
+    let batches = chunk.column(Layout::<D>::HALF).chunks_exact(LANES);
+    let rest = batches.remainder().iter().copied().fold(0.0, f64::max);
+    let lanes = batches.filter_map(<[f64]>::first_chunk);
+    let lanes = lanes.fold(Lanes::splat(rest), |most, batch| Lanes::load(batch).max(most));
+    lanes.to_array().into_iter().fold(0.0, f64::max)
 }

@@ -63,7 +63,7 @@ pub struct View<'a, const D: usize> {
 pub struct Options {
     /// Fields of the particles for ParaView.
     pub fields: Vec<PointField>,
-    /// Those fields in single precision (the restart state never is).
+    /// Those fields in single precision, but for those that the restart state holds already: that never is.
     pub single: bool,
     /// Also write all that a restart needs.
     pub restart: bool,
@@ -94,10 +94,11 @@ pub fn write<const D: usize>(
         let (leaves, particles) = totals(comm, file, view)?;
         Header::new(view, leaves.total, particles.total, options.restart).write(file)?;
         let mut checked = Checked::new(Some(comm), file);
-        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
+        // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
             state::write(file, &mut checked, view, leaves, particles)?;
         }
+        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
         checked.attach()
     })
 }
