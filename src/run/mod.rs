@@ -8,6 +8,7 @@ pub mod setup;
 pub mod stop;
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use partition::comm::{Comm, Disagreement};
 
@@ -20,6 +21,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
+use crate::solver::phases::Phase;
 use crate::solver::{Requests, Solver};
 
 /// How a run is started.
@@ -107,17 +109,12 @@ pub fn run<const D: usize>(
         None => Run::start(comm, problem, options)?,
         Some(from) => Run::resume(comm, problem, options, from)?,
     };
-    while run.solver.clock.time < problem.time.end {
-        let requests = Requests { stop: stop.is_set(), checkpoint: run.schedule.wall_due() };
-        let granted = run.step(requests)?;
-        run.write_due(granted.checkpoint)?;
-        if granted.stop {
-            let checkpoint = run.checkpoint()?;
-            return Ok(Outcome::Stopped { checkpoint });
-        }
-        run.balance();
-    }
-    Ok(Outcome::Finished(Box::new(run.finish()?)))
+    let outcome = run.advance(stop);
+    // Also after an error: the checkpoint on its way to disk is what the next run can start from.
+    let settled = run.outputs.settle(comm);
+    let outcome = outcome?;
+    settled?;
+    Ok(outcome)
 }
 
 /// A run under way.
@@ -209,6 +206,21 @@ impl<'a, const D: usize> Run<'a, D> {
         })
     }
 
+    /// Collective. Steps to the end, or until asked to stop.
+    fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
+        while self.solver.clock.time < self.problem.time.end {
+            let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
+            let granted = self.step(requests)?;
+            self.write_due(granted.checkpoint)?;
+            if granted.stop {
+                let checkpoint = self.checkpoint()?;
+                return Ok(Outcome::Stopped { checkpoint });
+            }
+            self.balance();
+        }
+        Ok(Outcome::Finished(Box::new(self.finish()?)))
+    }
+
     fn step(&mut self, requests: Requests) -> Result<Requests, RunError> {
         let clock = self.solver.clock;
         let report = self.solver.step(self.problem.time.end, requests);
@@ -219,6 +231,9 @@ impl<'a, const D: usize> Run<'a, D> {
     fn write_due(&mut self, checkpoint: bool) -> Result<(), RunError> {
         self.recorder.after_step(self.comm, &mut self.solver)?;
         let clock = self.solver.clock;
+        if clock.step.is_multiple_of(self.problem.telemetry_every) {
+            self.outputs.try_settle(self.comm)?;
+        }
         if self.schedule.output_due(self.outputs.next(), clock.time) {
             self.write_output()?;
         }
@@ -280,19 +295,24 @@ impl<'a, const D: usize> Run<'a, D> {
     }
 
     fn write_output(&mut self) -> Result<(), RunError> {
+        let start = Instant::now();
         let step = Some(self.solver.clock.step);
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         self.outputs.write(self.comm, &view)?;
         self.output_step = step;
+        self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(())
     }
 
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
+        let start = Instant::now();
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next(), self.output_step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
         self.schedule.checkpoint_written(self.solver.clock.time);
-        Ok(self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?)
+        self.solver.phases.book(Phase::Output, start.elapsed());
+        Ok(path)
     }
 }
 

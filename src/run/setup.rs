@@ -1,13 +1,13 @@
 //! From a job to the first state: tree, partition and particles.
-use partition::Forest;
 use partition::comm::{Comm, Disagreement};
+use partition::{Forest, Octant};
 use rayon::prelude::*;
 
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::seed::{SeedError, check_counts, fill_leaf};
-use crate::solver::rebalance::leaf_weight;
+use crate::particle::seed::{SeedError, check_counts, count_leaf, fill_leaf};
+use crate::solver::rebalance::leaf_cost;
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
 
@@ -69,13 +69,23 @@ fn forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Forest<D>
     if problem.tree.graded {
         forest.balance(comm);
     }
-    let counted = seed(&forest, problem);
-    let weights: Vec<u64> = match &counted {
-        Ok(chunks) => chunks.iter().map(leaf_weight).collect(),
-        Err(_) => vec![1; forest.leaves().len()],
+    // Counted, not filled: leaves that go to other ranks shall take no memory here.
+    let count = |leaf: &Octant<D>| {
+        let mut counts = vec![0; problem.bodies.len()];
+        count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost(counts.iter().sum()))
     };
-    forest.partition(comm, &weights);
-    counted.map(|_| forest)
+    let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
+    match counted {
+        Ok(weights) => {
+            forest.partition(comm, &weights);
+            Ok(forest)
+        }
+        Err(error) => {
+            // Collective: ranks without the fault do the same.
+            forest.partition(comm, &vec![1; forest.leaves().len()]);
+            Err(error)
+        }
+    }
 }
 
 /// Not collective. The particles of the own leaves, ids not yet given.

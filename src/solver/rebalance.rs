@@ -8,7 +8,12 @@ const LEAF_COST: u64 = 8;
 
 /// Cost of a leaf in a step.
 pub fn leaf_weight<const D: usize>(chunk: &Chunk<D>) -> u64 {
-    LEAF_COST + chunk.len() as u64
+    leaf_cost(chunk.len() as u64)
+}
+
+/// Cost of a leaf with so many particles.
+pub fn leaf_cost(particles: u64) -> u64 {
+    LEAF_COST + particles
 }
 
 /// Greatest cost of a rank over the mean.
