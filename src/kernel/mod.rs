@@ -178,13 +178,3 @@ const fn stencil_span(d: usize) -> usize {
 const fn symmetric_index<const D: usize>(i: usize, j: usize) -> usize {
     if i == j { i } else { i + j + 2 }
 }
-
-/// Calls `f` with the place in the arena, relative to the first node, and the index along each axis
-/// of all nodes of a stencil.
-#[inline(always)]
-fn for_each_node<const D: usize>(mut f: impl FnMut(usize, [usize; D])) {
-    for i in 0..3usize.pow(D as u32) {
-        let index = std::array::from_fn(|k| i / 3usize.pow(k as u32) % 3);
-        f((0..D).rev().fold(0, |place, k| place * ARENA_EDGE + index[k]), index);
-    }
-}
