@@ -1,4 +1,5 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
+pub mod adaptivity;
 pub mod bench;
 pub mod boundary;
 pub mod cli;

@@ -1,5 +1,8 @@
 //! Free flight across level jumps: what each transfer conserves. Each test launches its own binary under mpirun.
 
+#[path = "common/spinning.rs"]
+mod spinning;
+
 use std::process::Command;
 use std::sync::Mutex;
 
@@ -10,6 +13,7 @@ use agimp::particle::chunk::{Chunk, Layout};
 use agimp::run::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::{Comm, World};
+use spinning::{CUBE, SQUARE};
 
 /// Up to the first space.
 fn first_word(text: &str) -> String {
@@ -54,75 +58,6 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
 fn steps(comm: &Comm, steps: u64) -> u64 {
     if comm.size() > 1 { steps / 10 } else { steps }
 }
-
-/// A square of side 1 in the middle of 3 m x 3 m, where four regions of three levels meet; level 0 meets level 2.
-const SQUARE: &str = r#"
-version = 1
-dimension = 2
-gravity = [0, 0]
-[domain]
-size = [3, 3]
-root_edge = 1
-[tree]
-graded = false
-regions = [
-    { level = 1, shape = { kind = "box", min = [0, 0], max = [1.4, 1.4] } },
-    { level = 2, shape = { kind = "box", min = [1.5, 1.5], max = [3, 3] } },
-]
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e4
-poisson = 0.3
-[[bodies]]
-name = "square"
-material = "rubber"
-shape = { kind = "box", min = [1, 1], max = [2, 2] }
-angular_velocity = 1
-[numerics]
-transfer = "apic"
-[time]
-end = 1e3
-dt_max = 1e3
-[output]
-every = 1e3
-"#;
-
-/// A cube of side 1 likewise.
-const CUBE: &str = r#"
-version = 1
-dimension = 3
-gravity = [0, 0, 0]
-[domain]
-size = [3, 3, 3]
-root_edge = 1
-[tree]
-graded = false
-regions = [
-    { level = 1, shape = { kind = "box", min = [0, 0, 0], max = [1.4, 1.4, 3] } },
-    { level = 2, shape = { kind = "box", min = [1.5, 1.5, 1.5], max = [1.7, 1.7, 1.7] } },
-]
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e4
-poisson = 0.3
-[[bodies]]
-name = "cube"
-material = "rubber"
-shape = { kind = "box", min = [1, 1, 1], max = [2, 2, 2] }
-angular_velocity = [0.3, -0.2, 1]
-velocity = [0.01, 0.02, -0.01]
-[numerics]
-transfer = "apic"
-[time]
-end = 1e3
-dt_max = 1e3
-[output]
-every = 1e3
-"#;
 
 /// A soft square that flies through levels 0, 1 and 2 (a jump of two among them) with 1 m/s.
 const FLYING: &str = r#"
@@ -288,10 +223,13 @@ fn angular_momentum_of_flip_falls_with_the_cells() {
         };
         let flip = ["root_edge = 0.5", "root_edge = 0.25"];
         let flip = flip.map(|edge| drift("transfer = 'flip'\nflip = 1.0", edge, 2e-3));
+        let half_step = drift("transfer = 'flip'\nflip = 1.0", "root_edge = 0.5", 1e-3);
         let pic = drift("transfer = 'flip'\nflip = 0.0", "root_edge = 1", 4e-3);
         let xpic = drift("transfer = 'xpic'\nxpic_order = 5", "root_edge = 1", 4e-3);
-        println!("drift in 0.25 s: FLIP {flip:?}, PIC {pic}, XPIC(5) {xpic}");
+        println!("drift in 0.25 s: FLIP {flip:?}, half the step {half_step}, PIC {pic}, XPIC(5) {xpic}");
         assert!(flip[0] < 2e-2 && flip[1] < 0.35 * flip[0], "{flip:?}");
+        // Not of the order of the step.
+        assert!((half_step / flip[0] - 1.0).abs() < 0.2, "{half_step} {flip:?}");
         assert!(pic > 0.1, "{pic}");
         assert!(xpic < 0.5 * pic, "{xpic} {pic}");
     });

@@ -102,6 +102,31 @@ impl<const D: usize> Forest<D> {
         result
     }
 
+    /// Collective. Hands each request, a region with a value, to all ranks that own leaves which meet the
+    /// region. Returns the requests that concern leaves of this rank: by sending rank, then in its order.
+    pub fn to_owners(&self, comm: &Comm, requests: &[(Region<D>, u32)]) -> Vec<(Region<D>, u32)> {
+        let mut outgoing: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+        for (region, value) in requests {
+            for owner in self.owners_of(region) {
+                let message = outgoing.entry(owner).or_default();
+                message.extend_from_slice(&region.lo);
+                message.extend_from_slice(&region.hi);
+                message.push(*value);
+            }
+        }
+        let received = comm.sparse_exchange(outgoing.into_iter().collect());
+        let words = received.iter().flat_map(|(_, message)| message.chunks_exact(2 * D + 1));
+        words
+            .map(|words| {
+                let region = Region {
+                    lo: std::array::from_fn(|a| words[a]),
+                    hi: std::array::from_fn(|a| words[D + a]),
+                };
+                (region, words[2 * D])
+            })
+            .collect()
+    }
+
     /// Not collective. Calls `found` with the index of each leaf of this rank that meets the
     /// region, each once, in no particular order.
     pub fn own_leaves_in(&self, region: &Region<D>, found: &mut impl FnMut(usize)) {

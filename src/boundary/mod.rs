@@ -1,6 +1,9 @@
 //! Boundary conditions on the velocities of real nodes, and what becomes of particles that leave.
+pub mod collider;
 pub mod face;
+pub mod motion;
 
+pub use collider::{Collider, ColliderState, Contact};
 pub use face::FaceCondition;
 
 /// What happens to particles that leave the domain.

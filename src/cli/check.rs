@@ -56,6 +56,12 @@ fn write<const D: usize>(
             problem.materials[body.material].name
         )?;
     }
+    if !problem.colliders.is_empty() {
+        writeln!(out, "colliders    {}", problem.colliders.len())?;
+        for collider in &problem.colliders {
+            writeln!(out, "  {:18} {}", collider.name, collider)?;
+        }
+    }
     writeln!(out, "leaves       {}", grouped(estimate.total_leaves()))?;
     writeln!(out, "  level   cell edge, m         leaves         filled          cells      particles")?;
     let cells_per_leaf = 4_u64.pow(D as u32);

@@ -1,13 +1,16 @@
-//! Shapes: signed distance, membership, bounds, and classification of boxes against them.
+//! Shapes: signed distance and its gradient, membership, bounds, and classification of boxes against them.
 //!
 //! Shapes fill bodies with particles and select the leaves to refine. Distances are exact for the
 //! primitives; for booleans the value is a bound, never larger in magnitude than the distance to the
 //! surface and with the right sign, so that a ball of that radius lies on one side.
 mod classify;
+mod gradient;
 mod primitives;
+mod rotation;
 mod shape;
 
 pub use classify::Side;
+pub use rotation::rotation;
 pub use shape::{Frustum, Placement, Shape};
 
 /// An axis-aligned box, possibly unbounded or empty (`lower > upper` along some axis).

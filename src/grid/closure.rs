@@ -8,11 +8,12 @@
 //!
 //! A node that is needed at a seam is summed and updated by every rank that needs it, from the same
 //! contributions in the same order; one exchange of arenas per step is then enough.
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
 
 use partition::{Octant, Region};
+use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::constraint::{self, children_mask, parents_of};
+use super::constraint::{self, Kinship, parents_of};
 use super::known::{Cover, KnownTree};
 use super::mask::{
     arena_overlap, bits, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
@@ -71,8 +72,10 @@ pub fn constrained_nodes<const D: usize>(tree: &KnownTree<D>, level: u8, coord: 
 struct Builder<'a, const D: usize> {
     tree: &'a KnownTree<D>,
     overlaps: Vec<u64>,
-    levels: Vec<HashMap<[u32; D], NodeSets>>,
-    received: HashMap<(u8, [u32; D]), u64>,
+    kinship: Kinship,
+    containers: FxHashMap<(u8, [u32; D]), bool>,
+    levels: Vec<FxHashMap<[u32; D], NodeSets>>,
+    received: FxHashMap<(u8, [u32; D]), u64>,
 }
 
 impl<const D: usize> Closure<D> {
@@ -82,8 +85,10 @@ impl<const D: usize> Closure<D> {
         let mut builder = Builder {
             tree,
             overlaps: (0..offset_count(D)).map(|index| arena_overlap::<D>(offset(index))).collect(),
-            levels: vec![HashMap::new(); deepest as usize + 1],
-            received: HashMap::new(),
+            kinship: Kinship::new::<D>(),
+            containers: FxHashMap::default(),
+            levels: vec![FxHashMap::default(); deepest as usize + 1],
+            received: FxHashMap::default(),
         };
         builder.touch_own_bins();
         builder.add_parents();
@@ -161,7 +166,11 @@ impl<const D: usize> Builder<'_, D> {
                 }
                 for index in 0..offset_count(D) {
                     let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
-                    let children = children_mask::<D>(coord, sum, fine)
+                    let children = self.kinship.children(index, sum);
+                    if children == 0 {
+                        continue;
+                    }
+                    let children = children
                         & constrained_nodes(self.tree, level + 1, fine)
                         & self.receives(level + 1, fine);
                     if children != 0 {
@@ -180,6 +189,13 @@ impl<const D: usize> Builder<'_, D> {
         })
     }
 
+    /// Whether there is a bin of `level` at `coord`.
+    fn is_bin(&mut self, level: u8, coord: [u32; D]) -> bool {
+        let tree = self.tree;
+        let is_bin = self.containers.entry((level, coord));
+        *is_bin.or_insert_with(|| bin_container(tree, level, coord).is_some())
+    }
+
     /// Nodes of a block that can receive something: from bins of their level or by restriction.
     fn receives(&mut self, level: u8, coord: [u32; D]) -> u64 {
         if let Some(&mask) = self.received.get(&(level, coord)) {
@@ -188,7 +204,7 @@ impl<const D: usize> Builder<'_, D> {
         let mut mask = 0;
         for index in 0..offset_count(D) {
             if let Some(bin) = shifted(coord, offset::<D>(index))
-                && bin_container(self.tree, level, bin).is_some()
+                && self.is_bin(level, bin)
             {
                 mask |= self.overlaps[opposite(D, index)];
             }
@@ -197,14 +213,7 @@ impl<const D: usize> Builder<'_, D> {
             for index in 0..offset_count(D) {
                 let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
                 let from = constrained_nodes(self.tree, level + 1, fine) & self.receives(level + 1, fine);
-                for bit in bits(from) {
-                    for parent in parents_of::<D>(constraint::node_coord(fine, bit)) {
-                        let (block, bit) = constraint::block_and_bit(parent.node);
-                        if block == coord {
-                            mask |= 1 << bit;
-                        }
-                    }
-                }
+                mask |= self.kinship.parents(index, from);
             }
         }
         mask &= nodes_in_domain(self.tree, level, coord);
@@ -224,7 +233,7 @@ impl<const D: usize> Builder<'_, D> {
     /// A sum node receives from bins up to one block away, and whether such a bin exists depends on the
     /// leaves one block further; `coord ± 2` lies within one octant of the parent's neighbourhood.
     fn unknown_octants(&self) -> Vec<Octant<D>> {
-        let mut checked: HashSet<(u8, [u32; D])> = HashSet::new();
+        let mut checked: FxHashSet<(u8, [u32; D])> = FxHashSet::default();
         let mut unknown = Vec::new();
         let mut check = |level: u8, centre: [u32; D], reach: u32| {
             for offset in box_offsets::<D>(reach) {
@@ -261,7 +270,7 @@ impl<const D: usize> Builder<'_, D> {
         if self.tree.sources_are_near() {
             return;
         }
-        let mut looked: HashSet<(u8, [u32; D])> = HashSet::new();
+        let mut looked: FxHashSet<(u8, [u32; D])> = FxHashSet::default();
         for (level, blocks) in self.levels.iter().enumerate() {
             let mut with_sums: Vec<[u32; D]> =
                 blocks.iter().filter(|(_, sets)| sets.sum != 0).map(|(&coord, _)| coord).collect();

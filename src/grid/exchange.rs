@@ -1,11 +1,13 @@
 //! Exchange of arenas between ranks: one message per neighbour and step.
 use partition::Octant;
 use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
+use rustc_hash::FxHashMap;
 
 use super::arena::{Arenas, Moments};
 use super::fields::add_moments;
 use super::mask::bits;
 use super::plan::{GridPlan, ReceivedBin, ReceivedNodes, arena_index};
+use super::window::Window;
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -30,12 +32,14 @@ pub struct ArenaExchange<const D: usize> {
 pub struct ReceivedArenas<const D: usize> {
     rows: Vec<Row>,
     moments: Vec<Moments<D>>,
-    present: Vec<bool>,
+    /// Nodes with values of each received bin; none if it is not occupied.
+    windows: Vec<Window<D>>,
     parts: Vec<Vec<ReceivedPart>>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct ReceivedPart {
+    offset: u8,
     nodes: u64,
     constrained: u64,
     first_row: usize,
@@ -118,8 +122,9 @@ impl<const D: usize> ReceivedArenas<D> {
             .received
             .iter()
             .map(|bin| {
-                let place = |&ReceivedNodes { nodes, constrained, .. }: &ReceivedNodes| {
-                    let part = ReceivedPart { nodes, constrained, first_row: rows, first_moment: moments };
+                let place = |&ReceivedNodes { offset, nodes, constrained, .. }: &ReceivedNodes| {
+                    let (first_row, first_moment) = (rows, moments);
+                    let part = ReceivedPart { offset, nodes, constrained, first_row, first_moment };
                     rows += nodes.count_ones() as usize;
                     moments += constrained.count_ones() as usize;
                     part
@@ -130,26 +135,28 @@ impl<const D: usize> ReceivedArenas<D> {
         Self {
             rows: vec![ZERO; rows],
             moments: vec![[ZERO; D]; moments],
-            present: vec![false; plan.received.len()],
+            windows: vec![Window::EMPTY; plan.received.len()],
             parts,
         }
     }
 
     /// Whether a received bin is occupied.
     pub(super) fn is_occupied(&self, bin: u32) -> bool {
-        self.present[bin as usize]
+        self.windows[bin as usize] != Window::EMPTY
     }
 
     /// Adds part number `part` of a received arena to its block.
     pub(super) fn add(&self, bin: u32, part: u32, rows: &mut [Row], moments: Option<&mut [Moments<D>]>) {
         let part = self.parts[bin as usize][part as usize];
-        for (bit, from) in bits(part.nodes).zip(&self.rows[part.first_row..]) {
+        let inside = self.windows[bin as usize].nodes_of(part.offset as usize);
+        for (bit, from) in bits(part.nodes & inside).zip(&self.rows[part.first_row..]) {
             for lane in 0..4 {
                 rows[bit as usize].0[lane] += from.0[lane];
             }
         }
         if let Some(moments) = moments {
-            for (bit, from) in bits(part.constrained).zip(&self.moments[part.first_moment..]) {
+            let constrained = bits(part.constrained & inside);
+            for (bit, from) in constrained.zip(&self.moments[part.first_moment..]) {
                 add_moments(&mut moments[bit as usize], from);
             }
         }
@@ -161,18 +168,22 @@ impl<const D: usize> ReceivedArenas<D> {
         let mut values = values.chunks_exact(8).map(|b| f64::from_ne_bytes(std::array::from_fn(|i| b[i])));
         let mut next = || values.next().unwrap_or(f64::NAN);
         for (number, bin) in bins.enumerate() {
-            self.present[bin] = bitmap[number / 8] >> (number % 8) & 1 == 1;
-            if !self.present[bin] {
+            if bitmap[number / 8] >> (number % 8) & 1 == 0 {
+                self.windows[bin] = Window::EMPTY;
                 continue;
             }
+            let window = Window::from_bits(next().to_bits());
+            self.windows[bin] = window;
             for part in &self.parts[bin] {
-                for row in &mut self.rows[part.first_row..][..part.nodes.count_ones() as usize] {
+                let inside = window.nodes_of(part.offset as usize);
+                let rows = (part.nodes & inside).count_ones() as usize;
+                for row in &mut self.rows[part.first_row..][..rows] {
                     for lane in 0..D {
                         row.0[lane] = next();
                     }
                     row.0[3] = next();
                 }
-                let moments = part.constrained.count_ones() as usize;
+                let moments = (part.constrained & inside).count_ones() as usize;
                 for moments in &mut self.moments[part.first_moment..][..moments] {
                     for row in moments.iter_mut() {
                         for lane in 0..D {
@@ -185,24 +196,25 @@ impl<const D: usize> ReceivedArenas<D> {
     }
 }
 
-/// Message to one neighbour: a bitmap of the occupied bins, then their rows and moments.
+/// Message to one neighbour: a bitmap of the occupied bins, then of each its window and the rows and moments
+/// in it.
 fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
     let mut bitmap = vec![0u8; 8 * bins.len().div_ceil(64)];
     let mut values: Vec<f64> = Vec::new();
     for (number, sent) in bins.iter().enumerate() {
         let Some(arena) = arenas.get(sent.bin) else { continue };
         bitmap[number / 8] |= 1 << (number % 8);
+        values.push(f64::from_bits(arena.window.to_bits()));
         for &(offset, nodes, constrained) in &sent.parts {
-            for bit in bits(nodes) {
-                let node = arena_index::<D>(offset as usize, bit);
-                let row = if arena.window.contains(node) { arena.rows[node].0 } else { [0.0; 4] };
+            let inside = arena.window.nodes_of(offset as usize);
+            for bit in bits(nodes & inside) {
+                let row = &arena.rows[arena_index::<D>(offset as usize, bit)].0;
                 values.extend_from_slice(&row[..D]);
                 values.push(row[3]);
             }
             if let Some(moments) = arena.moments {
-                for bit in bits(constrained) {
-                    let node = arena_index::<D>(offset as usize, bit);
-                    let moments = if arena.window.contains(node) { moments[node] } else { [ZERO; D] };
+                for bit in bits(constrained & inside) {
+                    let moments = &moments[arena_index::<D>(offset as usize, bit)];
                     moments.iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
                 }
             }
@@ -224,7 +236,7 @@ fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>, leaf
 fn read_requests<const D: usize>(
     words: &[u64],
     plan: &GridPlan<D>,
-    own: &std::collections::HashMap<(u32, Octant<D>), u32>,
+    own: &FxHashMap<(u32, Octant<D>), u32>,
 ) -> Vec<SentBin> {
     let mut sent = Vec::new();
     let mut at = 0;

@@ -23,6 +23,9 @@ pub struct KnownTree<const D: usize> {
     rank: usize,
     leaves: Vec<Octant<D>>,
     keys: Vec<u64>,
+    /// First leaf of each slice of the curve, and the number of leaves at the end.
+    slices: Vec<u32>,
+    slice_bits: u32,
     owners: Vec<u32>,
     first_own: usize,
     own_len: usize,
@@ -49,6 +52,8 @@ impl<const D: usize> KnownTree<D> {
             rank,
             owners: vec![rank as u32; leaves.len()],
             keys: Vec::new(),
+            slices: Vec::new(),
+            slice_bits: 0,
             first_own: 0,
             own_len: leaves.len(),
             reach: allowance.reach,
@@ -73,6 +78,47 @@ impl<const D: usize> KnownTree<D> {
     fn index(&mut self) {
         self.keys = self.leaves.iter().map(Octant::key).collect();
         self.first_own = self.owners.iter().position(|&owner| owner as usize == self.rank).unwrap_or(0);
+        self.slice();
+    }
+
+    /// Cuts the known part of the curve into about twice as many equal slices as there are leaves, so that
+    /// [`KnownTree::locate`] has a few leaves to look at wherever leaves are of similar size.
+    fn slice(&mut self) {
+        let Some((&first, last)) = self.keys.first().zip(self.leaves.last()) else {
+            self.slices.clear();
+            return;
+        };
+        let wanted = (2 * self.keys.len() as u64).next_power_of_two().ilog2();
+        self.slice_bits = (last.key_end() - first).max(1).ilog2().saturating_sub(wanted);
+        let count = ((last.key_end() - 1 - first) >> self.slice_bits) as usize + 1;
+        self.slices.clear();
+        self.slices.resize(count + 1, 0);
+        for key in &self.keys {
+            self.slices[((key - first) >> self.slice_bits) as usize + 1] += 1;
+        }
+        for slice in 0..count {
+            self.slices[slice + 1] += self.slices[slice];
+        }
+    }
+
+    /// Number of known leaves with keys below `key`, `or_equal` to it.
+    fn leaves_below(&self, key: u64, or_equal: bool) -> usize {
+        let Some(&first) = self.keys.first() else { return 0 };
+        let Some(from) = key.checked_sub(first) else { return 0 };
+        let slice = (from >> self.slice_bits) as usize;
+        let Some(&[start, end]) = self.slices.get(slice..).and_then(|rest| rest.first_chunk()) else {
+            return self.keys.len();
+        };
+        let inside = &self.keys[start as usize..end as usize];
+        start as usize + inside.partition_point(|&k| k < key || (or_equal && k == key))
+    }
+
+    /// Whether all leaves inside an octant are own leaves: these fill a segment of the curve.
+    pub fn is_own(&self, octant: &Octant<D>) -> bool {
+        let own = self.own_leaves();
+        !own.is_empty()
+            && octant.key() >= self.keys[own.start]
+            && octant.key_end() <= self.leaves[own.end - 1].key_end()
     }
 
     /// The brick of root octants.
@@ -113,6 +159,8 @@ impl<const D: usize> KnownTree<D> {
             rank: 0,
             owners: vec![0; leaves.len()],
             keys: Vec::new(),
+            slices: Vec::new(),
+            slice_bits: 0,
             first_own: 0,
             own_len: leaves.len(),
             reach: 0,
@@ -166,8 +214,7 @@ impl<const D: usize> KnownTree<D> {
 
     /// The known leaf that contains the finest-level position `key`.
     pub fn locate(&self, key: u64) -> Option<usize> {
-        let after = self.keys.partition_point(|&k| k <= key);
-        let candidate = after.checked_sub(1)?;
+        let candidate = self.leaves_below(key, true).checked_sub(1)?;
         (key < self.leaves[candidate].key_end()).then_some(candidate)
     }
 
@@ -194,6 +241,9 @@ impl<const D: usize> KnownTree<D> {
             return true;
         }
         let octant = Octant { level, coord };
+        if self.is_own(&octant) {
+            return true;
+        }
         let Some(first) = self.locate(octant.key()) else { return false };
         let end = octant.key_end();
         let mut reached = self.leaves[first].key_end();
@@ -217,8 +267,6 @@ impl<const D: usize> KnownTree<D> {
     /// Known leaves inside the octant, which must be subdivided.
     pub fn leaves_within(&self, level: u8, coord: [u32; D]) -> std::ops::Range<usize> {
         let octant = Octant { level, coord };
-        let start = self.keys.partition_point(|&k| k < octant.key());
-        let end = self.keys.partition_point(|&k| k < octant.key_end());
-        start..end
+        self.leaves_below(octant.key(), false)..self.leaves_below(octant.key_end(), false)
     }
 }

@@ -1,5 +1,6 @@
 //! Links between constrained nodes and their parents, over which sums are restricted and values prolonged.
-use std::collections::HashMap;
+
+use rustc_hash::FxHashMap;
 
 use super::constraint::{block_and_bit, node_coord, parents_of};
 use super::mask::{bits, block_nodes, offset, offset_index, opposite};
@@ -88,7 +89,7 @@ impl Links {
 
 impl<const D: usize> GridPlan<D> {
     /// Lists the links of all levels; `number` numbers the blocks.
-    pub(super) fn link_levels(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
+    pub(super) fn link_levels(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
         let nodes = block_nodes(D) as u32;
         let levels = self.levels();
         let mut restriction: Vec<Vec<(u32, u32, Link)>> = vec![Vec::new(); levels];

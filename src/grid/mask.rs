@@ -14,9 +14,20 @@ pub const fn offset_count(d: usize) -> usize {
     3usize.pow(d as u32)
 }
 
+/// All of `{-1, 0, 1}^3`; the first nine hold `{-1, 0, 1}^2`. Grid plans look them up very often.
+const OFFSETS: [[i32; 3]; 27] = {
+    let mut offsets = [[0; 3]; 27];
+    let mut index = 0;
+    while index < 27 {
+        offsets[index] = [index as i32 % 3 - 1, index as i32 / 3 % 3 - 1, index as i32 / 9 - 1];
+        index += 1;
+    }
+    offsets
+};
+
 /// Offset number `index` of `{-1, 0, 1}^D`, first axis fastest.
 pub fn offset<const D: usize>(index: usize) -> [i32; D] {
-    std::array::from_fn(|axis| (index / 3usize.pow(axis as u32) % 3) as i32 - 1)
+    std::array::from_fn(|axis| OFFSETS[index][axis])
 }
 
 /// Number of an offset in `{-1, 0, 1}^D`; inverse of [`offset`].
@@ -58,13 +69,15 @@ pub fn bit_of_node<const D: usize>(node: [u32; D]) -> u32 {
 
 /// Product of one set of coordinates per axis (bit `k` of `sets[axis]` allows coordinate `k`).
 pub fn product<const D: usize>(sets: [u8; D]) -> u64 {
-    (0..block_nodes(D) as u32)
-        .filter(|&bit| {
-            let node = node_of_bit::<D>(bit);
-            (0..D).all(|axis| sets[axis] >> node[axis] & 1 == 1)
-        })
-        .fold(0, |mask, bit| mask | 1 << bit)
+    let full = if D == 2 { 0xffff } else { u64::MAX };
+    sets.iter().enumerate().fold(full, |mask, (axis, &set)| {
+        let repeated = (0..4).map(|k| (u64::from(set >> k & 1) * SLICE[axis]) << (k << (2 * axis)));
+        mask & repeated.fold(0, |slices, slice| slices | slice)
+    })
 }
+
+/// Nodes whose coordinate along each axis is 0.
+const SLICE: [u64; 3] = [0x1111_1111_1111_1111, 0x000f_000f_000f_000f, 0xffff];
 
 /// The nodes of block `bin + offset` that lie in the arena of `bin`: the arena reaches from one node below
 /// the block to the second node above it.

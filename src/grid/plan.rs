@@ -1,15 +1,16 @@
 //! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
-use std::collections::HashMap;
 
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
+use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
 use super::constraint::node_coord;
-use super::known::{Allowance, KnownTree};
+use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
 use super::mask::{
-    arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, opposite, shifted,
+    arena_overlap, bit_of_node, bits, block_nodes, box_offsets, node_of_bit, offset, offset_count, opposite,
+    shifted,
 };
 use super::reach::{bin_sources, potential_bins};
 use crate::kernel::{ARENA_EDGE, Row};
@@ -161,7 +162,7 @@ impl<const D: usize> GridPlan<D> {
             tree,
         };
         plan.list_blocks(&needed);
-        let number: HashMap<(u8, [u32; D]), u32> =
+        let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.list_bins(&number);
         plan.list_received(comm.rank());
@@ -251,6 +252,9 @@ impl<const D: usize> GridPlan<D> {
     /// The real nodes among `real` that lie in an own leaf; nodes on upper faces of the domain belong to
     /// the leaf below them.
     fn owned_nodes(&self, level: u8, coord: [u32; D], real: u64) -> u64 {
+        if let Cover::Leaf(leaf) = self.tree.cover(level, coord) {
+            return if self.tree.local(leaf).is_some() { real } else { 0 };
+        }
         bits(real)
             .filter(|&bit| {
                 let node = node_coord(coord, bit);
@@ -266,11 +270,11 @@ impl<const D: usize> GridPlan<D> {
             .fold(0, |mask, bit| mask | 1 << bit)
     }
 
-    fn list_bins(&mut self, number: &HashMap<(u8, [u32; D]), u32>) {
+    fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
         let first = self.tree.first_own();
         let own = self.tree.leaves().len() - self.tree.ghost_len();
         // Bins of several leaves may have one block; what depends on the block is made once.
-        let mut of_block: HashMap<Octant<D>, u32> = HashMap::new();
+        let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
         for leaf in 0..own {
             self.leaf_start.push(self.bins.len() as u32);
             for block in potential_bins(&self.tree, first + leaf) {
@@ -309,18 +313,21 @@ impl<const D: usize> GridPlan<D> {
         if !constrained.contains(&true) {
             return None;
         }
+        // Along each axis in turn, a base reaches what the three nodes from it reach.
+        let mut reached = constrained;
+        for axis in 0..D {
+            let step = ARENA_EDGE.pow(axis as u32);
+            for node in 0..reached.len() {
+                if node / step % ARENA_EDGE < ARENA_EDGE - 2 {
+                    reached[node] |= reached[node + step] | reached[node + 2 * step];
+                }
+            }
+        }
         let bases = ARENA_EDGE - 2;
         let table: Vec<bool> = (0..bases.pow(D as u32))
             .map(|base| {
-                (0..offset_count(D)).any(|node| {
-                    let index: usize = (0..D as u32)
-                        .map(|axis| {
-                            let at = base / bases.pow(axis) % bases + node / 3usize.pow(axis) % 3;
-                            at * ARENA_EDGE.pow(axis)
-                        })
-                        .sum();
-                    constrained[index]
-                })
+                let node = |axis: u32| base / bases.pow(axis) % bases * ARENA_EDGE.pow(axis);
+                reached[(0..D as u32).map(node).sum::<usize>()]
             })
             .collect();
         self.touched.push(table);
@@ -331,7 +338,8 @@ impl<const D: usize> GridPlan<D> {
     fn list_received(&mut self, rank: usize) {
         // (source leaf, bin, part)
         let mut needed: Vec<(u32, Octant<D>, ReceivedNodes)> = Vec::new();
-        let mut feeding: HashMap<Octant<D>, Vec<usize>> = HashMap::new();
+        let mut feeding: FxHashMap<Octant<D>, Vec<usize>> = FxHashMap::default();
+        let mut is_inner: FxHashMap<Octant<D>, bool> = FxHashMap::default();
         for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
             for towards in 0..offset_count(D) {
                 let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
@@ -342,6 +350,10 @@ impl<const D: usize> GridPlan<D> {
                 }
                 let bin = Octant { level: block.level, coord };
                 let remote = feeding.entry(bin).or_insert_with(|| {
+                    let start = bin.ancestor(self.tree.coarsest_reaching(bin.level));
+                    if *is_inner.entry(start).or_insert_with(|| self.is_inner(&start)) {
+                        return Vec::new();
+                    }
                     let mut leaves = bin_sources(&self.tree, bin.level, bin.coord);
                     leaves.retain(|&leaf| self.tree.owner(leaf) != rank);
                     leaves
@@ -364,6 +376,17 @@ impl<const D: usize> GridPlan<D> {
         }
     }
 
+    /// Whether all leaves that may feed bins inside `start` are own leaves.
+    fn is_inner(&self, start: &Octant<D>) -> bool {
+        let mut around = box_offsets::<D>(self.tree.reach_in_leaves());
+        around.all(|offset| {
+            shifted(start.coord, offset).is_none_or(|coord| {
+                let beside = Octant { level: start.level, coord };
+                !self.tree.contains(start.level, coord) || self.tree.is_own(&beside)
+            })
+        })
+    }
+
     /// Puts own and received bins into canonical order.
     fn list_sources(&mut self) {
         let first = self.tree.first_own() as u32;
@@ -377,7 +400,7 @@ impl<const D: usize> GridPlan<D> {
     }
 
     /// Own bins by known source leaf and block.
-    pub(super) fn own_bins(&self) -> HashMap<(u32, Octant<D>), u32> {
+    pub(super) fn own_bins(&self) -> FxHashMap<(u32, Octant<D>), u32> {
         let first = self.tree.first_own() as u32;
         self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
     }

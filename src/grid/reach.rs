@@ -59,6 +59,8 @@ fn finer_neighbours<const D: usize>(tree: &KnownTree<D>, here: Octant<D>) -> imp
     (0..offset_count(D))
         .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
         .filter(move |&beside| beside != here.coord && tree.contains(here.level, beside))
+        // Most neighbours are leaves of this size or larger, which is quickly seen.
+        .filter(move |&beside| !matches!(tree.cover(here.level, beside), Cover::Leaf(_)))
         .flat_map(move |beside| tree.leaves_within(here.level, beside))
         .map(move |other| tree.leaves()[other])
         .filter(move |other| other.level > here.level)

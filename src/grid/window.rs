@@ -2,7 +2,7 @@
 //!
 //! Bins beside level jumps often hold a few particles along one face. Clearing, summing, sending and loading
 //! only the nodes that these reach keeps their cost in proportion.
-use super::mask::offset;
+use super::mask::{offset, product};
 use crate::kernel::{ARENA_EDGE, BLOCK, arena_nodes};
 
 /// A box of arena nodes, `lower..upper` per axis; what lies outside holds no values.
@@ -44,12 +44,31 @@ impl<const D: usize> Window<D> {
         }
     }
 
-    /// Whether an arena node lies inside.
-    pub fn contains(&self, node: usize) -> bool {
-        (0..D).all(|axis| {
-            let at = (node / ARENA_EDGE.pow(axis as u32) % ARENA_EDGE) as u8;
-            (self.lower[axis]..self.upper[axis]).contains(&at)
+    /// Nodes of the block at offset number `index` from the bin that lie inside, as a mask.
+    pub fn nodes_of(&self, index: usize) -> u64 {
+        // Arena nodes 0, 1..5 and 5..7 belong to the blocks below, at and above the bin.
+        let towards = offset::<D>(index);
+        product::<D>(std::array::from_fn(|axis| {
+            let along = (1u16 << self.upper[axis]) - (1u16 << self.lower[axis].min(self.upper[axis]));
+            match towards[axis] {
+                -1 => ((along & 1) << 3) as u8,
+                0 => (along >> 1 & 0b1111) as u8,
+                _ => (along >> 5 & 0b11) as u8,
+            }
+        }))
+    }
+
+    /// The bounds packed into a word.
+    pub fn to_bits(self) -> u64 {
+        (0..D).fold(0, |bits, axis| {
+            bits | u64::from(self.lower[axis]) << (8 * axis) | u64::from(self.upper[axis]) << (8 * axis + 32)
         })
+    }
+
+    /// Inverse of [`Window::to_bits`].
+    pub fn from_bits(bits: u64) -> Self {
+        let of = |shift: usize| (bits >> shift & 7) as u8;
+        Self { lower: std::array::from_fn(|a| of(8 * a)), upper: std::array::from_fn(|a| of(8 * a + 32)) }
     }
 
     /// Whether the block at offset number `index` from the bin shares a node.
@@ -165,10 +184,19 @@ mod tests {
                         found.extend((0..run.len).map(|i| (run.arena + i, run.block + i)));
                     });
                 }
+                let inside = |node: usize| {
+                    (0..D).all(|axis| {
+                        let at = (node / ARENA_EDGE.pow(axis as u32) % ARENA_EDGE) as u8;
+                        (window.lower[axis]..window.upper[axis]).contains(&at)
+                    })
+                };
                 let expected: Vec<_> = bits(arena_overlap::<D>(offset(index)))
                     .map(|bit| (arena_index::<D>(index, bit), bit as usize))
-                    .filter(|&(node, _)| window.contains(node))
+                    .filter(|&(node, _)| inside(node))
                     .collect();
+                let mask = expected.iter().fold(0, |mask, &(_, bit)| mask | 1 << bit);
+                assert_eq!(window.nodes_of(index), mask);
+                assert_eq!(Window::from_bits(window.to_bits()), window);
                 assert_eq!(window.reaches(index), !expected.is_empty());
                 assert_eq!(found, expected);
             }

@@ -8,11 +8,11 @@ use super::hdf5_file::FileError;
 
 /// A column of the history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Column {
+pub struct Column<'a> {
     /// Name, for example `kinetic_energy`.
-    pub name: &'static str,
+    pub name: &'a str,
     /// SI unit, for example `J`; empty for a pure number.
-    pub unit: &'static str,
+    pub unit: &'a str,
 }
 
 /// The open history file. Belongs to rank 0.
@@ -28,7 +28,7 @@ pub struct History {
 
 impl History {
     /// Not collective. Starts a new file, replacing an old one.
-    pub fn create(path: &Path, columns: &[Column]) -> Result<Self, FileError> {
+    pub fn create(path: &Path, columns: &[Column<'_>]) -> Result<Self, FileError> {
         let file = File::create(path).map_err(|source| system(path, "create", source))?;
         let mut history = Self { file, path: path.into(), columns: columns.len(), last: None };
         history.line(header(columns))?;
@@ -38,7 +38,7 @@ impl History {
     /// Not collective. Opens the file of an earlier run that is restarted from `step`: rows of later
     /// steps and a torn last line are cut off, so that the finished file equals that of an
     /// uninterrupted run. Starts a new file if there is none.
-    pub fn resume(path: &Path, columns: &[Column], step: u64) -> Result<Self, FileError> {
+    pub fn resume(path: &Path, columns: &[Column<'_>], step: u64) -> Result<Self, FileError> {
         if !path.exists() {
             return Self::create(path, columns);
         }
@@ -92,7 +92,7 @@ impl History {
     }
 }
 
-fn header(columns: &[Column]) -> String {
+fn header(columns: &[Column<'_>]) -> String {
     let mut header = String::from("step");
     for Column { name, unit } in columns {
         header.push_str(&if unit.is_empty() { format!(",{name}") } else { format!(",{name} [{unit}]") });

@@ -54,8 +54,11 @@ impl Progress {
     pub fn record(&mut self, record: &Record) {
         let levels: Vec<String> =
             record.levels.iter().map(|level| format!("{}:{}", level.level, level.leaves)).collect();
+        let resampled = record.resampled.map_or_else(String::new, |r| {
+            format!(", {} regrids, {} splits, {} merges", r.regrids, grouped(r.splits), grouped(r.merges))
+        });
         self.tree = format!(
-            "{} particles, leaves {}, imbalance {:.2}, {:.2} GB/rank",
+            "{} particles, leaves {}, imbalance {:.2}, {:.2} GB/rank{resampled}",
             grouped(record.particles),
             levels.join(" "),
             record.imbalance,

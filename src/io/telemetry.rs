@@ -63,6 +63,25 @@ pub struct LevelCount {
     pub particles: u64,
 }
 
+/// What dynamic refinement has done since the start of the run, changes of the tree since that of the process.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Resampled {
+    /// Changes of the tree.
+    pub regrids: u64,
+    /// Particles split.
+    pub splits: u64,
+    /// Particles that could not be split any further.
+    pub refused: u64,
+    /// Particles made by merges.
+    pub merges: u64,
+    /// Particles that went away in merges.
+    pub merged_away: u64,
+    /// Kinetic energy that splits took out of affine velocities, J.
+    pub split_energy: f64,
+    /// Kinetic energy that merges removed, J.
+    pub merge_energy: f64,
+}
+
 /// One line of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
@@ -94,6 +113,9 @@ pub struct Record {
     pub memory: Spread,
     /// Relative difference between the mass on the real nodes and that of the particles.
     pub mass_error: f64,
+    /// Dynamic refinement, in jobs that have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resampled: Option<Resampled>,
     /// Number of ranks.
     pub ranks: u64,
     /// Threads per rank.
@@ -125,6 +147,8 @@ pub struct Contribution<'a, const D: usize> {
     pub imbalance: f64,
     /// Relative mass error (the same on all ranks).
     pub mass_error: f64,
+    /// Dynamic refinement (the same on all ranks).
+    pub resampled: Option<Resampled>,
 }
 
 impl Record {
@@ -173,6 +197,7 @@ impl Record {
             imbalance: mine.imbalance,
             memory,
             mass_error: mine.mass_error,
+            resampled: mine.resampled,
             ranks: comm.size() as u64,
             threads: rayon::current_num_threads() as u64,
         }
@@ -250,6 +275,7 @@ mod tests {
             imbalance: 1.01,
             memory: spread,
             mass_error: 1e-16,
+            resampled: None,
             ranks: 2,
             threads: 1,
         };

@@ -1,5 +1,7 @@
 //! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
 //! and bodies.
+use super::adaptivity::{Context, adaptivity};
+use super::colliders::colliders;
 use super::error::{Fault, alternatives, nearest, position};
 use super::file::{self, JobFile};
 use super::overlap;
@@ -72,12 +74,16 @@ fn problem<const D: usize>(
     let tree = tree(checks, &file.tree, &brick, &space, &root.key("tree"));
     let materials = materials(checks, &file.materials, &root.key("materials"));
     let bodies = bodies(checks, file, &space, &root.key("bodies"));
+    let colliders = colliders(checks, &file.colliders, &space, &root.key("colliders"));
     let gravity = match &file.gravity {
         Some(gravity) => checks.vector(gravity, &root.key("gravity")),
         None => Some([0.0; D]),
     };
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
+    let (tree, bodies) = (tree?, bodies?);
+    let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
+    let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
     let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
@@ -91,11 +97,13 @@ fn problem<const D: usize>(
         origin,
         root_edge,
         brick,
-        tree: tree?,
+        tree,
+        adaptivity,
         materials,
-        bodies: bodies?,
+        bodies,
         gravity: gravity?,
         faces: faces?,
+        colliders: colliders?,
         leaving: match file.boundaries.leaving {
             file::Leaving::Error => LeavingPolicy::Error,
             file::Leaving::Delete => LeavingPolicy::Delete,

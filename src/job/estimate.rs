@@ -114,6 +114,12 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
             norm(&body.velocity) + norm(&body.angular_velocity) * reach
         })
         .fold(0.0, f64::max);
+    let extent = problem.size();
+    let colliders = problem.colliders.iter();
+    let speed = colliders.fold(speed, |speed, collider| {
+        // A collider bounds the step by its own speed, not on top of the wave's.
+        speed.max(collider.greatest_speed(&collider.state_at(0.0), &extent, 0.0) - wave)
+    });
     let courant = problem.time.cfl * problem.cell_edge(finest) / (wave + speed);
     problem.time.dt_max.map_or(courant, |longest| courant.min(longest)).min(problem.time.end)
 }

@@ -3,10 +3,15 @@
 //! A file is parsed to a tree that knows where everything stands ([`load`]), checked against the
 //! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a
 //! [`Problem`] of its dimension.
+mod adaptivity;
+mod colliders;
 mod convert;
 pub mod error;
 pub mod estimate;
 pub mod file;
+pub mod file_adaptivity;
+pub mod file_colliders;
+pub mod file_output;
 pub mod file_shape;
 mod overlap;
 pub mod problem;

@@ -2,6 +2,8 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
+use crate::adaptivity::Adaptivity;
+use crate::boundary::Collider;
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
@@ -65,6 +67,8 @@ pub struct Problem<const D: usize> {
     pub brick: Brick<D>,
     /// Levels of the tree.
     pub tree: TreeSetup<D>,
+    /// Dynamic refinement, if wanted.
+    pub adaptivity: Option<Adaptivity<D>>,
     /// Materials.
     pub materials: Vec<MaterialSetup>,
     /// Bodies, in the order of the job file.
@@ -73,6 +77,8 @@ pub struct Problem<const D: usize> {
     pub gravity: [f64; D],
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
+    /// Rigid bodies that act on the material, in the order in which they act.
+    pub colliders: Vec<Collider<D>>,
     /// What happens to particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.

@@ -3,7 +3,7 @@ use super::convert::{Checks, Space};
 use super::file::Vector;
 use super::file_shape::Shape as Written;
 use super::source::Path;
-use crate::geometry::{Aabb, Frustum, Placement, Shape};
+use crate::geometry::{Aabb, Frustum, Placement, Shape, rotation};
 
 impl Checks<'_> {
     /// The shape in coordinates relative to the domain's lower corner.
@@ -103,7 +103,12 @@ impl Checks<'_> {
         Some(())
     }
 
-    fn point<const D: usize>(&mut self, point: &Vector, space: &Space<D>, path: &Path) -> Option<[f64; D]> {
+    pub(super) fn point<const D: usize>(
+        &mut self,
+        point: &Vector,
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<[f64; D]> {
         let point: [f64; D] = self.vector(point, path)?;
         Some(std::array::from_fn(|a| point[a] - space.origin[a]))
     }
@@ -141,7 +146,11 @@ impl Checks<'_> {
     }
 
     /// The axis of a rotation; z, and nothing else, in 2D.
-    fn turning_axis<const D: usize>(&mut self, axis: Option<&Vector>, path: &Path) -> Option<[f64; 3]> {
+    pub(super) fn turning_axis<const D: usize>(
+        &mut self,
+        axis: Option<&Vector>,
+        path: &Path,
+    ) -> Option<[f64; 3]> {
         match axis {
             None => Some([0.0, 0.0, 1.0]),
             Some(_) if D == 2 => {
@@ -176,20 +185,6 @@ impl Checks<'_> {
         }
         Some(Shape::Polygon(corners))
     }
-}
-
-/// Rodrigues' formula: `R = I + sin(a) K + (1 - cos(a)) K²` with `K x = axis × x`.
-fn rotation<const D: usize>(axis: [f64; 3], angle: f64) -> [[f64; D]; D] {
-    let [x, y, z] = axis;
-    let k = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    // Own elementary functions: positions of particles must not depend on the machine's library.
-    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            let square: f64 = (0..3).map(|m| k[i][m] * k[m][j]).sum();
-            f64::from(u8::from(i == j)) + sine * k[i][j] + (1.0 - cosine) * square
-        })
-    })
 }
 
 /// The first edge that meets an edge other than its neighbours, or has no length or folds back.

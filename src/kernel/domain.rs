@@ -9,8 +9,9 @@ use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// Least half width, as a share of the cell: keeps the weights of a box at a wall defined.
-const LEAST_SHARE: f64 = 1e-6;
+/// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small that
+/// what a box then has outside the domain is below round-off.
+const LEAST_SHARE: f64 = 1.0 / 70_368_744_177_664.0;
 
 /// Half widths of the selected particles along each axis, m, as the kernels use them on cells of edge
 /// `cell`: at most half a cell, and cut so that the box stays within the domain `[0, extent]`.

@@ -260,6 +260,19 @@ impl<const D: usize> Chunk<D> {
         self.len = len;
     }
 
+    /// A chunk whose particle `q` is particle `source[q]` of this one.
+    pub fn gathered(&self, source: &[u32]) -> Self {
+        let mut out = Self::with_capacity(source.len());
+        out.extend_zeroed(source.len());
+        for column in 0..Layout::<D>::REALS {
+            let from = self.column(column);
+            out.column_mut(column).iter_mut().zip(source).for_each(|(value, &p)| *value = from[p as usize]);
+        }
+        out.ids_mut().iter_mut().zip(source).for_each(|(id, &p)| *id = self.ids[p as usize]);
+        out.tags_mut().iter_mut().zip(source).for_each(|(tag, &p)| *tag = self.tags[p as usize]);
+        out
+    }
+
     /// Makes room for exactly `capacity` particles (rounded up to an odd multiple of 8) if there is less.
     pub fn reserve_exact(&mut self, capacity: usize) {
         if capacity <= self.capacity {

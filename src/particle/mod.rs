@@ -1,5 +1,6 @@
 //! Particles: structure-of-arrays chunks, one per leaf, in a canonical order.
 pub mod chunk;
+pub mod resample;
 pub mod seed;
 
 pub use chunk::{Chunk, Layout};

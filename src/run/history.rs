@@ -1,13 +1,17 @@
 //! Rows of `history.csv`.
+use crate::boundary::motion::Motion;
+use crate::boundary::{Collider, ColliderState};
 use crate::io::history::Column;
+use crate::solver::contact::Reaction;
+use crate::solver::resample::BooksTotal;
 use crate::solver::totals::{GridTotals, ParticleTotals};
 
-const fn column(name: &'static str, unit: &'static str) -> Column {
+const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
     Column { name, unit }
 }
 
-/// Columns after the step.
-pub const COLUMNS: [Column; 15] = [
+/// Columns after the step, without those of colliders.
+const COLUMNS: [Column<'static>; 15] = [
     column("time", "s"),
     column("dt", "s"),
     column("kinetic_energy", "J"),
@@ -25,11 +29,52 @@ pub const COLUMNS: [Column; 15] = [
     column("particles", ""),
 ];
 
-/// The values of one row.
-pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) -> [f64; COLUMNS.len()] {
+/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each collider those of its force, its torque and, if it moves, of
+/// its place follow the others.
+pub fn columns<const D: usize>(colliders: &[Collider<D>], is_adaptive: bool) -> Vec<(String, &'static str)> {
+    let mut columns: Vec<(String, &'static str)> =
+        COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
+    if is_adaptive {
+        columns.extend(BOOKS.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    for collider in colliders {
+        let mut add = |what: &str, axis: &str, unit| {
+            columns.push((format!("{what}_{}{axis}", collider.name), unit));
+        };
+        AXES[..D].iter().for_each(|axis| add("force", axis, "N"));
+        turning_axes::<D>().for_each(|k| add("torque", if D == 2 { "" } else { AXES[k] }, "N m"));
+        if collider.motion != Motion::Fixed {
+            AXES[..D].iter().for_each(|axis| add("position", axis, "m"));
+            add("angle", "", "rad");
+            AXES[..D].iter().for_each(|axis| add("velocity", axis, "m/s"));
+            add("spin", "", "rad/s");
+        }
+    }
+    columns
+}
+
+/// Columns of runs with dynamic refinement: sums since the start.
+const BOOKS: [(&str, &str); 5] =
+    [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
+
+/// The values of a row that are of splits and merges.
+pub fn book_values(books: &BooksTotal) -> [f64; BOOKS.len()] {
+    let count = |n: u64| n as f64;
+    [count(books.splits), count(books.merges), count(books.removed), books.split_energy, books.merge_energy]
+}
+
+const AXES: [&str; 3] = ["_x", "_y", "_z"];
+
+/// Components of a torque: only that about z in 2D.
+fn turning_axes<const D: usize>() -> std::ops::Range<usize> {
+    if D == 2 { 2..3 } else { 0..3 }
+}
+
+/// The values of a row that are not of colliders.
+pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) -> Vec<f64> {
     let [px, py, pz] = particles.momentum;
     let [lx, ly, lz] = grid.angular_momentum;
-    [
+    vec![
         time,
         dt,
         particles.kinetic,
@@ -46,4 +91,23 @@ pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) ->
         grid.mass,
         particles.count as f64,
     ]
+}
+
+/// The values of a row that are of one collider. `origin` is the lower corner of the domain, m.
+pub fn collider_values<const D: usize>(
+    collider: &Collider<D>,
+    state: &ColliderState<D>,
+    reaction: &Reaction,
+    origin: &[f64],
+) -> Vec<f64> {
+    let mut values = reaction.force[..D].to_vec();
+    values.extend(&reaction.torque[turning_axes::<D>()]);
+    if collider.motion != Motion::Fixed {
+        let centre = collider.centre(&state.pose);
+        values.extend((0..D).map(|a| origin[a] + centre[a]));
+        values.push(state.pose.angle);
+        values.extend(state.rate.velocity);
+        values.push(state.rate.spin);
+    }
+    values
 }

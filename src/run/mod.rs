@@ -211,6 +211,7 @@ impl<'a, const D: usize> Run<'a, D> {
         while self.solver.clock.time < self.problem.time.end {
             let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
             let granted = self.step(requests)?;
+            self.solver.regrid().map_err(|source| self.step_error(source))?;
             self.write_due(granted.checkpoint)?;
             if granted.stop {
                 let checkpoint = self.checkpoint()?;
@@ -225,6 +226,10 @@ impl<'a, const D: usize> Run<'a, D> {
         let clock = self.solver.clock;
         let report = self.solver.step(self.problem.time.end, requests);
         Ok(report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })?.granted)
+    }
+
+    fn step_error(&self, source: Disagreement) -> RunError {
+        RunError::Step { step: self.solver.clock.step, time: self.solver.clock.time, source }
     }
 
     /// Collective. Writes what is due after a step.
@@ -298,11 +303,24 @@ impl<'a, const D: usize> Run<'a, D> {
         let start = Instant::now();
         let step = Some(self.solver.clock.step);
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
+        let fields = self.leaf_fields();
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let view = View { leaf_fields: &fields, ..view };
         self.outputs.write(self.comm, &view)?;
         self.output_step = step;
         self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(())
+    }
+
+    /// Collective. Fields of leaves for the file of the tree.
+    fn leaf_fields(&mut self) -> Vec<(String, Vec<f64>)> {
+        let refinement = self.solver.refinement();
+        refinement.map_or_else(Vec::new, |refinement| {
+            vec![
+                ("refinement_indicator".into(), refinement.urgency),
+                ("wanted_level".into(), refinement.wanted),
+            ]
+        })
     }
 
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {

@@ -4,18 +4,21 @@ use std::time::Instant;
 use partition::comm::{Comm, Traffic};
 
 use super::{Options, RunError, history};
-use crate::io::history::History;
+use crate::io::history::{Column, History};
 use crate::io::progress::Progress;
-use crate::io::telemetry::{Contribution, Record, Telemetry};
+use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::solver::Solver;
 use crate::solver::phases::Phase;
+use crate::solver::resample::BooksTotal;
 
 /// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {
     history: Option<History>,
     telemetry: Option<Telemetry>,
     progress: Progress,
+    /// Lower corner of the domain, m.
+    origin: Vec<f64>,
     history_every: u64,
     telemetry_every: u64,
     since: Instant,
@@ -34,10 +37,12 @@ impl Recorder {
         let step = solver.clock.step;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
+        let named = history::columns(&solver.physics.colliders, solver.physics.adaptivity.is_some());
+        let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), step) {
-            (0, 0) => History::create(&rows, &history::COLUMNS)
+            (0, 0) => History::create(&rows, &columns)
                 .and_then(|history| Ok(Some((history, Telemetry::create(&lines)?)))),
-            (0, _) => History::resume(&rows, &history::COLUMNS, step)
+            (0, _) => History::resume(&rows, &columns, step)
                 .and_then(|history| Ok(Some((history, Telemetry::resume(&lines)?)))),
             _ => Ok(None),
         };
@@ -47,6 +52,7 @@ impl Recorder {
             history,
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
+            origin: problem.origin.to_vec(),
             history_every: problem.history_every,
             telemetry_every: problem.telemetry_every,
             since: Instant::now(),
@@ -87,13 +93,28 @@ impl Recorder {
         solver.phases = phases;
         let grid = comm.agree(grid)?;
         let particles = solver.particle_totals();
+        let reactions = solver.reactions();
+        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
         solver.phases.book(Phase::Output, start.elapsed());
         let mut written = Ok(());
         if row && let Some(history) = &mut self.history {
-            written = history.row(clock.step, &history::row(clock.time, clock.dt, &particles, &grid));
+            let mut values = history::row(clock.time, clock.dt, &particles, &grid);
+            if let Some(books) = &books {
+                values.extend(history::book_values(books));
+            }
+            let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
+            for ((collider, state), reaction) in all {
+                values.extend(history::collider_values(collider, state, reaction, &self.origin));
+            }
+            written = history.row(clock.step, &values);
+        }
+        if row {
+            // Where the row of this step has been written already, there is nothing to forget.
+            solver.forget_reactions();
         }
         if record {
-            let record = self.record(comm, solver, (grid.mass - particles.mass) / particles.mass);
+            let mass_error = (grid.mass - particles.mass) / particles.mass;
+            let record = self.record(comm, solver, mass_error, books);
             self.progress.record(&record);
             if let Some(telemetry) = &mut self.telemetry {
                 written = written.and_then(|()| telemetry.write(&record));
@@ -104,7 +125,13 @@ impl Recorder {
     }
 
     /// Collective. Speed, traffic and memory since the last record.
-    fn record<const D: usize>(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
+    fn record<const D: usize>(
+        &mut self,
+        comm: &Comm,
+        solver: &mut Solver<D>,
+        mass_error: f64,
+        books: Option<BooksTotal>,
+    ) -> Record {
         let phases: Vec<(&'static str, f64)> =
             Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
         let traffic = solver.traffic();
@@ -125,6 +152,15 @@ impl Recorder {
                 chunks: &solver.chunks,
                 imbalance: solver.imbalance().0,
                 mass_error,
+                resampled: books.map(|books| Resampled {
+                    regrids: solver.regrids,
+                    splits: books.splits,
+                    refused: books.refused,
+                    merges: books.merges,
+                    merged_away: books.removed,
+                    split_energy: books.split_energy,
+                    merge_energy: books.merge_energy,
+                }),
             },
         );
         solver.phases.clear();

@@ -5,6 +5,9 @@ use partition::Forest;
 use partition::comm::Comm;
 
 use super::{RunError, setup};
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
+use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::{self, Scalars, directory};
 use crate::job::Problem;
 use crate::solver::rebalance::leaf_weight;
@@ -43,7 +46,91 @@ pub fn scalars<const D: usize>(
     comm.sum_u64(&mut deleted);
     let mut counts = vec![(NEXT_OUTPUT.into(), next_output), (DELETED.into(), deleted[0])];
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
-    Scalars { reals: vec![(BOUND.into(), solver.clock.bound)], counts, exact: Vec::new() }
+    let mut reals = vec![(BOUND.into(), solver.clock.bound)];
+    let mut exact = Vec::new();
+    if !solver.contacts.states.is_empty() {
+        reals.push((SINCE.into(), solver.contacts.since));
+        let mut sums: Vec<ExactSum> = solver.contacts.sums.iter().flatten().cloned().collect();
+        ExactSum::sum_over_ranks(comm, &mut sums);
+        exact = sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())).collect();
+    }
+    if solver.physics.adaptivity.is_some() {
+        let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
+        let numbers = [splits, merges, removed, solver.books.next_root];
+        counts.extend(BOOKS.iter().map(|name| String::from(*name)).zip(numbers));
+        exact.extend(
+            ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())),
+        );
+    }
+    for (index, state) in solver.contacts.states.iter().enumerate() {
+        // Prescribed motions follow from the time.
+        if solver.physics.colliders[index].free().is_some() {
+            let values = state.pose.translation.into_iter().chain(state.rate.velocity);
+            let values = values.chain([state.pose.angle, state.rate.spin]);
+            reals.extend(values.enumerate().map(|(i, value)| (state_name(index, i), value)));
+        }
+    }
+    Scalars { reals, counts, exact }
+}
+
+/// Names of the counters of splits and merges.
+const BOOKS: [&str; 4] = ["splits", "merges", "particles_merged_away", "next_root"];
+/// Names of the energies booked by splits and merges.
+const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
+
+/// Takes over the books of splits and merges; the sums are on rank 0. `None` if the file lacks one.
+fn restore_books<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    if solver.physics.adaptivity.is_none() {
+        return Some(());
+    }
+    let energy = |name: &str| ExactSum::from_words(scalars.exact(name)?);
+    let (split_energy, merge_energy) = (energy(ENERGIES[0])?, energy(ENERGIES[1])?);
+    let [splits, merges, removed, next_root] = BOOKS.map(|name| scalars.count(name));
+    let books = &mut solver.books;
+    books.next_root = next_root?;
+    if rank == 0 {
+        (books.splits, books.merges, books.removed) = (splits?, merges?, removed?);
+        (books.split_energy, books.merge_energy) = (split_energy, merge_energy);
+    }
+    Some(())
+}
+
+/// Name of the time since which impulses on colliders are summed.
+const SINCE: &str = "collider_sums_since";
+
+/// Name of an exact sum of colliders, counted through all of them.
+fn sum_name(number: usize) -> String {
+    format!("collider_sum_{number}")
+}
+
+/// Name of a number of the state of a free collider: translation, velocity, angle, angular velocity.
+fn state_name(collider: usize, number: usize) -> String {
+    format!("collider_{collider}_state_{number}")
+}
+
+/// Puts the colliders back where the file has them. The sums are on rank 0. `None` if the file lacks a number.
+fn restore_colliders<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    let colliders = &solver.physics.colliders;
+    if colliders.is_empty() {
+        return Some(());
+    }
+    solver.contacts.since = scalars.real(SINCE)?;
+    for (index, collider) in colliders.iter().enumerate().filter(|(_, collider)| collider.free().is_some()) {
+        let number = |i: usize| scalars.real(&state_name(index, i));
+        let (mut translation, mut velocity) = ([0.0; D], [0.0; D]);
+        for a in 0..D {
+            (translation[a], velocity[a]) = (number(a)?, number(D + a)?);
+        }
+        let rate = Rate { velocity, spin: number(2 * D + 1)? };
+        solver.contacts.states[index] = collider.state((translation, number(2 * D)?), rate);
+    }
+    for (number, sum) in solver.contacts.sums.iter_mut().flatten().enumerate() {
+        let read = ExactSum::from_words(scalars.exact(&sum_name(number))?)?;
+        if rank == 0 {
+            *sum = read;
+        }
+    }
+    Some(())
 }
 
 /// Collective. Reads the state and spreads it over the ranks.
@@ -74,6 +161,15 @@ pub fn solver<const D: usize>(
         bound: header.scalars.real(BOUND).unwrap_or(0.0),
     };
     let mut solver = Solver::new(comm, setup::physics(problem), forest, chunks, clock);
+    if restore_colliders(comm.rank(), &mut solver, &header.scalars).is_none() {
+        // Every rank has read the same header.
+        let reason = "the state of a collider is missing".into();
+        return Err(FileError::Refused { path, reason }.into());
+    }
+    if restore_books(comm.rank(), &mut solver, &header.scalars).is_none() {
+        let reason = "the books of splits and merges are missing".into();
+        return Err(FileError::Refused { path, reason }.into());
+    }
     if comm.rank() == 0 {
         solver.deleted = header.scalars.count(DELETED).unwrap_or(0);
     }

@@ -1,6 +1,6 @@
 //! From a job to the first state: tree, partition and particles.
 use partition::comm::{Comm, Disagreement};
-use partition::{Forest, Octant};
+use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use crate::job::Problem;
@@ -19,6 +19,8 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
         gravity: problem.gravity,
         faces: problem.faces,
+        colliders: problem.colliders.clone(),
+        adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
         transfer: problem.transfer,
         boxes: problem.boxes,
@@ -35,14 +37,33 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
 /// # Errors
 /// Two bodies overlap or one has no particle; the same on all ranks.
 pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solver<D>, Disagreement> {
-    let forest = comm.agree(forest(comm, problem))?;
-    let mut chunks = comm.agree(seed(&forest, problem))?;
+    let mut forest = first_forest(comm, problem);
+    comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+    let mut solver = seeded(comm, problem, forest)?;
+    // Criteria look at particles, and finer leaves have other particles: until the tree stays.
+    let mut passes = 0;
+    while passes < MAX_LEVEL && solver.regrid_before_start() {
+        let mut forest = solver.forest;
+        comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+        solver = seeded(comm, problem, forest)?;
+        passes += 1;
+    }
     let mut counts = vec![0; problem.bodies.len()];
-    for tag in chunks.iter().flat_map(Chunk::tags) {
+    for tag in solver.chunks.iter().flat_map(Chunk::tags) {
         counts[usize::from(Tag::unpack(*tag).body)] += 1;
     }
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts))?;
+    Ok(solver)
+}
+
+/// Collective. Fills the leaves of a tree with numbered particles.
+fn seeded<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    forest: Forest<D>,
+) -> Result<Solver<D>, Disagreement> {
+    let mut chunks = comm.agree(seed(&forest, problem))?;
     let physics = physics(problem);
     let mut id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
     for chunk in &mut chunks {
@@ -59,33 +80,35 @@ pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solve
     Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 
-/// Collective. The tree that the job asks for, partitioned by the particles that its leaves will hold.
-///
-/// # Errors
-/// Two bodies overlap; on the rank that found it.
-fn forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Forest<D>, SeedError> {
+/// Collective. The tree that the job asks for before its criteria are looked at.
+fn first_forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Forest<D> {
     let mut forest = Forest::uniform(comm, problem.brick, problem.tree.base_level);
     forest.refine_where(comm, |leaf| problem.wants_refinement(leaf));
     if problem.tree.graded {
         forest.balance(comm);
     }
+    forest
+}
+
+/// Collective. Partitions a tree by the particles that its leaves will hold.
+///
+/// # Errors
+/// Two bodies overlap; on the rank that found it.
+fn partition_by_seeds<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    forest: &mut Forest<D>,
+) -> Result<(), SeedError> {
     // Counted, not filled: leaves that go to other ranks shall take no memory here.
     let count = |leaf: &Octant<D>| {
         let mut counts = vec![0; problem.bodies.len()];
         count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost(counts.iter().sum()))
     };
     let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
-    match counted {
-        Ok(weights) => {
-            forest.partition(comm, &weights);
-            Ok(forest)
-        }
-        Err(error) => {
-            // Collective: ranks without the fault do the same.
-            forest.partition(comm, &vec![1; forest.leaves().len()]);
-            Err(error)
-        }
-    }
+    let even = || vec![1; forest.leaves().len()];
+    let weights = counted.as_ref().map_or_else(|_| even(), Clone::clone);
+    forest.partition(comm, &weights);
+    counted.map(|_| ())
 }
 
 /// Not collective. The particles of the own leaves, ids not yet given.

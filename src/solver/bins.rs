@@ -107,7 +107,8 @@ impl<const D: usize> BinLists<D> {
     ) -> Result<(), BinMissing> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
         let given = !widths.are_known_to_kernels();
-        leaves.with_min_len(8).try_for_each_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
+        // All leaves, also after a failure: the others must not keep the lists of the step before.
+        let sorted = leaves.with_min_len(8).map_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
             let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
             *sorted = given || bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
             if *sorted {
@@ -115,7 +116,8 @@ impl<const D: usize> BinLists<D> {
                 bins.sort(plan, leaf, own, chunk, halves, given)?;
             }
             Ok(())
-        })
+        });
+        sorted.reduce(|| Ok(()), Result::and)
     }
 
     /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
@@ -152,6 +154,16 @@ impl<const D: usize> BinLists<D> {
             Some(bins) => bins.members[bin].whole.is_empty() && bins.members[bin].parts.is_empty(),
         };
         (!is_empty).then(|| self.window_of(leaf, bin))
+    }
+
+    /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
+    pub fn is_finer_within(&self, leaf: usize, x: &[f64; D], distance: f64) -> bool {
+        let own = self.bounds[leaf].level;
+        self.leaves[leaf]
+            .near
+            .iter()
+            .filter(|near| near.level > own)
+            .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
     }
 
     /// As [`BinLists::window`], for a bin that has members.
@@ -271,10 +283,12 @@ impl<const D: usize> LeafBins<D> {
         self.members[bin].window.include(lowest);
     }
 
-    /// Finest level among the leaves that the open box overlaps.
+    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
+    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
     fn finest_level(&self, own: &NearLeaf<D>, centre: [f64; D], half: [f64; D]) -> u8 {
-        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis]);
-        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis]);
+        let slack = own.upper.map(|x| 16.0 * f64::EPSILON * x);
+        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis] - slack[axis]);
+        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis] + slack[axis]);
         if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
             return own.level;
         }
@@ -309,9 +323,10 @@ impl<const D: usize> LeafBins<D> {
 }
 
 /// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not
-/// cut a box that is exactly one cell wide.
+/// cut a box that is exactly one cell wide; the kernel takes such a box as one cell wide, which is no more
+/// than a few units of the last place.
 fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
-    half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 1e-12))
+    half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 8.0 * f64::EPSILON))
 }
 
 fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) -> NearLeaf<D> {

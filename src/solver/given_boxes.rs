@@ -85,6 +85,8 @@ impl<const D: usize> GivenBoxes<D> {
             materials: vec![material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)],
             gravity: [0.0; D],
             faces: [[FaceCondition::Slip; 2]; D],
+            colliders: Vec::new(),
+            adaptivity: None,
             leaving: Leaving::default(),
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,

@@ -6,7 +6,8 @@ use super::bins::BinLists;
 use super::increment::Increments;
 use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
-use super::transfer::width_bound;
+use super::resample::Resampling;
+use super::transfer::{extent, width_bound};
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::exchange::ReceivedArenas;
@@ -73,7 +74,7 @@ impl<const D: usize> Grid<D> {
 pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
     let cells = width_bound(chunk, scheme) / cell;
     // Rounding must not make a box that is exactly one cell wide a wide one.
-    if cells <= 0.5 * (1.0 + 1e-12) { 0 } else { cells.ceil() as u32 }
+    if cells <= 0.5 * (1.0 + 4.0 * f64::EPSILON) { 0 } else { cells.ceil() as u32 }
 }
 
 impl<const D: usize> Solver<D> {
@@ -116,8 +117,14 @@ impl<const D: usize> Solver<D> {
 
     /// Moves particles to the leaves that contain them.
     pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
+        let scheme = self.physics.scheme();
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
-        let moved = self.phases.time(Phase::Migrate, || grid.migration.migrate(&grid.plan.tree, chunks));
+        let mut splits = Vec::new();
+        let moved = self.phases.time(Phase::Migrate, || {
+            grid.migration.migrate(&grid.plan.tree, chunks, resampling.as_ref(), &mut splits)
+        });
+        self.book_entries(&splits);
         self.deleted += moved.as_ref().map_or(0, |moved| moved.deleted);
         moved
     }

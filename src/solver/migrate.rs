@@ -7,6 +7,7 @@ use partition::comm::{Comm, NeighbourExchange, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::simd::{LANES, Lanes, Mask};
@@ -84,28 +85,41 @@ impl<const D: usize> Migration<D> {
         self.exchange.traffic()
     }
 
-    /// Collective over neighbours. Moves every particle into the leaf that contains it.
+    /// Collective over neighbours. Moves every particle into the leaf that contains it. With `resampling`, particles that
+    /// enter a leaf finer than they were made for become their children on the way; what that did is appended to
+    /// `splits`.
     ///
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
     /// in any case.
-    pub fn migrate(&mut self, tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) -> Result<Moved, MigrateError> {
+    pub(super) fn migrate(
+        &mut self,
+        tree: &KnownTree<D>,
+        chunks: &mut [Chunk<D>],
+        resampling: Option<&Resampling<'_, D>>,
+        splits: &mut Vec<Splits>,
+    ) -> Result<Moved, MigrateError> {
         let (first, rule) = (tree.first_own(), self.rule);
-        let found: Vec<Result<Vec<(u32, Destination)>, MigrateError>> = chunks
+        let found: Vec<(Leavers, Splits)> = chunks
             .par_iter_mut()
             .zip(&self.boxes)
             .enumerate()
             .with_min_len(4)
-            .map(|(leaf, (chunk, bounds))| rule.leavers(tree, first + leaf, chunk, bounds))
+            .map(|(leaf, (chunk, bounds))| {
+                rule.leavers_resampled(tree, first + leaf, chunk, bounds, resampling)
+            })
             .collect();
         let mut error = None;
         let mut moved = Moved::default();
         let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
-        let leaving = found.iter().flatten().map(Vec::len).sum();
+        let leaving = found.iter().flat_map(|(found, _)| found).map(Vec::len).sum();
         let mut staged = Chunk::<D>::with_capacity(leaving);
         let mut staged_leaf = Vec::with_capacity(leaving);
         let mut leavers = Vec::with_capacity(chunks.len());
-        for (leaf, found) in found.into_iter().enumerate() {
+        for (leaf, (found, split)) in found.into_iter().enumerate() {
+            if resampling.is_some() {
+                splits.push(split);
+            }
             let found = found.unwrap_or_else(|found| {
                 error.get_or_insert(found);
                 Vec::new()
@@ -149,7 +163,35 @@ impl<const D: usize> Migration<D> {
     }
 }
 
+/// Particles that leave a leaf, ascending, with where they go.
+type Leavers = Result<Vec<(u32, Destination)>, MigrateError>;
+
 impl Rule {
+    /// As [`Rule::leavers`], after splitting those that enter a leaf finer than they were made for; children
+    /// go each their own way.
+    fn leavers_resampled<const D: usize>(
+        self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        bounds: &([f64; D], [f64; D]),
+        resampling: Option<&Resampling<'_, D>>,
+    ) -> (Leavers, Splits) {
+        let mut splits = Splits::default();
+        loop {
+            let leavers = self.leavers(tree, leaf, chunk, bounds);
+            let (Some(resampling), Ok(found)) = (resampling, &leavers) else { return (leavers, splits) };
+            let entries = found.iter().filter_map(|(p, destination)| match destination {
+                Destination::Leaf(to) => Some((*p, tree.leaves()[*to as usize].level)),
+                Destination::Stay | Destination::Gone => None,
+            });
+            let level = tree.leaves()[leaf].level;
+            if found.is_empty() || !resampling.enter(chunk, level, entries, &mut splits) {
+                return (leavers, splits);
+            }
+        }
+    }
+
     /// Particles of one leaf that are outside it, with their destinations, in order.
     fn leavers<const D: usize>(
         self,
@@ -157,7 +199,7 @@ impl Rule {
         leaf: usize,
         chunk: &mut Chunk<D>,
         (lower, upper): &([f64; D], [f64; D]),
-    ) -> Result<Vec<(u32, Destination)>, MigrateError> {
+    ) -> Leavers {
         let mut leavers = Vec::new();
         for p in outside(chunk, lower, upper) {
             match self.destination(tree, leaf, chunk, p as usize)? {

@@ -2,12 +2,16 @@
 //!
 //! [`Solver::step`] is the method; the files beside it hold its phases.
 pub mod bins;
+pub mod contact;
 pub mod given_boxes;
 pub mod grid;
 mod increment;
+mod indicators;
 pub mod migrate;
 pub mod phases;
 pub mod rebalance;
+pub mod regrid;
+pub mod resample;
 pub mod time_step;
 pub mod totals;
 pub mod transfer;
@@ -17,12 +21,15 @@ use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
 use self::bins::BinMissing;
+use self::contact::Contacts;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
+use self::resample::Books;
 use self::time_step::StepControl;
 use self::transfer::Reach;
-use crate::boundary::{FaceCondition, Leaving};
+use crate::adaptivity::Adaptivity;
+use crate::boundary::{Collider, FaceCondition, Leaving};
 use crate::grid::fields::Part;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
@@ -40,6 +47,10 @@ pub struct Physics<const D: usize> {
     pub gravity: [f64; D],
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
+    /// Rigid bodies that act on the material, in the order in which they act.
+    pub colliders: Vec<Collider<D>>,
+    /// Dynamic refinement; `None`: tree and particles keep their sizes.
+    pub adaptivity: Option<Adaptivity<D>>,
     /// What happens to particles that leave the domain.
     pub leaving: Leaving,
     /// Transfer of velocities.
@@ -109,6 +120,8 @@ pub struct Solver<const D: usize> {
     pub chunks: Vec<Chunk<D>>,
     /// Step and time.
     pub clock: Clock,
+    /// Where the colliders are, and their reactions.
+    pub contacts: Contacts<D>,
     /// Wall time by phase since the last report.
     pub phases: Phases,
     grid: Grid<D>,
@@ -116,6 +129,12 @@ pub struct Solver<const D: usize> {
     signal: Vec<f64>,
     /// Particles that this rank deleted because they left the domain.
     pub deleted: u64,
+    /// Splits and merges of particles so far.
+    pub books: Books,
+    /// Changes of the tree since the start of this process.
+    pub regrids: u64,
+    /// Mean plastic strain rate in each own leaf in the last step, 1/s, where a criterion asked for it.
+    plastic_rate: Vec<f64>,
     /// What grids of earlier trees and partitions have sent.
     sent_before: Traffic,
 }
@@ -134,6 +153,7 @@ impl<const D: usize> Solver<D> {
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
+            contacts: Contacts::new(&physics, clock.time),
             physics,
             forest,
             chunks,
@@ -141,8 +161,12 @@ impl<const D: usize> Solver<D> {
             phases: Phases::default(),
             grid,
             deleted: 0,
+            books: Books::default(),
+            regrids: 0,
+            plastic_rate: Vec::new(),
             sent_before: Traffic::default(),
         };
+        solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
         if reach > 0 {
             solver.rebuild_grid(reach);
@@ -163,20 +187,24 @@ impl<const D: usize> Solver<D> {
     pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
+        let rates = self.collider_rates(dt);
 
         let sorted = self.sort_into_bins();
         self.note_velocities();
         self.nodes_from_particles(dt);
-        self.update_nodes(dt);
+        let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
+        let plastic = self.plastic_strain_sums();
         self.gather(dt);
+        self.note_plastic_rate(plastic, dt);
         let moved = self.migrate();
         let reach = self.local_reach();
 
         self.clock.step += 1;
         self.clock.time = if dt < left { self.clock.time + dt } else { end };
         self.clock.dt = dt;
+        self.advance_colliders(&rates, impulses, dt);
         self.close_step(sorted, moved, reach, requests)
     }
 

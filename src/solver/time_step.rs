@@ -25,16 +25,17 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
-    /// the sum of wave speed and particle speed.
+    /// the sum of wave speed and particle speed. Colliders bound it as well.
     pub(super) fn local_bound(&self) -> f64 {
         let plan = &self.grid.plan;
-        self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
+        let particles = self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
             f64::INFINITY,
             |bound, (leaf, signal)| {
                 let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
                 bound.min(self.physics.control.cfl * plan.cell(finest.unwrap_or(0)) / signal)
             },
-        )
+        );
+        particles.min(self.collider_bound())
     }
 
     /// Greatest sum of wave speed and particle speed in a chunk, from the materials at rest.

@@ -2,10 +2,13 @@
 use rayon::prelude::*;
 
 use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
+use super::contact::SUMS;
 use super::grid::Grid;
 use super::phases::{Phase, Phases};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
 use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
@@ -241,13 +244,18 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Nodes, || grid.fields.restrict(&grid.plan));
     }
 
-    /// Velocities on real nodes: momentum over mass, gravity, boundary conditions.
-    pub(super) fn update_nodes(&mut self, dt: f64) {
-        let (grid, physics) = (&mut self.grid, &self.physics);
+    /// Velocities on real nodes: momentum over mass, gravity, then the conditions of the colliders in their order, at
+    /// last those of the domain's faces, so that nothing is driven out of the domain. Returns impulse and angular
+    /// impulse on each collider from the nodes of this rank.
+    pub(super) fn update_nodes(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
+        let (grid, gravity) = (&mut self.grid, self.physics.gravity);
         self.phases.time(Phase::Nodes, || {
-            update_velocity(&mut grid.fields, &grid.plan, physics.gravity, dt);
-            apply_faces(&mut grid.fields, &grid.plan, &physics.faces);
+            update_velocity(&mut grid.fields, &grid.plan, gravity, dt);
         });
+        let impulses = self.collide(rates);
+        let (grid, faces) = (&mut self.grid, &self.physics.faces);
+        self.phases.time(Phase::Nodes, || apply_faces(&mut grid.fields, &grid.plan, faces));
+        impulses
     }
 
     /// Interpolates velocities on constrained nodes from their parents.

@@ -1,8 +1,10 @@
 //! Boxes on random trees.
 use super::random::Random;
 use super::tree::{contains, graded, random_leaves};
+use agimp::grid::{KnownTree, direct};
 use agimp::solver::given_boxes::GivenParticle;
 use partition::{Brick, MAX_LEVEL, Octant};
+use std::collections::BTreeMap;
 
 /// Position of a node, root edges.
 pub fn position<const D: usize>(place: [u32; D]) -> [f64; D] {
@@ -25,6 +27,57 @@ pub fn kappa<const D: usize>(centre: [f64; D], half: [f64; D]) -> f64 {
 pub fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64 {
     let leaf = leaves.iter().find(|leaf| contains(leaf, at)).expect("the tree fills its brick");
     0.25 * 0.5f64.powi(i32::from(leaf.level))
+}
+
+/// A box, by centre and half widths, and its share of the volume of the one that it was cut from.
+pub type Part<const D: usize> = ([f64; D], [f64; D], f64);
+
+/// The boxes that are transferred in place of one: equal parts, cut along the axes on which they are wider than the
+/// finest cell that they overlap.
+pub fn parts<const D: usize>(leaves: &[Octant<D>], whole: Part<D>) -> Vec<Part<D>> {
+    let (centre, half, share) = whole;
+    let overlaps = |leaf: &Octant<D>| {
+        let edge = 0.5f64.powi(i32::from(leaf.level));
+        (0..D).all(|a| {
+            let lower = f64::from(leaf.coord[a]) * edge;
+            centre[a] - half[a] < lower + edge && centre[a] + half[a] > lower
+        })
+    };
+    let finest = leaves.iter().filter(|leaf| overlaps(leaf)).map(|leaf| leaf.level).max();
+    let cell = 0.25 * 0.5f64.powi(i32::from(finest.expect("a leaf below the box")));
+    let wide = half.map(|half| half > 0.5 * cell * (1.0 + 8.0 * f64::EPSILON));
+    let count = wide.iter().filter(|&&wide| wide).count();
+    if count == 0 {
+        return vec![whole];
+    }
+    let smaller: [f64; D] = std::array::from_fn(|a| if wide[a] { 0.5 * half[a] } else { half[a] });
+    let corners = (0..1u32 << D).filter(|corner| (0..D).all(|a| wide[a] || corner >> a & 1 == 0));
+    let side = |corner: u32, a: usize| f64::from(2 * (corner >> a & 1)) - 1.0;
+    let at = |corner, a: usize| centre[a] + if wide[a] { side(corner, a) * smaller[a] } else { 0.0 };
+    let cut = corners.map(|c| (std::array::from_fn(|a| at(c, a)), smaller, share / f64::from(1u32 << count)));
+    cut.flat_map(|part| parts(leaves, part)).collect()
+}
+
+/// `Σ V |∇w|` at each node: over the boxes that are transferred, and over the boxes as given.
+pub fn gradient_sums<const D: usize>(
+    brick: Brick<D>,
+    leaves: &[Octant<D>],
+    boxes: &[GivenParticle<D>],
+) -> [BTreeMap<[u32; D], f64>; 2] {
+    let tree = KnownTree::whole(brick, leaves.to_vec());
+    let mut sums = [BTreeMap::new(), BTreeMap::new()];
+    for given in boxes {
+        let whole = (given.position, given.half, 1.0);
+        for (sum, boxes) in sums.iter_mut().zip([parts(leaves, whole), vec![whole]]) {
+            for (centre, half, share) in boxes {
+                for node in direct::weights(&tree, 1.0, centre, half) {
+                    let length = node.gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+                    *sum.entry(node.place).or_insert(0.0) += share * given.mass * length;
+                }
+            }
+        }
+    }
+    sums
 }
 
 /// All kinds of boxes.

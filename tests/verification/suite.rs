@@ -12,6 +12,8 @@ mod advect;
 mod page;
 mod plot;
 mod spin;
+#[path = "../common/spinning.rs"]
+mod spinning;
 mod wave;
 
 /// The value, or the end of the suite with the reason.

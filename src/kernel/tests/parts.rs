@@ -193,7 +193,7 @@ fn boxes_stay_in_the_domain_and_follow_the_policy() {
                         chunk.column(Layout::<3>::HALF)[p] * stretch
                     }
                 };
-                assert_eq!(half[p][k], free.min(0.5 * CELL).min(room).max(1e-6 * CELL));
+                assert_eq!(half[p][k], free.min(0.5 * CELL).min(room).max(2f64.powi(-46) * CELL));
             }
         }
     }

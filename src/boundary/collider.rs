@@ -1,0 +1,297 @@
+//! Rigid bodies that act on the nodes inside them, and are acted on.
+//!
+//! On a real node inside a collider (signed distance at most 0) the condition holds for the velocity relative to the
+//! collider's surface there, with the gradient of the signed distance as normal. The momentum that this takes from
+//! the material is what the material gives to the collider: its force and torque.
+use super::motion::{Free, Motion, Pose, Rate, length};
+use crate::geometry::{Aabb, Shape};
+
+/// What a collider does to material that it touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Contact {
+    /// The material moves with the collider.
+    Sticky,
+    /// No motion through the surface, free motion along it.
+    Slip,
+    /// No motion into the collider, free motion away from it; Coulomb friction while it is pressed.
+    Separating {
+        /// Coefficient of friction, tan of the friction angle; 0 is frictionless.
+        friction: f64,
+    },
+}
+
+impl Contact {
+    /// Applies the condition to a velocity relative to the surface (m/s), with the outward unit normal.
+    ///
+    /// Friction takes away at most the tangential velocity that the normal impulse allows:
+    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step).
+    pub fn apply<const D: usize>(self, velocity: &mut [f64; D], outward: &[f64; D]) {
+        let normal = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(outward[a], sum));
+        let tangential: [f64; D] = std::array::from_fn(|a| (-normal).mul_add(outward[a], velocity[a]));
+        match self {
+            Self::Sticky => *velocity = [0.0; D],
+            Self::Slip => *velocity = tangential,
+            Self::Separating { friction } => {
+                if normal >= 0.0 {
+                    return;
+                }
+                let (speed, lost) = (length(&tangential), -friction * normal);
+                let kept = if speed > lost { 1.0 - lost / speed } else { 0.0 };
+                *velocity = tangential.map(|v| v * kept);
+            }
+        }
+    }
+}
+
+/// A collider as the job describes it; it does not change in a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collider<const D: usize> {
+    /// Name.
+    pub name: String,
+    /// Where it is in the job.
+    pub shape: Shape<D>,
+    /// The point that rotations leave in place and torques refer to, in the job, m.
+    pub reference: [f64; D],
+    /// Unit axis of rotations; z in 2D.
+    pub axis: [f64; 3],
+    /// What it does to material.
+    pub contact: Contact,
+    /// How it moves.
+    pub motion: Motion<D>,
+}
+
+/// Where a collider is and how fast it moves, between two steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColliderState<const D: usize> {
+    /// Where it is.
+    pub pose: Pose<D>,
+    /// Velocities; of a prescribed motion the mean ones of the step done last.
+    pub rate: Rate<D>,
+}
+
+impl<const D: usize> Collider<D> {
+    /// The state at a time (s); of a free body that at the start.
+    pub fn state_at(&self, time: f64) -> ColliderState<D> {
+        let rate = match &self.motion {
+            Motion::Table(_) => Rate::REST,
+            motion => motion.mean_rate(time, 0.0),
+        };
+        self.state(self.motion.place(time), rate)
+    }
+
+    /// A state from its numbers: way of the reference point (m) with the angle (rad), and velocities.
+    pub fn state(&self, place: ([f64; D], f64), rate: Rate<D>) -> ColliderState<D> {
+        ColliderState { pose: Pose::new(place.0, place.1, self.axis), rate }
+    }
+
+    /// The free body, if it is one.
+    pub fn free(&self) -> Option<&Free<D>> {
+        if let Motion::Free(free) = &self.motion { Some(free) } else { None }
+    }
+
+    /// Where the reference point is, m.
+    pub fn centre(&self, pose: &Pose<D>) -> [f64; D] {
+        std::array::from_fn(|a| self.reference[a] + pose.translation[a])
+    }
+
+    /// Where the point `x` of space (m) lies in the collider as the job has it.
+    fn to_own(&self, x: &[f64; D], pose: &Pose<D>) -> [f64; D] {
+        let centre = self.centre(pose);
+        std::array::from_fn(|i| {
+            (0..D).fold(self.reference[i], |sum, j| pose.rotation[j][i].mul_add(x[j] - centre[j], sum))
+        })
+    }
+
+    /// Signed distance of a point `x` (m) to the surface of the collider in a pose, m; negative inside. For booleans
+    /// of shapes a bound, never larger in magnitude (see [`crate::geometry`]).
+    pub fn distance(&self, x: &[f64; D], pose: &Pose<D>) -> f64 {
+        self.shape.distance(&self.to_own(x, pose))
+    }
+
+    /// Lower bound on the distance of a box to the collider in a pose, m: the distance of its centre less its half
+    /// diagonal. Not above 0 for every box that meets the collider.
+    pub fn distance_to_box(&self, aabb: &Aabb<D>, pose: &Pose<D>) -> f64 {
+        self.distance(&aabb.centre(), pose) - aabb.half_diagonal()
+    }
+
+    /// Outward unit normal at a point: the gradient of the signed distance.
+    pub fn normal(&self, x: &[f64; D], pose: &Pose<D>) -> [f64; D] {
+        let own = self.shape.gradient(&self.to_own(x, pose));
+        std::array::from_fn(|i| (0..D).fold(0.0, |sum, j| pose.rotation[i][j].mul_add(own[j], sum)))
+    }
+
+    /// Velocity of the collider at a point `x` of it: `V + ω × (x - c)`, m/s.
+    pub fn velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
+        if rate.spin == 0.0 {
+            return rate.velocity;
+        }
+        let centre = self.centre(pose);
+        let arm: [f64; 3] = std::array::from_fn(|a| if a < D { x[a] - centre[a] } else { 0.0 });
+        let cross = cross(self.axis, arm);
+        std::array::from_fn(|a| rate.spin.mul_add(cross[a], rate.velocity[a]))
+    }
+
+    /// Mean velocities over the step from `time` to `time + dt` (s). A free body gains `dt g`; what the material does
+    /// to it in the step acts from the next one on.
+    pub fn step_rate(&self, state: &ColliderState<D>, gravity: &[f64; D], time: f64, dt: f64) -> Rate<D> {
+        match &self.motion {
+            Motion::Free(free) => Rate {
+                velocity: std::array::from_fn(|a| {
+                    let fall = if free.along[a] { gravity[a] } else { 0.0 };
+                    (0.5 * dt).mul_add(fall, state.rate.velocity[a])
+                }),
+                spin: state.rate.spin,
+            },
+            motion => motion.mean_rate(time, dt),
+        }
+    }
+
+    /// The state after a step that ends at `time` (s) and was `dt` long, in which the collider moved with `mean`
+    /// and got the given impulse (kg m/s) and angular impulse about its reference point (kg m²/s). Without contact a
+    /// free body follows the parabola of its fall exactly.
+    pub fn advanced(
+        &self,
+        state: &ColliderState<D>,
+        mean: &Rate<D>,
+        gravity: &[f64; D],
+        [time, dt]: [f64; 2],
+        impulse: [f64; D],
+        torque: [f64; 3],
+    ) -> ColliderState<D> {
+        let Motion::Free(free) = &self.motion else { return self.state(self.motion.place(time), *mean) };
+        let mut rate = state.rate;
+        let mut translation = state.pose.translation;
+        for a in (0..D).filter(|&a| free.along[a]) {
+            rate.velocity[a] = dt.mul_add(gravity[a], rate.velocity[a]) + impulse[a] / free.mass;
+            translation[a] = dt.mul_add(mean.velocity[a], translation[a]);
+        }
+        let mut angle = state.pose.angle;
+        if let Some(inertia) = free.inertia {
+            let about = (0..3).fold(0.0, |sum, a| self.axis[a].mul_add(torque[a], sum));
+            rate.spin += about / inertia;
+            angle = dt.mul_add(mean.spin, angle);
+        }
+        self.state((translation, angle), rate)
+    }
+
+    /// Bound on the speed of any point of the collider within `extent` (the upper corner of the domain, m) from
+    /// `time` on, m/s; of a free body that of the state.
+    pub fn greatest_speed(&self, state: &ColliderState<D>, extent: &[f64; D], time: f64) -> f64 {
+        let (speed, spin) = match &self.motion {
+            Motion::Free(_) => (length(&state.rate.velocity), state.rate.spin.abs()),
+            motion => motion.greatest_speeds(time),
+        };
+        if spin == 0.0 {
+            return speed;
+        }
+        // The farthest point: of a bounded shape a corner of its box; of others one of the domain, from the place
+        // that the reference point has now.
+        let farthest = |from: &[f64; D], aabb: &Aabb<D>| {
+            let arm: [f64; D] =
+                std::array::from_fn(|a| (from[a] - aabb.lower[a]).abs().max((aabb.upper[a] - from[a]).abs()));
+            length(&arm)
+        };
+        let own = farthest(&self.reference, &self.shape.bounds());
+        let inside = farthest(&self.centre(&state.pose), &Aabb::new([0.0; D], *extent));
+        spin.mul_add(if own.is_finite() { own } else { inside }, speed)
+    }
+}
+
+impl<const D: usize> std::fmt::Display for Collider<D> {
+    /// Contact and motion in words.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.contact {
+            Contact::Sticky => write!(f, "sticky, ")?,
+            Contact::Slip => write!(f, "slip, ")?,
+            Contact::Separating { friction } => write!(f, "separating with friction {friction}, ")?,
+        }
+        let speeds = |rate: &Rate<D>| format!("{:.4} m/s, {:.4} rad/s", length(&rate.velocity), rate.spin);
+        match &self.motion {
+            Motion::Fixed => write!(f, "fixed"),
+            Motion::Steady(rate) => write!(f, "steady with {}", speeds(rate)),
+            Motion::Table(knots) => {
+                let (speed, spin) = self.motion.greatest_speeds(f64::NEG_INFINITY);
+                write!(f, "by a table of {} rows, at most {speed:.4} m/s, {spin:.4} rad/s", knots.len())
+            }
+            Motion::Free(free) => write!(f, "free, {} kg, at first {}", free.mass, speeds(&free.start)),
+        }
+    }
+}
+
+/// Cross product.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        a[i].mul_add(b[j], -(a[j] * b[i]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn disc(motion: Motion<2>) -> Collider<2> {
+        Collider {
+            name: "disc".into(),
+            shape: Shape::Box(Aabb::new([1.0, 0.0], [2.0, 0.5])),
+            reference: [1.0, 0.0],
+            axis: [0.0, 0.0, 1.0],
+            contact: Contact::Sticky,
+            motion,
+        }
+    }
+
+    #[test]
+    fn poses_move_distances_normals_and_velocities() {
+        let spin = std::f64::consts::FRAC_PI_2;
+        let collider = disc(Motion::Steady(Rate { velocity: [0.0, 1.0], spin }));
+        // Shifted by 1 m upwards and turned by 90 degrees: from x = 0.5 to 1, y = 1 to 2.
+        let state = collider.state_at(1.0);
+        let close = |a: [f64; 2], b: [f64; 2]| assert!(length(&[a[0] - b[0], a[1] - b[1]]) < 1e-15, "{a:?}");
+        assert!((collider.distance(&[0.3, 1.5], &state.pose) - 0.2).abs() < 1e-15);
+        close(collider.normal(&[0.3, 1.5], &state.pose), [-1.0, 0.0]);
+        close(collider.velocity_at(&[1.0, 2.0], &state.pose, &state.rate), [-spin, 1.0]);
+        let speed = collider.greatest_speed(&state, &[9.0, 9.0], 1.0);
+        assert!((speed - (1.0 + spin * 1.25_f64.sqrt())).abs() < 1e-14, "{speed}");
+    }
+
+    #[test]
+    fn free_bodies_fall_on_the_parabola_and_take_impulses() {
+        let free = Free {
+            mass: 2.0,
+            along: [true, true],
+            inertia: Some(0.5),
+            start: Rate { velocity: [1.0, 3.0], spin: 0.0 },
+        };
+        let (collider, gravity) = (disc(Motion::Free(free)), [0.0, -10.0]);
+        let (mut state, mut time) = (collider.state_at(0.0), 0.0);
+        for step in 0..100 {
+            let dt = 0.001 * f64::from(1 + step % 3);
+            let mean = collider.step_rate(&state, &gravity, time, dt);
+            time += dt;
+            state = collider.advanced(&state, &mean, &gravity, [time, dt], [0.0; 2], [0.0; 3]);
+        }
+        let exact = [time, 3.0 * time - 5.0 * time * time];
+        assert!((0..2).all(|a| (state.pose.translation[a] - exact[a]).abs() < 1e-14), "{state:?} {exact:?}");
+        let hit = collider.advanced(&state, &state.rate, &[0.0; 2], [time, 0.0], [4.0, 0.0], [0.0, 0.0, 1.0]);
+        assert_eq!(hit.rate.velocity, [state.rate.velocity[0] + 2.0, state.rate.velocity[1]]);
+        assert_eq!(hit.rate.spin, 2.0);
+    }
+
+    #[test]
+    fn friction_is_limited_by_the_normal_impulse() {
+        let contact = Contact::Separating { friction: 0.5 };
+        let mut v = [3.0, -2.0];
+        contact.apply(&mut v, &[0.0, 1.0]);
+        assert_eq!(v, [2.0, 0.0]);
+        let mut v = [0.5, -2.0];
+        contact.apply(&mut v, &[0.0, 1.0]);
+        assert_eq!(v, [0.0, 0.0]);
+        let mut v = [0.5, 2.0];
+        contact.apply(&mut v, &[0.0, 1.0]);
+        assert_eq!(v, [0.5, 2.0]);
+        let mut v = [0.5, 2.0];
+        Contact::Slip.apply(&mut v, &[0.0, 1.0]);
+        assert_eq!(v, [0.5, 0.0]);
+    }
+}

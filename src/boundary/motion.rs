@@ -1,0 +1,188 @@
+//! How colliders move: at rest, steadily, by a table, or freely under gravity and the forces on them.
+use crate::geometry::rotation;
+
+/// Where a collider is: shifted from its place in the job and turned about its reference point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<const D: usize> {
+    /// Way of the reference point from its place in the job, m.
+    pub translation: [f64; D],
+    /// Angle about the collider's axis, rad.
+    pub angle: f64,
+    /// The rotation by that angle, row by row: turned = R own.
+    pub rotation: [[f64; D]; D],
+}
+
+impl<const D: usize> Pose<D> {
+    /// The pose after a translation (m) and a rotation by an angle (rad) about a unit axis.
+    pub fn new(translation: [f64; D], angle: f64, axis: [f64; 3]) -> Self {
+        Self { translation, angle, rotation: rotation(axis, angle) }
+    }
+}
+
+/// How fast a collider moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate<const D: usize> {
+    /// Velocity of the reference point, m/s.
+    pub velocity: [f64; D],
+    /// Angular velocity about the collider's axis, rad/s.
+    pub spin: f64,
+}
+
+impl<const D: usize> Rate<D> {
+    /// No motion.
+    pub const REST: Self = Self { velocity: [0.0; D], spin: 0.0 };
+}
+
+/// One row of a table of motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knot<const D: usize> {
+    /// Time, s.
+    pub time: f64,
+    /// Way of the reference point from its place in the job, m.
+    pub translation: [f64; D],
+    /// Angle about the collider's axis, rad.
+    pub angle: f64,
+}
+
+/// A rigid body that moves under gravity and the forces of the material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Free<const D: usize> {
+    /// Mass, kg; in plane strain of one metre of thickness.
+    pub mass: f64,
+    /// Axes along which it may move.
+    pub along: [bool; D],
+    /// Moment of inertia about the collider's axis through the reference point, kg m²; `None`: it does not turn.
+    pub inertia: Option<f64>,
+    /// Velocity and angular velocity at the start.
+    pub start: Rate<D>,
+}
+
+/// The motion of a collider.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Motion<const D: usize> {
+    /// At rest.
+    Fixed,
+    /// Velocity and angular velocity that never change.
+    Steady(Rate<D>),
+    /// Linear between the rows of a table with increasing times; at rest before the first and after the last.
+    Table(Vec<Knot<D>>),
+    /// A rigid body.
+    Free(Free<D>),
+}
+
+impl<const D: usize> Motion<D> {
+    /// Translation and angle at a time (s); for a free body those at the start.
+    pub fn place(&self, time: f64) -> ([f64; D], f64) {
+        match self {
+            Self::Fixed | Self::Free(_) => ([0.0; D], 0.0),
+            Self::Steady(rate) => (rate.velocity.map(|v| v * time), rate.spin * time),
+            Self::Table(knots) => {
+                let Some((first, last)) = knots.first().zip(knots.last()) else { return ([0.0; D], 0.0) };
+                if time <= first.time {
+                    return (first.translation, first.angle);
+                }
+                let next = knots.partition_point(|knot| knot.time < time);
+                let Some(to) = knots.get(next) else { return (last.translation, last.angle) };
+                let from = &knots[next - 1];
+                let part = (time - from.time) / (to.time - from.time);
+                let between = |a: f64, b: f64| part.mul_add(b - a, a);
+                let translation = std::array::from_fn(|k| between(from.translation[k], to.translation[k]));
+                (translation, between(from.angle, to.angle))
+            }
+        }
+    }
+
+    /// Mean velocity and angular velocity over a step from `time` to `time + dt` (s): the derivative of the
+    /// interpolation, averaged. So the collider and the material that it carries move by the same amount, also across
+    /// rows of a table. Of a free body: those at the start.
+    pub fn mean_rate(&self, time: f64, dt: f64) -> Rate<D> {
+        match self {
+            Self::Fixed => Rate::REST,
+            Self::Steady(rate) => *rate,
+            Self::Free(free) => free.start,
+            Self::Table(knots) => {
+                let end = time + dt;
+                let mut mean = Rate::REST;
+                for pair in knots.windows(2) {
+                    let overlap = end.min(pair[1].time) - time.max(pair[0].time);
+                    if overlap > 0.0 {
+                        let share = overlap / (end - time);
+                        let slope = slope(pair);
+                        for k in 0..D {
+                            mean.velocity[k] = share.mul_add(slope.velocity[k], mean.velocity[k]);
+                        }
+                        mean.spin = share.mul_add(slope.spin, mean.spin);
+                    }
+                }
+                mean
+            }
+        }
+    }
+
+    /// The greatest speed of the reference point (m/s) and the greatest angular speed (rad/s) from `time` on; of a
+    /// free body those at the start.
+    pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
+        let speeds = |rate: &Rate<D>| (length(&rate.velocity), rate.spin.abs());
+        match self {
+            Self::Fixed => (0.0, 0.0),
+            Self::Steady(rate) => speeds(rate),
+            Self::Free(free) => speeds(&free.start),
+            Self::Table(knots) => {
+                let ahead = knots.windows(2).filter(|pair| pair[1].time > time);
+                ahead
+                    .map(|pair| speeds(&slope(pair)))
+                    .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
+            }
+        }
+    }
+}
+
+/// Velocities between two rows.
+fn slope<const D: usize>(pair: &[Knot<D>]) -> Rate<D> {
+    let span = pair[1].time - pair[0].time;
+    Rate {
+        velocity: std::array::from_fn(|k| (pair[1].translation[k] - pair[0].translation[k]) / span),
+        spin: (pair[1].angle - pair[0].angle) / span,
+    }
+}
+
+/// Euclidean length.
+pub(super) fn length(vector: &[f64]) -> f64 {
+    vector.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Motion<2> {
+        let knot = |time, x, angle| Knot { time, translation: [x, 0.0], angle };
+        Motion::Table(vec![knot(1.0, 0.0, 0.0), knot(2.0, 4.0, 1.0), knot(4.0, 2.0, 1.0)])
+    }
+
+    #[test]
+    fn tables_are_linear_between_rows_and_rest_outside() {
+        let motion = table();
+        assert_eq!(motion.place(0.5), ([0.0, 0.0], 0.0));
+        assert_eq!(motion.place(1.25), ([1.0, 0.0], 0.25));
+        assert_eq!(motion.place(3.0), ([3.0, 0.0], 1.0));
+        assert_eq!(motion.place(9.0), ([2.0, 0.0], 1.0));
+        assert_eq!(motion.mean_rate(0.0, 0.5), Rate::REST);
+        assert_eq!(motion.mean_rate(1.0, 0.5), Rate { velocity: [4.0, 0.0], spin: 1.0 });
+        assert_eq!(motion.greatest_speeds(0.0), (4.0, 1.0));
+        assert_eq!(motion.greatest_speeds(2.0), (1.0, 0.0));
+    }
+
+    /// The mean velocity of a step moves by what the table moves, rows within the step included.
+    #[test]
+    fn mean_rates_add_up_to_the_way() {
+        let motion = table();
+        let (mut time, mut way) = (0.0, 0.0);
+        for step in 0..50 {
+            let dt = 0.05 + 0.01 * f64::from(step % 7);
+            way += dt * motion.mean_rate(time, dt).velocity[0];
+            time += dt;
+            assert!((way - motion.place(time).0[0]).abs() < 1e-14, "{time}");
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Several particles become one.
+use super::super::chunk::{Chunk, Layout, Tag};
+use super::mix::{Group, mixtures};
+use super::{Setting, ids, volume};
+
+/// How different particles may be that become one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Greatest difference of a velocity from the affine field through the velocities of the group, as a share of the
+    /// wave speed of the undeformed material. The field is fitted to the centres as if these were boxes, so that a
+    /// quarter of the affine part may count as difference as well.
+    pub velocity: f64,
+    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm), and of the logarithm of the
+    /// plastic volume ratio.
+    pub strain: f64,
+    /// Greatest difference of the first history variable (plastic strain) from the mean.
+    pub history: f64,
+    /// Greatest half width of the merged box, and of a box about the boxes of the group, over that of an undeformed
+    /// particle of the new level. Above 1, and below the stretch at which particles split, so that a merge does not
+    /// undo that.
+    pub stretch: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { velocity: 0.005, strain: 0.02, history: 0.2, stretch: 1.5 }
+    }
+}
+
+/// What [`merge`] did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Merged {
+    /// Particles that stand for a group now.
+    pub merged: u64,
+    /// Those among them that were complete families, and are the parent again.
+    pub families: u64,
+    /// By how many the number of particles fell.
+    pub removed: u64,
+    /// Indices, ascending, of particles that stand for a group of strangers and carry the smallest identifier of the
+    /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
+    /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`ids`]).
+    pub unnamed: Vec<u32>,
+}
+
+/// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
+/// families of siblings, then particles of one material and body whose centres lie in one cell of the lattice that seeding
+/// uses on the next coarser level, in the order of the chunk, as many as fill the volume of an undeformed particle of
+/// that level. Only groups within the `limits` merge, and only where `may_merge` allows it for their centre of mass.
+///
+/// Strangers that fill less than half of that volume become one particle of the level they have.
+///
+/// A merged particle takes the place of the first of its group; all others keep their order. Mass, volume and plastic
+/// work are kept, momentum and, with APIC, angular momentum to round-off; the current volume is kept and the stress is
+/// admissible. `book` gets the kinetic energy that each merge removes, J, which is not negative.
+pub fn merge<const D: usize>(
+    chunk: &mut Chunk<D>,
+    setting: &Setting<D>,
+    limits: &Limits,
+    may_merge: impl Fn([f64; D]) -> bool,
+    book: &mut impl FnMut(f64),
+) -> Merged {
+    let mut report = Merged::default();
+    let finest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).max().unwrap_or(0);
+    let mut unnamed = Vec::new();
+    for level in (setting.level + 1..=finest).rev() {
+        for find in [families::<D>, strangers::<D>] {
+            let groups = find(chunk, setting, level);
+            if groups.is_empty() {
+                continue;
+            }
+            unnamed.resize(chunk.len(), false);
+            let mixtures = mixtures(chunk, setting, limits, &groups, level - 1);
+            let mut stays = vec![true; chunk.len()];
+            let mut done = Vec::new();
+            for (number, group) in groups.iter().enumerate() {
+                let Some(energy) = mixtures.energy[number] else { continue };
+                if !may_merge(mixtures.chunk.position(number)) {
+                    continue;
+                }
+                group.members[1..].iter().for_each(|&p| stays[p as usize] = false);
+                unnamed[group.members[0] as usize] = !group.is_family;
+                done.push((group.members[0], number));
+                report.merged += 1;
+                report.families += u64::from(group.is_family);
+                report.removed += group.members.len() as u64 - 1;
+                book(energy);
+            }
+            replace(chunk, &mut unnamed, &stays, &mut done, &mixtures.chunk);
+        }
+    }
+    report.unnamed = (0..).zip(unnamed).filter(|(_, unnamed)| *unnamed).map(|(p, _)| p).collect();
+    report
+}
+
+/// Writes the merged particles (index in the chunk, number in `merged`) over the first of their groups and takes
+/// out those that do not stay.
+fn replace<const D: usize>(
+    chunk: &mut Chunk<D>,
+    unnamed: &mut Vec<bool>,
+    stays: &[bool],
+    done: &mut [(u32, usize)],
+    merged: &Chunk<D>,
+) {
+    if done.is_empty() {
+        return;
+    }
+    done.sort_unstable();
+    let source: Vec<u32> = (0..).zip(stays).filter(|(_, stays)| **stays).map(|(p, _)| p).collect();
+    *unnamed = source.iter().map(|&p| unnamed[p as usize]).collect();
+    *chunk = chunk.gathered(&source);
+    let mut place = 0;
+    for &(first, number) in done.iter() {
+        place += source[place..].partition_point(|&p| p < first);
+        for column in 0..Layout::<D>::REALS {
+            chunk.column_mut(column)[place] = merged.column(column)[number];
+        }
+        chunk.ids_mut()[place] = merged.ids()[number];
+        chunk.tags_mut()[place] = merged.tags()[number];
+    }
+}
+
+/// Complete families of a level, by identifier. Children in the order of their numbers.
+fn families<const D: usize>(chunk: &Chunk<D>, _: &Setting<D>, level: u8) -> Vec<Group> {
+    let mut children: Vec<(u64, usize, u64, u32)> = of_level(chunk, level)
+        .filter_map(|(p, tag)| {
+            let (parent, number) = ids::parent::<D>(chunk.ids()[p as usize])?;
+            Some((parent, number, tag, p))
+        })
+        .collect();
+    children.sort_unstable();
+    let whole = |family: &&[(u64, usize, u64, u32)]| {
+        family.len() == 1 << D && family.iter().all(|child| child.2 == family[0].2)
+    };
+    children
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(whole)
+        .map(|family| Group::new(family.iter().map(|child| child.3).collect(), family[0].0, true))
+        .collect()
+}
+
+/// Particles of a level that share a cell of the lattice of the next coarser level, by material, body and cell.
+fn strangers<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, level: u8) -> Vec<Group> {
+    let mut members: Vec<(u64, [i64; D], u32)> = of_level(chunk, level)
+        .map(|(p, tag)| {
+            let spacing = 2.0 * setting.nominal(Tag::unpack(tag), level - 1);
+            (tag, chunk.position(p as usize).map(|x| (x / spacing).floor() as i64), p)
+        })
+        .collect();
+    members.sort_unstable();
+    let mut groups = Vec::new();
+    for cell in members.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0), level - 1);
+        // A lattice of equal parts fills the volume to round-off.
+        let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 1e-9);
+        let mut group: Vec<u32> = Vec::new();
+        let mut filled = 0.0;
+        for &(_, _, p) in cell {
+            let part = volume(chunk, p as usize);
+            if filled + part > room {
+                close(chunk, &mut group, &mut groups);
+                filled = 0.0;
+            }
+            group.push(p);
+            filled += part;
+        }
+        close(chunk, &mut group, &mut groups);
+    }
+    groups
+}
+
+/// Ends a group, which counts if it has two members or more.
+fn close<const D: usize>(chunk: &Chunk<D>, group: &mut Vec<u32>, groups: &mut Vec<Group>) {
+    let members = std::mem::take(group);
+    if members.len() < 2 {
+        return;
+    }
+    let smallest = members.iter().map(|&p| chunk.ids()[p as usize]).min();
+    groups.extend(smallest.map(|id| Group::new(members, id, false)));
+}
+
+/// Index and packed tag of the particles made for a level.
+fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
+    let tags = (0..).zip(chunk.tags().iter().copied());
+    tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
+}

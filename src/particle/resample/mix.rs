@@ -1,0 +1,328 @@
+//! The particle that stands for a group.
+use super::super::chunk::{Chunk, Layout, Tag};
+use super::{Limits, Setting, read, read_matrix, volume, write, write_matrix};
+use crate::kernel::math::{exp, ln};
+use crate::kernel::simd::{LANES, Lanes};
+use crate::kernel::{Select, Transfer};
+use crate::material::{self, HISTORIES, State, Symmetric, eigen};
+
+/// Particles that might become one.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// At least two; children of a family in the order of their numbers, others in the order of the chunk.
+    pub members: Vec<u32>,
+    /// Identifier of the merged particle.
+    pub id: u64,
+    /// Whether these are all children of one parent.
+    pub is_family: bool,
+}
+
+impl Group {
+    /// Children of a family are given by number, which is not their order in the chunk once they have moved.
+    pub fn new(mut members: Vec<u32>, id: u64, is_family: bool) -> Self {
+        if let Some(first) = (0..members.len()).min_by_key(|&i| members[i]) {
+            // The merged particle takes the place of the first in the chunk.
+            members[..=first].rotate_right(1);
+        }
+        Self { members, id, is_family }
+    }
+}
+
+/// Merged particles, one per group.
+pub(super) struct Mixtures<const D: usize> {
+    /// The particles.
+    pub chunk: Chunk<D>,
+    /// Kinetic energy that the merge would remove, J; `None` if the group is not within the limits.
+    pub energy: Vec<Option<f64>>,
+}
+
+/// Merges each group into a particle of a level, and says which may do so.
+pub(super) fn mixtures<const D: usize>(
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    limits: &Limits,
+    groups: &[Group],
+    level: u8,
+) -> Mixtures<D> {
+    let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
+    let half = setting.territories(chunk, Select::List(&members));
+    let strain = hencky(chunk, &members);
+    let firsts: Vec<u32> = groups.iter().map(|group| group.members[0]).collect();
+    let mut out = Mixtures { chunk: chunk.gathered(&firsts), energy: Vec::with_capacity(groups.len()) };
+    let mut strains = Vec::with_capacity(groups.len());
+    let mut reaches = Vec::with_capacity(groups.len());
+    let mut start = 0;
+    for (number, group) in groups.iter().enumerate() {
+        let range = start..start + group.members.len();
+        start = range.end;
+        let tag = Tag { level, ..Tag::unpack(chunk.tags()[group.members[0] as usize]) };
+        out.chunk.ids_mut()[number] = group.id;
+        out.chunk.tags_mut()[number] = tag.pack();
+
+        let motion = mix_motion(&mut out.chunk, number, chunk, setting, group, &half[range.clone()]);
+        let (mean, difference) = mix_matter(&mut out.chunk, number, chunk, setting, group, &strain[range]);
+        let speed = limits.velocity * setting.scheme.materials[usize::from(tag.material)].wave_speed();
+        let close = motion.difference <= speed
+            && difference.strain <= limits.strain
+            && difference.history <= limits.history;
+        out.energy.push(close.then_some(motion.energy));
+        strains.push(mean);
+        reaches.push(motion.reach);
+    }
+    restore(&mut out.chunk, setting, &strains);
+
+    for (number, half) in setting.territories(&out.chunk, Select::All).iter().enumerate() {
+        let tag = Tag::unpack(out.chunk.tags()[number]);
+        // A box that just fits does so to round-off.
+        let greatest = limits.stretch * setting.nominal(tag, level) * (1.0 + 1e-9);
+        if half.iter().chain(&reaches[number]).any(|&half| half > greatest) {
+            out.energy[number] = None;
+        }
+        // Strangers that fill less than half of a particle of the level are still one of the finer level, which may
+        // merge again; else it would split into crumbs as soon as it meets finer cells.
+        let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
+        if !groups[number].is_family && volume(&out.chunk, number) < 0.5 * whole * (1.0 - 1e-9) {
+            out.chunk.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
+        }
+    }
+    out
+}
+
+/// Sum of the first `2^k` and the others, so that `2^k` equal numbers have an exact sum.
+fn pairwise(values: &[f64]) -> f64 {
+    match values {
+        [] => 0.0,
+        [value] => *value,
+        _ => {
+            let (first, rest) = values.split_at(values.len().next_power_of_two() / 2);
+            pairwise(first) + pairwise(rest)
+        }
+    }
+}
+
+/// Weighted mean by differences from the first, exact where all are equal.
+fn mean<const N: usize>(shares: &[f64], values: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+    let first = values(0);
+    let mut sum = [0.0; N];
+    for (i, share) in shares.iter().enumerate() {
+        let value = values(i);
+        (0..N).for_each(|c| sum[c] = share.mul_add(value[c] - first[c], sum[c]));
+    }
+    std::array::from_fn(|c| first[c] + sum[c])
+}
+
+/// Shares of positive values in their sum, which comes last.
+fn shares(values: Vec<f64>) -> (Vec<f64>, f64) {
+    let sum = pairwise(&values);
+    (values.into_iter().map(|value| value / sum).collect(), sum)
+}
+
+/// How the members of a group move against each other.
+struct Motion<const D: usize> {
+    /// Kinetic energy of the differences of velocity, J.
+    energy: f64,
+    /// Greatest difference of a velocity from the affine field, m/s.
+    difference: f64,
+    /// Half widths of a box about the new centre that holds all boxes, m.
+    reach: [f64; D],
+}
+
+/// Mass, position, velocity and affine matrix.
+fn mix_motion<const D: usize>(
+    out: &mut Chunk<D>,
+    number: usize,
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    group: &Group,
+    half: &[[f64; D]],
+) -> Motion<D> {
+    let member = |i: usize| group.members[i] as usize;
+    let masses: Vec<f64> =
+        group.members.iter().map(|&p| chunk.column(Layout::<D>::MASS)[p as usize]).collect();
+    let (shares, mass) = shares(masses);
+    let x = mean(&shares, |i| chunk.position(member(i)));
+    let v: [f64; D] = mean(&shares, |i| read(chunk, Layout::<D>::VELOCITY, member(i)));
+
+    // Sums of u ⊗ r, of r ⊗ r with the second moments s of boxes, and of the members' own affine matrices.
+    let (mut turning, mut metric, mut own, mut boxed) =
+        ([[0.0; D]; D], [[0.0; D]; D], [[0.0; D]; D], [[0.0; D]; D]);
+    let mut reach = [0.0_f64; D];
+    let mut energy = 0.0;
+    let mut relative = Vec::with_capacity(shares.len());
+    for (i, &share) in shares.iter().enumerate() {
+        let (position, p) = (chunk.position(member(i)), member(i));
+        let velocity: [f64; D] = read(chunk, Layout::<D>::VELOCITY, p);
+        let affine = read_matrix(chunk, p);
+        let r: [f64; D] = std::array::from_fn(|a| position[a] - x[a]);
+        let u: [f64; D] = std::array::from_fn(|a| velocity[a] - v[a]);
+        for a in 0..D {
+            for b in 0..D {
+                let second = half[i][b] * half[i][b] * (1.0 / 3.0);
+                turning[a][b] = f64::mul_add(share * u[a], r[b], turning[a][b]);
+                metric[a][b] = f64::mul_add(share * r[a], r[b], metric[a][b]);
+                own[a][b] = share.mul_add(affine[a][b], own[a][b]);
+                boxed[a][b] = f64::mul_add(share * affine[a][b], second, boxed[a][b]);
+                if a == b {
+                    metric[a][b] = share.mul_add(second, metric[a][b]);
+                }
+            }
+            reach[a] = reach[a].max(r[a].abs() + half[i][a]);
+            energy = f64::mul_add(share * u[a], u[a], energy);
+        }
+        relative.push((r, u));
+    }
+    let field = divide(turning, metric);
+    let difference = relative.iter().map(|(r, u)| {
+        let square = (0..D).fold(0.0, |square, a| {
+            let rest = (0..D).fold(u[a], |rest, b| f64::mul_add(-field[a][b], r[b], rest));
+            f64::mul_add(rest, rest, square)
+        });
+        square.sqrt()
+    });
+    let affine = match setting.scheme.transfer {
+        Transfer::Apic => add(own, turning),
+        Transfer::Tpic => divide(add(boxed, turning), metric),
+        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
+    };
+    write(out, Layout::<D>::POSITION, number, &x);
+    write(out, Layout::<D>::VELOCITY, number, &v);
+    write(out, Layout::<D>::MASS, number, &[mass]);
+    write_matrix(out, number, &affine);
+    Motion { energy: 0.5 * mass * energy, difference: difference.fold(0.0, f64::max), reach }
+}
+
+fn add<const D: usize>(a: [[f64; D]; D], b: [[f64; D]; D]) -> [[f64; D]; D] {
+    std::array::from_fn(|i| std::array::from_fn(|k| a[i][k] + b[i][k]))
+}
+
+/// X with `X A = N` for a symmetric positive definite A, by elimination.
+fn divide<const D: usize>(n: [[f64; D]; D], mut a: [[f64; D]; D]) -> [[f64; D]; D] {
+    let mut n = n;
+    // Columns of N follow those of A, as A is symmetric.
+    for pivot in 0..D {
+        for row in pivot + 1..D {
+            let factor = a[row][pivot] / a[pivot][pivot];
+            (pivot..D).for_each(|k| a[row][k] = f64::mul_add(-factor, a[pivot][k], a[row][k]));
+            (0..D).for_each(|i| n[i][row] = f64::mul_add(-factor, n[i][pivot], n[i][row]));
+        }
+    }
+    for pivot in (0..D).rev() {
+        for i in 0..D {
+            let rest = (pivot + 1..D).fold(n[i][pivot], |rest, k| f64::mul_add(-a[pivot][k], n[i][k], rest));
+            n[i][pivot] = rest / a[pivot][pivot];
+        }
+    }
+    n
+}
+
+/// How the matter of the members of a group differs from the mean.
+struct Difference {
+    /// Of the Hencky strain, and of the logarithm of the plastic volume ratio.
+    strain: f64,
+    /// Of the first history variable.
+    history: f64,
+}
+
+/// Reference volume, history and plastic work. Returns the elastic Hencky strain as well, from which [`restore`] makes
+/// the elastic deformation and the stress.
+fn mix_matter<const D: usize>(
+    out: &mut Chunk<D>,
+    number: usize,
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    group: &Group,
+    strains: &[[f64; 6]],
+) -> ([f64; 6], Difference) {
+    let member = |i: usize| group.members[i] as usize;
+    let half = |i: usize| chunk.column(Layout::<D>::HALF)[member(i)];
+    let (shares, total) = shares(group.members.iter().map(|&p| volume(chunk, p as usize)).collect());
+    let equal = (1..shares.len()).all(|i| half(i) == half(0));
+    let width = match (D, equal && shares.len() == 1 << D) {
+        (_, true) => 2.0 * half(0),
+        (2, _) => 0.5 * total.sqrt(),
+        _ => 0.5 * libm::cbrt(total),
+    };
+    let history = |i: usize| -> [f64; HISTORIES] { read(chunk, Layout::<D>::HISTORY, member(i)) };
+    let mean_history = mean(&shares, history);
+    let mut strain = mean(&shares, |i| strains[i]);
+    let mut difference = Difference { strain: 0.0, history: 0.0 };
+    for (i, own) in strains.iter().enumerate() {
+        let square = (0..6).fold(0.0, |square, c| {
+            let rest = own[c] - strain[c];
+            f64::mul_add(if c < 3 { rest } else { 2.0 * rest }, rest, square)
+        });
+        let gain = (history(i)[1] - mean_history[1]).abs();
+        difference.strain = difference.strain.max(square.sqrt()).max(gain);
+        difference.history = difference.history.max((history(i)[0] - mean_history[0]).abs());
+    }
+
+    // The mean of logarithms is the logarithm of the geometric mean; the volume that is missing is added.
+    let tag = Tag::unpack(chunk.tags()[member(0)]);
+    let is_plastic = setting.scheme.materials[usize::from(tag.material)].is_plastic();
+    let logarithm = |strain: &[f64; 6], history: &[f64; HISTORIES]| {
+        strain[0] + strain[1] + strain[2] + if is_plastic { history[1] } else { 0.0 }
+    };
+    let middle = logarithm(&strain, &mean_history);
+    let excess = (0..shares.len()).fold(0.0, |sum, i| {
+        shares[i].mul_add(libm::expm1(logarithm(&strains[i], &history(i)) - middle), sum)
+    });
+    let missing = libm::log1p(excess) / D as f64;
+    strain.iter_mut().take(D).for_each(|strain| *strain += missing);
+
+    write(out, Layout::<D>::HALF, number, &[width]);
+    write(out, Layout::<D>::HISTORY, number, &mean_history);
+    let work = mean(&shares, |i| read::<D, 1>(chunk, Layout::<D>::WORK, member(i)));
+    write(out, Layout::<D>::WORK, number, &work);
+    (strain, difference)
+}
+
+/// A symmetric tensor of each of up to [`LANES`] particles.
+fn tensors(count: usize, tensor: impl Fn(usize) -> [f64; 6]) -> Symmetric {
+    let rows: [[f64; 6]; LANES] = std::array::from_fn(|lane| tensor(lane.min(count - 1)));
+    std::array::from_fn(|c| Lanes::new(std::array::from_fn(|lane| rows[lane][c])))
+}
+
+/// Symmetric columns from `first`, in the order of [`Symmetric`].
+fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
+    let (reals, stride) = chunk.reals();
+    std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { reals[(first + c) * stride + p] } else { 0.0 })
+}
+
+/// Elastic Hencky strains `½ ln b` of the listed particles.
+fn hencky<const D: usize>(chunk: &Chunk<D>, list: &[u32]) -> Vec<[f64; 6]> {
+    let mut out = Vec::with_capacity(list.len());
+    for list in list.chunks(LANES) {
+        let b = tensors(list.len(), |i| symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, list[i] as usize));
+        let eigen = eigen::decompose(&b, D == 2);
+        let strain = eigen.compose(&eigen.value.map(|value| ln(value) * 0.5), D == 2).map(Lanes::to_array);
+        out.extend((0..list.len()).map(|lane| strain.map(|component| component[lane])));
+    }
+    out
+}
+
+/// Elastic deformation from Hencky strains, and stress by an update of the material without increment, which maps the
+/// strain to the yield surface should it lie outside. What that dissipates is plastic work.
+fn restore<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, strains: &[[f64; 6]]) {
+    for (first, strains) in (0..).step_by(LANES).zip(strains.chunks(LANES)) {
+        let count = strains.len();
+        let at = |lane: usize| first + lane.min(count - 1);
+        let eigen = eigen::decompose(&tensors(count, |lane| strains[lane]), D == 2);
+        let mut state = State::new(eigen.compose(&eigen.value.map(|value| exp(value + value)), D == 2));
+        for (h, history) in state.history.iter_mut().enumerate() {
+            let column = chunk.column(Layout::<D>::HISTORY + h);
+            *history = Lanes::new(std::array::from_fn(|lane| column[at(lane)]));
+        }
+        let index = std::array::from_fn(|lane| Tag::unpack(chunk.tags()[at(lane)]).material);
+        material::update(setting.scheme.materials, &index, &mut state, D == 2);
+        let (elastic, stress) = (state.elastic.map(Lanes::to_array), state.stress.map(Lanes::to_array));
+        let (history, work) = (state.history.map(Lanes::to_array), state.work.to_array());
+        for lane in 0..count {
+            let p = first + lane;
+            let of = |tensor: &[[f64; LANES]; 6]| tensor.map(|component| component[lane]);
+            write(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&elastic)[..Layout::<D>::SYMMETRIC]);
+            write(chunk, Layout::<D>::STRESS, p, &of(&stress)[..Layout::<D>::SYMMETRIC]);
+            write(chunk, Layout::<D>::HISTORY, p, &history.map(|variable| variable[lane]));
+            chunk.column_mut(Layout::<D>::WORK)[p] += work[lane];
+        }
+    }
+}

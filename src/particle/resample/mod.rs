@@ -1,0 +1,120 @@
+//! Splitting and merging of particles, so that their size follows that of the cells.
+//!
+//! Pure functions on the chunk of one leaf: they know neither tree nor ranks, and the result depends on the content of
+//! the chunk alone. After either, particles may lie in another leaf (children do where a box crosses a face), so the
+//! caller sorts them into leaves afterwards. What is conserved, and why, is said in `docs/theory.md`, "Splitting and
+//! merging".
+use super::chunk::{Chunk, Layout, Tag};
+use crate::kernel::{BoxPolicy, Scheme, Select, domain};
+
+pub mod ids;
+mod merge;
+mod mix;
+mod split;
+#[cfg(test)]
+mod tests;
+
+pub use merge::{Limits, Merged, merge};
+pub use split::{Split, split};
+
+/// What splitting and merging need to know beside the particles of a leaf.
+#[derive(Clone, Copy)]
+pub struct Setting<'a, const D: usize> {
+    /// Box policy, transfer and materials.
+    pub scheme: &'a Scheme<'a>,
+    /// Upper corner of the domain, m.
+    pub extent: [f64; D],
+    /// Level of the leaf.
+    pub level: u8,
+    /// Half width of an undeformed particle of level 0 by body, m: half a cell of level 0 over the particles per cell
+    /// and direction. On level k it is this over 2^k.
+    pub nominal: &'a [f64],
+}
+
+impl<const D: usize> Setting<'_, D> {
+    /// Half width of an undeformed particle of a level, m.
+    fn nominal(&self, tag: Tag, level: u8) -> f64 {
+        self.nominal[usize::from(tag.body)] / f64::from(1u32 << level.min(31))
+    }
+
+    /// Half widths of the space that belongs to each of the selected particles, m: its box, except that boxes of one
+    /// cell overlap those of their neighbours, so that there the part of the box counts that the particle's volume
+    /// fills. Cut at the walls of the domain.
+    fn territories(&self, chunk: &Chunk<D>, select: Select) -> Vec<[f64; D]> {
+        let cell = self.scheme.root_cell / f64::from(1u32 << self.level.min(31));
+        let mut out = Vec::new();
+        domain::full_half_widths(chunk, select, cell, &self.extent, self.scheme, &mut out);
+        if self.scheme.boxes == BoxPolicy::Cell {
+            let by_volume = Scheme { boxes: BoxPolicy::default(), ..*self.scheme };
+            let mut filled = Vec::new();
+            domain::full_half_widths(chunk, select, cell, &self.extent, &by_volume, &mut filled);
+            for (half, filled) in out.iter_mut().zip(filled) {
+                *half = std::array::from_fn(|axis| half[axis].min(filled[axis]));
+            }
+        }
+        out
+    }
+}
+
+/// Particles that are too large for their leaf.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Those to split, ascending.
+    pub which: Vec<u32>,
+    /// Number of those that cannot be split, since their identifiers have no room for another generation.
+    pub refused: u64,
+}
+
+/// Particles that [`split`] should treat: those made for a level coarser than that of the leaf, and, where boxes follow
+/// the stretch ([`BoxPolicy::Volume`]), those whose box is wider along some axis than `stretch` times that of an
+/// undeformed particle of the leaf's level. The latter are measured against the leaf and not against themselves, so
+/// that their children do not split again before they have stretched as much once more.
+pub fn needs_split<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, stretch: Option<f64>) -> Wanted {
+    let stretch = stretch.filter(|_| matches!(setting.scheme.boxes, BoxPolicy::Volume { .. }));
+    let half = stretch.map(|limit| (limit, setting.territories(chunk, Select::All)));
+    let mut wanted = Wanted::default();
+    for (p, (&tag, &id)) in chunk.tags().iter().zip(chunk.ids()).enumerate() {
+        let tag = Tag::unpack(tag);
+        let too_wide = |(limit, half): &(f64, Vec<[f64; D]>)| {
+            let greatest = limit * setting.nominal(tag, setting.level);
+            half[p].iter().any(|&half| half > greatest)
+        };
+        if tag.level < setting.level || half.as_ref().is_some_and(too_wide) {
+            match ids::generation(id) < ids::GENERATIONS {
+                true => wanted.which.push(p as u32),
+                false => wanted.refused += 1,
+            }
+        }
+    }
+    wanted
+}
+
+/// Reference volume of particle `p`, m³ (m² in plane strain).
+fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
+    (1..D).fold(edge, |volume, _| volume * edge)
+}
+
+/// Columns `first..first + N` of particle `p`.
+fn read<const D: usize, const N: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; N] {
+    let (reals, stride) = chunk.reals();
+    std::array::from_fn(|i| reals[(first + i) * stride + p])
+}
+
+/// Writes what [`read`] reads.
+fn write<const D: usize>(chunk: &mut Chunk<D>, first: usize, p: usize, values: &[f64]) {
+    let (reals, stride) = chunk.reals_mut();
+    values.iter().enumerate().for_each(|(i, &value)| reals[(first + i) * stride + p] = value);
+}
+
+/// The affine columns of particle `p` as a matrix.
+fn read_matrix<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
+    std::array::from_fn(|i| read(chunk, Layout::<D>::AFFINE + D * i, p))
+}
+
+/// Writes what [`read_matrix`] reads.
+fn write_matrix<const D: usize>(chunk: &mut Chunk<D>, p: usize, matrix: &[[f64; D]; D]) {
+    for (i, row) in matrix.iter().enumerate() {
+        write(chunk, Layout::<D>::AFFINE + D * i, p, row);
+    }
+}

@@ -1,0 +1,172 @@
+//! One particle becomes `2^D`.
+use super::super::chunk::{Chunk, Layout, Tag};
+use super::{Setting, ids, read, read_matrix, write, write_matrix};
+use crate::kernel::{Select, Transfer};
+
+/// What [`split`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Split {
+    /// Particles that were replaced by their children.
+    pub split: u64,
+    /// Particles that stayed, since their identifiers have no room for another generation.
+    pub refused: u64,
+}
+
+/// Replaces the particles `which` (ascending) by `2^D` children each, of the next level, in their place: child 0 first,
+/// where bit a of a child's number says that it lies on the upper side along axis a. All others keep their order.
+///
+/// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it its affine
+/// matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children stand at a quarter of the particle's
+/// box, so that theirs tile it. Mass, volume and centre of mass are kept bit for bit, momentum where the affine part of a
+/// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book` gets the
+/// kinetic energy that each split adds, J, which comes out of the affine part.
+pub fn split<const D: usize>(
+    chunk: &mut Chunk<D>,
+    setting: &Setting<D>,
+    which: &[u32],
+    spreads: &[[f64; D]],
+    book: &mut impl FnMut(f64),
+) -> Split {
+    assert_eq!(which.len(), spreads.len(), "one spread per particle");
+    let territories = setting.territories(chunk, Select::List(which));
+    let mut report = Split::default();
+    let mut source = Vec::with_capacity(chunk.len() + which.len() * ((1 << D) - 1));
+    let mut families = Vec::with_capacity(which.len());
+    let mut listed = which.iter().enumerate().peekable();
+    for (p, &id) in (0..).zip(chunk.ids()) {
+        match listed.next_if(|&(_, &listed)| listed == p) {
+            Some(_) if ids::generation(id) >= ids::GENERATIONS => report.refused += 1,
+            Some((place, _)) => {
+                families.push((source.len(), place));
+                source.extend(std::iter::repeat_n(p, (1 << D) - 1));
+            }
+            None => {}
+        }
+        source.push(p);
+    }
+    if families.is_empty() {
+        return report;
+    }
+    report.split = families.len() as u64;
+    *chunk = chunk.gathered(&source);
+    for (first, place) in families {
+        book(divide(chunk, setting, first, &territories[place], &spreads[place]));
+    }
+    report
+}
+
+/// Turns `2^D` copies of a particle from index `first` into its children. Returns the kinetic energy added, J.
+fn divide<const D: usize>(
+    chunk: &mut Chunk<D>,
+    setting: &Setting<D>,
+    first: usize,
+    half: &[f64; D],
+    spread: &[f64; D],
+) -> f64 {
+    let number = 1 << D;
+    let x = chunk.position(first);
+    let v: [f64; D] = read(chunk, Layout::<D>::VELOCITY, first);
+    let [mass] = read(chunk, Layout::<D>::MASS, first);
+    let [width] = read(chunk, Layout::<D>::HALF, first);
+    let share = 1.0 / number as f64;
+
+    let places: [(f64, f64); D] =
+        std::array::from_fn(|axis| sides(x[axis], 0.5 * half[axis], setting.extent[axis]));
+    let offset: [f64; D] = std::array::from_fn(|axis| places[axis].1 - x[axis]);
+    let mut kept = read_matrix(chunk, first);
+    let gradient = match setting.scheme.transfer {
+        Transfer::Apic => {
+            let gradient = kept.map(|row| std::array::from_fn(|k| row[k] / spread[k]));
+            for i in 0..D {
+                for k in 0..D {
+                    kept[i][k] = f64::mul_add(-gradient[i][k], offset[k] * offset[k], kept[i][k]);
+                }
+            }
+            gradient
+        }
+        Transfer::Tpic => kept,
+        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
+    };
+
+    let mut energy = 0.0;
+    // Children on opposite sides have opposite offsets, hence opposite affine velocities.
+    for lower in 0..number / 2 {
+        let is_upper = |axis: usize| lower >> axis & 1 == 1;
+        let mut velocities = [[0.0; D]; 2];
+        for i in 0..D {
+            let affine = (0..D).fold(0.0, |sum, k| {
+                let step = if is_upper(k) { offset[k] } else { -offset[k] };
+                f64::mul_add(gradient[i][k], step, sum)
+            });
+            let (less, more) = opposite(v[i], affine);
+            (velocities[0][i], velocities[1][i]) = (more, less);
+            energy += (more - v[i]) * (more - v[i]) + (less - v[i]) * (less - v[i]);
+        }
+        for (child, velocity) in [(lower, velocities[0]), (number - 1 - lower, velocities[1])] {
+            let p = first + child;
+            let position: [f64; D] =
+                std::array::from_fn(|a| if child >> a & 1 == 1 { places[a].1 } else { places[a].0 });
+            write(chunk, Layout::<D>::POSITION, p, &position);
+            write(chunk, Layout::<D>::VELOCITY, p, &velocity);
+            write(chunk, Layout::<D>::MASS, p, &[mass * share]);
+            write(chunk, Layout::<D>::HALF, p, &[0.5 * width]);
+            write_matrix(chunk, p, &kept);
+            let parent = chunk.ids()[p];
+            chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);
+            let tag = Tag::unpack(chunk.tags()[p]);
+            chunk.tags_mut()[p] = Tag { level: tag.level + 1, ..tag }.pack();
+        }
+    }
+    0.5 * mass * share * energy
+}
+
+/// Places at a distance of about `offset` on both sides of x within the domain, whose mean is x exactly.
+fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
+    // Half the way to a wall at most: a box is wider than that only within a millionth of a cell of the wall.
+    let offset = offset.min(0.5 * x).min(0.5 * (extent - x)).max(0.0);
+    let (lower, upper) = opposite(x, offset);
+    if upper < extent { (lower, upper) } else { (x, x) }
+}
+
+/// `(a - b', a + b')` with b' next to b, such that both are exact where `|b| <= |a|`; else rounded.
+fn opposite(a: f64, b: f64) -> (f64, f64) {
+    // Away from zero numbers are coarser. What the sum there has of b is a multiple of the spacing of numbers at a,
+    // so that taking it off again is exact.
+    let far = a + b.abs().copysign(a);
+    let near = a - (far - a);
+    if b.is_sign_negative() == a.is_sign_negative() { (near, far) } else { (far, near) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn opposite_sides_are_exact(a in -1e3_f64..1e3, share in -1.0_f64..1.0) {
+            let b = share * a;
+            let (less, more) = opposite(a, b);
+            prop_assert_eq!(more - a, a - less);
+            prop_assert_eq!(0.5 * less + 0.5 * more, a);
+            prop_assert!((more - a - b).abs() <= f64::EPSILON * a.abs());
+        }
+
+        #[test]
+        fn sides_stay_in_the_domain(x in 0.0_f64..1.0, offset in 0.0_f64..2.0) {
+            let (lower, upper) = sides(x, offset, 1.0);
+            prop_assert!(lower >= 0.0 && upper < 1.0);
+            prop_assert_eq!(upper - x, x - lower);
+        }
+    }
+
+    #[test]
+    fn at_the_walls() {
+        assert_eq!(sides(0.0, 0.1, 1.0), (0.0, 0.0));
+        let last = 1.0 - f64::EPSILON / 2.0;
+        assert_eq!(sides(last, 0.1, 1.0), (last, last));
+        assert_eq!(opposite(0.0, 0.5), (-0.5, 0.5));
+        assert_eq!(opposite(0.0, -0.5), (0.5, -0.5));
+        assert_eq!(opposite(-1.0, 0.5), (-1.5, -0.5));
+    }
+}

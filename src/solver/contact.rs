@@ -1,0 +1,228 @@
+//! Colliders in a step: their condition on nodes, their reactions and their motion.
+use rayon::prelude::*;
+
+use super::phases::Phase;
+use super::transfer::extent;
+use super::{Physics, Solver};
+use crate::boundary::collider::cross;
+use crate::boundary::motion::Rate;
+use crate::boundary::{Collider, ColliderState};
+use crate::exact_sum::ExactSum;
+use crate::geometry::Aabb;
+use crate::grid::mask::{block_nodes, node_of_bit};
+use crate::grid::plan::Block;
+use crate::grid::{GridPlan, NodeFields};
+use crate::kernel::BLOCK;
+
+/// Components of an impulse and of an angular impulse.
+pub const SUMS: usize = 6;
+
+/// Force and torque that the material exerts on a collider.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reaction {
+    /// Force, N; in plane strain per metre of thickness, and without a third component.
+    pub force: [f64; 3],
+    /// Torque about the reference point, N m; in plane strain only the third component.
+    pub torque: [f64; 3],
+}
+
+/// States of the colliders and what has been summed up of their reactions.
+#[derive(Clone, Debug)]
+pub struct Contacts<const D: usize> {
+    /// State of each collider; the same on all ranks.
+    pub states: Vec<ColliderState<D>>,
+    /// Per collider, impulse and angular impulse from the nodes of this rank since [`Contacts::since`].
+    pub sums: Vec<[ExactSum; SUMS]>,
+    /// Time of the last row of the history, s.
+    pub since: f64,
+}
+
+impl<const D: usize> Contacts<D> {
+    /// The colliders at a time, nothing summed.
+    pub(super) fn new(physics: &Physics<D>, time: f64) -> Self {
+        Self {
+            states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
+            sums: vec![std::array::from_fn(|_| ExactSum::new()); physics.colliders.len()],
+            since: time,
+        }
+    }
+}
+
+/// What one node gives to a collider.
+struct Touch<const D: usize> {
+    collider: usize,
+    position: [f64; D],
+    impulse: [f64; D],
+}
+
+/// Applies the colliders' conditions, in their order, to the real nodes inside them. Returns what the nodes that this
+/// rank counts give to the colliders, in the order of the nodes.
+fn apply_colliders<const D: usize>(
+    fields: &mut NodeFields<D>,
+    plan: &GridPlan<D>,
+    colliders: &[Collider<D>],
+    states: &[ColliderState<D>],
+    rates: &[Rate<D>],
+) -> Vec<Touch<D>> {
+    let nodes = block_nodes(D);
+    let blocks = fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).zip(&fields.active);
+    let touched = blocks.with_min_len(32).filter(|(_, active)| **active).map(|((rows, block), _)| {
+        let mut touches = Vec::new();
+        let cell = plan.cell(block.level);
+        let nodes_box = nodes_box(block, cell);
+        for (index, ((collider, state), rate)) in colliders.iter().zip(states).zip(rates).enumerate() {
+            if collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
+                continue;
+            }
+            let real = block.value & !block.constrained;
+            for (bit, row) in rows.iter_mut().enumerate() {
+                let mass = row.0[3];
+                if real >> bit & 1 == 0 || mass <= 0.0 {
+                    continue;
+                }
+                let local = node_of_bit::<D>(bit as u32);
+                let x = std::array::from_fn(|a| f64::from(BLOCK as u32 * block.coord[a] + local[a]) * cell);
+                if collider.distance(&x, &state.pose) > 0.0 {
+                    continue;
+                }
+                let surface = collider.velocity_at(&x, &state.pose, rate);
+                let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
+                let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
+                let free = relative;
+                collider.contact.apply(&mut relative, &collider.normal(&x, &state.pose));
+                if relative == free {
+                    continue;
+                }
+                for a in 0..D {
+                    row.0[a] = surface[a] + relative[a];
+                }
+                if block.owned >> bit & 1 == 1 {
+                    let impulse = std::array::from_fn(|a| mass * (before[a] - row.0[a]));
+                    touches.push(Touch { collider: index, position: x, impulse });
+                }
+            }
+        }
+        touches
+    });
+    touched.collect::<Vec<_>>().into_iter().flatten().collect()
+}
+
+/// The box that a block's nodes span.
+fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
+    let edge = BLOCK as u32;
+    Aabb::new(
+        block.coord.map(|c| f64::from(edge * c) * cell),
+        block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
+    )
+}
+
+impl<const D: usize> Solver<D> {
+    /// Mean velocities of the colliders over the next step.
+    pub(super) fn collider_rates(&self, dt: f64) -> Vec<Rate<D>> {
+        let all = self.physics.colliders.iter().zip(&self.contacts.states);
+        all.map(|(collider, state)| collider.step_rate(state, &self.physics.gravity, self.clock.time, dt))
+            .collect()
+    }
+
+    /// Not collective. Holds the nodes inside colliders to their conditions. Returns impulse and angular impulse on
+    /// each collider from the nodes that this rank counts.
+    pub(super) fn collide(&mut self, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
+        let colliders = &self.physics.colliders;
+        let mut sums = vec![std::array::from_fn(|_| ExactSum::new()); colliders.len()];
+        if colliders.is_empty() {
+            return sums;
+        }
+        let (grid, states) = (&mut self.grid, &self.contacts.states);
+        self.phases.time(Phase::Nodes, || {
+            for touch in apply_colliders(&mut grid.fields, &grid.plan, colliders, states, rates) {
+                let centre = colliders[touch.collider].centre(&states[touch.collider].pose);
+                let in_space = |v: &dyn Fn(usize) -> f64| -> [f64; 3] {
+                    std::array::from_fn(|a| if a < D { v(a) } else { 0.0 })
+                };
+                let impulse = in_space(&|a| touch.impulse[a]);
+                let turn = cross(in_space(&|a| touch.position[a] - centre[a]), impulse);
+                for (sum, value) in sums[touch.collider].iter_mut().zip(impulse.into_iter().chain(turn)) {
+                    sum.add(value);
+                }
+            }
+        });
+        sums
+    }
+
+    /// Collective. Moves the colliders over the step that has just been done. One more reduction if any is free.
+    pub(super) fn advance_colliders(&mut self, rates: &[Rate<D>], step: Vec<[ExactSum; SUMS]>, dt: f64) {
+        for (sums, step) in self.contacts.sums.iter_mut().zip(&step) {
+            sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
+        }
+        let gravity = self.physics.gravity;
+        let mut impulses = vec![[0.0; SUMS]; step.len()];
+        if self.physics.colliders.iter().any(|collider| collider.free().is_some()) {
+            let comm = &self.comm;
+            impulses = self.phases.time(Phase::Reduce, || totals(comm, &step));
+        }
+        let all = self.physics.colliders.iter().zip(&mut self.contacts.states);
+        for (((collider, state), rate), impulse) in all.zip(rates).zip(impulses) {
+            let [x, y, z, turn @ ..] = impulse;
+            let linear = std::array::from_fn(|a| [x, y, z][a]);
+            *state = collider.advanced(state, rate, &gravity, [self.clock.time, dt], linear, turn);
+        }
+    }
+
+    /// Collective. Mean force and torque on each collider since the last row of the history, that is, the momentum
+    /// given to it over the time since. Exact before it is rounded once.
+    pub fn reactions(&self) -> Vec<Reaction> {
+        let elapsed = self.clock.time - self.contacts.since;
+        let mean = |impulse: f64| if elapsed > 0.0 { impulse / elapsed } else { 0.0 };
+        let all = self.collider_impulses().into_iter();
+        all.map(|[x, y, z, a, b, c]| Reaction { force: [x, y, z].map(mean), torque: [a, b, c].map(mean) })
+            .collect()
+    }
+
+    /// Collective. Impulse (kg m/s) and angular impulse (kg m²/s) on each collider since the last row of the history.
+    fn collider_impulses(&self) -> Vec<[f64; SUMS]> {
+        totals(&self.comm, &self.contacts.sums)
+    }
+
+    /// Not collective. Starts the means of [`Solver::reactions`] anew.
+    pub fn forget_reactions(&mut self) {
+        self.contacts.sums.iter_mut().flatten().for_each(|sum| *sum = ExactSum::new());
+        self.contacts.since = self.clock.time;
+    }
+
+    /// Bound on the next step from the colliders: none may cross more than the Courant number's part of a cell of a
+    /// leaf with particles, and one that is away may use up its way there as well, s.
+    pub(super) fn collider_bound(&self) -> f64 {
+        let mut bound = f64::INFINITY;
+        let (plan, time) = (&self.grid.plan, self.clock.time);
+        let extent = extent(plan);
+        for (collider, state) in self.physics.colliders.iter().zip(&self.contacts.states) {
+            let speed = collider.greatest_speed(state, &extent, time);
+            if speed == 0.0 {
+                continue;
+            }
+            let filled = self.signal.iter().zip(self.forest.leaves()).enumerate();
+            for (leaf, (_, octant)) in filled.filter(|(_, (signal, _))| **signal > 0.0) {
+                let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
+                let cell = plan.cell(finest.unwrap_or(0));
+                let edge = f64::from(BLOCK as u32) * plan.cell(octant.level);
+                let aabb = Aabb::new(
+                    octant.coord.map(|c| f64::from(c) * edge),
+                    octant.coord.map(|c| f64::from(c + 1) * edge),
+                );
+                let way = collider.distance_to_box(&aabb, &state.pose).max(0.0);
+                bound = bound.min(self.physics.control.cfl.mul_add(cell, way) / speed);
+            }
+        }
+        bound
+    }
+}
+
+/// Collective. Totals over all ranks, rounded once.
+fn totals(comm: &partition::comm::Comm, sums: &[[ExactSum; SUMS]]) -> Vec<[f64; SUMS]> {
+    if sums.is_empty() {
+        return Vec::new();
+    }
+    let mut flat: Vec<ExactSum> = sums.iter().flatten().cloned().collect();
+    ExactSum::sum_over_ranks(comm, &mut flat);
+    flat.chunks_exact(SUMS).map(|six| std::array::from_fn(|i| six[i].to_f64())).collect()
+}

@@ -1,0 +1,221 @@
+//! What refinement criteria look at, leaf by leaf, after a step.
+//!
+//! Everything follows from the particles of the leaf and from nodes that its rank sums anyway, so the values do
+//! not depend on the partition.
+use partition::Octant;
+use rayon::prelude::*;
+
+use super::migrate::leaf_box;
+use super::transfer::extent;
+use super::{Physics, Solver};
+use crate::adaptivity::{Criterion, Kind, Value};
+use crate::boundary::ColliderState;
+use crate::geometry::Aabb;
+use crate::grid::mask::{arena_overlap, bits, block_nodes, node_of_bit, offset, offset_count};
+use crate::grid::plan::NO_BLOCK;
+use crate::grid::{GridPlan, NodeFields};
+use crate::kernel::{Select, domain};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// Share of the greatest node mass nearby below which a node counts as free of material. A full node in a
+/// corner of three walls has an eighth.
+const NEXT_TO_NOTHING: f64 = 0.1;
+
+/// What the values follow from: the state of one rank after a step.
+#[derive(Clone, Copy)]
+struct State<'a, const D: usize> {
+    leaves: &'a [Octant<D>],
+    chunks: &'a [Chunk<D>],
+    physics: &'a Physics<D>,
+    colliders: &'a [ColliderState<D>],
+    plan: &'a GridPlan<D>,
+    fields: &'a NodeFields<D>,
+    plastic_rate: &'a [f64],
+    time: f64,
+}
+
+impl<const D: usize> State<'_, D> {
+    fn value(&self, criterion: &Criterion<D>, leaf: usize) -> Value {
+        let of = |octant: &Octant<D>| self.distance(criterion, octant);
+        let here = &self.leaves[leaf];
+        match of(here) {
+            Some(distance) => {
+                let parent = here.parent().and_then(|parent| of(&parent)).unwrap_or(distance);
+                Value { leaf: distance, parent }
+            }
+            None => {
+                let value = self.indicator(criterion, leaf);
+                Value { leaf: value, parent: value }
+            }
+        }
+    }
+
+    /// Distance of an octant's box, if that is what the criterion looks at, m.
+    fn distance(&self, criterion: &Criterion<D>, octant: &Octant<D>) -> Option<f64> {
+        let (lower, upper) = leaf_box(octant, self.physics.root_edge);
+        let octant_box = Aabb::new(lower, upper);
+        match &criterion.kind {
+            Kind::Region { shape, motion } => {
+                let (way, _) = motion.place(self.time);
+                let centre = octant_box.centre();
+                let centre = std::array::from_fn(|axis| centre[axis] - way[axis]);
+                Some(shape.distance(&centre) - octant_box.half_diagonal())
+            }
+            Kind::Collider(index) => {
+                let (collider, state) = (&self.physics.colliders[*index], &self.colliders[*index]);
+                Some(collider.distance_to_box(&octant_box, &state.pose))
+            }
+            _ => None,
+        }
+    }
+
+    /// The value of a criterion that looks at the content of the leaf.
+    fn indicator(&self, criterion: &Criterion<D>, leaf: usize) -> f64 {
+        let chunk = &self.chunks[leaf];
+        let greatest = |column: usize| chunk.column(column).iter().copied().fold(0.0, f64::max);
+        match &criterion.kind {
+            Kind::Region { .. } | Kind::Collider(_) => f64::INFINITY,
+            Kind::FreeSurface => f64::from(u8::from(self.is_exposed(leaf))),
+            Kind::VelocityGradient => self.velocity_gradient(leaf),
+            Kind::PlasticStrain => greatest(Layout::<D>::HISTORY),
+            Kind::PlasticStrainRate => self.plastic_rate.get(leaf).copied().unwrap_or(0.0),
+            Kind::Stretch => self.greatest_stretch(leaf),
+            Kind::Material(material) => {
+                let found = chunk.tags().iter().any(|&tag| Tag::unpack(tag).material == *material);
+                f64::from(u8::from(found))
+            }
+        }
+    }
+
+    /// Number of the leaf's own block of nodes.
+    fn own_block(&self, leaf: usize) -> Option<usize> {
+        let plan = self.plan;
+        let block = plan.bins[plan.leaf_start[leaf] as usize].around[offset_count(D) / 2];
+        (block != NO_BLOCK && self.fields.active[block as usize]).then_some(block as usize)
+    }
+
+    /// Root mean square of the norm of the velocity gradient over the leaf's real nodes, weighted with mass, 1/s.
+    fn velocity_gradient(&self, leaf: usize) -> f64 {
+        let Some(number) = self.own_block(leaf) else { return 0.0 };
+        let block = &self.plan.blocks[number];
+        let real = block.value & !block.constrained;
+        let rows = &self.fields.rows[number * block_nodes(D)..][..block_nodes(D)];
+        let per_cell = 1.0 / self.plan.cell(block.level);
+        let mut sum_of_axes = 0.0;
+        for axis in 0..D {
+            let (mut squares, mut weights) = (0.0, 0.0);
+            for bit in bits(real).filter(|&bit| node_of_bit::<D>(bit)[axis] < 3) {
+                let next = bit + (1 << (2 * axis));
+                let (here, there) = (&rows[bit as usize].0, &rows[next as usize].0);
+                let weight = here[3].min(there[3]);
+                if real >> next & 1 == 1 && weight > 0.0 {
+                    let slopes = (0..D).map(|i| (there[i] - here[i]) * per_cell);
+                    squares += weight * slopes.fold(0.0, |sum: f64, slope| slope.mul_add(slope, sum));
+                    weights += weight;
+                }
+            }
+            if weights > 0.0 {
+                sum_of_axes += squares / weights;
+            }
+        }
+        sum_of_axes.sqrt()
+    }
+
+    /// Greatest speed along each axis of the leaf's nodes that have mass, m/s.
+    fn node_speeds(&self, leaf: usize) -> [f64; D] {
+        let mut speeds = [0.0; D];
+        if let Some(number) = self.own_block(leaf) {
+            let rows = &self.fields.rows[number * block_nodes(D)..][..block_nodes(D)];
+            for row in rows.iter().filter(|row| row.0[3] > 0.0) {
+                speeds = std::array::from_fn(|axis| f64::max(speeds[axis], row.0[axis].abs()));
+            }
+        }
+        speeds
+    }
+
+    /// Whether any real node in the arena of the leaf's own bin is free of material.
+    fn is_exposed(&self, leaf: usize) -> bool {
+        let plan = self.plan;
+        let around = &plan.bins[plan.leaf_start[leaf] as usize].around;
+        let (mut least, mut greatest) = (f64::INFINITY, 0.0);
+        for (index, &number) in around.iter().enumerate().take(offset_count(D)) {
+            if number == NO_BLOCK {
+                continue;
+            }
+            let block = &plan.blocks[number as usize];
+            let nodes = block.value & !block.constrained & arena_overlap::<D>(offset(index));
+            let rows = &self.fields.rows[number as usize * block_nodes(D)..][..block_nodes(D)];
+            for bit in bits(nodes) {
+                let mass = rows[bit as usize].0[3];
+                least = f64::min(least, mass);
+                greatest = f64::max(greatest, mass);
+            }
+        }
+        least < NEXT_TO_NOTHING * greatest
+    }
+
+    fn greatest_stretch(&self, leaf: usize) -> f64 {
+        let chunk = &self.chunks[leaf];
+        let plan = self.plan;
+        let cell = plan.cell(self.leaves[leaf].level);
+        let mut halves = Vec::new();
+        let scheme = self.physics.scheme();
+        domain::full_half_widths(chunk, Select::All, cell, &extent(plan), &scheme, &mut halves);
+        let undeformed = chunk.column(Layout::<D>::HALF);
+        let stretches = halves.iter().zip(undeformed).flat_map(|(half, own)| half.map(|half| half / own));
+        stretches.fold(0.0, f64::max)
+    }
+}
+
+impl<const D: usize> Solver<D> {
+    fn state(&self) -> State<'_, D> {
+        State {
+            leaves: self.forest.leaves(),
+            chunks: &self.chunks,
+            physics: &self.physics,
+            colliders: &self.contacts.states,
+            plan: &self.grid.plan,
+            fields: &self.grid.fields,
+            plastic_rate: &self.plastic_rate,
+            time: self.clock.time,
+        }
+    }
+
+    /// Not collective. The value of each criterion (inner) in each own leaf (outer); empty for leaves without particles.
+    pub(super) fn indicators(&self, criteria: &[Criterion<D>]) -> Vec<Vec<Value>> {
+        let state = self.state();
+        let leaves = (0..self.chunks.len()).into_par_iter().with_min_len(16);
+        leaves
+            .map(|leaf| match state.chunks[leaf].is_empty() {
+                true => Vec::new(),
+                false => criteria.iter().map(|criterion| state.value(criterion, leaf)).collect(),
+            })
+            .collect()
+    }
+
+    /// Greatest speed along each axis of an own leaf's nodes that have mass, m/s.
+    pub(super) fn node_speeds(&self, leaf: usize) -> [f64; D] {
+        self.state().node_speeds(leaf)
+    }
+
+    /// Not collective. Sum of the plastic strain of each leaf's particles, where a criterion will need its rate.
+    pub(super) fn plastic_strain_sums(&self) -> Option<Vec<f64>> {
+        let adaptivity = self.physics.adaptivity.as_ref()?;
+        let wanted = adaptivity.criteria.iter().any(|c| matches!(c.kind, Kind::PlasticStrainRate));
+        let due = (self.clock.step + 1).is_multiple_of(adaptivity.every);
+        (wanted && due).then(|| {
+            let sum = |chunk: &Chunk<D>| chunk.column(Layout::<D>::HISTORY).iter().sum();
+            self.chunks.par_iter().map(sum).collect()
+        })
+    }
+
+    /// Not collective. Mean rate of the plastic strain in each leaf over the step `dt` (s), from the sums before it.
+    pub(super) fn note_plastic_rate(&mut self, before: Option<Vec<f64>>, dt: f64) {
+        let after = self.plastic_strain_sums();
+        let Some((before, after)) = before.zip(after) else { return };
+        let each = self.chunks.iter().zip(before.iter().zip(&after));
+        self.plastic_rate = each
+            .map(|(chunk, (before, after))| (after - before) / (dt * chunk.len().max(1) as f64))
+            .collect();
+    }
+}
