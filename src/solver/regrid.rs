@@ -119,16 +119,17 @@ impl<const D: usize> Solver<D> {
                 continue;
             }
             // Material must not leave the buffer before the next time.
-            let speeds = self.node_speeds(number);
+            let [least, greatest] = self.velocity_range(number);
             for level in levels {
                 // Children that need more get it one level at a time.
                 let times = f64::from(level.saturating_sub(leaf.level).max(1));
-                let ahead = speeds.map(|speed| (times * speed * interval / unit).ceil() as u32);
+                let way = |velocity: f64| (times * velocity.abs() * interval / unit).ceil() as u32;
+                let (back, ahead) = (least.map(way), greatest.map(way));
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
                 let (lower, upper) = (leaf.lower(), leaf.upper());
                 // Without its surface the region meets only leaves that overlap it.
                 let lo =
-                    std::array::from_fn(|a| (lower[a] + 1).saturating_sub(buffer.saturating_add(ahead[a])));
+                    std::array::from_fn(|a| (lower[a] + 1).saturating_sub(buffer.saturating_add(back[a])));
                 let hi =
                     std::array::from_fn(|a| (upper[a] - 1).saturating_add(buffer).saturating_add(ahead[a]));
                 requests.push((Region { lo, hi }, u32::from(level)));
