@@ -105,7 +105,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena);
+            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None);
         }
         arena[100 % arena_nodes(D)]
     });

@@ -98,7 +98,8 @@ fn each_node(plan: &GridPlan<D>, arenas: &Arenas<D>, bin: usize, mut add: impl F
         if block == NO_BLOCK || plan.blocks[block as usize].sum == 0 {
             continue;
         }
-        arena.window.for_each_shared(towards, |run| {
+        let Some(shared) = arena.window.shared(towards) else { continue };
+        shared.for_each_run(|run| {
             let first = block as usize * block_nodes(D) + run.block;
             for (node, row) in (first..).zip(&arena.rows[run.arena..][..run.len]) {
                 add(node, &row.0);

@@ -1,5 +1,6 @@
 //! Adaptive generalized interpolation material point method on a distributed octree.
 pub mod adaptivity;
+pub mod bench;
 pub mod boundary;
 pub mod cli;
 pub mod exact_sum;

@@ -416,6 +416,7 @@ fn outputs_checkpoints_and_the_latest() {
                 outputs.write(comm, &view).expect("written");
                 outputs.checkpoint(comm, &view, 2).expect("written");
             }
+            outputs.settle(comm).expect("on disk");
             let mut resumed = Outputs::resume(comm, &directory, "col", light, 2, 0.1).expect("resumed");
             resumed.write(comm, &View { step: 20, time: 0.2, ..run.view() }).expect("written");
             assert_eq!(resumed.next(), 3);

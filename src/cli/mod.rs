@@ -3,6 +3,7 @@ use crate::job::JobError;
 use crate::particle::seed::SeedError;
 use clap::{Parser, Subcommand};
 
+pub mod bench;
 pub mod check;
 pub mod diff;
 pub mod digest;
@@ -44,6 +45,8 @@ pub enum Command {
     Diff(diff::Arguments),
     /// Print the weights of given boxes on given trees.
     Weights(weights::Arguments),
+    /// Measure the speed of whole steps on built-in jobs.
+    Bench(bench::Arguments),
 }
 
 /// Why the program ends without success.
@@ -105,6 +108,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),
         Command::Weights(arguments) => weights::execute(&arguments),
+        Command::Bench(arguments) => bench::execute(&arguments),
     }
 }
 

@@ -90,7 +90,7 @@ fn print(out: &mut impl Write, summary: &Summary) -> std::io::Result<()> {
 }
 
 /// Collective. Starts the threads of this rank and warns when they do not fit the machine.
-fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
+pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = wanted.map_or_else(|| (cores / comm.size()).max(1), usize::from);
     // The main thread works too; handing each small loop to another thread would cost more than the loop.

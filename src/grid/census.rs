@@ -74,10 +74,7 @@ fn bytes_for<const D: usize>(
         for part in parts.chunks_exact(3) {
             let (towards, nodes, constrained) = (part[0] as usize, part[1], part[2]);
             let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
-            let mut touched = 0u64;
-            arena.window.for_each_shared(towards, |run| {
-                (run.block..run.block + run.len).for_each(|node| touched |= 1 << node);
-            });
+            let touched = arena.window.nodes_of(towards);
             let entry = needed.entry(Octant { level: block.level, coord }).or_default();
             entry.rows |= nodes & touched;
             if arena.moments.is_some() {

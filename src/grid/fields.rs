@@ -10,7 +10,7 @@ use super::exchange::ReceivedArenas;
 use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
 use super::plan::{GridPlan, NO_BLOCK, Source};
-use super::window::Window;
+use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
 
 const ZERO: Row = Row([0.0; 4]);
@@ -83,27 +83,24 @@ impl<const D: usize> NodeFields<D> {
         let nodes = block_nodes(D);
         let mut moments = self.moments.chunks_mut(nodes);
         let flags = self.active.iter_mut().zip(&mut self.dirty);
-        let blocks: Vec<_> = self
-            .rows
-            .chunks_mut(nodes)
-            .zip(&plan.blocks)
-            .zip(flags)
-            .enumerate()
-            .map(|(index, ((rows, block), flags))| {
-                (index, BlockMut { rows, moments: block.moments.and_then(|_| moments.next()) }, flags)
-            })
-            .filter(|&(index, ..)| plan.is_seam[index] == (part == Part::Seam))
-            .collect();
-        blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block, (active, dirty))| {
-            let entries = entries.of(index);
-            *active = !entries.is_empty();
-            if *active || *dirty {
-                block.rows.fill(ZERO);
-                if let Some(moments) = &mut block.moments {
-                    moments.fill([ZERO; D]);
+        let mut blocks = Vec::new();
+        let all = self.rows.chunks_mut(nodes).zip(&plan.blocks).zip(flags).enumerate();
+        for (index, ((rows, block), (active, dirty))) in all {
+            let moments = block.moments.and_then(|_| moments.next());
+            if plan.is_seam[index] == (part == Part::Seam) {
+                *active = !entries.of(index).is_empty();
+                if *active || *dirty {
+                    blocks.push((index, BlockMut { rows, moments }));
                 }
+                *dirty = *active;
             }
-            *dirty = *active;
+        }
+        blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block)| {
+            block.rows.fill(ZERO);
+            if let Some(moments) = &mut block.moments {
+                moments.fill([ZERO; D]);
+            }
+            let entries = entries.of(index);
             for &(source, place) in entries {
                 match source {
                     Source::Own(bin) => {
@@ -214,12 +211,13 @@ impl<const D: usize> NodeFields<D> {
     pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
         let has_moments = bin.touched.is_some();
-        window.for_each_run(|run| {
-            arena.rows[run.clone()].fill(ZERO);
-            if has_moments {
-                arena.moments[run].fill([ZERO; D]);
-            }
-        });
+        // Blocks on all sides give all nodes of the window a value.
+        if bin.around[..offset_count(D)].contains(&NO_BLOCK) {
+            window.for_each_run(|run| arena.rows[run].fill(ZERO));
+        }
+        if has_moments {
+            window.for_each_run(|run| arena.moments[run].fill([ZERO; D]));
+        }
         let nodes = block_nodes(D);
         for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
             if block == NO_BLOCK {
@@ -229,14 +227,15 @@ impl<const D: usize> NodeFields<D> {
             let block = &plan.blocks[block as usize];
             let moments = block.moments.filter(|_| has_moments);
             let moments = moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
-            window.for_each_shared(index, |run| {
-                arena.rows[run.arena..][..run.len].copy_from_slice(&rows[run.block..][..run.len]);
-                if let Some(moments) = moments {
+            let Some(shared) = window.shared(index) else { continue };
+            copy_rows(shared, rows, &mut arena.rows);
+            if let Some(moments) = moments {
+                shared.for_each_run(|run| {
                     for i in (0..run.len).filter(|i| block.constrained >> (run.block + i) & 1 == 1) {
                         arena.moments[run.arena + i] = moments[run.block + i];
                     }
-                }
-            });
+                });
+            }
         }
     }
 }
@@ -253,11 +252,20 @@ pub fn load_rows<const D: usize>(
     let nodes = block_nodes(D);
     let around = plan.bins[bin].around.iter().take(offset_count(D)).enumerate();
     for (index, &block) in around.filter(|(_, block)| **block != NO_BLOCK) {
-        let rows = &rows[block as usize * nodes..][..nodes];
-        window.for_each_shared(index, |run| {
-            arena[run.arena..][..run.len].copy_from_slice(&rows[run.block..][..run.len]);
-        });
+        if let Some(shared) = window.shared(index) {
+            copy_rows(shared, &rows[block as usize * nodes..][..nodes], arena);
+        }
     }
+}
+
+/// Copies the shared nodes from the rows of a block into those of an arena.
+#[inline(always)]
+fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]) {
+    let (block, arena) = (&block[..block_nodes(D)], &mut arena[..arena_nodes(D)]);
+    shared.for_each_run(|run| {
+        let to = &mut arena[run.arena..][..run.len];
+        to.iter_mut().zip(&block[run.block..][..run.len]).for_each(|(to, from)| *to = *from);
+    });
 }
 
 /// The fields of the levels below `level`, whose first moment slot is `slot`, and those of `level` and deeper.
@@ -353,18 +361,18 @@ impl<const D: usize> BlockMut<'_, D> {
 
     /// Adds the part of an arena that lies in this block.
     fn add(&mut self, rows: &[Row], moments: Option<&[Moments<D>]>, window: &Window<D>, offset: u8) {
-        window.for_each_shared(offset as usize, |run| {
-            let to = &mut self.rows[run.block..][..run.len];
-            for (to, from) in to.iter_mut().zip(&rows[run.arena..][..run.len]) {
-                for lane in 0..4 {
-                    to.0[lane] += from.0[lane];
-                }
-            }
-            if let (Some(to), Some(from)) = (&mut self.moments, moments) {
+        let Some(shared) = window.shared(offset as usize) else { return };
+        let (to, from) = (&mut self.rows[..block_nodes(D)], &rows[..arena_nodes(D)]);
+        shared.for_each_run(|run| {
+            let to = &mut to[run.block..][..run.len];
+            to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| to.add(from));
+        });
+        if let (Some(to), Some(from)) = (&mut self.moments, moments) {
+            shared.for_each_run(|run| {
                 let to = &mut to[run.block..][..run.len];
                 to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| add_moments(to, from));
-            }
-        });
+            });
+        }
     }
 }
 

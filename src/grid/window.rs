@@ -3,7 +3,7 @@
 //! Bins beside level jumps often hold a few particles along one face. Clearing, summing, sending and loading
 //! only the nodes that these reach keeps their cost in proportion.
 use super::mask::{offset, product};
-use crate::kernel::ARENA_EDGE;
+use crate::kernel::{ARENA_EDGE, BLOCK, arena_nodes};
 
 /// A box of arena nodes, `lower..upper` per axis; what lies outside holds no values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,8 +81,11 @@ impl<const D: usize> Window<D> {
         })
     }
 
-    /// All nodes, run by run.
+    /// All nodes, in runs of consecutive ones.
     pub fn for_each_run(&self, mut f: impl FnMut(std::ops::Range<usize>)) {
+        if *self == Self::FULL {
+            return f(0..arena_nodes(D));
+        }
         let (lower, upper) = (self.lower.map(usize::from), self.upper.map(usize::from));
         for_each_line(lower, upper, |line| {
             let start = (0..D).map(|axis| line[axis] * ARENA_EDGE.pow(axis as u32)).sum::<usize>();
@@ -90,29 +93,63 @@ impl<const D: usize> Window<D> {
         });
     }
 
-    /// The nodes that the block at offset number `index` from the bin shares, run by run.
-    pub fn for_each_shared(&self, index: usize, mut f: impl FnMut(Run)) {
+    /// The nodes that the block at offset number `index` from the bin shares; `None` if there are none.
+    #[inline(always)]
+    pub fn shared(&self, index: usize) -> Option<Shared<D>> {
         // Arena nodes 0, 1..5 and 5..7 belong to the blocks below, at and above the bin.
-        let towards = offset::<D>(index);
-        let (mut lower, mut upper, mut first) = ([0; D], [0; D], [0; D]);
+        let mut rest = index;
+        let mut shared = Shared { arena: 0, block: 0, count: [0; D] };
         for axis in 0..D {
-            let (start, end, node) = match towards[axis] {
-                -1 => (0, 1, 3),
-                0 => (1, 5, 0),
-                _ => (5, 7, 0),
-            };
-            lower[axis] = start.max(usize::from(self.lower[axis]));
-            upper[axis] = end.min(usize::from(self.upper[axis]));
-            if lower[axis] >= upper[axis] {
-                return;
+            let (start, end, node) = PIECES[rest % 3];
+            rest /= 3;
+            let lower = start.max(usize::from(self.lower[axis]));
+            let upper = end.min(usize::from(self.upper[axis]));
+            if lower >= upper {
+                return None;
             }
-            first[axis] = node + lower[axis] - start;
+            shared.arena += lower * ARENA_EDGE.pow(axis as u32);
+            shared.block += (node + lower - start) << (2 * axis);
+            shared.count[axis] = upper - lower;
         }
-        for_each_line(lower, upper, |line| {
-            let arena = (0..D).map(|axis| line[axis] * ARENA_EDGE.pow(axis as u32)).sum();
-            let block = (0..D).map(|axis| (first[axis] + line[axis] - lower[axis]) << (2 * axis)).sum();
-            f(Run { arena, block, len: upper[0] - lower[0] });
-        });
+        Some(shared)
+    }
+}
+
+/// First arena node, the one after the last, and the first block node that the arena of a bin shares along one axis
+/// with the blocks below, at and above it.
+const PIECES: [(usize, usize, usize); 3] = [(0, 1, 3), (1, 5, 0), (5, 7, 0)];
+
+/// A box of nodes that an arena and a block share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shared<const D: usize> {
+    /// First node in the arena.
+    arena: usize,
+    /// First node in the block.
+    block: usize,
+    /// Nodes per axis, at most 4.
+    count: [usize; D],
+}
+
+impl<const D: usize> Shared<D> {
+    /// Calls `f` for each run along x. Runs have one of four lengths, each with its own copy of the loop.
+    #[inline(always)]
+    pub fn for_each_run(self, mut f: impl FnMut(Run)) {
+        match self.count[0] {
+            1 => self.with_length(1, &mut f),
+            2 => self.with_length(2, &mut f),
+            3 => self.with_length(3, &mut f),
+            _ => self.with_length(4, &mut f),
+        }
+    }
+
+    #[inline(always)]
+    fn with_length(self, len: usize, f: &mut impl FnMut(Run)) {
+        for z in 0..if D == 3 { self.count[D - 1] } else { 1 } {
+            for y in 0..self.count[1] {
+                let arena = self.arena + ARENA_EDGE * (y + ARENA_EDGE * z);
+                f(Run { arena, block: self.block + BLOCK * (y + BLOCK * z), len });
+            }
+        }
     }
 }
 
@@ -142,9 +179,11 @@ mod tests {
         for window in [Window::FULL, window] {
             for index in 0..offset_count(D) {
                 let mut found = Vec::new();
-                window.for_each_shared(index, |run| {
-                    found.extend((0..run.len).map(|i| (run.arena + i, run.block + i)));
-                });
+                if let Some(shared) = window.shared(index) {
+                    shared.for_each_run(|run| {
+                        found.extend((0..run.len).map(|i| (run.arena + i, run.block + i)));
+                    });
+                }
                 let inside = |node: usize| {
                     (0..D).all(|axis| {
                         let at = (node / ARENA_EDGE.pow(axis as u32) % ARENA_EDGE) as u8;

@@ -2,7 +2,7 @@
 //!
 //! A pure function of particle state, cell size and domain size: scatter, gather and the search for
 //! the block of a particle call the same code and get the same bits.
-use super::batch::Batch;
+use super::batch::{Batch, Batches};
 use super::math::{exp, ln};
 use super::simd::{LANES, Lanes, Mask};
 use super::{BoxPolicy, Scheme, Select};
@@ -51,12 +51,11 @@ fn collect<const D: usize>(
 ) {
     out.clear();
     let (reals, stride) = chunk.reals();
-    for i in 0..Batch::number(&select, chunk.len()) {
-        let batch = Batch::of(&select, chunk.len(), i);
+    for batch in Batches::new(select, chunk.len(), stride) {
         let position = batch.positions(reals, stride);
         let half = of_batch(reals, stride, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
         let half = half.map(Lanes::to_array);
-        out.extend((0..batch.count).map(|lane| std::array::from_fn(|axis| half[axis][lane])));
+        out.extend(batch.members().map(|lane| std::array::from_fn(|axis| half[axis][lane])));
     }
 }
 

@@ -7,7 +7,7 @@
 //! where V and S are the first and second moments that constrained nodes inherit (zero
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
-use super::batch::Batch;
+use super::batch::{Batch, Batches};
 use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
@@ -92,13 +92,12 @@ pub fn gather<const D: usize>(
     let mut weights = Weights::new();
     let mut sums = Sums::new();
     let mut greatest = Lanes::splat(0.0);
-    for i in 0..Batch::number(&select, len) {
-        let batch = Batch::of(&select, len, i);
+    for batch in Batches::new(select, len, stride) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        for lane in 0..batch.count.min(LANES) {
+        for lane in batch.members() {
             sums.gather(&weights, lane, fields, plain);
         }
         greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
@@ -165,15 +164,14 @@ pub fn interpolate<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
-    for i in 0..Batch::number(&select, chunk.len()) {
-        let batch = Batch::of(&select, chunk.len(), i);
+    for batch in Batches::new(select, chunk.len(), stride) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        for lane in 0..batch.count.min(LANES) {
+        for lane in batch.members() {
             let first = weights.first(lane);
-            let row = mean(&weights, lane, |node| velocity[first + node]).to_array();
+            let row = mean(&weights, lane, &velocity[first..]).to_array();
             each(batch.particle(lane), std::array::from_fn(|axis| row[axis]));
         }
     }
@@ -231,14 +229,20 @@ impl<const D: usize> Sums<D> {
     fn gather_others(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>) {
         let first = weights.first(lane);
         if let Some(increment) = fields.increment {
-            self.increment[lane] = mean(weights, lane, |node| increment[first + node]);
+            self.increment[lane] = mean(weights, lane, &increment[first..]);
         }
         if let Some(moments) = &fields.moments
             && moments.touched[weights.base(lane)]
         {
+            let nodes = &moments.first[first..][..super::stencil_span(D)];
+            let mut sum = [F64x4::splat(0.0); D];
+            weights.for_each_node(lane, |node, weight| {
+                for k in 0..D {
+                    sum[k] = weight.mul_add(F64x4::new(nodes[node][k].0), sum[k]);
+                }
+            });
             for k in 0..D {
-                let moment = mean(weights, lane, |node| moments.first[first + node][k]);
-                self.affine[k][lane] = self.affine[k][lane] + moment;
+                self.affine[k][lane] = self.affine[k][lane] + sum[k];
             }
         }
     }
@@ -284,12 +288,11 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// `Σ w f_j`.
-fn mean<const D: usize>(weights: &Weights<D>, lane: usize, f: impl Fn(usize) -> Row) -> F64x4 {
+/// `Σ w f_j` over the nodes from the first of the stencil on.
+fn mean<const D: usize>(weights: &Weights<D>, lane: usize, nodes: &[Row]) -> F64x4 {
+    let nodes = &nodes[..super::stencil_span(D)];
     let mut sum = F64x4::splat(0.0);
-    super::for_each_node::<D>(|node, index| {
-        sum = F64x4::splat(weights.weight(lane, index)).mul_add(F64x4::new(f(node).0), sum);
-    });
+    weights.for_each_node(lane, |node, weight| sum = weight.mul_add(F64x4::new(nodes[node].0), sum));
     sum
 }
 
@@ -367,7 +370,7 @@ fn advance<const D: usize>(
         batch.store(reals, stride, Layout::<D>::WORK, work);
     }
     let speed = state.wave_speed + square.sqrt();
-    speed.le(Lanes::splat(f64::MAX)).select(speed, Lanes::splat(f64::INFINITY))
+    batch.of_members(speed.le(Lanes::splat(f64::MAX)).select(speed, Lanes::splat(f64::INFINITY)))
 }
 
 /// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.

@@ -5,7 +5,7 @@
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
 
-use self::simd::Lanes;
+use self::simd::{F64x4, Lanes};
 use crate::material::Material;
 
 mod batch;
@@ -44,6 +44,14 @@ pub const fn stencil_bases(d: usize) -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Row(pub [f64; 4]);
+
+impl Row {
+    /// Adds another row.
+    #[inline(always)]
+    pub fn add(&mut self, other: &Self) {
+        self.0 = (F64x4::new(self.0) + F64x4::new(other.0)).to_array();
+    }
+}
 
 /// The block of cells that a call works on. Lengths in m, relative to the lower corner of the domain.
 #[derive(Clone, Copy, Debug)]
@@ -169,14 +177,4 @@ const fn stencil_span(d: usize) -> usize {
 /// Component of a symmetric tensor in the order of [`crate::particle::Layout`].
 const fn symmetric_index<const D: usize>(i: usize, j: usize) -> usize {
     if i == j { i } else { i + j + 2 }
-}
-
-/// Calls `f` with the place in the arena, relative to the first node, and the index along each axis
-/// of all nodes of a stencil.
-#[inline(always)]
-fn for_each_node<const D: usize>(mut f: impl FnMut(usize, [usize; D])) {
-    for i in 0..3usize.pow(D as u32) {
-        let index = std::array::from_fn(|k| i / 3usize.pow(k as u32) % 3);
-        f((0..D).rev().fold(0, |place, k| place * ARENA_EDGE + index[k]), index);
-    }
 }

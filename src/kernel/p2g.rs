@@ -14,7 +14,7 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
-use super::batch::Batch;
+use super::batch::{Batch, Batches};
 use super::simd::{F64x4, LANES, Lanes};
 use super::spread::Constraints;
 use super::weights::Weights;
@@ -30,7 +30,8 @@ pub struct MomentSums<'a, const D: usize> {
     pub sums: &'a mut [[Row; D]],
 }
 
-/// Adds the selected particles to the arena of their block: rows (momentum, mass).
+/// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also first
+/// moments where a stencil touches a constrained node.
 ///
 /// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
 /// the arena, which holds when its centre lies in the block.
@@ -41,21 +42,13 @@ pub fn scatter<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
+    moments: Option<MomentSums<D>>,
 ) {
-    scatter_all(chunk, select, frame, scheme, dt, arena, None);
-}
-
-/// As [`scatter`], and adds first moments where a stencil touches a constrained node.
-pub fn scatter_with_moments<const D: usize>(
-    chunk: &Chunk<D>,
-    select: Select,
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    arena: &mut [Row],
-    moments: MomentSums<D>,
-) {
-    scatter_all(chunk, select, frame, scheme, dt, arena, Some(moments));
+    // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
+    match moments {
+        None => scatter_all(chunk, select, frame, scheme, dt, arena, None),
+        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments),
+    }
 }
 
 /// Adds parts of boxes to the arena of their block; the affine term is relative to the particle.
@@ -77,7 +70,7 @@ pub fn scatter_sub_boxes<const D: usize>(
         let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]));
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
-        prepared.add(batch.count, arena, moments.as_mut());
+        prepared.add(&batch, arena, moments.as_mut());
     }
 }
 
@@ -94,18 +87,17 @@ fn scatter_all<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut prepared = Prepared::new();
-    for i in 0..Batch::number(&select, chunk.len()) {
-        let batch = Batch::of(&select, chunk.len(), i);
+    for batch in Batches::new(select, chunk.len(), stride) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
         if let Some(moments) = &moments {
-            moments.constraints.add_spread(&prepared.weights, batch.count, &mut spread);
+            moments.constraints.add_spread(&prepared.weights, &batch, &mut spread);
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
-        prepared.add(batch.count, arena, moments.as_mut());
+        prepared.add(&batch, arena, moments.as_mut());
     }
 }
 
@@ -188,11 +180,11 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
-    /// Adds the first `count` lanes in order.
+    /// Adds the members of a batch in order.
     #[inline(always)]
-    fn add(&self, count: usize, arena: &mut [Row], mut moments: Option<&mut MomentSums<D>>) {
+    fn add(&self, batch: &Batch, arena: &mut [Row], mut moments: Option<&mut MomentSums<D>>) {
         let span = super::stencil_span(D);
-        for lane in 0..count.min(LANES) {
+        for lane in batch.members() {
             let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
             if let Some(moments) = moments.as_deref_mut()
@@ -243,11 +235,12 @@ impl<const D: usize> Prepared<D> {
     }
 
     fn add_moments(&self, lane: usize, nodes: &mut [[Row; D]]) {
-        super::for_each_node::<D>(|node, index| {
-            let weight = F64x4::splat(self.weights.weight(lane, index));
+        let nodes = &mut nodes[..super::stencil_span(D)];
+        let affine: [F64x4; D] = std::array::from_fn(|k| self.affine[k][lane]);
+        self.weights.for_each_node(lane, |node, weight| {
             for k in 0..D {
                 let sum = &mut nodes[node][k].0;
-                *sum = weight.mul_add(self.affine[k][lane], F64x4::new(*sum)).to_array();
+                *sum = weight.mul_add(affine[k], F64x4::new(*sum)).to_array();
             }
         });
     }

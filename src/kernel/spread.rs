@@ -3,8 +3,8 @@
 //! `D_k = Σ_j w ((x_j - x_p)_k² + S_j,k)` is diagonal for axis-aligned boxes on any tree, but not constant: it
 //! depends on where the box lies in its cells. S_j are the second moments that constrained nodes inherit from their
 //! parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
-use super::batch::Batch;
-use super::simd::{LANES, Lanes};
+use super::batch::{Batch, Batches};
+use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{Frame, Row, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::Chunk;
@@ -19,25 +19,32 @@ pub struct Constraints<'a> {
 }
 
 impl Constraints<'_> {
-    /// Adds `Σ w S` of the first `count` lanes.
+    /// Adds `Σ w S` of the members of a batch.
+    #[inline(always)]
     pub(super) fn add_spread<const D: usize>(
         &self,
         weights: &Weights<D>,
-        count: usize,
+        batch: &Batch,
         spread: &mut [Lanes; D],
     ) {
-        if !(0..count.min(LANES)).any(|lane| self.touched[weights.base(lane)]) {
-            return;
+        if batch.members().any(|lane| self.touched[weights.base(lane)]) {
+            self.add_some_spread(weights, batch, spread);
         }
+    }
+
+    #[inline(never)]
+    fn add_some_spread<const D: usize>(&self, weights: &Weights<D>, batch: &Batch, spread: &mut [Lanes; D]) {
         let mut values = spread.map(Lanes::to_array);
-        for lane in (0..count.min(LANES)).filter(|&lane| self.touched[weights.base(lane)]) {
-            let nodes = &self.second[weights.first(lane)..];
-            super::for_each_node::<D>(|node, index| {
-                let weight = weights.weight(lane, index);
-                for axis in 0..D {
-                    values[axis][lane] = weight.mul_add(nodes[node].0[axis], values[axis][lane]);
-                }
+        for lane in batch.members().filter(|&lane| self.touched[weights.base(lane)]) {
+            let nodes = &self.second[weights.first(lane)..][..super::stencil_span(D)];
+            let mut sum = F64x4::splat(0.0);
+            weights.for_each_node(lane, |node, weight| {
+                sum = weight.mul_add(F64x4::new(nodes[node].0), sum);
             });
+            let sum = sum.to_array();
+            for axis in 0..D {
+                values[axis][lane] += sum[axis];
+            }
         }
         *spread = values.map(Lanes::new);
     }
@@ -55,14 +62,13 @@ pub fn of_particles<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
-    for i in 0..Batch::number(&select, chunk.len()) {
-        let batch = Batch::of(&select, chunk.len(), i);
+    for batch in Batches::new(select, chunk.len(), stride) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        let spread = complete(&weights, batch.count, constraints);
-        for lane in 0..batch.count {
+        let spread = complete(&weights, &batch, constraints);
+        for lane in batch.members() {
             each(batch.particle(lane), spread.map(|axis| axis[lane]));
         }
     }
@@ -83,8 +89,8 @@ pub fn of_parts<const D: usize>(
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        let spread = complete(&weights, batch.count, constraints);
-        for lane in 0..batch.count {
+        let spread = complete(&weights, &batch, constraints);
+        for lane in batch.members() {
             each(first + lane, spread.map(|axis| axis[lane]));
         }
     }
@@ -92,12 +98,12 @@ pub fn of_parts<const D: usize>(
 
 fn complete<const D: usize>(
     weights: &Weights<D>,
-    count: usize,
+    batch: &Batch,
     constraints: Option<Constraints>,
 ) -> [[f64; LANES]; D] {
     let mut spread = weights.spread;
     if let Some(constraints) = constraints {
-        constraints.add_spread(weights, count, &mut spread);
+        constraints.add_spread(weights, batch, &mut spread);
     }
     spread.map(Lanes::to_array)
 }

@@ -1,5 +1,5 @@
 //! Tensor-product stencils of a batch of boxes.
-use super::simd::{LANES, Lanes};
+use super::simd::{F64x4, LANES, Lanes};
 use super::stencil::Axis;
 use super::{ARENA_EDGE, BASES, Frame};
 
@@ -89,9 +89,19 @@ impl<const D: usize> Weights<D> {
         self.base[lane].to_bits() as u16 as usize
     }
 
-    /// Weight of one node.
+    /// Calls `f` with the place in the arena, relative to the first node, and the weight of all nodes of a stencil.
     #[inline(always)]
-    pub fn weight(&self, lane: usize, index: [usize; D]) -> f64 {
-        (0..D).fold(1.0, |weight, k| weight * self.axis[k].weight[index[k]][lane])
+    pub fn for_each_node(&self, lane: usize, mut f: impl FnMut(usize, F64x4)) {
+        let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
+        let x = &self.axis[0].weight;
+        let along = [of(&x[0]), of(&x[1]), of(&x[2])];
+        for c in 0..if D == 3 { 3 } else { 1 } {
+            for b in 0..3 {
+                let across = of(if D == 3 { &self.product[b][c] } else { &self.axis[1].weight[b] });
+                for a in 0..3 {
+                    f(a + ARENA_EDGE * (b + ARENA_EDGE * c), along[a] * across);
+                }
+            }
+        }
     }
 }

@@ -12,6 +12,7 @@ pub mod fixed_corotated;
 pub mod hencky;
 pub mod neo_hookean;
 pub mod parameters;
+mod spectral;
 pub mod von_mises;
 
 pub use eigen::Symmetric;

@@ -2,25 +2,24 @@
 //! logarithmic strains (Simo 1992).
 //!
 //! `f = |dev τ| - √(2/3) (σ_y + H κ)`, closed form: `Δγ = f / (2μ + 2H/3)`, `Δκ = √(2/3) Δγ`.
-use super::hencky::{energy, principal_strains, principal_stresses, wave_speed};
+use super::hencky::Hencky;
+use super::spectral::Trial;
 use super::{Lame, Material, State, Symmetric, parameters};
-use crate::kernel::math::exp;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, Mask};
 
 /// Von Mises solid.
 #[derive(Clone, Copy, Debug)]
 pub struct VonMises {
-    lame: Lame,
+    solid: Hencky,
     yield_stress: f64,
     hardening: f64,
-    density: f64,
 }
 
 impl VonMises {
     /// From parameters and density, kg/m³.
     pub fn new(p: &parameters::VonMises, density: f64) -> Self {
         let lame = Lame::new(p.young, p.poisson);
-        Self { lame, yield_stress: p.yield_stress, hardening: p.hardening, density }
+        Self { solid: Hencky::new(lame, density), yield_stress: p.yield_stress, hardening: p.hardening }
     }
 }
 
@@ -29,48 +28,39 @@ impl Material for VonMises {
         let zero = Lanes::splat(0.0);
         let one = Lanes::splat(1.0);
         let root = (2.0_f64 / 3.0).sqrt();
-        let twice_mu = Lanes::splat(2.0 * self.lame.mu);
-        let (eigen, trial) = principal_strains(&state.elastic, plane);
-        let mean = (trial[0] + trial[1] + trial[2]) * (1.0 / 3.0);
-        let deviator = trial.map(|e| e - mean);
-        let norm = deviator[0]
-            .mul_add(deviator[0], deviator[1].mul_add(deviator[1], deviator[2] * deviator[2]))
-            .sqrt();
+        let mu = self.solid.shear_modulus();
+        let trial = Trial::of(&state.elastic, plane);
         let radius = |kappa: Lanes| {
             kappa.mul_add(Lanes::splat(root * self.hardening), Lanes::splat(root * self.yield_stress))
         };
-        let excess = norm.mul_add(twice_mu, -radius(state.history[0]));
+        let excess = trial.norm.mul_add(Lanes::splat(2.0 * mu), -radius(state.history[0]));
         let flows = zero.lt(excess);
-        let mut strain = trial;
+        let mut strain = trial.strain;
         state.work = zero;
         if flows.any() {
-            let flow = excess * (1.0 / (2.0 * self.lame.mu + 2.0 / 3.0 * self.hardening));
-            let kept = one - flow / norm;
+            let flow = excess * (1.0 / (2.0 * mu + 2.0 / 3.0 * self.hardening));
+            let kept = one - flow / trial.norm;
+            let mean = trial.trace * (1.0 / 3.0);
             for k in 0..3 {
-                strain[k] = flows.select(deviator[k].mul_add(kept, mean), trial[k]);
+                strain[k] = flows.select(trial.deviator[k].mul_add(kept, mean), strain[k]);
             }
             let kappa = flow.mul_add(Lanes::splat(root), state.history[0]);
             state.history[0] = flows.select(kappa, state.history[0]);
             state.work = flows.select(radius(kappa) * flow, zero);
-            let elastic = eigen.compose(&strain.map(|e| exp(e + e)), plane);
-            for c in 0..6 {
-                state.elastic[c] = flows.select(elastic[c], state.elastic[c]);
-            }
         }
-        state.stress = eigen.compose(&principal_stresses(&self.lame, &strain), plane);
-        state.wave_speed = wave_speed(&self.lame, self.density, &state.stress);
+        trial.finish(&self.solid, state, &strain, flows, Mask::from_bits(0), plane);
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {
-        energy(&self.lame, b, plane)
+        self.solid.energy(b, plane)
     }
 
     fn density(&self) -> f64 {
-        self.density
+        self.solid.density()
     }
 
     fn wave_speed(&self) -> f64 {
-        (self.lame.pressure_wave() / self.density).sqrt()
+        Material::wave_speed(&self.solid)
     }
 
     fn is_plastic(&self) -> bool {

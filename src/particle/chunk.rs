@@ -6,6 +6,7 @@
 //!
 //! Positions are relative to the lower corner of the domain, so that an origin far from zero costs
 //! no digits.
+use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
 /// Column numbers of the real-valued components of a particle in `D` dimensions.
 ///
@@ -65,6 +66,11 @@ impl Tag {
     }
 }
 
+/// One cache line of a column. Columns begin with a line, so that a batch of lanes never straddles two.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([f64; CAPACITY_STEP]);
+
 /// Particles of one leaf: `Layout::<D>::REALS` columns of `f64` and two of `u64` (id and tag).
 ///
 /// All columns live in one allocation per type with a common capacity.
@@ -72,7 +78,7 @@ impl Tag {
 pub struct Chunk<const D: usize> {
     len: usize,
     capacity: usize,
-    reals: Vec<f64>,
+    lines: Vec<Line>,
     ids: Vec<u64>,
     tags: Vec<u64>,
 }
@@ -83,7 +89,7 @@ const CAPACITY_STEP: usize = 8;
 impl<const D: usize> Chunk<D> {
     /// An empty chunk.
     pub fn new() -> Self {
-        Self { len: 0, capacity: 0, reals: Vec::new(), ids: Vec::new(), tags: Vec::new() }
+        Self { len: 0, capacity: 0, lines: Vec::new(), ids: Vec::new(), tags: Vec::new() }
     }
 
     /// An empty chunk with room for `capacity` particles.
@@ -110,33 +116,34 @@ impl<const D: usize> Chunk<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        8 * (self.reals.capacity() + self.ids.capacity() + self.tags.capacity())
+        size_of::<Line>() * self.lines.capacity() + 8 * (self.ids.capacity() + self.tags.capacity())
     }
 
     /// Column `column` (see [`Layout`]), `len` values.
     pub fn column(&self, column: usize) -> &[f64] {
-        &self.reals[column * self.capacity..][..self.len]
+        &self.reals().0[column * self.capacity..][..self.len]
     }
 
     /// Column `column`, mutable.
     pub fn column_mut(&mut self, column: usize) -> &mut [f64] {
-        &mut self.reals[column * self.capacity..][..self.len]
+        let start = column * self.capacity;
+        &mut cast_slice_mut(&mut self.lines)[start..][..self.len]
     }
 
     /// All columns at once: `(reals, stride)`; column `c` of particle `p` is `reals[c * stride + p]`.
     pub fn reals(&self) -> (&[f64], usize) {
-        (&self.reals, self.capacity)
+        (cast_slice(&self.lines), self.capacity)
     }
 
     /// All columns at once, mutable.
     pub fn reals_mut(&mut self) -> (&mut [f64], usize) {
-        (&mut self.reals, self.capacity)
+        (cast_slice_mut(&mut self.lines), self.capacity)
     }
 
     /// Real columns (with their stride) and tags at once, for kernels that write the former and read
     /// the latter.
     pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
-        (&mut self.reals, self.capacity, &self.tags[..self.len])
+        (cast_slice_mut(&mut self.lines), self.capacity, &self.tags[..self.len])
     }
 
     /// Identifiers, unique over the run.
@@ -161,7 +168,8 @@ impl<const D: usize> Chunk<D> {
 
     /// Position of particle `p` relative to the domain's lower corner, m.
     pub fn position(&self, p: usize) -> [f64; D] {
-        std::array::from_fn(|axis| self.reals[(Layout::<D>::POSITION + axis) * self.capacity + p])
+        let (reals, stride) = self.reals();
+        std::array::from_fn(|axis| reals[(Layout::<D>::POSITION + axis) * stride + p])
     }
 
     /// Appends a particle with all columns zero and returns its index.
@@ -169,9 +177,8 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(1);
         let p = self.len;
         self.len += 1;
-        for column in 0..Layout::<D>::REALS {
-            self.reals[column * self.capacity + p] = 0.0;
-        }
+        let (reals, stride) = self.reals_mut();
+        (0..Layout::<D>::REALS).for_each(|column| reals[column * stride + p] = 0.0);
         self.ids[p] = id;
         self.tags[p] = tag.pack();
         p
@@ -182,8 +189,9 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(1);
         let q = self.len;
         self.len += 1;
+        let ((to, stride), (from, source_stride)) = (self.reals_mut(), source.reals());
         for column in 0..Layout::<D>::REALS {
-            self.reals[column * self.capacity + q] = source.reals[column * source.capacity + p];
+            to[column * stride + q] = from[column * source_stride + p];
         }
         self.ids[q] = source.ids[p];
         self.tags[q] = source.tags[p];
@@ -194,9 +202,8 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(n);
         let first = self.len;
         self.len += n;
-        for column in 0..Layout::<D>::REALS {
-            self.reals[column * self.capacity + first..][..n].fill(0.0);
-        }
+        let (reals, stride) = self.reals_mut();
+        (0..Layout::<D>::REALS).for_each(|column| reals[column * stride + first..][..n].fill(0.0));
         self.ids[first..][..n].fill(0);
         self.tags[first..][..n].fill(0);
         first
@@ -243,7 +250,7 @@ impl<const D: usize> Chunk<D> {
         let moves: Vec<(usize, usize)> =
             gaps.zip(fillers).map(|(to, from)| (to as usize, from as usize)).collect();
         for column in 0..Layout::<D>::REALS {
-            let values = &mut self.reals[column * self.capacity..][..self.len];
+            let values = self.column_mut(column);
             moves.iter().for_each(|&(to, from)| values[to] = values[from]);
         }
         for (to, from) in moves {
@@ -273,11 +280,12 @@ impl<const D: usize> Chunk<D> {
         }
         // An odd multiple: with powers of two all columns would share a few sets of the cache.
         let capacity = (capacity.div_ceil(CAPACITY_STEP) | 1) * CAPACITY_STEP;
-        let mut reals = vec![0.0; capacity * Layout::<D>::REALS];
+        let mut lines = vec![Line::zeroed(); capacity / CAPACITY_STEP * Layout::<D>::REALS];
+        let reals: &mut [f64] = cast_slice_mut(&mut lines);
         for column in 0..Layout::<D>::REALS {
             reals[column * capacity..][..self.len].copy_from_slice(self.column(column));
         }
-        self.reals = reals;
+        self.lines = lines;
         self.ids.reserve_exact(capacity - self.ids.len());
         self.ids.resize(capacity, 0);
         self.tags.reserve_exact(capacity - self.tags.len());

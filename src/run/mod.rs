@@ -8,6 +8,7 @@ pub mod setup;
 pub mod stop;
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use partition::comm::{Comm, Disagreement};
 
@@ -20,6 +21,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
+use crate::solver::phases::Phase;
 use crate::solver::{Clock, Requests, Solver};
 
 /// How a run is started.
@@ -125,7 +127,12 @@ pub fn run<const D: usize>(
         None => Run::start(comm, problem, options)?,
         Some(from) => Run::resume(comm, problem, options, from)?,
     };
-    run.advance(stop).map_err(|error| error.after(run.solver.clock))
+    let outcome = run.advance(stop).map_err(|error| error.after(run.solver.clock));
+    // Also after an error: the checkpoint on its way to disk is what the next run can start from.
+    let settled = run.outputs.settle(comm);
+    let outcome = outcome?;
+    settled?;
+    Ok(outcome)
 }
 
 /// A run under way.
@@ -247,6 +254,9 @@ impl<'a, const D: usize> Run<'a, D> {
     fn write_due(&mut self, checkpoint: bool) -> Result<(), RunError> {
         self.recorder.after_step(self.comm, &mut self.solver)?;
         let clock = self.solver.clock;
+        if clock.step.is_multiple_of(self.problem.telemetry_every) {
+            self.outputs.try_settle(self.comm)?;
+        }
         if self.schedule.output_due(self.outputs.next(), clock.time) {
             self.write_output()?;
         }
@@ -304,6 +314,7 @@ impl<'a, const D: usize> Run<'a, D> {
     }
 
     fn write_output(&mut self) -> Result<(), RunError> {
+        let start = Instant::now();
         let step = Some(self.solver.clock.step);
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
         let fields = self.leaf_fields();
@@ -311,6 +322,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let view = View { leaf_fields: &fields, ..view };
         self.outputs.write(self.comm, &view)?;
         self.output_step = step;
+        self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(())
     }
 
@@ -326,10 +338,13 @@ impl<'a, const D: usize> Run<'a, D> {
     }
 
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
+        let start = Instant::now();
         let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next(), self.output_step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
         self.schedule.checkpoint_written(self.solver.clock.time);
-        Ok(self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?)
+        self.solver.phases.book(Phase::Output, start.elapsed());
+        Ok(path)
     }
 }
 

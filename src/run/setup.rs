@@ -1,13 +1,13 @@
 //! From a job to the first state: tree, partition and particles.
 use partition::comm::{Comm, Disagreement};
-use partition::{Forest, MAX_LEVEL};
+use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::seed::{SeedError, check_counts, fill_leaf};
-use crate::solver::rebalance::leaf_weight;
+use crate::particle::seed::{SeedError, check_counts, count_leaf, fill_leaf};
+use crate::solver::rebalance::leaf_cost;
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
 
@@ -99,11 +99,14 @@ fn partition_by_seeds<const D: usize>(
     problem: &Problem<D>,
     forest: &mut Forest<D>,
 ) -> Result<(), SeedError> {
-    let counted = seed(forest, problem);
-    let weights: Vec<u64> = match &counted {
-        Ok(chunks) => chunks.iter().map(leaf_weight).collect(),
-        Err(_) => vec![1; forest.leaves().len()],
+    // Counted, not filled: leaves that go to other ranks shall take no memory here.
+    let count = |leaf: &Octant<D>| {
+        let mut counts = vec![0; problem.bodies.len()];
+        count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost(counts.iter().sum()))
     };
+    let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
+    let even = || vec![1; forest.leaves().len()];
+    let weights = counted.as_ref().map_or_else(|_| even(), Clone::clone);
     forest.partition(comm, &weights);
     counted.map(|_| ())
 }

@@ -14,7 +14,11 @@ use crate::grid::plan::Bin;
 use crate::grid::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
+use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout};
+
+/// Particles of a leaf from which on its own bin counts as touching all nodes.
+const CROWDED: usize = 128;
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]
@@ -179,8 +183,17 @@ impl<const D: usize> LeafBins<D> {
         let here = tree.leaves()[known];
         let around = leaves_around(tree, known);
         let beside_finer = around.iter().any(|&leaf| tree.leaves()[leaf].level > here.level);
-        let near = around.into_iter().map(|leaf| near_leaf(tree, leaf, plan.root_edge)).collect();
-        Self { members: vec![Members::default(); bins], cut: Vec::new(), near, beside_finer }
+        let mut leaf =
+            Self { members: vec![Members::default(); bins], cut: Vec::new(), near: Vec::new(), beside_finer };
+        // All others need it only if boxes get wider than a cell.
+        if beside_finer {
+            leaf.find_near(plan, around);
+        }
+        leaf
+    }
+
+    fn find_near(&mut self, plan: &GridPlan<D>, around: Vec<usize>) {
+        self.near = around.into_iter().map(|leaf| near_leaf(&plan.tree, leaf, plan.root_edge)).collect();
     }
 
     fn sort(
@@ -192,19 +205,31 @@ impl<const D: usize> LeafBins<D> {
         halves: &[[f64; D]],
         given: bool,
     ) -> Result<(), BinMissing> {
+        if self.near.is_empty() {
+            self.find_near(plan, leaves_around(&plan.tree, plan.tree.first_own() + leaf));
+        }
         self.cut.clear();
         for members in &mut self.members {
             members.whole.clear();
             members.parts.clear();
             members.window = Window::EMPTY;
         }
+        // So many particles touch nearly all nodes; to find out which they miss would cost more than it saves.
+        let crowded = chunk.len() >= CROWDED;
+        if crowded {
+            self.members[0].window = Window::FULL;
+        }
         for (p, &half) in halves.iter().enumerate() {
             let centre = chunk.position(p);
             let level = self.finest_level(own, centre, half);
             if !given && is_narrow(half, plan.cell(level)) {
-                let bin = self.bin(plan, leaf, level, centre).ok_or(BinMissing { id: chunk.ids()[p] })?;
+                // The first bin of a leaf is its own block's.
+                let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
+                let bin = bin.ok_or(BinMissing { id: chunk.ids()[p] })?;
                 self.members[bin].whole.push(p as u32);
-                self.include(plan, leaf, bin, centre, half);
+                if bin != 0 || !crowded {
+                    self.include(plan, leaf, bin, centre, half);
+                }
                 continue;
             }
             let slot = self.cut.len() as u32;
@@ -312,5 +337,9 @@ fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) 
 
 /// Greatest half width without deformation in a chunk, m.
 pub fn greatest_half<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    chunk.column(Layout::<D>::HALF).iter().copied().fold(0.0, f64::max)
+    let batches = chunk.column(Layout::<D>::HALF).chunks_exact(LANES);
+    let rest = batches.remainder().iter().copied().fold(0.0, f64::max);
+    let lanes = batches.filter_map(<[f64]>::first_chunk);
+    let lanes = lanes.fold(Lanes::splat(rest), |most, batch| Lanes::load(batch).max(most));
+    lanes.to_array().into_iter().fold(0.0, f64::max)
 }

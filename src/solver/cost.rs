@@ -52,7 +52,12 @@ pub struct Costs {
 
 /// Cost of a leaf in particles, as long as no time is measured.
 pub fn leaf_weight<const D: usize>(chunk: &Chunk<D>) -> u64 {
-    if chunk.is_empty() { 1 } else { LEAF_COST + chunk.len() as u64 }
+    leaf_cost(chunk.len() as u64)
+}
+
+/// As [`leaf_weight`], for a leaf with so many particles.
+pub fn leaf_cost(particles: u64) -> u64 {
+    if particles == 0 { 1 } else { LEAF_COST + particles }
 }
 
 impl Costs {

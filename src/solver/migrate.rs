@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
+use crate::kernel::simd::{LANES, Lanes, Mask};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 const TAG: u16 = 12;
@@ -111,8 +112,9 @@ impl<const D: usize> Migration<D> {
         let mut error = None;
         let mut moved = Moved::default();
         let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
-        let mut staged = Chunk::<D>::new();
-        let mut staged_leaf = Vec::new();
+        let leaving = found.iter().flat_map(|(found, _)| found).map(Vec::len).sum();
+        let mut staged = Chunk::<D>::with_capacity(leaving);
+        let mut staged_leaf = Vec::with_capacity(leaving);
         let mut leavers = Vec::with_capacity(chunks.len());
         for (leaf, (found, split)) in found.into_iter().enumerate() {
             if resampling.is_some() {
@@ -199,24 +201,10 @@ impl Rule {
         (lower, upper): &([f64; D], [f64; D]),
     ) -> Leavers {
         let mut leavers = Vec::new();
-        // Nearly all particles stay; one pass per axis over a column finds out cheaply. Written so that a NaN
-        // counts as outside.
-        let is_inside = |axis: usize, x: f64| (x >= lower[axis]) & (x < upper[axis]);
-        let all_inside = (0..D).all(|axis| {
-            let column = chunk.column(Layout::<D>::POSITION + axis);
-            column.iter().fold(true, |all, &x| all & is_inside(axis, x))
-        });
-        if all_inside {
-            return Ok(leavers);
-        }
-        for p in 0..chunk.len() {
-            let position = chunk.position(p);
-            if (0..D).all(|axis| is_inside(axis, position[axis])) {
-                continue;
-            }
-            match self.destination(tree, leaf, chunk, p)? {
+        for p in outside(chunk, lower, upper) {
+            match self.destination(tree, leaf, chunk, p as usize)? {
                 Destination::Stay => {}
-                destination => leavers.push((p as u32, destination)),
+                destination => leavers.push((p, destination)),
             }
         }
         Ok(leavers)
@@ -256,6 +244,28 @@ impl Rule {
             None => Err(too_far(chunk, p)),
         }
     }
+}
+
+/// Particles that are not in a box, in order; one whose position is not a number is in none.
+fn outside<const D: usize>(chunk: &Chunk<D>, lower: &[f64; D], upper: &[f64; D]) -> Vec<u32> {
+    let (reals, stride) = chunk.reals();
+    let mut found = Vec::new();
+    for first in (0..chunk.len()).step_by(LANES) {
+        let mut inside = !Mask::from_bits(0);
+        for axis in 0..D {
+            // Columns hold whole batches; what lies behind the last particle is passed over below.
+            let column = &reals[(Layout::<D>::POSITION + axis) * stride + first..];
+            let x = column.first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load);
+            inside = inside & Lanes::splat(lower[axis]).le(x) & x.lt(Lanes::splat(upper[axis]));
+        }
+        // Nearly all particles stay.
+        if !inside.all() {
+            let lanes = 0..LANES.min(chunk.len() - first);
+            let left = lanes.filter(|lane| inside.bits() >> lane & 1 == 0);
+            found.extend(left.map(|lane| (first + lane) as u32));
+        }
+    }
+    found
 }
 
 /// Key of the finest-level octant that contains a position inside the domain. Leaf membership of particles

@@ -2,7 +2,7 @@
 use std::time::Instant;
 
 use super::Solver;
-pub use super::cost::leaf_weight;
+pub use super::cost::{leaf_cost, leaf_weight};
 use super::phases::Phase;
 use crate::particle::Chunk;
 

@@ -178,13 +178,9 @@ impl<const D: usize> Solver<D> {
                 let (frame, rows, mut sums) = (frame(plan, bin), arena.rows, arena.moments);
                 let constraints = constraints(plan, bin);
                 if let Some(whole) = selected.whole {
-                    match sums.as_deref_mut().zip(constraints) {
-                        None => p2g::scatter(chunk, whole, &frame, &scheme, dt, rows),
-                        Some((sums, constraints)) => {
-                            let moments = MomentSums { constraints, sums };
-                            p2g::scatter_with_moments(chunk, whole, &frame, &scheme, dt, rows, moments);
-                        }
-                    }
+                    let sums = sums.as_deref_mut().zip(constraints);
+                    let moments = sums.map(|(sums, constraints)| MomentSums { constraints, sums });
+                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments);
                 }
                 if !selected.parts.is_empty() {
                     let moments =

@@ -168,7 +168,7 @@ fn hand_on<const D: usize>(
     };
     for corner in 0..1u64 << D {
         let upper = |a: usize| corner >> a & 1 == 1;
-        if (0..D).any(|a| upper(a) && place[a] % cell == 0) {
+        if (0..D).any(|a| upper(a) && place[a].is_multiple_of(cell)) {
             continue;
         }
         let share = |a: usize| if upper(a) { place[a] % cell } else { cell - place[a] % cell };

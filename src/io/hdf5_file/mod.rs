@@ -12,8 +12,7 @@ use hdf5_sys::h5::{H5open, herr_t};
 use hdf5_sys::h5d::H5D_FILL_TIME_NEVER;
 use hdf5_sys::h5e::{H5E_DEFAULT, H5E_WALK_UPWARD, H5E_error2_t, H5Eclear2, H5Eset_auto2, H5Ewalk2};
 use hdf5_sys::h5f::{
-    H5F_ACC_RDONLY, H5F_ACC_TRUNC, H5F_LIBVER_LATEST, H5F_LIBVER_V18, H5F_SCOPE_GLOBAL, H5Fclose, H5Fcreate,
-    H5Fflush, H5Fopen,
+    H5F_ACC_RDONLY, H5F_ACC_TRUNC, H5F_LIBVER_LATEST, H5F_LIBVER_V18, H5Fclose, H5Fcreate, H5Fopen,
 };
 use hdf5_sys::h5g::{H5Gclose, H5Gcreate2};
 use hdf5_sys::h5i::hid_t;
@@ -262,15 +261,15 @@ impl ParallelFile {
             .all(|name| unsafe { H5Lexists(self.id(), name.as_ptr(), H5P_DEFAULT) > 0 })
     }
 
-    /// Hands everything to the operating system and closes the file.
+    /// Hands everything to the operating system and closes the file. Does not wait for the disk, as a flush of a
+    /// shared file would.
     pub fn close(mut self) -> Result<(), FileError> {
         let Some(file) = self.file.take() else { return Ok(()) };
         // SAFETY: the file is open, and its handle is forgotten after the explicit close.
         let closed = unsafe {
-            let flushed = self.check(H5Fflush(file.id, H5F_SCOPE_GLOBAL), "flush", "the file");
             let closed = self.check(H5Fclose(file.id), "close", "the file");
             std::mem::forget(file);
-            flushed.and(closed)
+            closed
         };
         self.agree(closed)
     }

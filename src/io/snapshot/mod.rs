@@ -4,7 +4,6 @@
 //! and, where asked for, all that a restart needs, bit by bit. A file is written under a temporary
 //! name and gets its own when it is whole and on disk. Nothing in it depends on the number of ranks.
 
-use std::fs::File;
 use std::path::Path;
 
 use partition::comm::Comm;
@@ -14,6 +13,7 @@ use super::hdf5_file::{FileError, ParallelFile};
 use crate::particle::chunk::Chunk;
 
 mod checked;
+pub mod commit;
 pub mod compare;
 pub mod directory;
 pub(crate) mod fields;
@@ -23,6 +23,7 @@ mod state;
 mod vtkhdf;
 
 use checked::{Checked, Rows};
+use commit::Unnamed;
 pub use fields::PointField;
 pub use header::{Header, Scalars};
 pub use outputs::Outputs;
@@ -63,7 +64,7 @@ pub struct View<'a, const D: usize> {
 pub struct Options {
     /// Fields of the particles for ParaView.
     pub fields: Vec<PointField>,
-    /// Those fields in single precision (the restart state never is).
+    /// Those fields in single precision, but for those that the restart state holds already: that never is.
     pub single: bool,
     /// Also write all that a restart needs.
     pub restart: bool,
@@ -90,27 +91,40 @@ pub fn write<const D: usize>(
     view: &View<D>,
     options: &Options,
 ) -> Result<(), FileError> {
-    safely(comm, path, |file| {
+    start_write(comm, path, view, options)?.finish(comm)
+}
+
+/// Collective. As [`write()`], but does not wait for the disk: the file gets its name when the caller finishes what
+/// this returns.
+pub fn start_write<const D: usize>(
+    comm: &Comm,
+    path: &Path,
+    view: &View<D>,
+    options: &Options,
+) -> Result<Unnamed, FileError> {
+    Unnamed::write(comm, path, |file| {
         let (leaves, particles) = totals(comm, file, view)?;
         Header::new(view, leaves.total, particles.total, options.restart).write(file)?;
         let mut checked = Checked::new(Some(comm), file);
-        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
+        // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
             state::write(file, &mut checked, view, leaves, particles)?;
         }
+        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
         checked.attach()
     })
 }
 
 /// Collective. Writes the leaves of the tree to `path`, as [`write()`] does the particles.
 pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> Result<(), FileError> {
-    safely(comm, path, |file| {
+    let written = Unnamed::write(comm, path, |file| {
         let (leaves, particles) = totals(comm, file, view)?;
         Header::new(view, leaves.total, particles.total, false).write(file)?;
         let mut checked = Checked::new(Some(comm), file);
         vtkhdf::write_leaves(file, &mut checked, comm, view, leaves)?;
         checked.attach()
-    })
+    });
+    written?.finish(comm)
 }
 
 /// Collective. Reads a file for a restart on any number of ranks. Refuses, with the reason, a file that is
@@ -171,43 +185,6 @@ fn totals<const D: usize>(
     })?;
     let particles = view.chunks.iter().map(|chunk| chunk.len() as u64).sum();
     Ok((Rows::place(comm, view.leaves.len() as u64), Rows::place(comm, particles)))
-}
-
-/// Collective. Lets `fill` write a new file under a temporary name, brings it to disk and gives it its
-/// name. After an error the temporary file is removed.
-fn safely(
-    comm: &Comm,
-    path: &Path,
-    fill: impl FnOnce(&ParallelFile) -> Result<(), FileError>,
-) -> Result<(), FileError> {
-    let part = path.with_added_extension("part");
-    let written = ParallelFile::create(comm, &part).and_then(|file| {
-        let filled = fill(&file).and_then(|()| Header::mark_complete(&file));
-        if filled.is_err() && comm.rank() == 0 {
-            // On a full disk the library could not even close the file, and would crash at the end of
-            // the program; so give the space back first. If that fails too, the first error matters.
-            let _ = File::options().write(true).open(&part).and_then(|file| file.set_len(0));
-        }
-        comm.barrier();
-        filled.and_then(|()| file.close())
-    });
-    let named = written.and_then(|()| {
-        let here = if comm.rank() == 0 { sync_and_rename(&part, path) } else { Ok(()) };
-        let here = here.map_err(|source| FileError::System { path: path.into(), action: "finish", source });
-        Ok(comm.agree(here)?)
-    });
-    if named.is_err() && comm.rank() == 0 {
-        // It may not exist; the error that matters is the first one.
-        let _ = std::fs::remove_file(&part);
-    }
-    named
-}
-
-fn sync_and_rename(part: &Path, path: &Path) -> std::io::Result<()> {
-    File::open(part)?.sync_all()?;
-    std::fs::rename(part, path)?;
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    File::open(directory)?.sync_all()
 }
 
 #[cfg(test)]

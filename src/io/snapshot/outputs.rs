@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use partition::comm::Comm;
 
+use super::commit::Unnamed;
 use super::directory::{checkpoint_path, output_path, remove_old_checkpoints, tree_path};
-use super::{Options, View, write, write_tree};
+use super::{Options, View, start_write, write, write_tree};
 use crate::io::hdf5_file::FileError;
 use crate::io::series::Series;
 
 /// Writes the outputs of one run. The same calls on all ranks.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Outputs {
     directory: PathBuf,
     name: String,
@@ -18,6 +19,15 @@ pub struct Outputs {
     next: u64,
     particles: Series,
     tree: Series,
+    pending: Option<Pending>,
+}
+
+/// A checkpoint on its way to disk.
+#[derive(Debug)]
+struct Pending {
+    file: Unnamed,
+    step: u64,
+    keep: usize,
 }
 
 impl Outputs {
@@ -61,7 +71,15 @@ impl Outputs {
         };
         let (particles, tree) = (series(""), series(".tree"));
         let (directory, name) = (directory.into(), name.into());
-        Ok(Self { directory, name, options, next: from.map_or(0, |(next, _)| next), particles, tree })
+        Ok(Self {
+            directory,
+            name,
+            options,
+            next: from.map_or(0, |(next, _)| next),
+            particles,
+            tree,
+            pending: None,
+        })
     }
 
     /// Index of the particle files, for ParaView.
@@ -96,13 +114,15 @@ impl Outputs {
     }
 
     /// Collective. Writes a checkpoint and removes older ones but for the last `keep` (at least one,
-    /// with this), as well as those of later steps: they are of an earlier run.
+    /// with this), as well as those of later steps: they are of an earlier run. Returns the path that it will have when
+    /// it is on disk: see [`Outputs::settle`] and [`Outputs::try_settle`].
     pub fn checkpoint<const D: usize>(
-        &self,
+        &mut self,
         comm: &Comm,
         view: &View<D>,
         keep: usize,
     ) -> Result<PathBuf, FileError> {
+        self.settle(comm)?;
         let path = checkpoint_path(&self.directory, &self.name, view.step);
         // Velocity and level are enough to look at; the state has the rest.
         let options = Options {
@@ -110,12 +130,28 @@ impl Outputs {
             single: true,
             restart: true,
         };
-        write(comm, &path, view, &options)?;
+        let file = start_write(comm, &path, view, &options)?;
+        self.pending = Some(Pending { file, step: view.step, keep });
+        Ok(path)
+    }
+
+    /// Collective. Waits until the last checkpoint is on disk, and gives it its name.
+    pub fn settle(&mut self, comm: &Comm) -> Result<(), FileError> {
+        let Some(Pending { file, step, keep }) = self.pending.take() else { return Ok(()) };
+        file.finish(comm)?;
         let removed = match comm.rank() {
-            0 => remove_old_checkpoints(&self.directory, &self.name, view.step, keep.max(1)),
+            0 => remove_old_checkpoints(&self.directory, &self.name, step, keep.max(1)),
             _ => Ok(()),
         };
         comm.agree(removed)?;
-        Ok(path)
+        Ok(())
+    }
+
+    /// Collective. As [`Outputs::settle`] if nobody would have to wait.
+    pub fn try_settle(&mut self, comm: &Comm) -> Result<(), FileError> {
+        let Some(pending) = &self.pending else { return Ok(()) };
+        let mut ready = [u64::from(pending.file.is_on_disk())];
+        comm.min_u64(&mut ready);
+        if ready[0] == 1 { self.settle(comm) } else { Ok(()) }
     }
 }

@@ -5,7 +5,8 @@ use partition::Octant;
 use partition::comm::Comm;
 
 use super::checked::{Checked, Rows};
-use super::fields::Values;
+use super::fields::{PointField, Values};
+use super::state::path;
 use super::{Options, View};
 use crate::io::hdf5_file::{Element, FileError, ParallelFile};
 use crate::particle::chunk::Chunk;
@@ -36,14 +37,14 @@ fn single<T: Element>(checked: &mut Checked, comm: &Comm, name: &str, value: T) 
     checked.write(&format!("{GROUP}/{name}"), rows, 0, mine)
 }
 
-/// Collective. Points and cells; cell `i` has the `corners` points from `corners * i`.
+/// Collective. Cells: cell `i` has the `corners` points from `corners * i`.
 fn grid(
+    file: &ParallelFile,
     checked: &mut Checked,
     comm: &Comm,
     cells: Rows,
     corners: u64,
     cell_type: u8,
-    points: &Values,
 ) -> Result<(), FileError> {
     let connectivity = cells.times(corners);
     for (name, value) in [
@@ -53,13 +54,18 @@ fn grid(
     ] {
         single(checked, comm, name, value as i64)?;
     }
-    field(checked, "Points", connectivity, points)?;
     let numbers = |rows: Rows, step: u64| -> Vec<i64> {
         (rows.offset..rows.offset + rows.count).map(|i| (i * step) as i64).collect()
     };
-    checked.write(&format!("{GROUP}/Connectivity"), connectivity, 0, &numbers(connectivity, 1))?;
-    let ends = cells.and_one(comm);
-    checked.write(&format!("{GROUP}/Offsets"), ends, 0, &numbers(ends, corners))?;
+    let (ends, offsets, list) =
+        (cells.and_one(comm), format!("{GROUP}/Offsets"), format!("{GROUP}/Connectivity"));
+    checked.write(&offsets, ends, 0, &numbers(ends, corners))?;
+    if corners == 1 {
+        // 0, 1, 2 and so on as well; readers take as many entries as the number above says.
+        file.hard_link(&offsets, &list)?;
+    } else {
+        checked.write(&list, connectivity, 0, &numbers(connectivity, 1))?;
+    }
     checked.write(&format!("{GROUP}/Types"), cells, 0, &vec![cell_type; cells.count as usize])
 }
 
@@ -86,16 +92,42 @@ pub(super) fn write_particles<const D: usize>(
     start(file, checked, comm, view.time)?;
     let extent = view.brick.roots.iter().fold(0.0, |most: f64, &n| most.max(f64::from(n))) * view.root_edge;
     let near = view.origin.iter().all(|x| x.abs() <= FAR * extent);
-    let points = Values::Real(positions(view), 3);
-    let points = if options.single && near { points.into_single() } else { points };
-    grid(checked, comm, particles, 1, VERTEX, &points)?;
-    drop(points);
+    grid(file, checked, comm, particles, 1, VERTEX)?;
+    let is_at_zero = view.origin.iter().all(|&x| x == 0.0);
+    if options.restart && D == 3 && is_at_zero {
+        file.hard_link(&path("particles", "position"), &format!("{GROUP}/Points"))?;
+    } else {
+        let points = Values::Real(positions(view), 3);
+        field(
+            checked,
+            "Points",
+            particles,
+            &if options.single && near { points.into_single() } else { points },
+        )?;
+    }
     for chosen in &options.fields {
+        let name = format!("PointData/{}", chosen.name());
+        if options.restart
+            && let Some(set) = in_state::<D>(*chosen)
+        {
+            file.hard_link(&path("particles", set), &format!("{GROUP}/{name}"))?;
+            continue;
+        }
         let values = chosen.values(view);
-        let values = if options.single { values.into_single() } else { values };
-        field(checked, &format!("PointData/{}", chosen.name()), particles, &values)?;
+        field(checked, &name, particles, &if options.single { values.into_single() } else { values })?;
     }
     Ok(())
+}
+
+/// The data set of the restart state that holds the same numbers in the same shape as a field.
+fn in_state<const D: usize>(field: PointField) -> Option<&'static str> {
+    match field {
+        // Plane strain lacks the third component.
+        PointField::Velocity if D == 3 => Some("velocity"),
+        PointField::Id => Some("id"),
+        PointField::Mass => Some("mass"),
+        _ => None,
+    }
 }
 
 /// Positions with the origin added and three components.
@@ -122,7 +154,8 @@ pub(super) fn write_leaves<const D: usize>(
     let corners = 1 << D;
     let cell_type = if D == 2 { PIXEL } else { VOXEL };
     let points = view.leaves.iter().flat_map(|leaf| leaf_corners(view, leaf)).flatten().collect();
-    grid(checked, comm, leaves, corners, cell_type, &Values::Real(points, 3))?;
+    grid(file, checked, comm, leaves, corners, cell_type)?;
+    field(checked, "Points", leaves.times(corners), &Values::Real(points, 3))?;
     let levels: Vec<u8> = view.leaves.iter().map(|leaf| leaf.level).collect();
     checked.write(&format!("{GROUP}/CellData/level"), leaves, 0, &levels)?;
     let counts: Vec<i64> = view.chunks.iter().map(|chunk| chunk.len() as i64).collect();

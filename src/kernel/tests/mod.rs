@@ -1,6 +1,6 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
-use super::p2g::{MomentSums, scatter, scatter_sub_boxes, scatter_with_moments};
+use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
 use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use crate::material::{Material, Parameters, build};
@@ -127,7 +127,7 @@ fn scatter_equals_definition<const D: usize>(transfer: Transfer) {
     let mut half = Vec::new();
     domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
     let mut arena = vec![Row::default(); arena_nodes(D)];
-    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena);
+    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None);
     let at = |column: usize, p: usize| chunk.column(column)[p];
     // C = B D⁻¹ with APIC, the gradient itself with TPIC.
     let spreads: Vec<[f64; D]> = (0..chunk.len())
@@ -302,7 +302,7 @@ fn steps_conserve<const D: usize>() {
     let mass: f64 = chunk.column(Layout::<D>::MASS).iter().sum();
     for _ in 0..50 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena);
+        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena, None);
         assert!((arena.iter().map(|row| row.0[3]).sum::<f64>() - mass).abs() < 1e-13 * mass);
         assert!(close(&momenta_of_nodes(&arena), &before, 1e-12));
         divide_by_mass(&mut arena);
@@ -353,7 +353,7 @@ fn batches_do_not_matter<const D: usize>() {
     let sum = |select: &[Select]| {
         let mut arena = vec![Row::default(); arena_nodes(D)];
         for &select in select {
-            scatter(&all, select, &frame, &scheme, DT, &mut arena);
+            scatter(&all, select, &frame, &scheme, DT, &mut arena, None);
         }
         arena
     };

@@ -32,7 +32,7 @@ fn parts_equal_the_whole<const D: usize>() {
     }
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut other = arena.clone();
-    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena);
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None);
     let mut sums = vec![[0.0; D]; parted.len()];
     spread::of_parts(&parted, &parts, &frame, None, |part, own| {
         let part = &parts[part];
@@ -89,11 +89,11 @@ fn moments_follow<const D: usize>() {
         let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![[Row::default(); D]; nodes]);
         let constraints = spread::Constraints { touched: &touched, second };
         let moments = MomentSums { constraints, sums: &mut sums };
-        scatter_with_moments(&start, Select::All, &frame, &scheme, DT, &mut arena, moments);
+        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments));
         (arena, sums)
     };
     let mut plain = vec![Row::default(); nodes];
-    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain);
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None);
     // Second moments of zero change nothing.
     assert_eq!(plain, scattered(&vec![Row::default(); nodes]).0);
     let mut numbers = Numbers(12);
@@ -234,7 +234,7 @@ fn checksum<const D: usize>() -> u64 {
     let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for _ in 0..4 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena);
+        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None);
         for row in &mut arena {
             row.0.iter().for_each(|&x| add(x));
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };

@@ -1,0 +1,93 @@
+//! From a written file to one that is on disk under its own name.
+//!
+//! A file grows under a temporary name. It gets its own only when every rank has brought what it wrote to disk, so
+//! that whatever has a name is whole. The disk may take many times as long as handing the bytes to the operating
+//! system; this wait can go on in the background.
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
+
+use partition::comm::Comm;
+
+use super::header::Header;
+use crate::io::hdf5_file::{FileError, ParallelFile};
+
+/// A file that is written but has no name of its own yet.
+#[derive(Debug)]
+pub struct Unnamed {
+    part: PathBuf,
+    path: PathBuf,
+    /// This rank's wait for the disk.
+    on_disk: JoinHandle<std::io::Result<()>>,
+}
+
+impl Unnamed {
+    /// Collective. Lets `fill` write a new file, and starts to bring it to disk. After an error the temporary file is
+    /// removed.
+    pub fn write(
+        comm: &Comm,
+        path: &Path,
+        fill: impl FnOnce(&ParallelFile) -> Result<(), FileError>,
+    ) -> Result<Self, FileError> {
+        let part = path.with_added_extension("part");
+        let written = ParallelFile::create(comm, &part).and_then(|file| {
+            let filled = fill(&file).and_then(|()| Header::mark_complete(&file));
+            if filled.is_err() && comm.rank() == 0 {
+                // On a full disk the library could not even close the file, and would crash at the end of
+                // the program; so give the space back first. If that fails too, the first error matters.
+                let _ = File::options().write(true).open(&part).and_then(|file| file.set_len(0));
+            }
+            comm.barrier();
+            filled.and_then(|()| file.close())
+        });
+        match written {
+            Ok(()) => {
+                let file = part.clone();
+                let on_disk = std::thread::spawn(move || File::open(file)?.sync_all());
+                Ok(Self { part, path: path.into(), on_disk })
+            }
+            Err(error) => {
+                remove(comm, &part);
+                Err(error)
+            }
+        }
+    }
+
+    /// Not collective. Whether [`Unnamed::finish`] would not have to wait for this rank.
+    pub fn is_on_disk(&self) -> bool {
+        self.on_disk.is_finished()
+    }
+
+    /// The name that the file will have.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Collective. Waits until the file is on disk and gives it its name.
+    pub fn finish(self, comm: &Comm) -> Result<(), FileError> {
+        let Self { part, path, on_disk } = self;
+        let failed = |source| FileError::System { path: path.clone(), action: "finish", source };
+        let synced = on_disk.join().unwrap_or_else(|_| Err(std::io::Error::other("the writer failed")));
+        let named = comm.agree(synced.map_err(failed)).and_then(|()| {
+            comm.agree(if comm.rank() == 0 { rename(&part, &path) } else { Ok(()) }.map_err(failed))
+        });
+        if named.is_err() {
+            remove(comm, &part);
+        }
+        Ok(named?)
+    }
+}
+
+/// Not collective. Removes a file that did not come to be; it may not even exist, and the error that matters is the
+/// one before.
+fn remove(comm: &Comm, part: &Path) {
+    if comm.rank() == 0 {
+        let _ = std::fs::remove_file(part);
+    }
+}
+
+fn rename(part: &Path, path: &Path) -> std::io::Result<()> {
+    std::fs::rename(part, path)?;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    File::open(directory)?.sync_all()
+}
