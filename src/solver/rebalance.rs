@@ -9,7 +9,7 @@ use crate::particle::Chunk;
 /// Imbalance below which nothing is done.
 const LIMIT: f64 = 1.02;
 /// A new partition is expected to serve as long as the last one has, within these numbers of steps.
-const HORIZON: std::ops::RangeInclusive<u64> = 20..=2000;
+const HORIZON: std::ops::RangeInclusive<u64> = 100..=2000;
 
 /// Greatest cost of a rank over the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,9 +157,9 @@ mod tests {
         assert!(!prospect.pays());
         assert!(!Prospect { then: 1.4, ..prospect }.pays());
         assert!(Prospect { then: 1.04, ..prospect }.pays());
-        // 4 % of 20 steps for the price of one: not yet; of 30 steps: yes.
-        let small = Prospect { now: 1.0, then: 0.96, step: 1.0, price: 1.0, age: 1 };
+        // 4 % of 100 steps for the price of five: not yet; of 130 steps: yes.
+        let small = Prospect { now: 1.0, then: 0.96, step: 1.0, price: 5.0, age: 1 };
         assert!(!small.pays());
-        assert!(Prospect { age: 30, ..small }.pays());
+        assert!(Prospect { age: 130, ..small }.pays());
     }
 }
