@@ -53,6 +53,9 @@ impl<const D: usize> Solver<D> {
             let moved = self.migrate();
             let moved: Result<Moved, StepError> = moved.map_err(|error: MigrateError| error.into());
             self.comm.agree(moved)?;
+        }
+        let changed = self.reunite_families()? || changed;
+        if changed {
             self.signal = self.chunks.iter().map(|chunk| self.signal_at_rest(chunk)).collect();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
