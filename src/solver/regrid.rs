@@ -102,7 +102,7 @@ impl<const D: usize> Solver<D> {
         self.comm.any(is_new).then(|| self.move_to_leaves(&old))
     }
 
-    /// What the criteria want for and around each occupied leaf.
+    /// Collective. What the criteria want for and around each occupied leaf.
     fn requests(&self, adaptivity: &Adaptivity<D>) -> Vec<Request<D>> {
         let mut requests = Vec::new();
         let indicators = self.indicators(&adaptivity.criteria);

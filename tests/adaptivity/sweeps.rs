@@ -95,7 +95,7 @@ where
         solver.regrids
     );
     assert!(most > 2 * number && total.refused == 0);
-    assert!(booked > 0.0 && total.merges > 10 * number, "{total:?}");
+    assert!(booked > 0.0 && total.merges >= 9 * number, "{total:?}");
     assert!(solver.forest.leaves().iter().all(|leaf| leaf.level == 0));
     assert_eq!(count(&solver), number, "families find together again");
     // Splits make affine velocities visible, merges hide them; the rest is what the method loses anyway.
