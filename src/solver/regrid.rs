@@ -70,6 +70,9 @@ impl<const D: usize> Solver<D> {
             let moved = self.migrate();
             let moved: Result<Moved, StepError> = moved.map_err(|error: MigrateError| error.into());
             self.comm.agree(moved)?;
+        }
+        let changed = self.reunite_families()? || changed;
+        if changed {
             self.signal = self.chunks.iter().map(|chunk| self.signal_at_rest(chunk)).collect();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
@@ -116,7 +119,7 @@ impl<const D: usize> Solver<D> {
         self.comm.any(is_new).then(|| self.move_to_leaves(&old))
     }
 
-    /// What the criteria want for and around each occupied leaf.
+    /// Collective. What the criteria want for and around each occupied leaf.
     fn requests(&self, adaptivity: &Adaptivity<D>) -> Vec<Request<D>> {
         let indicators = self.indicators(&adaptivity.criteria);
         let wishes: Vec<Wish<D>> =
