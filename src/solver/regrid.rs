@@ -17,16 +17,17 @@ type Request<const D: usize> = (Region<D>, u32);
 struct Wish<const D: usize> {
     /// Levels, ascending, each with its own width of buffer.
     levels: Vec<u8>,
-    /// Way that the material can go until the tree changes next, on the finest lattice.
-    ahead: [u32; D],
+    /// Way that the material can go down and up along each axis until the tree changes next, on the finest lattice.
+    way: [[u32; D]; 2],
 }
 
-/// An octant's box with a layer around, without its surface, so that it meets only leaves that overlap it.
-fn grown<const D: usize>(octant: &Octant<D>, growth: [u32; D]) -> Region<D> {
+/// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
+/// overlap it.
+fn grown<const D: usize>(octant: &Octant<D>, [below, above]: [[u32; D]; 2]) -> Region<D> {
     let (lower, upper) = (octant.lower(), octant.upper());
     Region {
-        lo: std::array::from_fn(|a| (lower[a] + 1).saturating_sub(growth[a])),
-        hi: std::array::from_fn(|a| (upper[a] - 1).saturating_add(growth[a])),
+        lo: std::array::from_fn(|a| (lower[a] + 1).saturating_sub(below[a])),
+        hi: std::array::from_fn(|a| (upper[a] - 1).saturating_add(above[a])),
     }
 }
 
@@ -137,12 +138,12 @@ impl<const D: usize> Solver<D> {
                 (whole && same).then_some(parent)
             });
             let (octant, members) = alike.map_or((leaves[leaf], leaf..leaf + 1), |parent| (parent, family));
-            let ahead = wishes[members.clone()].iter().fold([0; D], |most: [u32; D], wish| {
-                std::array::from_fn(|axis| most[axis].max(wish.ahead[axis]))
+            let way = wishes[members.clone()].iter().fold([[0; D]; 2], |most: [[u32; D]; 2], wish| {
+                std::array::from_fn(|side| std::array::from_fn(|a| most[side][a].max(wish.way[side][a])))
             });
             for &level in &wishes[leaf].levels {
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
-                let growth = ahead.map(|ahead| buffer.saturating_add(ahead));
+                let growth = way.map(|side| side.map(|way| buffer.saturating_add(way)));
                 requests.push((grown(&octant, growth), u32::from(level)));
             }
             leaf = members.end;
@@ -161,13 +162,13 @@ impl<const D: usize> Solver<D> {
         levels.sort_unstable();
         levels.dedup();
         if levels.is_empty() {
-            return Wish { levels, ahead: [0; D] };
+            return Wish { levels, way: [[0; D]; 2] };
         }
         // Material must not leave the buffer before the next time.
         let interval = adaptivity.every as f64 * self.clock.dt;
         let unit = self.physics.root_edge / f64::from(1u32 << MAX_LEVEL);
-        let ahead = self.node_speeds(leaf).map(|speed| (speed * interval / unit).ceil() as u32);
-        Wish { levels, ahead }
+        let way = |velocity: f64| (velocity.abs() * interval / unit).ceil() as u32;
+        Wish { levels, way: self.velocity_range(leaf).map(|side| side.map(way)) }
     }
 
     /// Collective. Refines own leaves to what is requested, coarsens families by one level where nothing objects, and
