@@ -1,5 +1,7 @@
 //! `agimp check`: the size and cost of a job, without running it.
 use super::{Failure, bytes, grouped};
+use crate::adaptivity::{Adaptivity, Criterion, Kind};
+use crate::boundary::motion::Motion;
 use crate::job::estimate::{Estimate, estimate};
 use crate::job::{self, AnyProblem, Problem};
 use crate::particle::seed::check_counts;
@@ -76,6 +78,9 @@ fn write<const D: usize>(
             grouped(count.particles)
         )?;
     }
+    if let Some(adaptivity) = &problem.adaptivity {
+        write_refinement(out, problem, adaptivity)?;
+    }
     let ranks = f64::from(arguments.ranks);
     writeln!(
         out,
@@ -98,6 +103,49 @@ fn write<const D: usize>(
         problem.checkpoint.keep
     )?;
     Ok(())
+}
+
+/// Criteria in words, and what they mean for the numbers above and below.
+fn write_refinement<const D: usize>(
+    out: &mut impl Write,
+    problem: &Problem<D>,
+    adaptivity: &Adaptivity<D>,
+) -> std::io::Result<()> {
+    let merging = if adaptivity.merge.is_some() { "split and merge" } else { "split" };
+    writeln!(
+        out,
+        "refinement   every {} steps, {} leaves around what is wanted, particles {merging}",
+        adaptivity.every, adaptivity.buffer
+    )?;
+    for criterion in &adaptivity.criteria {
+        writeln!(out, "  level {:5}        {}", criterion.level, words(problem, criterion))?;
+    }
+    writeln!(
+        out,
+        "  Counts and memory are those of the job's tree, before criteria make it finer; time step and steps are for"
+    )?;
+    writeln!(out, "  the finest level that criteria want.")
+}
+
+/// A criterion in words.
+fn words<const D: usize>(problem: &Problem<D>, criterion: &Criterion<D>) -> String {
+    let (refine, coarsen) = (criterion.refine, criterion.coarsen);
+    let near = |what: &str| format!("within {refine} m of {what}, until {coarsen} m from it");
+    let above =
+        |what: &str, unit: &str| format!("{what} from {refine}{unit} on, until below {coarsen}{unit}");
+    match &criterion.kind {
+        Kind::Region { motion: Motion::Fixed, .. } => near("a region"),
+        Kind::Region { .. } => near("a region that moves"),
+        Kind::Collider(index) => near(&format!("collider {}", problem.colliders[*index].name)),
+        Kind::FreeSurface => "at free surfaces".into(),
+        Kind::VelocityGradient => above("velocity gradient", " 1/s"),
+        Kind::PlasticStrain => above("plastic strain", ""),
+        Kind::PlasticStrainRate => above("plastic strain rate", " 1/s"),
+        Kind::Stretch => above("stretch of particles", ""),
+        Kind::Material(index) => {
+            format!("where there is {}", problem.materials[usize::from(*index)].name)
+        }
+    }
 }
 
 fn plural(ranks: u32) -> String {

@@ -10,11 +10,12 @@ use std::collections::HashSet;
 /// Size and cost of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Particles of each body, in the order of the job.
+    /// Particles of each body, in the order of the job; on the tree that the job gives, as criteria of dynamic refinement
+    /// need the particles themselves.
     pub particles: Vec<u64>,
-    /// Leaves by level, from level 0 to the finest one.
+    /// Leaves of that tree by level, from level 0 to the finest one.
     pub levels: Vec<LevelCount>,
-    /// First time step, s.
+    /// First time step, s; with dynamic refinement for leaves of the finest level that a criterion wants.
     pub time_step: f64,
     /// Steps to the end if the first time step were kept.
     pub steps: f64,
@@ -79,7 +80,9 @@ pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, SeedEr
             *sum += count;
         }
     }
-    let time_step = time_step(problem, finest);
+    // Criteria may make any leaf as fine as they want, which shortens the step of all.
+    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
+    let time_step = time_step(problem, criteria.map(|criterion| criterion.level).fold(finest, u8::max));
     let outputs =
         problem.output.every.map_or(2, |every| (problem.time.end / every - 1e-9).floor() as u64 + 2);
     let mut estimate = Estimate {

@@ -1,8 +1,8 @@
 //! What refinement criteria look at, leaf by leaf, after a step.
 //!
-//! Everything follows from the particles of the leaf and from nodes that its rank sums anyway, so the values do
-//! not depend on the partition.
-use partition::Octant;
+//! Everything follows from the particles of the leaf, from nodes that its rank sums anyway and from which leaves are
+//! empty, so the values do not depend on the partition.
+use partition::{Octant, Region};
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
@@ -11,6 +11,7 @@ use super::{Physics, Solver};
 use crate::adaptivity::{Criterion, Kind, Value};
 use crate::boundary::ColliderState;
 use crate::geometry::Aabb;
+use crate::grid::known::Cover;
 use crate::grid::mask::{arena_overlap, bits, block_nodes, node_of_bit, offset, offset_count};
 use crate::grid::plan::NO_BLOCK;
 use crate::grid::{GridPlan, NodeFields};
@@ -31,6 +32,7 @@ struct State<'a, const D: usize> {
     plan: &'a GridPlan<D>,
     fields: &'a NodeFields<D>,
     plastic_rate: &'a [f64],
+    beside_empty: &'a [bool],
     time: f64,
 }
 
@@ -121,8 +123,13 @@ impl<const D: usize> State<'_, D> {
         sum_of_axes.sqrt()
     }
 
-    /// Whether any real node in the arena of the leaf's own bin is free of material.
+    /// Whether the leaf touches one without particles, or any real node in the arena of its own bin is free of
+    /// material. Only nodes on the leaf and on leaves of its level count: the lattice goes on over finer leaves, but
+    /// what is there has its mass on finer nodes.
     fn is_exposed(&self, leaf: usize) -> bool {
+        if self.beside_empty.get(leaf) == Some(&true) {
+            return true;
+        }
         let plan = self.plan;
         let around = &plan.bins[plan.leaf_start[leaf] as usize].around;
         let (mut least, mut greatest) = (f64::INFINITY, 0.0);
@@ -131,9 +138,18 @@ impl<const D: usize> State<'_, D> {
                 continue;
             }
             let block = &plan.blocks[number as usize];
-            let nodes = block.value & !block.constrained & arena_overlap::<D>(offset(index));
+            let is_of_level = match plan.tree.cover(block.level, block.coord) {
+                Cover::Leaf(other) => plan.tree.leaves()[other].level == block.level,
+                Cover::Outside | Cover::Finer(_) | Cover::Unknown => false,
+            };
+            let beside = offset::<D>(index);
+            let on_leaf = |bit: u32| {
+                let node = node_of_bit::<D>(bit);
+                (0..D).all(|a| beside[a] == 0 || beside[a] > 0 && node[a] == 0)
+            };
+            let nodes = block.value & !block.constrained & arena_overlap::<D>(beside);
             let rows = &self.fields.rows[number as usize * block_nodes(D)..][..block_nodes(D)];
-            for bit in bits(nodes) {
+            for bit in bits(nodes).filter(|&bit| is_of_level || on_leaf(bit)) {
                 let mass = rows[bit as usize].0[3];
                 least = f64::min(least, mass);
                 greatest = f64::max(greatest, mass);
@@ -165,13 +181,32 @@ impl<const D: usize> Solver<D> {
             plan: &self.grid.plan,
             fields: &self.grid.fields,
             plastic_rate: &self.plastic_rate,
+            beside_empty: &[],
             time: self.clock.time,
         }
     }
 
-    /// Not collective. The value of each criterion (inner) in each own leaf (outer); empty for leaves without particles.
+    /// Collective. Whether each own leaf touches one without particles; nothing where no criterion asks for that. A
+    /// leaf cannot see it from its nodes where the other one is coarser.
+    fn beside_empty(&self, criteria: &[Criterion<D>]) -> Vec<bool> {
+        if !criteria.iter().any(|criterion| matches!(criterion.kind, Kind::FreeSurface)) {
+            return Vec::new();
+        }
+        let leaves = self.forest.leaves();
+        let empty = leaves.iter().zip(&self.chunks).filter(|(_, chunk)| chunk.is_empty());
+        let around: Vec<(Region<D>, u32)> =
+            empty.map(|(leaf, _)| (Region { lo: leaf.lower(), hi: leaf.upper() }, 0)).collect();
+        let mut beside = vec![false; leaves.len()];
+        for (region, _) in self.forest.to_owners(&self.comm, &around) {
+            self.forest.own_leaves_in(&region, &mut |leaf| beside[leaf] = true);
+        }
+        beside
+    }
+
+    /// Collective. The value of each criterion (inner) in each own leaf (outer); empty for leaves without particles.
     pub(super) fn indicators(&self, criteria: &[Criterion<D>]) -> Vec<Vec<Value>> {
-        let state = self.state();
+        let beside_empty = self.beside_empty(criteria);
+        let state = State { beside_empty: &beside_empty, ..self.state() };
         let leaves = (0..self.chunks.len()).into_par_iter().with_min_len(16);
         leaves
             .map(|leaf| match state.chunks[leaf].is_empty() {
@@ -193,8 +228,8 @@ impl<const D: usize> Solver<D> {
     pub(super) fn plastic_strain_sums(&self) -> Option<Vec<f64>> {
         let adaptivity = self.physics.adaptivity.as_ref()?;
         let wanted = adaptivity.criteria.iter().any(|c| matches!(c.kind, Kind::PlasticStrainRate));
-        let due = (self.clock.step + 1).is_multiple_of(adaptivity.every);
-        (wanted && due).then(|| {
+        // In every step, as files show the rate whenever they are written.
+        wanted.then(|| {
             let sum = |chunk: &Chunk<D>| chunk.column(Layout::<D>::HISTORY).iter().sum();
             self.chunks.par_iter().map(sum).collect()
         })

@@ -109,17 +109,53 @@ impl<const D: usize> Migration<D> {
                 rule.leavers_resampled(tree, first + leaf, chunk, bounds, resampling)
             })
             .collect();
-        let mut error = None;
-        let mut moved = Moved::default();
-        let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
-        let leaving = found.iter().flat_map(|(found, _)| found).map(Vec::len).sum();
-        let mut staged = Chunk::<D>::with_capacity(leaving);
-        let mut staged_leaf = Vec::with_capacity(leaving);
-        let mut leavers = Vec::with_capacity(chunks.len());
-        for (leaf, (found, split)) in found.into_iter().enumerate() {
+        let mut all = Vec::with_capacity(found.len());
+        for (leavers, split) in found {
             if resampling.is_some() {
                 splits.push(split);
             }
+            all.push(leavers);
+        }
+        self.carry(tree, chunks, all)
+    }
+
+    /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the places given
+    /// with them, which must be in or next to their leaf; they stay where they are in space.
+    pub(super) fn gather(
+        &mut self,
+        tree: &KnownTree<D>,
+        chunks: &mut [Chunk<D>],
+        wanted: &[Vec<(u32, [f64; D])>],
+    ) -> Result<Moved, MigrateError> {
+        let roots = tree.brick().roots;
+        let destination = |leaf: usize, place: [f64; D]| {
+            let to = tree.locate(position_key(place, roots, self.rule.root_edge));
+            to.filter(|&to| to != tree.first_own() + leaf).map(|to| Destination::Leaf(to as u32))
+        };
+        let each = wanted.iter().enumerate().map(|(leaf, wanted)| {
+            let known = wanted.iter().filter_map(|&(p, place)| Some((p, destination(leaf, place)?)));
+            Ok(known.collect())
+        });
+        let each = each.collect();
+        self.carry(tree, chunks, each)
+    }
+
+    /// Collective over neighbours. Moves what was found to leave each own leaf.
+    fn carry(
+        &mut self,
+        tree: &KnownTree<D>,
+        chunks: &mut [Chunk<D>],
+        found: Vec<Leavers>,
+    ) -> Result<Moved, MigrateError> {
+        let first = tree.first_own();
+        let mut error = None;
+        let mut moved = Moved::default();
+        let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
+        let leaving = found.iter().flatten().map(Vec::len).sum();
+        let mut staged = Chunk::<D>::with_capacity(leaving);
+        let mut staged_leaf = Vec::with_capacity(leaving);
+        let mut leavers = Vec::with_capacity(chunks.len());
+        for (leaf, found) in found.into_iter().enumerate() {
             let found = found.unwrap_or_else(|found| {
                 error.get_or_insert(found);
                 Vec::new()

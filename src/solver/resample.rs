@@ -1,13 +1,15 @@
 //! Splitting and merging of particles in a run, and the books about it.
 use partition::Octant;
-use partition::comm::Comm;
+use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 
-use super::{Physics, Solver};
+use super::migrate::leaf_box;
+use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::kernel::Scheme;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
+use crate::particle::resample::family::separated;
 use crate::particle::resample::{Merged, Setting, ids, merge, needs_split, split};
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
@@ -119,13 +121,30 @@ impl<'a, const D: usize> Resampling<'a, D> {
     fn fit(&self, chunk: &mut Chunk<D>, level: u8, from: u8) -> Splits {
         let mut done = Splits::default();
         loop {
-            let wanted = needs_split(chunk, &self.setting(level), self.stretch);
+            let stretch = self.stretch.filter(|&stretch| self.may_exceed(chunk, level, stretch));
+            let wanted = needs_split(chunk, &self.setting(level), stretch);
             if wanted.which.is_empty() {
                 done.refused += wanted.refused;
                 return done;
             }
             self.split(chunk, &wanted.which, from, &mut done);
         }
+    }
+
+    /// Whether a box may be wider than `stretch` times that of an undeformed particle of a level: a quick bound from
+    /// the columns of a chunk, so that most leaves need no closer look.
+    fn may_exceed(&self, chunk: &Chunk<D>, level: u8, stretch: f64) -> bool {
+        let greatest = |column: usize| chunk.column(column).iter().copied().fold(0.0, f64::max);
+        let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+        // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
+        // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
+        // where a model has one.
+        let elastic = (first..first + 3).map(greatest).fold(0.0, f64::max);
+        let plastic = greatest(Layout::<D>::HISTORY + 1);
+        let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
+        let width = greatest(Layout::<D>::HALF) * elastic.sqrt().max(isotropic);
+        let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
+        width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
     }
 
     /// Splits those among `leavers` (index, level of the leaf they enter) that enter a leaf finer than they were made
@@ -148,6 +167,11 @@ impl<'a, const D: usize> Resampling<'a, D> {
         self.split(chunk, &which, level, done);
         true
     }
+}
+
+/// Whether a chunk has particles made for a finer level than this.
+fn has_finer<const D: usize>(chunk: &Chunk<D>, level: u8) -> bool {
+    chunk.tags().iter().any(|&tag| Tag::unpack(tag).level > level)
 }
 
 /// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d
@@ -186,24 +210,26 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
-    /// finer leaf. Returns per leaf those that are to be named.
-    fn merge_in_leaves(&mut self) -> Vec<Merged> {
+    /// finer leaf; strangers only on demand. Returns per leaf those that are to be named.
+    fn merge_in_leaves(&mut self, among_strangers: bool) -> Vec<Merged> {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
         let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else { return Vec::new() };
         let Some(limits) = self.physics.adaptivity.as_ref().and_then(|a| a.merge) else { return Vec::new() };
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
-        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).enumerate().with_min_len(16);
+        let root_edge = self.physics.root_edge;
+        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).enumerate().with_min_len(8);
         let done: Vec<(Merged, Vec<f64>)> = leaves
             .map(|(number, (chunk, leaf)): (usize, (&mut Chunk<D>, &Octant<D>))| {
-                let finer = chunk.tags().iter().any(|&tag| Tag::unpack(tag).level > leaf.level);
                 let mut energies = Vec::new();
                 let mut merged = Merged::default();
-                if finer {
+                if has_finer(chunk, leaf.level) {
                     let cell = plan.cell(leaf.level);
                     let is_far = |x: [f64; D]| !lists.is_finer_within(number, &x, cell);
                     let setting = resampling.setting(leaf.level);
-                    merged = merge(chunk, &setting, &limits, is_far, &mut |e| energies.push(e));
+                    let bounds = leaf_box(leaf, root_edge);
+                    let bounds = among_strangers.then_some(&bounds);
+                    merged = merge(chunk, &setting, &limits, bounds, is_far, &mut |e| energies.push(e));
                 }
                 (merged, energies)
             })
@@ -218,9 +244,45 @@ impl<const D: usize> Solver<D> {
         reports
     }
 
+    /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go
+    /// back. Faces across one combination of axes are tried at a time, in turn from call to call. All particles must be
+    /// in their leaves. Returns whether any rank merged any.
+    ///
+    /// # Errors
+    /// On all ranks when a particle could not be moved.
+    pub(super) fn reunite_families(&mut self) -> Result<bool, Disagreement> {
+        let Some(adaptivity) = &self.physics.adaptivity else { return Ok(false) };
+        let Some(limits) = adaptivity.merge else { return Ok(false) };
+        let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
+        let scheme = self.physics.scheme();
+        let extent = super::transfer::extent(&self.grid.plan);
+        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else { return Ok(false) };
+        let root_edge = self.physics.root_edge;
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(8);
+        let apart: Vec<Vec<(u32, [f64; D])>> = leaves
+            .map(|(chunk, leaf)| match has_finer(chunk, leaf.level) {
+                true => {
+                    let bounds = leaf_box(leaf, root_edge);
+                    separated(chunk, &resampling.setting(leaf.level), &limits, &bounds, axes)
+                }
+                false => Vec::new(),
+            })
+            .collect();
+        if !self.comm.any(apart.iter().any(|apart| !apart.is_empty())) {
+            return Ok(false);
+        }
+        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let gathered = grid.migration.gather(&grid.plan.tree, chunks, &apart);
+        let gathered = gathered.map_err(StepError::from);
+        let merged = self.merge_in_leaves(false).iter().any(|report| report.merged > 0);
+        let returned = self.migrate().map_err(StepError::from);
+        self.comm.agree(gathered.and(returned))?;
+        Ok(self.comm.any(merged))
+    }
+
     /// Collective. Merges particles in leaves that are coarser than they are. Returns whether this rank merged any.
     pub(super) fn merge_particles(&mut self) -> bool {
-        let reports = self.merge_in_leaves();
+        let reports = self.merge_in_leaves(true);
         // Groups that are no family get roots of their own, counted along the curve.
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
         let mut total = [strangers];

@@ -1,7 +1,8 @@
 //! Several particles become one.
 use super::super::chunk::{Chunk, Layout, Tag};
+use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
-use super::{Setting, ids, volume};
+use super::{Setting, volume};
 
 /// How different particles may be that become one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,11 +44,14 @@ pub struct Merged {
 }
 
 /// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
-/// families of siblings, then particles of one material and body whose centres lie in one cell of the lattice that seeding
-/// uses on the next coarser level, in the order of the chunk, as many as fill the volume of an undeformed particle of
-/// that level. Only groups within the `limits` merge, and only where `may_merge` allows it for their centre of mass.
+/// families of siblings, then, with the `bounds` of the leaf given, strangers: particles of one material and body whose
+/// centres lie in one cell of the lattice that seeding uses on the next coarser level, in the order of the chunk, as many
+/// as fill the volume of an undeformed particle of that level. Only groups within the `limits` merge, and only where
+/// `may_merge` allows it for their centre of mass.
 ///
-/// Strangers that fill less than half of that volume become one particle of the level they have.
+/// Strangers that fill less than half of that volume become one particle of the level they have. Siblings that may
+/// still find together are no strangers (see [`super::family`]): a merge of strangers breaks up families for ever, and
+/// leaves particles of uneven size, while a family gives back the particle that was split.
 ///
 /// A merged particle takes the place of the first of its group; all others keep their order. Mass, volume and plastic
 /// work are kept, momentum and, with APIC, angular momentum to round-off; the current volume is kept and the stress is
@@ -56,6 +60,7 @@ pub fn merge<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
     limits: &Limits,
+    bounds: Option<&Bounds<D>>,
     may_merge: impl Fn([f64; D]) -> bool,
     book: &mut impl FnMut(f64),
 ) -> Merged {
@@ -63,8 +68,12 @@ pub fn merge<const D: usize>(
     let finest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).max().unwrap_or(0);
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
-        for find in [families::<D>, strangers::<D>] {
-            let groups = find(chunk, setting, level);
+        for among_strangers in [false, true] {
+            let groups = match bounds {
+                _ if !among_strangers => families(chunk, level),
+                Some(bounds) => strangers(chunk, setting, limits, bounds, level),
+                None => continue,
+            };
             if groups.is_empty() {
                 continue;
             }
@@ -120,27 +129,26 @@ fn replace<const D: usize>(
 }
 
 /// Complete families of a level, by identifier. Children in the order of their numbers.
-fn families<const D: usize>(chunk: &Chunk<D>, _: &Setting<D>, level: u8) -> Vec<Group> {
-    let mut children: Vec<(u64, usize, u64, u32)> = of_level(chunk, level)
-        .filter_map(|(p, tag)| {
-            let (parent, number) = ids::parent::<D>(chunk.ids()[p as usize])?;
-            Some((parent, number, tag, p))
-        })
-        .collect();
-    children.sort_unstable();
-    let whole = |family: &&[(u64, usize, u64, u32)]| {
-        family.len() == 1 << D && family.iter().all(|child| child.2 == family[0].2)
-    };
-    children
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(whole)
-        .map(|family| Group::new(family.iter().map(|child| child.3).collect(), family[0].0, true))
+fn families<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Group> {
+    let siblings = family::siblings(chunk, level);
+    let whole = siblings.chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
+    whole
+        .map(|siblings| Group::new(siblings.iter().map(|child| child.p).collect(), siblings[0].parent, true))
         .collect()
 }
 
-/// Particles of a level that share a cell of the lattice of the next coarser level, by material, body and cell.
-fn strangers<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, level: u8) -> Vec<Group> {
+/// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
+/// body and cell.
+fn strangers<const D: usize>(
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    limits: &Limits,
+    bounds: &Bounds<D>,
+    level: u8,
+) -> Vec<Group> {
+    let waiting = family::waiting(chunk, setting, limits, bounds, level);
     let mut members: Vec<(u64, [i64; D], u32)> = of_level(chunk, level)
+        .filter(|(p, _)| waiting.binary_search(p).is_err())
         .map(|(p, tag)| {
             let spacing = 2.0 * setting.nominal(Tag::unpack(tag), level - 1);
             (tag, chunk.position(p as usize).map(|x| (x / spacing).floor() as i64), p)
@@ -179,7 +187,7 @@ fn close<const D: usize>(chunk: &Chunk<D>, group: &mut Vec<u32>, groups: &mut Ve
 }
 
 /// Index and packed tag of the particles made for a level.
-fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
+pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
     let tags = (0..).zip(chunk.tags().iter().copied());
     tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

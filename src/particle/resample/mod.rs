@@ -7,6 +7,7 @@
 use super::chunk::{Chunk, Layout, Tag};
 use crate::kernel::{BoxPolicy, Scheme, Select, domain};
 
+pub mod family;
 pub mod ids;
 mod merge;
 mod mix;

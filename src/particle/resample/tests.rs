@@ -1,3 +1,4 @@
+use super::family::{Bounds, separated};
 use super::*;
 use crate::kernel::{Transfer, simd::Lanes};
 use crate::material::{self, Material, Parameters, State, parameters};
@@ -34,6 +35,11 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
     Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL }
+}
+
+/// The domain as one leaf.
+fn everywhere<const D: usize>() -> Bounds<D> {
+    ([0.0; D], [EXTENT; D])
 }
 
 struct Numbers(u64);
@@ -177,7 +183,7 @@ fn split_all<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>) -> f64 
 
 fn merge_all<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, limits: &Limits) -> (Merged, f64) {
     let (before, mut energy) = (chunk.len(), 0.0);
-    let report = merge(chunk, setting, limits, |_| true, &mut |value| {
+    let report = merge(chunk, setting, limits, Some(&everywhere()), |_| true, &mut |value| {
         assert!(value >= 0.0);
         energy += value;
     });
@@ -377,7 +383,10 @@ fn limits_are_respected() {
     assert!(!merges(&|chunk| chunk.tags_mut()[2] += 1));
     let mut chunk = family.clone();
     assert_eq!(merge_all(&mut chunk, &setting(&scheme, 2), &limits).0, Merged::default());
-    assert_eq!(merge(&mut chunk, &setting(&scheme, 1), &limits, |_| false, &mut |_| ()), Merged::default());
+    assert_eq!(
+        merge(&mut chunk, &setting(&scheme, 1), &limits, Some(&everywhere()), |_| false, &mut |_| ()),
+        Merged::default()
+    );
 }
 
 #[test]
@@ -403,7 +412,7 @@ fn others_do_not_matter() {
     kept.extend((0..8).map(|i| 2 * i + 1));
     kept.sort_unstable();
     let mut mixed = mixed.gathered(&kept);
-    merge(&mut mixed, &coarse, &OPEN, |x| x[0] < 3.0, &mut |_| ());
+    merge(&mut mixed, &coarse, &OPEN, Some(&everywhere()), |x| x[0] < 3.0, &mut |_| ());
     assert_eq!(mixed.len(), 5);
     let p = mixed.ids().iter().position(|&id| id == alone.ids()[0]).unwrap();
     assert_eq!(p, 1);
@@ -459,4 +468,32 @@ fn boxes_of_one_cell_do_not_put_children_on_each_other() {
     split_all(&mut chunk, &setting(&scheme, 1));
     let distance = chunk.position(1)[0] - chunk.position(0)[0];
     assert!((distance - half).abs() < 1e-14);
+}
+
+/// A face cuts a family, whose parts wait at it; once together they become the parent again.
+#[test]
+fn families_wait_for_siblings_beyond_a_face() {
+    let materials = materials();
+    let scheme = scheme(&materials, Transfer::Apic);
+    let setting = setting::<2>(&scheme, 1);
+    let mut family = particles::<2>(10, 1, 1, Some(0)).gathered(&[0]);
+    set_matter(&mut family, 0, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; 2]);
+    let (x, parent) = (family.position(0), family.ids()[0]);
+    split_all(&mut family, &super::Setting { level: 2, ..setting });
+    let upper_leaf = ([x[0], 0.0], [x[0] + 1.0, EXTENT]);
+    let mut upper = family.gathered(&[1, 3]);
+    let merged = |chunk: &mut Chunk<2>, bounds: &Bounds<2>| {
+        merge(chunk, &setting, &OPEN, Some(bounds), |_| true, &mut |_| ()).removed
+    };
+    assert_eq!(merged(&mut upper.clone(), &upper_leaf), 0);
+    assert_eq!(merged(&mut family.gathered(&[0, 2]), &([x[0] - 1.0, 0.0], [x[0], EXTENT])), 0);
+    let crossing = separated(&upper, &setting, &OPEN, &upper_leaf, 0b01);
+    assert_eq!(crossing.iter().map(|(p, _)| *p).collect::<Vec<_>>(), [0, 1]);
+    assert!(crossing.iter().all(|(_, beyond)| beyond[0] < x[0] && beyond[0] > x[0] - 1.0));
+    assert_eq!(separated(&upper, &setting, &OPEN, &upper_leaf, 0b10), []);
+    assert_eq!(separated(&family, &setting, &OPEN, &upper_leaf, 0b11), []);
+    assert_eq!(merged(&mut family, &upper_leaf), 3);
+    assert_eq!(family.ids(), [parent]);
+    // Far from all faces the others will not come any more.
+    assert_eq!(merged(&mut upper, &everywhere()), 1);
 }

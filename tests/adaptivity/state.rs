@@ -1,0 +1,108 @@
+//! Jobs of the tests through the library, to look at leaves and particles.
+use std::process::Command;
+
+use agimp::job::{AnyProblem, Problem, parse};
+use agimp::particle::chunk::{Layout, Tag};
+use agimp::run::setup;
+use agimp::solver::{Requests, Solver};
+use partition::comm::{Comm, World};
+
+/// Runs `body` on each number of ranks. MPI starts once per process, so each is a process group of its own.
+pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
+    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
+        let world = World::init().expect("MPI starts");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+        pool.build_global().expect("threads start once");
+        body(world.comm());
+        return;
+    }
+    let _turn = crate::in_turn();
+    for n in ranks {
+        let output = Command::new("mpirun")
+            .env("OMPI_MCA_mpi_yield_when_idle", "1")
+            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+            .env("MPIEXEC_TIMEOUT", "300")
+            .args(["--oversubscribe", "--bind-to", "none", "-n", &n.to_string()])
+            .arg(std::env::current_exe().expect("own path"))
+            .args(["--exact", test, "--nocapture", "--test-threads=1"])
+            .output()
+            .expect("mpirun starts");
+        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
+        println!("{n} ranks: {text}");
+    }
+}
+
+/// The job with its first tree and particles.
+pub fn solver<const D: usize>(comm: &Comm, text: &str) -> Solver<D>
+where
+    Problem<D>: TryFrom<AnyProblem>,
+{
+    let problem = parse(text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+    let problem: Problem<D> = problem.try_into().unwrap_or_else(|_| panic!("another dimension"));
+    setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Steps, each followed by what is due to tree and particles.
+pub fn advance<const D: usize>(solver: &mut Solver<D>, steps: u64) {
+    for _ in 0..steps {
+        solver.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+        solver.regrid().unwrap_or_else(|error| panic!("{error}"));
+    }
+}
+
+/// Number of particles of all ranks.
+pub fn count<const D: usize>(solver: &Solver<D>) -> u64 {
+    solver.particle_totals().count
+}
+
+/// A leaf with particles.
+#[derive(Clone, Copy, Debug)]
+pub struct Filled<const D: usize> {
+    /// Level.
+    pub level: u8,
+    /// Lower corner, m.
+    pub lower: [f64; D],
+    /// Upper corner, m.
+    pub upper: [f64; D],
+    /// Body of its first particle.
+    pub body: u16,
+    /// Greatest plastic strain.
+    pub plastic_strain: f64,
+}
+
+/// Own leaves with particles.
+pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
+    let leaves = solver.forest.leaves().iter().zip(&solver.chunks).filter(|(_, chunk)| !chunk.is_empty());
+    leaves
+        .map(|(leaf, chunk)| {
+            let (lower, upper) = agimp::solver::migrate::leaf_box(leaf, solver.physics.root_edge);
+            let plastic = chunk.column(Layout::<D>::HISTORY).iter().copied().fold(0.0, f64::max);
+            let body = Tag::unpack(chunk.tags()[0]).body;
+            Filled { level: leaf.level, lower, upper, body, plastic_strain: plastic }
+        })
+        .collect()
+}
+
+/// Greatest component of stress of any own particle, Pa.
+pub fn greatest_stress<const D: usize>(solver: &Solver<D>) -> f64 {
+    let columns = (Layout::<D>::STRESS..Layout::<D>::MASS).collect::<Vec<_>>();
+    let of = |column: usize| solver.chunks.iter().flat_map(move |chunk| chunk.column(column));
+    columns.into_iter().flat_map(of).fold(0.0, |greatest, stress| f64::max(greatest, stress.abs()))
+}
+
+/// Lower and upper corner of a box about the boxes of all own particles, m.
+pub fn extents<const D: usize>(solver: &Solver<D>) -> ([f64; D], [f64; D]) {
+    let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+    for chunk in &solver.chunks {
+        for p in 0..chunk.len() {
+            let (x, half) = (chunk.position(p), chunk.column(Layout::<D>::HALF)[p]);
+            for a in 0..D {
+                lower[a] = lower[a].min(x[a] - half);
+                upper[a] = upper[a].max(x[a] + half);
+            }
+        }
+    }
+    (lower, upper)
+}
