@@ -14,15 +14,15 @@ pub type Result = (Run, Vec<(&'static str, f64)>);
 pub fn head(quick: bool, floor: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let version = if quick {
-        "Written by `jobs/adaptivity/compare --quick`: all levels are one lower than in the jobs, so cells are twice as wide. \
-         At full size the gain is larger, since leaves beside what needs them are smaller"
+        "Written by `jobs/adaptivity/compare --quick`: all levels are one lower than in the jobs, so cells are twice as wide, \
+         and so are the layers of leaves beside what needs fine ones"
     } else {
         "Written by `jobs/adaptivity/compare`"
     };
     format!(
         "# What refinement gains\n\n\
          {version}. Each scene runs twice on one rank with {cores} threads: as it is in `jobs/`, and with cells of the \
-         finest level everywhere and no refinement. Both step with the same time step, that of the finest level, so what \
+         finest level everywhere and no refinement. All levels make the same time step, that of the finest with particles, so what \
          refinement can gain is bounded by the ratio of the particle-steps, the sum of the particles over all steps.\n\n\
          Memory is the greatest resident memory in the telemetry. {:.0} MB of it are the program itself with its \
          libraries, measured with a job of next to no particles; the row below is without it. Processor \
