@@ -37,6 +37,9 @@ fn main() {
     let AnyProblem::Three(problem) = job::parse(&text, "block.toml".as_ref()).expect("a good job") else {
         panic!("a job in space")
     };
+    // Whole steps run on one thread: their time is the work in them.
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    alone.build_global().expect("one thread");
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     for threads in [1, cores] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

@@ -218,6 +218,7 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
         "tables of P ranks, MB",
         "checkpoint, TB",
     ];
+    let leaves = 1e6 / 512.0 * 2.0;
     let large = [(64.0, 64e6), (1e3, 1e9), (1e4, 1e10)].map(|(ranks, particles)| fits.row(ranks, particles));
     Ok(format!(
         "# Scaling\n\n\
@@ -243,15 +244,19 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
          From the fits, with 8 particles per cell and every second leaf empty:\n\n{}\n\
          No message and no table grows with the whole tree. What grows with P is 8 bytes per rank and table (the markers \
          of the curve) and what MPI itself keeps per partner. What would break first, in this order:\n\n\
-         1. **A checkpoint.** All ranks write one file collectively; at a parallel file system's 100 GB/s the 2.7 TB of \
+         1. **The seams of small pieces.** With a million particles per rank there are {:.1} ghost leaves for each own one, and a \
+         rank beside a change of level sends {:.0} MB per step; 100 such ranks on a node send {:.1} GB per step, which takes longer than \
+         a tenth of the step on most networks. Fewer ranks with more threads are the remedy: eight times the leaves per rank \
+         have {:.1} ghost leaves for each own one, and the node sends {:.1} GB.\n\
+         2. **A checkpoint.** All ranks write one file collectively; at a parallel file system's 100 GB/s the 2.7 TB of \
          10^10 particles take half a minute, and much longer if stripes and collective buffers are left at their defaults.\n\
-         2. **Planning a partition.** Each rank gathers five integers from every rank and reduces two per rank: 400 kB and \
+         3. **Planning a partition.** Each rank gathers five integers from every rank and reduces two per rank: 400 kB and \
          160 kB at P = 10,000, some milliseconds each, at most once in 20 steps. At P = 10^6 this would have to become a tree.\n\
-         3. **Waiting.** With one reduction per step the slowest rank sets the pace. An imbalance of a few per cent, or noise of \
+         4. **Waiting.** With one reduction per step the slowest rank sets the pace. An imbalance of a few per cent, or noise of \
          the operating system, costs more than the reduction itself (14 stages at P = 10,000).\n\
-         4. **Exact sums for the history.** A row reduces 15 exact accumulators; with `history.every_steps = 1` this is the \
+         5. **Exact sums for the history.** A row reduces 15 exact accumulators; with `history.every_steps = 1` this is the \
          largest reduction of a step.\n\
-         5. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Nodes of one rank are counted in 32 \
+         6. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Nodes of one rank are counted in 32 \
          bits: 6.7e7 blocks. Identifiers of particles have 64 bits.\n\n",
         table(&["strong", "fine"]),
         table(&["weak"]),
@@ -266,6 +271,11 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
         100.0 * fits.memory_off,
         fits.per_rank / 1e3,
         markdown(&heads, &large),
+        layer(leaves, fits.thickness) / leaves,
+        fits.bytes_at(leaves) / 1e6,
+        100.0 * fits.bytes_at(leaves) / 1e9,
+        layer(8.0 * leaves, fits.thickness) / (8.0 * leaves),
+        100.0 / 8.0 * fits.bytes_at(8.0 * leaves) / 1e9,
     ))
 }
 

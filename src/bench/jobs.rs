@@ -128,7 +128,7 @@ fn sheet(particles: f64) -> String {
 /// around it and 10 mm in its mantle; cells of 20 mm everywhere without.
 fn column(particles: f64, adaptive: bool) -> String {
     // Height over width; share of the width that the middle and the core take.
-    let (slender, middle, core) = (0.9, 0.8, 0.45);
+    let (slender, middle, core) = (0.9, 0.85, 0.6);
     // Particles per volume in cells of 20 mm are 1 / SPACING³; eight times more or less by level.
     let share = |inner: f64| inner * inner * (slender - 0.5 * (1.0 - inner));
     let density = if adaptive {
@@ -137,7 +137,7 @@ fn column(particles: f64, adaptive: bool) -> String {
         slender
     };
     // Leaves that cross a border belong to the finer side; half a leaf's edge goes there.
-    let crossing = if adaptive { 0.93 } else { 1.0 };
+    let crossing = if adaptive { 0.88 } else { 1.0 };
     let width = (particles / density).cbrt() * SPACING * crossing;
     let height = slender * width;
     let room = 0.3;
@@ -145,12 +145,14 @@ fn column(particles: f64, adaptive: bool) -> String {
     let top = ((height + 0.1) / ROOT).ceil() * ROOT;
     let (low, high) = (0.5 * (domain - width), 0.5 * (domain + width));
     let region = |level: u8, inner: f64| {
+        // The room that the sand runs into in the course of a measurement is fine as well, all else is coarse.
+        let (first, last) = (low - 0.03, high + 0.03);
         let (low, high) = (0.5 * (domain - inner * width), 0.5 * (domain + inner * width));
-        let height = height - 0.5 * (1.0 - inner) * width;
+        let inner_height = height - 0.5 * (1.0 - inner) * width;
         format!(
             "[[tree.regions]]\nlevel = {level}\n[tree.regions.shape]\nkind = \"difference\"\n\
-             from = {{ kind = \"box\", min = [0, 0, 0], max = [{domain}, {domain}, {top}] }}\n\
-             remove = [{{ kind = \"box\", min = [{low}, {low}, -1], max = [{high}, {high}, {height}] }}]\n"
+             from = {{ kind = \"box\", min = [{first}, {first}, 0], max = [{last}, {last}, {height}] }}\n\
+             remove = [{{ kind = \"box\", min = [{low}, {low}, -1], max = [{high}, {high}, {inner_height}] }}]\n"
         )
     };
     let tree = if adaptive {

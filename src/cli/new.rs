@@ -5,10 +5,11 @@ use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
 
 /// Templates: name and text. They are the jobs of the project itself, so they always run.
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 7] = [
     ("column_collapse", include_str!("../../jobs/column_collapse.toml")),
     ("column_collapse_fine", include_str!("../../jobs/column_collapse_fine.toml")),
     ("column_collapse_2d", include_str!("../../jobs/column_collapse_2d.toml")),
+    ("column_collapse_tall", include_str!("../../jobs/column_collapse_tall.toml")),
     ("cylinder_in_sand", include_str!("../../jobs/cylinder_in_sand.toml")),
     ("taylor_bar", include_str!("../../jobs/taylor_bar.toml")),
     ("elastic_cubes", include_str!("../../jobs/elastic_cubes.toml")),

@@ -175,14 +175,6 @@ impl<const D: usize> Solver<D> {
         self.comm.sum_u64(&mut sums);
         self.costs.take_in(&sums, materials);
     }
-
-    /// Not collective. Wall seconds of this rank in steps so far, waiting for others included; without files and new
-    /// partitions.
-    pub(super) fn seconds_in_steps(&self) -> f64 {
-        let phases: Vec<Phase> =
-            Phase::ALL.into_iter().filter(|phase| !matches!(phase, Phase::Regrid | Phase::Output)).collect();
-        self.phases.total(&phases)
-    }
 }
 
 impl Costs {

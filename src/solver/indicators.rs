@@ -123,18 +123,6 @@ impl<const D: usize> State<'_, D> {
         sum_of_axes.sqrt()
     }
 
-    /// Greatest speed along each axis of the leaf's nodes that have mass, m/s.
-    fn node_speeds(&self, leaf: usize) -> [f64; D] {
-        let mut speeds = [0.0; D];
-        if let Some(number) = self.own_block(leaf) {
-            let rows = &self.fields.rows[number * block_nodes(D)..][..block_nodes(D)];
-            for row in rows.iter().filter(|row| row.0[3] > 0.0) {
-                speeds = std::array::from_fn(|axis| f64::max(speeds[axis], row.0[axis].abs()));
-            }
-        }
-        speeds
-    }
-
     /// Whether the leaf touches one without particles, or any real node in the arena of its own bin is free of
     /// material. Only nodes on the leaf and on leaves of its level count: the lattice goes on over finer leaves, but
     /// what is there has its mass on finer nodes.
@@ -228,9 +216,12 @@ impl<const D: usize> Solver<D> {
             .collect()
     }
 
-    /// Greatest speed along each axis of an own leaf's nodes that have mass, m/s.
-    pub(super) fn node_speeds(&self, leaf: usize) -> [f64; D] {
-        self.state().node_speeds(leaf)
+    /// Least and greatest velocity along each axis of an own leaf's particles, 0 among them, m/s. Nodes would not do:
+    /// those with next to no mass may be very fast.
+    pub(super) fn velocity_range(&self, leaf: usize) -> [[f64; D]; 2] {
+        let velocity = |axis: usize| self.chunks[leaf].column(Layout::<D>::VELOCITY + axis).iter().copied();
+        let least = std::array::from_fn(|axis| velocity(axis).fold(0.0, f64::min));
+        [least, std::array::from_fn(|axis| velocity(axis).fold(0.0, f64::max))]
     }
 
     /// Not collective. Sum of the plastic strain of each leaf's particles, where a criterion will need its rate.

@@ -27,7 +27,7 @@ use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
-use self::rebalance::LastPartition;
+use self::rebalance::{LastPartition, Moment};
 use self::resample::Books;
 use self::time_step::StepControl;
 use self::transfer::Reach;
@@ -156,7 +156,7 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
-        let start = std::time::Instant::now();
+        let start = Moment::now();
         let grid = Grid::build(comm, &forest, &physics, 0);
         let partitioned = LastPartition::at_start(clock.step, start.elapsed());
         let mut solver = Self {

@@ -1,5 +1,5 @@
 //! Partition of leaves by their cost.
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::Solver;
 pub use super::cost::{leaf_cost, leaf_weight};
@@ -9,7 +9,7 @@ use crate::particle::Chunk;
 /// Imbalance below which nothing is done.
 const LIMIT: f64 = 1.02;
 /// A new partition is expected to serve as long as the last one has, within these numbers of steps.
-const HORIZON: std::ops::RangeInclusive<u64> = 20..=2000;
+const HORIZON: std::ops::RangeInclusive<u64> = 100..=2000;
 
 /// Greatest cost of a rank over the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,20 +38,47 @@ impl Prospect {
     }
 }
 
+/// Time that this thread has run. What other programs take of the machine does not count, where the system tells.
+fn running_time() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(text.split_whitespace().next()?.parse::<u64>().ok()? as f64 * 1e-9)
+}
+
+/// A moment in the run of this thread.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    wall: Instant,
+    running: Option<f64>,
+}
+
+impl Moment {
+    pub fn now() -> Self {
+        Self { wall: Instant::now(), running: running_time() }
+    }
+
+    /// Seconds since then.
+    pub fn elapsed(&self) -> f64 {
+        match (self.running, running_time()) {
+            (Some(then), Some(now)) => now - then,
+            _ => self.wall.elapsed().as_secs_f64(),
+        }
+    }
+}
+
 /// When the current partition was made and what that took.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LastPartition {
     step: u64,
     /// Seconds; at first those of building the grid.
     price: f64,
-    /// Seconds in steps and their number at the last look.
-    looked: (f64, u64),
+    /// Time and step of the last look.
+    looked: (Moment, u64),
 }
 
 impl LastPartition {
     /// The partition with which a run starts or goes on.
-    pub fn at_start(step: u64, building: Duration) -> Self {
-        Self { step, price: building.as_secs_f64(), looked: (0.0, step) }
+    pub fn at_start(step: u64, price: f64) -> Self {
+        Self { step, price, looked: (Moment::now(), step) }
     }
 }
 
@@ -75,19 +102,21 @@ impl<const D: usize> Solver<D> {
     pub fn balance(&mut self) -> bool {
         self.agree_on_costs();
         let now = self.imbalance().0;
-        let (seconds, steps) = self.partitioned.looked;
-        self.partitioned.looked = (self.seconds_in_steps(), self.clock.step);
+        let (moment, steps) = self.partitioned.looked;
+        let step = moment.elapsed() / (self.clock.step - steps).max(1) as f64;
+        self.partitioned.looked = (Moment::now(), self.clock.step);
         if now <= LIMIT {
             return false;
         }
-        let step = (self.partitioned.looked.0 - seconds) / (self.clock.step - steps).max(1) as f64;
         let mut slowest = [step, self.partitioned.price];
         self.comm.max_f64s(&mut slowest);
         let cuts = self.forest.plan_partition(&self.comm, &self.leaf_costs());
         let [step, price] = slowest;
         let age = self.clock.step - self.partitioned.step;
         let pays = Prospect { now, then: cuts.imbalance(), step, price, age }.pays();
-        pays && self.move_leaves(cuts)
+        let moved = pays && self.move_leaves(cuts);
+        self.partitioned.looked.0 = Moment::now();
+        moved
     }
 
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
@@ -98,7 +127,7 @@ impl<const D: usize> Solver<D> {
     }
 
     fn move_leaves(&mut self, cuts: partition::Cuts) -> bool {
-        let start = Instant::now();
+        let (start, moment) = (Instant::now(), Moment::now());
         let shipment = self.forest.partition_at(&self.comm, cuts);
         self.partitioned.step = self.clock.step;
         if shipment.changed() {
@@ -112,7 +141,7 @@ impl<const D: usize> Solver<D> {
             self.costs.forget(self.chunks.len());
             self.rebuild_grid(self.grid.plan.tree.reach());
         }
-        self.partitioned.price = start.elapsed().as_secs_f64();
+        self.partitioned.price = moment.elapsed();
         self.phases.book(Phase::Regrid, start.elapsed());
         shipment.changed()
     }
@@ -128,9 +157,9 @@ mod tests {
         assert!(!prospect.pays());
         assert!(!Prospect { then: 1.4, ..prospect }.pays());
         assert!(Prospect { then: 1.04, ..prospect }.pays());
-        // 4 % of 20 steps for the price of one: not yet; of 30 steps: yes.
-        let small = Prospect { now: 1.0, then: 0.96, step: 1.0, price: 1.0, age: 1 };
+        // 4 % of 100 steps for the price of five: not yet; of 130 steps: yes.
+        let small = Prospect { now: 1.0, then: 0.96, step: 1.0, price: 5.0, age: 1 };
         assert!(!small.pays());
-        assert!(Prospect { age: 30, ..small }.pays());
+        assert!(Prospect { age: 130, ..small }.pays());
     }
 }

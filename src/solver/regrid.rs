@@ -7,11 +7,29 @@ use partition::{MAX_LEVEL, Mark, Octant, Region, correspondence};
 use super::migrate::{MigrateError, Moved, position_key};
 use super::phases::Phase;
 use super::{Solver, StepError};
-use crate::adaptivity::Adaptivity;
+use crate::adaptivity::{Adaptivity, Value};
 use crate::particle::Chunk;
 
 /// A region with the level that all leaves which meet it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
+
+/// What a leaf wants for itself and the leaves around.
+struct Wish<const D: usize> {
+    /// Levels, ascending, each with its own width of buffer.
+    levels: Vec<u8>,
+    /// Way that the material can go down and up along each axis until the tree changes next, on the finest lattice.
+    way: [[u32; D]; 2],
+}
+
+/// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
+/// overlap it.
+fn grown<const D: usize>(octant: &Octant<D>, [below, above]: [[u32; D]; 2]) -> Region<D> {
+    let (lower, upper) = (octant.lower(), octant.upper());
+    Region {
+        lo: std::array::from_fn(|a| (lower[a] + 1).saturating_sub(below[a])),
+        hi: std::array::from_fn(|a| (upper[a] - 1).saturating_add(above[a])),
+    }
+}
 
 /// Refinement of each own leaf, for files.
 #[derive(Clone, Debug, Default)]
@@ -104,40 +122,53 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. What the criteria want for and around each occupied leaf.
     fn requests(&self, adaptivity: &Adaptivity<D>) -> Vec<Request<D>> {
-        let mut requests = Vec::new();
         let indicators = self.indicators(&adaptivity.criteria);
-        // The finest lattice, on which regions are given.
-        let unit = self.physics.root_edge / f64::from(1u32 << MAX_LEVEL);
-        let interval = adaptivity.every as f64 * self.clock.dt;
-        for (number, values) in indicators.iter().enumerate().filter(|(_, values)| !values.is_empty()) {
-            let leaf = self.forest.leaves()[number];
-            let each = adaptivity.criteria.iter().zip(values);
-            let mut levels: Vec<u8> = each
-                .map(|(criterion, &value)| criterion.wanted_level(value, leaf.level))
-                .filter(|&level| level > adaptivity.base_level)
-                .collect();
-            levels.sort_unstable();
-            levels.dedup();
-            if levels.is_empty() {
-                continue;
-            }
-            // Material must not leave the buffer before the next time.
-            let speeds = self.node_speeds(number);
-            for level in levels {
-                // Children that need more get it one level at a time.
-                let times = f64::from(level.saturating_sub(leaf.level).max(1));
-                let ahead = speeds.map(|speed| (times * speed * interval / unit).ceil() as u32);
+        let wishes: Vec<Wish<D>> =
+            indicators.iter().enumerate().map(|(leaf, values)| self.wish(adaptivity, leaf, values)).collect();
+        let leaves = self.forest.leaves();
+        let mut requests = Vec::new();
+        let mut leaf = 0;
+        while leaf < leaves.len() {
+            // A family that wants the same asks as one; most do.
+            let family = leaf..leaf + Octant::<D>::CHILDREN;
+            let alike = leaves.get(family.clone()).and_then(|members| {
+                let parent = members[0].parent()?;
+                let whole = members.iter().enumerate().all(|(child, member)| *member == parent.child(child));
+                let same = wishes[family.clone()].iter().all(|wish| wish.levels == wishes[leaf].levels);
+                (whole && same).then_some(parent)
+            });
+            let (octant, members) = alike.map_or((leaves[leaf], leaf..leaf + 1), |parent| (parent, family));
+            let way = wishes[members.clone()].iter().fold([[0; D]; 2], |most: [[u32; D]; 2], wish| {
+                std::array::from_fn(|side| std::array::from_fn(|a| most[side][a].max(wish.way[side][a])))
+            });
+            for &level in &wishes[leaf].levels {
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
-                let (lower, upper) = (leaf.lower(), leaf.upper());
-                // Without its surface the region meets only leaves that overlap it.
-                let lo =
-                    std::array::from_fn(|a| (lower[a] + 1).saturating_sub(buffer.saturating_add(ahead[a])));
-                let hi =
-                    std::array::from_fn(|a| (upper[a] - 1).saturating_add(buffer).saturating_add(ahead[a]));
-                requests.push((Region { lo, hi }, u32::from(level)));
+                let growth = way.map(|side| side.map(|way| buffer.saturating_add(way)));
+                requests.push((grown(&octant, growth), u32::from(level)));
             }
+            leaf = members.end;
         }
         requests
+    }
+
+    /// What one leaf wants.
+    fn wish(&self, adaptivity: &Adaptivity<D>, leaf: usize, values: &[Value]) -> Wish<D> {
+        let own = self.forest.leaves()[leaf].level;
+        let each = adaptivity.criteria.iter().zip(values);
+        let mut levels: Vec<u8> = each
+            .map(|(criterion, &value)| criterion.wanted_level(value, own))
+            .filter(|&level| level > adaptivity.base_level)
+            .collect();
+        levels.sort_unstable();
+        levels.dedup();
+        if levels.is_empty() {
+            return Wish { levels, way: [[0; D]; 2] };
+        }
+        // Material must not leave the buffer before the next time.
+        let interval = adaptivity.every as f64 * self.clock.dt;
+        let unit = self.physics.root_edge / f64::from(1u32 << MAX_LEVEL);
+        let way = |velocity: f64| (velocity.abs() * interval / unit).ceil() as u32;
+        Wish { levels, way: self.velocity_range(leaf).map(|side| side.map(way)) }
     }
 
     /// Collective. Refines own leaves to what is requested, coarsens families by one level where nothing objects, and

@@ -121,13 +121,30 @@ impl<'a, const D: usize> Resampling<'a, D> {
     fn fit(&self, chunk: &mut Chunk<D>, level: u8, from: u8) -> Splits {
         let mut done = Splits::default();
         loop {
-            let wanted = needs_split(chunk, &self.setting(level), self.stretch);
+            let stretch = self.stretch.filter(|&stretch| self.may_exceed(chunk, level, stretch));
+            let wanted = needs_split(chunk, &self.setting(level), stretch);
             if wanted.which.is_empty() {
                 done.refused += wanted.refused;
                 return done;
             }
             self.split(chunk, &wanted.which, from, &mut done);
         }
+    }
+
+    /// Whether a box may be wider than `stretch` times that of an undeformed particle of a level: a quick bound from
+    /// the columns of a chunk, so that most leaves need no closer look.
+    fn may_exceed(&self, chunk: &Chunk<D>, level: u8, stretch: f64) -> bool {
+        let greatest = |column: usize| chunk.column(column).iter().copied().fold(0.0, f64::max);
+        let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+        // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
+        // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
+        // where a model has one.
+        let elastic = (first..first + 3).map(greatest).fold(0.0, f64::max);
+        let plastic = greatest(Layout::<D>::HISTORY + 1);
+        let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
+        let width = greatest(Layout::<D>::HALF) * elastic.sqrt().max(isotropic);
+        let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
+        width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
     }
 
     /// Splits those among `leavers` (index, level of the leaf they enter) that enter a leaf finer than they were made
