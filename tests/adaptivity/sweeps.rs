@@ -9,14 +9,16 @@ use crate::state::{advance, count, on_ranks, solver};
 
 /// Length of all time steps, s.
 const STEP: f64 = 3e-4;
+/// Steps in which the slab passes once.
+const STEPS_PER_SWEEP: u64 = 40;
 
 /// A job in which a slab as thick as a leaf goes to and fro; outside of the body at the start and from the end of the
 /// last sweep on.
-fn job(dimension: usize, body: &str, sweeps: usize, steps_per_sweep: usize) -> String {
+fn job(dimension: usize, body: &str, sweeps: usize) -> String {
     let zeros = ", 0".repeat(dimension - 1);
     let mut rows = String::new();
     for sweep in 0..=sweeps {
-        let time = (sweep * steps_per_sweep) as f64 * STEP;
+        let time = (sweep as u64 * STEPS_PER_SWEEP) as f64 * STEP;
         let place = if sweep % 2 == 0 { 0.0 } else { 2.6 };
         write!(rows, "{{ time = {time}, translation = [{place}{zeros}] }}, ").expect("text");
     }
@@ -60,20 +62,20 @@ fn conserved<const D: usize>(solver: &mut Solver<D>) -> Vec<[f64; 3]> {
     vec![[particles.mass, 0.0, 0.0], particles.momentum, grid.angular_momentum]
 }
 
-fn sweeps<const D: usize>(comm: &Comm, job: &str, regrids: u64, after: u64)
+/// Sweeps so often, looking after each; the tree must change `changes` times or more.
+fn sweeps<const D: usize>(comm: &Comm, body: &str, sweeps: usize, changes: u64)
 where
     Problem<D>: TryFrom<AnyProblem>,
 {
-    let mut solver = solver::<D>(comm, job);
+    let mut solver = solver::<D>(comm, &job(D, body, sweeps));
     let (start, number) = (conserved(&mut solver), count(&solver));
     let energy = |solver: &Solver<D>| {
         let totals = solver.particle_totals();
         totals.kinetic + totals.elastic
     };
     let (energy_before, mut most, mut booked) = (energy(&solver), number, 0.0);
-    let parts = 40;
-    for part in 0..parts {
-        advance(&mut solver, regrids / parts);
+    for part in 0..2 * sweeps {
+        advance(&mut solver, STEPS_PER_SWEEP / 2);
         most = most.max(count(&solver));
         for (quantity, (now, then)) in conserved(&mut solver).iter().zip(&start).enumerate() {
             let norm = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -85,7 +87,8 @@ where
         booked = total.merge_energy;
         assert_eq!(number + total.splits * ((1 << D) - 1) - total.removed, count(&solver));
     }
-    advance(&mut solver, after);
+    // Families that were just left take their time.
+    advance(&mut solver, 4 * STEPS_PER_SWEEP);
     let total = solver.books.total(comm);
     let energy_after = energy(&solver);
     println!(
@@ -94,25 +97,25 @@ where
         count(&solver),
         solver.regrids
     );
-    assert!(most > 2 * number && total.refused == 0);
+    assert!(most > 2 * number && total.refused == 0 && solver.regrids >= changes);
     assert!(booked > 0.0 && total.merges >= 9 * number, "{total:?}");
     assert!(solver.forest.leaves().iter().all(|leaf| leaf.level == 0));
     assert_eq!(count(&solver), number, "families find together again");
     // Splits make affine velocities visible, merges hide them; the rest is what the method loses anyway.
     let explained = energy_before + total.split_energy - total.merge_energy;
-    assert!((energy_after - explained).abs() <= 2e-3 * energy_before, "{energy_after} {explained}");
+    assert!((energy_after - explained).abs() <= 5e-3 * energy_before, "{energy_after} {explained}");
 }
 
 #[test]
 fn over_a_disc() {
     let body = "shape = { kind = 'circle', centre = [0.9, 0.95], radius = 0.4 }\n\
-                velocity = [0.5, 0.2]\nangular_velocity = 6";
-    on_ranks("sweeps::over_a_disc", &[1], |comm| sweeps::<2>(comm, &job(2, body, 25, 40), 1000, 120));
+                velocity = [0.2, 0.1]\nangular_velocity = 6";
+    on_ranks("sweeps::over_a_disc", &[1], |comm| sweeps::<2>(comm, body, 130, 1000));
 }
 
 #[test]
 fn over_a_ball() {
     let body = "particles_per_cell = 1\nshape = { kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }\n\
                 velocity = [0.5, 0.2, -0.3]\nangular_velocity = [2, -3, 5]";
-    on_ranks("sweeps::over_a_ball", &[2], |comm| sweeps::<3>(comm, &job(3, body, 10, 40), 400, 160));
+    on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, body, 10, 70));
 }

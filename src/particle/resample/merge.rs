@@ -39,7 +39,7 @@ pub struct Merged {
     pub removed: u64,
     /// Indices, ascending, of particles that stand for a group of strangers and carry the smallest identifier of the
     /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
-    /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`ids`]).
+    /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
 }
 
