@@ -68,23 +68,28 @@ fn way(length: f64) -> f64 {
 fn job(case: &Case, dt: f64) -> (String, f64) {
     let half = half_length(case.length);
     let (jump, size) = (8.0 * half, 16.0 * half);
-    let base = case.levels[0].min(case.levels[1]);
+    // A brick has at most 64 roots along an axis; a longer bar takes larger roots, each a level coarser.
+    let deeper = u8::from(size > 256.0);
+    let edge = 4.0 * f64::from(1 << deeper);
+    let levels = case.levels.map(|level| level + deeper);
+    let base = levels[0].min(levels[1]);
     let mut regions = String::new();
-    for (level, [from, to]) in case.levels.into_iter().zip([[0.0, jump], [jump, size]]) {
+    for (level, [from, to]) in levels.into_iter().zip([[0.0, jump], [jump, size]]) {
         if level > base {
             regions = format!(
-                "regions = [{{ level = {level}, shape = {{ kind = \"box\", min = [{}, 0.5], max = [{}, 3.5] }} }}]",
+                "regions = [{{ level = {level}, shape = {{ kind = \"box\", min = [{}, 0.5], max = [{}, {}] }} }}]",
                 from + 0.5,
-                to - 0.5
+                to - 0.5,
+                edge - 0.5
             );
         }
     }
     let text = format!(
         "version = 1\ndimension = 2\ngravity = [0, 0]\n\
-         [domain]\nsize = [{size}, 4]\nroot_edge = 4\n\
+         [domain]\nsize = [{size}, {edge}]\nroot_edge = {edge}\n\
          [tree]\ngraded = false\nbase_level = {base}\n{regions}\n\
          [[materials]]\nname = \"bar\"\ndensity = 1\nmodel = \"fixed_corotated\"\nyoung = 1\npoisson = 0\n\
-         [[bodies]]\nname = \"bar\"\nmaterial = \"bar\"\nshape = {{ kind = \"box\", min = [0, 0], max = [{size}, 4] }}\n\
+         [[bodies]]\nname = \"bar\"\nmaterial = \"bar\"\nshape = {{ kind = \"box\", min = [0, 0], max = [{size}, {edge}] }}\n\
          [numerics]\ntransfer = \"flip\"\nflip = 1.0\n\
          [time]\nend = 1e6\ncfl = 0.5\ndt_max = {dt}\n[output]\nevery = 1e6\n"
     );
@@ -171,7 +176,8 @@ pub fn section(comm: &Comm, page: &mut Page) {
          transmitted packet is as far behind the jump: *transmitted* is the energy behind the jump over the incident one, \
          *amplitude* the greatest velocity there over that of the exact packet, *late* the distance between the \
          centres (of v squared) in H, as dispersion slows the packet on its whole way; its share of this way follows. \
-         Exact is 1, 1, 0 and 0.\n",
+         Exact is 1, 1, 0 and 0. *By the jump* is what is left of that share without the mean of the delays on uniform \
+         grids of both cell sizes.\n",
     );
     // Reference values of the independent calculation where there are any.
     let cases = [
@@ -198,6 +204,11 @@ pub fn section(comm: &Comm, page: &mut Page) {
         let difference = outcome.left.iter().zip(&uniform.left);
         let energy = difference.map(|(a, b)| energy([a[0], a[1] - b[1], a[2] - b[2]])).sum::<f64>();
         let reflected = (energy / outcome.incident).sqrt();
+        // A finer grid than that is a matter of minutes.
+        let by_jump = (ratio == 0.5).then(|| {
+            let behind = run(comm, &Case { length, levels: [levels[1]; 2] }, dt).behind;
+            (outcome.behind - 0.5 * (uniform.behind + behind)) / way(length)
+        });
         let transmitted = outcome.right / outcome.incident;
         rows.push(vec![
             name.to_string(),
@@ -209,9 +220,10 @@ pub fn section(comm: &Comm, page: &mut Page) {
             format!("{:.3}", outcome.amplitude),
             format!("{:.3}", outcome.behind),
             format!("{:.2} %", 100.0 * outcome.behind / way(length)),
+            by_jump.map_or_else(String::new, |share| format!("{:.2} %", 100.0 * share)),
         ]);
         found.insert((name, length as u32), reflected);
-        lateness.insert((name, length as u32), outcome.behind / way(length));
+        lateness.insert((name, length as u32), by_jump.unwrap_or(f64::NAN));
         if series.last().is_none_or(|s| s.name != name) {
             series.push(Series { name: name.to_string(), points: Vec::new(), marks: true });
         }
@@ -246,6 +258,7 @@ pub fn section(comm: &Comm, page: &mut Page) {
             "amplitude",
             "late, H",
             "of the way",
+            "by the jump",
         ],
         &rows,
     );
@@ -264,9 +277,9 @@ pub fn section(comm: &Comm, page: &mut Page) {
     let fall = found[&("1:2 into fine", 10)] / two;
     let late = lateness[&("1:2 into fine", 20)].abs();
     page.check(
-        "delay of the transmitted packet, share of its way, 1:2, 20 cells, at most 2e-2",
+        "delay of the transmitted packet by the jump, share of its way, 1:2, 20 cells, at most 5e-3",
         late,
-        late <= 2e-2,
+        late <= 5e-3,
     );
     page.check("fall of R from 10 to 20 cells per wave length, at least 3.3", fall, fall >= 3.3);
 }
