@@ -1,10 +1,9 @@
 //! Free flight across level jumps: what each transfer conserves. Each test launches its own binary under mpirun.
 
+#[path = "common/relaunch.rs"]
+mod relaunch;
 #[path = "common/spinning.rs"]
 mod spinning;
-
-use std::process::Command;
-use std::sync::Mutex;
 
 use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem, parse};
@@ -13,6 +12,7 @@ use agimp::particle::chunk::{Chunk, Layout};
 use agimp::run::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::{Comm, World};
+use relaunch::{is_launched, relaunch};
 use spinning::{CUBE, SQUARE};
 
 /// Up to the first space.
@@ -22,7 +22,7 @@ fn first_word(text: &str) -> String {
 
 /// Runs `body` on each number of ranks; what it prints after `same: ` must not depend on that number. Each is a new process group, as MPI starts once per process.
 fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
-    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
+    if is_launched() {
         let world = World::init().expect("MPI starts");
         // One thread that works is enough, as ranks share the cores.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
@@ -30,23 +30,9 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
         body(world.comm());
         return;
     }
-    // One launch at a time: more would only compete for the same cores.
-    static ONE_LAUNCH: Mutex<()> = Mutex::new(());
-    let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let mut same: Option<Vec<String>> = None;
-    for n in ranks {
-        let output = Command::new("mpirun")
-            .env("OMPI_MCA_mpi_yield_when_idle", "1")
-            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-            .env("MPIEXEC_TIMEOUT", "100")
-            .args(["--oversubscribe", "--bind-to", "none", "-n", &n.to_string()])
-            .arg(std::env::current_exe().expect("own path"))
-            .args(["--exact", test, "--nocapture", "--test-threads=1"])
-            .output()
-            .expect("mpirun starts");
-        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
+    for &n in ranks {
+        let text = relaunch(test, n, 100);
         let now: Vec<String> = text.split("same: ").skip(1).map(first_word).collect();
         let before = same.get_or_insert_with(|| now.clone());
         assert_eq!(*before, now, "{test}: {n} ranks against {}", ranks[0]);

@@ -16,6 +16,7 @@ pub mod links;
 pub mod mask;
 pub mod plan;
 pub mod reach;
+mod sources;
 pub mod window;
 
 pub use exchange::ArenaExchange;

@@ -1,15 +1,15 @@
 //! Jobs of the tests through the library, to look at leaves and particles.
-use std::process::Command;
-
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::{Layout, Tag};
 use agimp::run::setup;
 use agimp::solver::{Requests, Solver};
 use partition::comm::{Comm, World};
 
+use crate::relaunch::{is_launched, relaunch};
+
 /// Runs `body` on each number of ranks. MPI starts once per process, so each is a process group of its own.
 pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
-    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
+    if is_launched() {
         let world = World::init().expect("MPI starts");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
         pool.build_global().expect("threads start once");
@@ -17,20 +17,8 @@ pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
         return;
     }
     let _turn = crate::in_turn();
-    for n in ranks {
-        let output = Command::new("mpirun")
-            .env("OMPI_MCA_mpi_yield_when_idle", "1")
-            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-            .env("MPIEXEC_TIMEOUT", "300")
-            .args(["--oversubscribe", "--bind-to", "none", "-n", &n.to_string()])
-            .arg(std::env::current_exe().expect("own path"))
-            .args(["--exact", test, "--nocapture", "--test-threads=1"])
-            .output()
-            .expect("mpirun starts");
-        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
-        println!("{n} ranks: {text}");
+    for &n in ranks {
+        println!("{n} ranks: {}", relaunch(test, n, 300));
     }
 }
 
