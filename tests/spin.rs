@@ -11,8 +11,8 @@ use agimp::kernel::Transfer;
 use agimp::particle::chunk::{Chunk, Layout};
 use agimp::run::setup;
 use agimp::solver::{Clock, Requests, Solver};
-use partition::comm::{Comm, World};
-use relaunch::{is_launched, relaunch};
+use partition::comm::Comm;
+use relaunch::{ran_if_launched, relaunch};
 use spinning::{CUBE, SQUARE};
 
 /// Up to the first space.
@@ -22,12 +22,7 @@ fn first_word(text: &str) -> String {
 
 /// Runs `body` on each number of ranks; what it prints after `same: ` must not depend on that number. Each is a new process group, as MPI starts once per process.
 fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
-    if is_launched() {
-        let world = World::init().expect("MPI starts");
-        // One thread that works is enough, as ranks share the cores.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
-        pool.build_global().expect("threads start once");
-        body(world.comm());
+    if ran_if_launched(body) {
         return;
     }
     let mut same: Option<Vec<String>> = None;

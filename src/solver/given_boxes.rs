@@ -8,12 +8,11 @@ use partition::{Forest, MAX_LEVEL};
 use super::bins::{BinMissing, BoxWidths, greatest_half};
 use super::migrate::position_key;
 use super::time_step::StepControl;
-use super::transfer::{Reach, extent, sort_with};
+use super::transfer::{extent, sort_with};
 use super::update::update_velocity;
 use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraint::node_coord;
-use crate::grid::fields::Part;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};
@@ -130,13 +129,7 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
         let solver = &mut self.solver;
         let sorted = sort_with(&mut solver.grid, &solver.chunks, &mut solver.phases, &self.halves);
-        solver.scatter(dt, Reach::Neighbours);
-        let pending = solver.send_arenas();
-        solver.scatter(dt, Reach::Own);
-        solver.sum_nodes(Part::Interior);
-        solver.receive_arenas(pending);
-        solver.sum_nodes(Part::Seam);
-        solver.restrict();
+        solver.nodes_from_particles(dt);
         sorted
     }
 

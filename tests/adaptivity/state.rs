@@ -3,17 +3,13 @@ use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::{Layout, Tag};
 use agimp::run::setup;
 use agimp::solver::{Requests, Solver};
-use partition::comm::{Comm, World};
+use partition::comm::Comm;
 
-use crate::relaunch::{is_launched, relaunch};
+use crate::relaunch::{ran_if_launched, relaunch};
 
 /// Runs `body` on each number of ranks. MPI starts once per process, so each is a process group of its own.
 pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
-    if is_launched() {
-        let world = World::init().expect("MPI starts");
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
-        pool.build_global().expect("threads start once");
-        body(world.comm());
+    if ran_if_launched(body) {
         return;
     }
     let _turn = crate::in_turn();

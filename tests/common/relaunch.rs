@@ -3,9 +3,19 @@
 use std::process::Command;
 use std::sync::Mutex;
 
-/// Whether this process is one of those that [`relaunch`] started.
-pub fn is_launched() -> bool {
-    std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some()
+use partition::comm::{Comm, World};
+
+/// Runs `body` on one thread if this process is one of those that [`relaunch`] started; says whether it is.
+pub fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
+    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_none() {
+        return false;
+    }
+    let world = World::init().expect("MPI starts");
+    // One thread that works is enough, as ranks share the cores.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("threads start once");
+    body(world.comm());
+    true
 }
 
 /// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it printed.
