@@ -27,7 +27,7 @@ use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
-use self::rebalance::{LastPartition, Moment};
+use self::rebalance::{LastPartition, thread_time};
 use self::resample::Books;
 use self::time_step::StepControl;
 use self::transfer::Reach;
@@ -156,9 +156,9 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
-        let start = Moment::now();
+        let start = thread_time();
         let grid = Grid::build(comm, &forest, &physics, 0);
-        let partitioned = LastPartition::at_start(clock.step, start.elapsed());
+        let partitioned = LastPartition::since(start);
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -237,7 +237,10 @@ impl<const D: usize> Solver<D> {
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
         self.sent_before = self.traffic();
+        // Fresh memory costs as much as the first scatter into it.
+        let arenas = std::mem::take(&mut self.grid.arenas);
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
+        self.grid.arenas = arenas;
     }
 
     /// Collective. Reach that the boxes of all ranks need.
