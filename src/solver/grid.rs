@@ -1,6 +1,7 @@
 //! What lives on the grid for one tree and one partition, and the exchanges of a step.
 use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
+use rayon::prelude::*;
 
 use super::bins::BinLists;
 use super::increment::Increments;
@@ -92,9 +93,10 @@ impl<const D: usize> Solver<D> {
     /// Not collective. [`needed_reach`] of this rank's particles.
     pub(super) fn local_reach(&self) -> u32 {
         let scheme = self.physics.scheme();
-        let leaves = self.forest.leaves().iter().zip(&self.chunks);
+        let root_edge = self.physics.root_edge;
+        let leaves = self.forest.leaves().par_iter().zip(&self.chunks).with_min_len(32);
         let reaches = leaves.map(|(leaf, chunk)| {
-            let cell = self.physics.root_edge / f64::from(4u32 << leaf.level);
+            let cell = root_edge / f64::from(4u32 << leaf.level);
             needed_reach(&scheme, chunk, cell)
         });
         reaches.max().unwrap_or(0)

@@ -11,6 +11,7 @@ mod indicators;
 pub mod migrate;
 pub mod phases;
 pub mod rebalance;
+mod records;
 pub mod regrid;
 pub mod resample;
 pub mod time_step;
