@@ -145,6 +145,8 @@ pub struct Solver<const D: usize> {
     arena_bytes: u64,
     costs: Costs,
     partitioned: LastPartition,
+    /// New partitions since the start of this process.
+    pub partitions: u64,
 }
 
 impl<const D: usize> Solver<D> {
@@ -178,6 +180,7 @@ impl<const D: usize> Solver<D> {
             arena_bytes: 0,
             costs: Costs::new(clock.step),
             partitioned,
+            partitions: 0,
         };
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();

@@ -134,6 +134,7 @@ impl<const D: usize> Solver<D> {
             self.rebuild_grid(self.grid.plan.tree.reach());
         }
         self.partitioned = LastPartition::since(start);
+        self.partitions += u64::from(shipment.changed());
         self.phases.book(Phase::Regrid, wall.elapsed());
         shipment.changed()
     }
