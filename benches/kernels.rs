@@ -7,7 +7,7 @@ use agimp::kernel::spread::Constraints;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g, stencil_bases};
 use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use agimp::material::{Material, Parameters, build};
-use agimp::particle::chunk::{Chunk, Layout, Tag};
+use agimp::particle::chunk::{Chunk, Layout, Place, Tag};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -107,7 +107,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None);
+            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None, Place::default());
         }
         arena[100 % arena_nodes(D)]
     });
@@ -121,7 +121,15 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
-            greatest.max(g2p::gather(chunk, Select::All, &setting.frame, &scheme, DT, &fields))
+            greatest.max(g2p::gather(
+                chunk,
+                Select::All,
+                &setting.frame,
+                &scheme,
+                DT,
+                &fields,
+                Place::default(),
+            ))
         })
     });
 }
@@ -147,7 +155,16 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
             arena.fill(Row::default());
             let constraints = Constraints { touched: &touched, second: &second };
             let moments = jump.then_some(p2g::MomentSums { constraints, sums: &mut sums });
-            p2g::scatter(chunk, Select::List(&list), &setting.frame, &scheme, DT, &mut arena, moments);
+            p2g::scatter(
+                chunk,
+                Select::List(&list),
+                &setting.frame,
+                &scheme,
+                DT,
+                &mut arena,
+                moments,
+                Place::default(),
+            );
         }
         arena[100]
     });
@@ -164,7 +181,15 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
         let moments = jump.then_some(g2p::Moments { touched: &touched, first: &first });
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
-            greatest.max(g2p::gather(chunk, Select::List(&list), &setting.frame, &scheme, DT, &fields))
+            greatest.max(g2p::gather(
+                chunk,
+                Select::List(&list),
+                &setting.frame,
+                &scheme,
+                DT,
+                &fields,
+                Place::default(),
+            ))
         })
     });
 }

@@ -12,7 +12,7 @@ use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// Moments of the arena's nodes at level jumps.
 #[derive(Clone, Copy)]
@@ -76,7 +76,8 @@ impl<const D: usize> Gathered<D> {
 }
 
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if any is not finite.
+/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `next` is the place of the chunk
+/// that will be read after this one.
 pub fn gather<const D: usize>(
     chunk: &mut Chunk<D>,
     select: Select,
@@ -84,15 +85,16 @@ pub fn gather<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     fields: &Fields<D>,
+    next: Place,
 ) -> f64 {
-    let len = chunk.len();
+    let batches = Batches::new(select, chunk, next);
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
     let plain = fields.increment.is_none() && fields.moments.is_none();
     let cell = frame.cell;
     let mut weights = Weights::new();
     let mut sums = Sums::new();
     let mut greatest = Lanes::splat(0.0);
-    for batch in Batches::new(select, len, stride) {
+    for batch in batches {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
@@ -164,7 +166,7 @@ pub fn interpolate<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);

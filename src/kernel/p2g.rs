@@ -19,7 +19,7 @@ use super::simd::{F64x4, LANES, Lanes};
 use super::spread::Constraints;
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// First moments `A = Σ w m C` of the nodes, gathered only from stencils that touch a constrained
 /// node.
@@ -34,7 +34,8 @@ pub struct MomentSums<'a, const D: usize> {
 /// moments where a stencil touches a constrained node.
 ///
 /// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
-/// the arena, which holds when its centre lies in the block.
+/// the arena, which holds when its centre lies in the block. `next` is the place of the chunk that will be read after
+/// this one.
 pub fn scatter<const D: usize>(
     chunk: &Chunk<D>,
     select: Select,
@@ -43,11 +44,12 @@ pub fn scatter<const D: usize>(
     dt: f64,
     arena: &mut [Row],
     moments: Option<MomentSums<D>>,
+    next: Place,
 ) {
     // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
     match moments {
-        None => scatter_all(chunk, select, frame, scheme, dt, arena, None),
-        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments),
+        None => scatter_all(chunk, select, frame, scheme, dt, arena, None, next),
+        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments, next),
     }
 }
 
@@ -83,11 +85,12 @@ fn scatter_all<const D: usize>(
     dt: f64,
     arena: &mut [Row],
     mut moments: Option<MomentSums<D>>,
+    next: Place,
 ) {
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut prepared = Prepared::new();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, next) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);

@@ -7,7 +7,7 @@ use super::batch::{Batch, Batches};
 use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{Frame, Row, Scheme, Select, SubBox, domain};
-use crate::particle::chunk::Chunk;
+use crate::particle::chunk::{Chunk, Place};
 
 /// Constrained nodes in an arena.
 #[derive(Clone, Copy)]
@@ -62,7 +62,7 @@ pub fn of_particles<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);

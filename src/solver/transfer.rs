@@ -20,7 +20,7 @@ use crate::kernel::{
     BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
 };
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Tag};
+use crate::particle::chunk::{Layout, Place, Tag};
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +180,8 @@ impl<const D: usize> Solver<D> {
                 if let Some(whole) = selected.whole {
                     let sums = sums.as_deref_mut().zip(constraints);
                     let moments = sums.map(|(sums, constraints)| MomentSums { constraints, sums });
-                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments);
+                    let next = chunks.get(leaf + 1).map_or(Place::default(), Chunk::place);
+                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments, next);
                 }
                 if !selected.parts.is_empty() {
                     let moments =
@@ -274,6 +275,7 @@ impl<const D: usize> Solver<D> {
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
+        let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
@@ -282,6 +284,7 @@ impl<const D: usize> Solver<D> {
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
                 let mut signal: f64 = 0.0;
+                let next = places.get(leaf + 1).copied().unwrap_or_default();
                 for (number, bin) in plan.leaf_bins(leaf).enumerate() {
                     let selected = Selected::of(lists, leaf, number, chunk);
                     if selected.is_empty() {
@@ -302,7 +305,7 @@ impl<const D: usize> Solver<D> {
                     let nodes = Fields { velocity: &arena.rows, increment, moments };
                     g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
-                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes));
+                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes, next));
                     }
                 }
                 signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))

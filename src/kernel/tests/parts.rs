@@ -32,7 +32,7 @@ fn parts_equal_the_whole<const D: usize>() {
     }
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut other = arena.clone();
-    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None);
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let mut sums = vec![[0.0; D]; parted.len()];
     spread::of_parts(&parted, &parts, &frame, None, |part, own| {
         let part = &parts[part];
@@ -52,7 +52,7 @@ fn parts_equal_the_whole<const D: usize>() {
         }
     }
     let fields = Fields { velocity: &arena, increment: None, moments: None };
-    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields);
+    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
     gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
@@ -89,11 +89,11 @@ fn moments_follow<const D: usize>() {
         let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![[Row::default(); D]; nodes]);
         let constraints = spread::Constraints { touched: &touched, second };
         let moments = MomentSums { constraints, sums: &mut sums };
-        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments));
+        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments), Place::default());
         (arena, sums)
     };
     let mut plain = vec![Row::default(); nodes];
-    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None);
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None, Place::default());
     // Second moments of zero change nothing.
     assert_eq!(plain, scattered(&vec![Row::default(); nodes]).0);
     let mut numbers = Numbers(12);
@@ -139,7 +139,7 @@ fn moments_follow<const D: usize>() {
     let run = |moments: Option<Moments<D>>| {
         let mut chunk = start.clone();
         let fields = Fields { velocity: &plain, increment: None, moments };
-        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
         chunk
     };
     let without = run(None);
@@ -208,7 +208,7 @@ fn flip_and_tpic() {
     let fields = Fields { velocity: &velocity, increment: Some(&increment), moments: None };
     let mut chunk = start.clone();
     let flip = Transfer::Flip { blend: 0.75 };
-    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields);
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields, Place::default());
     for p in 0..start.len() {
         for i in 0..3 {
             let old = start.column(Layout::<3>::VELOCITY + i)[p];
@@ -220,7 +220,15 @@ fn flip_and_tpic() {
         }
     }
     let mut chunk = start.clone();
-    gather(&mut chunk, Select::All, &frame, &scheme(&materials, Transfer::Tpic), DT, &fields);
+    gather(
+        &mut chunk,
+        Select::All,
+        &frame,
+        &scheme(&materials, Transfer::Tpic),
+        DT,
+        &fields,
+        Place::default(),
+    );
     assert!(chunk.column(Layout::<3>::AFFINE).iter().all(|c| c.abs() < 1e-9));
 }
 
@@ -234,14 +242,14 @@ fn checksum<const D: usize>() -> u64 {
     let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for _ in 0..4 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None);
+        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
         for row in &mut arena {
             row.0.iter().for_each(|&x| add(x));
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
             row.0 = row.0.map(|x| x * inverse);
         }
         let fields = Fields { velocity: &arena, increment: None, moments: None };
-        add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields));
+        add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default()));
     }
     for p in 0..chunk.len() {
         bits(&chunk, p).into_iter().for_each(|x| add(f64::from_bits(x)));
