@@ -214,7 +214,7 @@ fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
             }
             if let Some(moments) = arena.moments {
                 for bit in bits(constrained & inside) {
-                    let moments = &moments[arena_index::<D>(offset as usize, bit)];
+                    let moments = moments.at(offset as usize, bit);
                     moments.iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
                 }
             }

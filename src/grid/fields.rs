@@ -4,7 +4,7 @@
 //! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
 use rayon::prelude::*;
 
-use super::arena::{Arenas, Moments};
+use super::arena::{Arena, Arenas, Moments};
 use super::entries::Entries;
 use super::exchange::ReceivedArenas;
 use super::links::Links;
@@ -105,7 +105,7 @@ impl<const D: usize> NodeFields<D> {
                 match source {
                     Source::Own(bin) => {
                         if let Some(arena) = arenas.get(bin.0) {
-                            block.add(arena.rows, arena.moments, &arena.window, place as u8);
+                            block.add(&arena, place as usize);
                         }
                     }
                     Source::Received(bin) => {
@@ -210,13 +210,10 @@ impl<const D: usize> NodeFields<D> {
     /// touch constrained nodes their first moments.
     pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
-        let has_moments = bin.touched.is_some();
+        let constraints = bin.touched.map(|table| &plan.constraints[table as usize]);
         // Blocks on all sides give all nodes of the window a value.
         if bin.around[..offset_count(D)].contains(&NO_BLOCK) {
             window.for_each_run(|run| arena.rows[run].fill(ZERO));
-        }
-        if has_moments {
-            window.for_each_run(|run| arena.moments[run].fill([ZERO; D]));
         }
         let nodes = block_nodes(D);
         for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
@@ -225,16 +222,13 @@ impl<const D: usize> NodeFields<D> {
             }
             let rows = &self.rows[block as usize * nodes..][..nodes];
             let block = &plan.blocks[block as usize];
-            let moments = block.moments.filter(|_| has_moments);
-            let moments = moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
             let Some(shared) = window.shared(index) else { continue };
             copy_rows(shared, rows, &mut arena.rows);
-            if let Some(moments) = moments {
-                shared.for_each_run(|run| {
-                    for i in (0..run.len).filter(|i| block.constrained >> (run.block + i) & 1 == 1) {
-                        arena.moments[run.arena + i] = moments[run.block + i];
-                    }
-                });
+            if let Some(constraints) = constraints {
+                let moments = block.moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
+                for (bit, number) in constraints.of_block(index, u64::MAX) {
+                    arena.moments[number] = moments.map_or([ZERO; D], |moments| moments[bit as usize]);
+                }
             }
         }
     }
@@ -360,18 +354,17 @@ impl<const D: usize> BlockMut<'_, D> {
     }
 
     /// Adds the part of an arena that lies in this block.
-    fn add(&mut self, rows: &[Row], moments: Option<&[Moments<D>]>, window: &Window<D>, offset: u8) {
-        let Some(shared) = window.shared(offset as usize) else { return };
-        let (to, from) = (&mut self.rows[..block_nodes(D)], &rows[..arena_nodes(D)]);
+    fn add(&mut self, arena: &Arena<'_, D>, offset: usize) {
+        let Some(shared) = arena.window.shared(offset) else { return };
+        let (to, from) = (&mut self.rows[..block_nodes(D)], &arena.rows[..arena_nodes(D)]);
         shared.for_each_run(|run| {
             let to = &mut to[run.block..][..run.len];
             to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| to.add(from));
         });
-        if let (Some(to), Some(from)) = (&mut self.moments, moments) {
-            shared.for_each_run(|run| {
-                let to = &mut to[run.block..][..run.len];
-                to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| add_moments(to, from));
-            });
+        if let (Some(to), Some(from)) = (&mut self.moments, arena.moments) {
+            for (bit, from) in from.of_block(offset, arena.window.nodes_of(offset)) {
+                add_moments(&mut to[bit as usize], from);
+            }
         }
     }
 }
@@ -381,7 +374,7 @@ impl<const D: usize> BlockMut<'_, D> {
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`; zero at real nodes.
+    /// First moments `V_j` of the constrained nodes, by their number in the arena.
     pub moments: Vec<Moments<D>>,
 }
 

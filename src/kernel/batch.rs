@@ -42,6 +42,15 @@ impl<'a> Batches<'a> {
         Self { select, len: chunk.len(), stride: chunk.capacity(), taken: 0, place, next }
     }
 
+    /// The next particles of the chunk. Columns have room for whole batches.
+    #[inline(always)]
+    fn whole(&self) -> Batch {
+        let first = self.taken;
+        let count = (self.len - first).min(LANES);
+        let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
+        Batch { index, lanes: ALL >> (LANES - count), contiguous: true, ahead: self.ahead(first) }
+    }
+
     /// Where to read ahead while the particles from `first` on are at work.
     #[inline(always)]
     fn ahead(&self, first: usize) -> Place {
@@ -67,12 +76,9 @@ impl Iterator for Batches<'_> {
                 if first >= self.len {
                     return None;
                 }
-                // Columns have room for whole batches.
-                let count = (self.len - first).min(LANES);
+                let batch = self.whole();
                 self.taken += LANES;
-                let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
-                let ahead = self.ahead(first);
-                Some(Batch { index, lanes: ALL >> (LANES - count), contiguous: true, ahead })
+                Some(batch)
             }
             Select::List(list) => {
                 let rest = &list[self.taken..];
@@ -88,10 +94,30 @@ impl Iterator for Batches<'_> {
 }
 
 impl Batch {
+    /// Particles of a chunk from `first` on, as many as there are.
+    #[inline(always)]
+    pub fn from_chunk<const D: usize>(chunk: &Chunk<D>, first: usize) -> Self {
+        let batches = Batches { taken: first, ..Batches::new(Select::All, chunk, Place::default()) };
+        batches.whole()
+    }
+
     /// The first particles of a list, and their number. Where at least half of the next [`LANES`] particles of the chunk
     /// are on the list, as is usual beside level jumps, these are read as they stand; elsewhere they are picked.
-    #[inline(never)]
+    #[inline(always)]
     fn of_list(list: &[u32], stride: usize) -> (Self, usize) {
+        let first = list[0];
+        if let Some(next) = list.first_chunk::<LANES>()
+            && next[LANES - 1] == first + LANES as u32 - 1
+        {
+            let batch = Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() };
+            return (batch, LANES);
+        }
+        Self::of_gaps(list, stride)
+    }
+
+    /// As [`Batch::of_list`], for lists with gaps.
+    #[inline(never)]
+    fn of_gaps(list: &[u32], stride: usize) -> (Self, usize) {
         let first = list[0];
         let end = first + LANES as u32;
         let (mut index, mut lanes, mut count, mut least) = ([first; LANES], 0, 0, first);

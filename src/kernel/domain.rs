@@ -40,6 +40,20 @@ pub fn full_half_widths<const D: usize>(
     collect(chunk, select, cell, f64::INFINITY, extent, scheme, out);
 }
 
+/// [`full_half_widths`] of [`LANES`] particles from `first` on; lanes behind the last particle hold anything.
+pub fn full_half_widths_from<const D: usize>(
+    chunk: &Chunk<D>,
+    first: usize,
+    cell: f64,
+    extent: &[f64; D],
+    scheme: &Scheme,
+) -> [Lanes; D] {
+    let (reals, stride) = chunk.reals();
+    let batch = Batch::from_chunk(chunk, first);
+    let position = batch.positions(reals, stride);
+    of_batch(reals, stride, chunk.tags(), &batch, &position, cell, f64::INFINITY, extent, scheme)
+}
+
 fn collect<const D: usize>(
     chunk: &Chunk<D>,
     select: Select,

@@ -13,6 +13,7 @@ pub mod phases;
 pub mod rebalance;
 pub mod regrid;
 pub mod resample;
+mod sides;
 pub mod time_step;
 pub mod totals;
 pub mod transfer;

@@ -1,4 +1,5 @@
 //! Scatter and gather together, against a plain scalar definition.
+use super::constrained::ConstrainedNodes;
 use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
