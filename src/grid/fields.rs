@@ -222,13 +222,10 @@ impl<const D: usize> NodeFields<D> {
     /// touch constrained nodes their first moments.
     pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
-        let has_moments = bin.touched.is_some();
+        let constraints = bin.touched.map(|table| &plan.constraints[table as usize]);
         // Blocks on all sides give all nodes of the window a value.
         if bin.around[..offset_count(D)].contains(&NO_BLOCK) {
             window.for_each_run(|run| arena.rows[run].fill(ZERO));
-        }
-        if has_moments {
-            window.for_each_run(|run| arena.moments[run].fill([ZERO; D]));
         }
         let nodes = block_nodes(D);
         for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
@@ -237,16 +234,13 @@ impl<const D: usize> NodeFields<D> {
             }
             let rows = &self.rows[block as usize * nodes..][..nodes];
             let block = &plan.blocks[block as usize];
-            let moments = block.moments.filter(|_| has_moments);
-            let moments = moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
             let Some(shared) = window.shared(index) else { continue };
             copy_rows(shared, rows, &mut arena.rows);
-            if let Some(moments) = moments {
-                shared.for_each_run(|run| {
-                    for i in (0..run.len).filter(|i| block.constrained >> (run.block + i) & 1 == 1) {
-                        arena.moments[run.arena + i] = moments[run.block + i];
-                    }
-                });
+            if let Some(constraints) = constraints {
+                let moments = block.moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
+                for (bit, number) in constraints.of_block(index, u64::MAX) {
+                    arena.moments[number] = moments.map_or([ZERO; D], |moments| moments[bit as usize]);
+                }
             }
         }
     }
@@ -377,7 +371,7 @@ impl<const D: usize> BlockMut<'_, D> {
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`; zero at real nodes.
+    /// First moments `V_j` of the constrained nodes, by their number in the arena.
     pub moments: Vec<Moments<D>>,
 }
 

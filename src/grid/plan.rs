@@ -1,20 +1,21 @@
 //! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
 
+use std::sync::Arc;
+
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
+use super::constrained::{ArenaConstraints, has_constrained};
 use super::constraint::node_coord;
 use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
-use super::mask::{
-    arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted,
-};
+use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use super::reach::potential_bins;
 use super::sources::{Part, Piece};
-use crate::kernel::{ARENA_EDGE, Row};
+use crate::kernel::ARENA_EDGE;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;
@@ -48,7 +49,7 @@ pub struct Bin<const D: usize> {
     pub block: Octant<D>,
     /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
     pub around: [u32; 27],
-    /// Which stencils (by base, see [`GridPlan::touched`]) reach a constrained node, if any does.
+    /// Its constrained nodes among [`GridPlan::constraints`], if it has any.
     pub touched: Option<u32>,
 }
 
@@ -82,10 +83,8 @@ pub struct GridPlan<const D: usize> {
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of blocks with first moments.
     pub moment_blocks: usize,
-    /// Per table of [`Bin::touched`], the second moments `S` of the arena's nodes, m².
-    pub second: Vec<Vec<Row>>,
-    /// Tables of [`Bin::touched`], each `(BLOCK + 1)^D` long: base `-1..=3` per axis, first axis fastest.
-    pub touched: Vec<Vec<bool>>,
+    /// Constrained nodes of arenas, for [`Bin::touched`].
+    pub constraints: Arc<Vec<ArenaConstraints>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -118,8 +117,7 @@ impl<const D: usize> GridPlan<D> {
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
             moment_blocks: 0,
-            second: Vec::new(),
-            touched: Vec::new(),
+            constraints: Arc::default(),
             rounds,
             tree,
         };
@@ -132,14 +130,14 @@ impl<const D: usize> GridPlan<D> {
         plan.link_levels(&number);
         plan.find_face_nodes();
         let spread = plan.constraint_spread();
-        plan.second = vec![Vec::new(); plan.touched.len()];
-        for number in 0..plan.bins.len() {
-            if let Some(table) = plan.bins[number].touched
-                && plan.second[table as usize].is_empty()
-            {
-                plan.second[table as usize] = plan.arena_of(&plan.bins[number].around, &spread);
+        let mut constraints = Vec::new();
+        for bin in &plan.bins {
+            // Numbers were given in the order of the first bin that has them.
+            if bin.touched == Some(constraints.len() as u32) {
+                constraints.push(ArenaConstraints::new(&plan.blocks, &bin.around, &spread));
             }
         }
+        plan.constraints = Arc::new(constraints);
         plan
     }
 
@@ -179,7 +177,7 @@ impl<const D: usize> GridPlan<D> {
             + self.feeders.heap_bytes()
             + self.pieces.capacity() * size_of::<Piece>()
             + self.parts.capacity() * size_of::<Part>()
-            + self.second.iter().map(|table| table.capacity() * size_of::<Row>()).sum::<usize>()
+            + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
 
     fn list_blocks(&mut self, needed: &NeededBlocks<D>) {
@@ -235,6 +233,7 @@ impl<const D: usize> GridPlan<D> {
         let own = self.tree.leaves().len() - self.tree.ghost_len();
         // Bins of several leaves may have one block; what depends on the block is made once.
         let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
+        let mut constrained = 0;
         for leaf in 0..own {
             self.leaf_start.push(self.bins.len() as u32);
             for block in potential_bins(&self.tree, first + leaf) {
@@ -252,46 +251,12 @@ impl<const D: usize> GridPlan<D> {
                         *slot = found;
                     }
                 }
-                let touched = self.touched_bases(&around);
+                let touched = has_constrained(&self.blocks, &around).then_some(constrained);
+                constrained += u32::from(touched.is_some());
                 self.bins.push(Bin { leaf: leaf as u32, block, around, touched });
             }
         }
         self.leaf_start.push(self.bins.len() as u32);
-    }
-
-    /// Table of the stencil bases that reach a constrained node, or `None` if there is no such base.
-    fn touched_bases(&mut self, around: &[u32; 27]) -> Option<u32> {
-        let mut constrained = vec![false; ARENA_EDGE.pow(D as u32)];
-        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
-            if block != NO_BLOCK {
-                let mask = self.blocks[block as usize].constrained & arena_overlap::<D>(offset(index));
-                for bit in bits(mask) {
-                    constrained[arena_index::<D>(index, bit)] = true;
-                }
-            }
-        }
-        if !constrained.contains(&true) {
-            return None;
-        }
-        // Along each axis in turn, a base reaches what the three nodes from it reach.
-        let mut reached = constrained;
-        for axis in 0..D {
-            let step = ARENA_EDGE.pow(axis as u32);
-            for node in 0..reached.len() {
-                if node / step % ARENA_EDGE < ARENA_EDGE - 2 {
-                    reached[node] |= reached[node + step] | reached[node + 2 * step];
-                }
-            }
-        }
-        let bases = ARENA_EDGE - 2;
-        let table: Vec<bool> = (0..bases.pow(D as u32))
-            .map(|base| {
-                let node = |axis: u32| base / bases.pow(axis) % bases * ARENA_EDGE.pow(axis);
-                reached[(0..D as u32).map(node).sum::<usize>()]
-            })
-            .collect();
-        self.touched.push(table);
-        Some(self.touched.len() as u32 - 1)
     }
 
     fn find_face_nodes(&mut self) {
@@ -311,22 +276,6 @@ impl<const D: usize> GridPlan<D> {
                 }
             }
         }
-    }
-
-    /// The rows of moment nodes as they stand in the arena of a bin; zero elsewhere.
-    fn arena_of(&self, around: &[u32; 27], rows: &[Row]) -> Vec<Row> {
-        let mut arena = vec![Row([0.0; 4]); ARENA_EDGE.pow(D as u32)];
-        let nodes = block_nodes(D);
-        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
-            if block == NO_BLOCK {
-                continue;
-            }
-            let Some(slot) = self.blocks[block as usize].moments else { continue };
-            for bit in bits(arena_overlap::<D>(offset(index))) {
-                arena[arena_index::<D>(index, bit)] = rows[slot as usize * nodes + bit as usize];
-            }
-        }
-        arena
     }
 
     /// Place of a node's first moments, if its block has any.

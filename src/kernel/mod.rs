@@ -9,6 +9,7 @@ use self::simd::{F64x4, Lanes};
 use crate::material::Material;
 
 mod batch;
+pub mod constrained;
 pub mod domain;
 pub mod g2p;
 pub mod math;
@@ -75,7 +76,7 @@ pub struct Frame<const D: usize> {
 pub enum Select<'a> {
     /// All, in the order of the chunk.
     All,
-    /// These, in this order; no index twice.
+    /// These; ascending, no index twice.
     List(&'a [u32]),
 }
 

@@ -83,6 +83,18 @@ pub struct Chunk<const D: usize> {
     tags: Vec<u64>,
 }
 
+/// Where the columns of a chunk lie in memory: from the chunk that comes next, kernels fetch the first lines while they
+/// are still at work on this one. Holds no borrow; an address that is no longer right costs time and nothing else.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    /// Address of the first column; 0 if there are no particles.
+    pub columns: usize,
+    /// Bytes from column to column.
+    pub stride: usize,
+    /// Address of the tags.
+    pub tags: usize,
+}
+
 /// Capacities are multiples of this, so that a batch of lanes never reads past a column.
 const CAPACITY_STEP: usize = 8;
 
@@ -144,6 +156,15 @@ impl<const D: usize> Chunk<D> {
     /// the latter.
     pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
         (cast_slice_mut(&mut self.lines), self.capacity, &self.tags[..self.len])
+    }
+
+    /// Where the columns lie in memory.
+    pub fn place(&self) -> Place {
+        if self.is_empty() {
+            return Place::default();
+        }
+        let stride = self.capacity * size_of::<f64>();
+        Place { columns: self.lines.as_ptr().addr(), stride, tags: self.tags.as_ptr().addr() }
     }
 
     /// Identifiers, unique over the run.

@@ -14,6 +14,7 @@ pub mod rebalance;
 mod records;
 pub mod regrid;
 pub mod resample;
+mod sides;
 pub mod time_step;
 pub mod totals;
 pub mod transfer;
