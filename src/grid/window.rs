@@ -58,29 +58,6 @@ impl<const D: usize> Window<D> {
         }))
     }
 
-    /// The bounds packed into a word.
-    pub fn to_bits(self) -> u64 {
-        (0..D).fold(0, |bits, axis| {
-            bits | u64::from(self.lower[axis]) << (8 * axis) | u64::from(self.upper[axis]) << (8 * axis + 32)
-        })
-    }
-
-    /// Inverse of [`Window::to_bits`].
-    pub fn from_bits(bits: u64) -> Self {
-        let of = |shift: usize| (bits >> shift & 7) as u8;
-        Self { lower: std::array::from_fn(|a| of(8 * a)), upper: std::array::from_fn(|a| of(8 * a + 32)) }
-    }
-
-    /// Whether the block at offset number `index` from the bin shares a node.
-    pub fn reaches(&self, index: usize) -> bool {
-        let towards = offset::<D>(index);
-        (0..D).all(|axis| match towards[axis] {
-            -1 => self.lower[axis] == 0,
-            0 => self.lower[axis] < 5 && self.upper[axis] > 1,
-            _ => self.upper[axis] > 5,
-        })
-    }
-
     /// All nodes, in runs of consecutive ones.
     pub fn for_each_run(&self, mut f: impl FnMut(std::ops::Range<usize>)) {
         if *self == Self::FULL {
@@ -196,8 +173,6 @@ mod tests {
                     .collect();
                 let mask = expected.iter().fold(0, |mask, &(_, bit)| mask | 1 << bit);
                 assert_eq!(window.nodes_of(index), mask);
-                assert_eq!(Window::from_bits(window.to_bits()), window);
-                assert_eq!(window.reaches(index), !expected.is_empty());
                 assert_eq!(found, expected);
             }
         }
