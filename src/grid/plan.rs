@@ -7,7 +7,7 @@ use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
-use super::constrained::{ArenaConstraints, has_constrained};
+use super::constrained::{ArenaConstraints, Tables, has_constrained};
 use super::constraint::node_coord;
 use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
@@ -171,14 +171,17 @@ impl<const D: usize> GridPlan<D> {
             plan.is_seam[part.block as usize] = true;
         }
         let spread = plan.constraint_spread();
-        let mut constraints = Vec::new();
-        for bin in &plan.bins {
-            // Numbers were given in the order of the first bin that has them.
-            if bin.touched == Some(constraints.len() as u32) {
-                constraints.push(ArenaConstraints::new(&plan.blocks, &bin.around, &spread));
+        let (mut tables, mut number) = (Tables::default(), Vec::new());
+        for bin in &mut plan.bins {
+            if let Some(of_block) = bin.touched {
+                // So far blocks are numbered, in the order of the first bin that has them.
+                if of_block as usize == number.len() {
+                    number.push(tables.number(&plan.blocks, &bin.around, &spread));
+                }
+                bin.touched = Some(number[of_block as usize]);
             }
         }
-        plan.constraints = Arc::new(constraints);
+        plan.constraints = Arc::new(tables.finish());
         plan
     }
 
