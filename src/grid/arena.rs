@@ -50,6 +50,13 @@ pub struct ArenaMut<'a, const D: usize> {
     pub moments: &'a mut [Moments<D>],
 }
 
+impl<const D: usize> Arena<'_, D> {
+    /// First moments of a node inside the window; `None` for bins without.
+    pub fn moments_at(&self, node: usize) -> Option<Moments<D>> {
+        self.moments.map(|moments| moments.at(node))
+    }
+}
+
 impl<const D: usize> ArenaMut<'_, D> {
     /// Sets the nodes of a window and all moments to zero.
     pub fn clear(&mut self, window: &Window<D>) {

@@ -98,9 +98,8 @@ impl<'a, const D: usize> ArenaMoments<'a, D> {
         numbers.map(move |(bit, number)| (bit, &self.values[number]))
     }
 
-    /// Moments of node `bit` of the block at offset number `index`; zero if it is not constrained.
-    pub fn at(self, index: usize, bit: u32) -> Moments<D> {
-        let number = self.constraints.nodes.place(arena_index::<D>(index, bit));
-        number.map_or([Row::default(); D], |number| self.values[number])
+    /// Moments of a node of the arena; zero if it is not constrained.
+    pub fn at(self, node: usize) -> Moments<D> {
+        self.constraints.nodes.place(node).map_or([Row::default(); D], |number| self.values[number])
     }
 }

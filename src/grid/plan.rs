@@ -9,18 +9,16 @@ use rustc_hash::FxHashMap;
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
 use super::constrained::{ArenaConstraints, Tables, has_constrained};
 use super::constraint::node_coord;
+use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use super::reach::potential_bins;
+use super::sources::{Part, Piece};
 use crate::kernel::ARENA_EDGE;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;
-
-/// Number of a bin of this rank.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct BinId(pub u32);
 
 /// A block of `4^D` nodes.
 #[derive(Clone, Copy, Debug)]
@@ -55,41 +53,6 @@ pub struct Bin<const D: usize> {
     pub touched: Option<u32>,
 }
 
-/// Where an arena comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// An own bin.
-    Own(BinId),
-    /// A received bin: number among [`GridPlan::received`].
-    Received(u32),
-}
-
-/// A bin of another rank that contributes here, with the nodes needed of it.
-#[derive(Clone, Debug)]
-pub struct ReceivedBin<const D: usize> {
-    /// Owner.
-    pub rank: usize,
-    /// Known leaf whose particles it takes.
-    pub leaf: u32,
-    /// Level and block coordinate of the arena.
-    pub block: Octant<D>,
-    /// Needed nodes by block.
-    pub parts: Vec<ReceivedNodes>,
-}
-
-/// Nodes of a received bin that fall into one block.
-#[derive(Clone, Copy, Debug)]
-pub struct ReceivedNodes {
-    /// The block.
-    pub block: u32,
-    /// Offset number of the block from the bin.
-    pub offset: u8,
-    /// Needed nodes.
-    pub nodes: u64,
-    /// Those that are constrained.
-    pub constrained: u64,
-}
-
 /// The grid of one rank. Valid for one revision of the forest.
 pub struct GridPlan<const D: usize> {
     /// Revision of the forest it was made for.
@@ -106,11 +69,12 @@ pub struct GridPlan<const D: usize> {
     pub bins: Vec<Bin<D>>,
     /// First bin of each own leaf, and the number of bins at the end.
     pub leaf_start: Vec<u32>,
-    /// Bins of other ranks that contribute to sums here, by rank, leaf and bin.
-    pub received: Vec<ReceivedBin<D>>,
-    /// All bins whose arenas enter sums here, in canonical order: by source leaf along the curve, level, and
-    /// curve position of the block.
-    pub sources: Vec<Source>,
+    /// Which own bins reach each block.
+    pub feeders: Feeders,
+    /// Sums that this rank needs of others, by rank.
+    pub pieces: Vec<Piece>,
+    pub(super) parts: Vec<Part>,
+    pub(super) part_start: Vec<u32>,
     /// Per level, restriction into its nodes from constrained nodes one level finer.
     pub restriction: Vec<Links>,
     /// Per level, prolongation into its constrained nodes from one level coarser.
@@ -119,8 +83,6 @@ pub struct GridPlan<const D: usize> {
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of blocks with first moments.
     pub moment_blocks: usize,
-    /// Per block, whether received arenas contribute to it.
-    pub is_seam: Vec<bool>,
     /// Constrained nodes of arenas, for [`Bin::touched`].
     pub constraints: Arc<Vec<ArenaConstraints>>,
     /// Rounds that the ghost layer took to close.
@@ -147,13 +109,14 @@ impl<const D: usize> GridPlan<D> {
             level_start: Vec::new(),
             bins: Vec::new(),
             leaf_start: Vec::new(),
-            received: Vec::new(),
-            sources: Vec::new(),
+            feeders: Feeders::default(),
+            pieces: Vec::new(),
+            parts: Vec::new(),
+            part_start: Vec::new(),
             restriction: Vec::new(),
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
             moment_blocks: 0,
-            is_seam: Vec::new(),
             constraints: Arc::default(),
             rounds,
             tree,
@@ -162,14 +125,10 @@ impl<const D: usize> GridPlan<D> {
         let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.list_bins(&number);
-        plan.list_received(comm.rank());
-        plan.list_sources();
+        plan.feeders = Feeders::new(&plan.tree, &plan.bins, plan.blocks.len());
+        plan.list_pieces(comm.rank());
         plan.link_levels(&number);
         plan.find_face_nodes();
-        plan.is_seam = vec![false; plan.blocks.len()];
-        for part in plan.received.iter().flat_map(|bin| &bin.parts) {
-            plan.is_seam[part.block as usize] = true;
-        }
         let spread = plan.constraint_spread();
         let (mut tables, mut number) = (Tables::default(), Vec::new());
         for bin in &mut plan.bins {
@@ -218,7 +177,9 @@ impl<const D: usize> GridPlan<D> {
         self.tree.heap_bytes()
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
-            + self.sources.capacity() * size_of::<Source>()
+            + self.feeders.heap_bytes()
+            + self.pieces.capacity() * size_of::<Piece>()
+            + self.parts.capacity() * size_of::<Part>()
             + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
 
@@ -299,12 +260,6 @@ impl<const D: usize> GridPlan<D> {
             }
         }
         self.leaf_start.push(self.bins.len() as u32);
-    }
-
-    /// Own bins by known source leaf and block.
-    pub(super) fn own_bins(&self) -> FxHashMap<(u32, Octant<D>), u32> {
-        let first = self.tree.first_own() as u32;
-        self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
     }
 
     fn find_face_nodes(&mut self) {

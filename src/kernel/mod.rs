@@ -50,7 +50,13 @@ impl Row {
     /// Adds another row.
     #[inline(always)]
     pub fn add(&mut self, other: &Self) {
-        self.0 = (F64x4::new(self.0) + F64x4::new(other.0)).to_array();
+        *self = self.plus(other);
+    }
+
+    /// The sum of two rows.
+    #[inline(always)]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self((F64x4::new(self.0) + F64x4::new(other.0)).to_array())
     }
 }
 

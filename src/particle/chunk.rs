@@ -230,34 +230,35 @@ impl<const D: usize> Chunk<D> {
         first
     }
 
-    /// All columns as bytes, to send the particles to another rank of the same job.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut words: Vec<u64> = Vec::with_capacity(1 + self.len * (Layout::<D>::REALS + 2));
-        words.push(self.len as u64);
+    /// Appends all columns as bytes, to send the particles to another rank of the same job.
+    pub fn append_to(&self, bytes: &mut Vec<u8>) {
+        bytes.reserve(8 * self.len * (Layout::<D>::REALS + 2));
         for column in 0..Layout::<D>::REALS {
-            words.extend(self.column(column).iter().map(|value| value.to_bits()));
+            bytes.extend_from_slice(cast_slice(self.column(column)));
         }
-        words.extend(self.ids());
-        words.extend(self.tags());
-        bytemuck::cast_slice(&words).to_vec()
+        bytes.extend_from_slice(cast_slice(self.ids()));
+        bytes.extend_from_slice(cast_slice(self.tags()));
     }
 
-    /// The particles that [`Chunk::to_bytes`] packed; empty if the bytes are not of that form.
+    /// The particles that [`Chunk::append_to`] packed; empty if the bytes are not of that form.
     pub fn from_bytes(bytes: &[u8]) -> Self {
-        let mut words = bytes.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
-        let len = words.next().unwrap_or(0) as usize;
-        if bytes.len() != 8 * (1 + len * (Layout::<D>::REALS + 2)) {
-            return Self::new();
-        }
+        let len = bytes.len() / (8 * (Layout::<D>::REALS + 2));
         let mut chunk = Self::with_capacity(len);
-        chunk.extend_zeroed(len);
-        for column in 0..Layout::<D>::REALS {
-            for (value, word) in chunk.column_mut(column).iter_mut().zip(&mut words) {
-                *value = f64::from_bits(word);
-            }
+        if bytes.len() != 8 * len * (Layout::<D>::REALS + 2) || len == 0 {
+            return chunk;
         }
-        chunk.ids_mut().iter_mut().zip(&mut words).for_each(|(id, word)| *id = word);
-        chunk.tags_mut().iter_mut().zip(&mut words).for_each(|(tag, word)| *tag = word);
+        chunk.extend_zeroed(len);
+        let mut columns = bytes.chunks_exact(8 * len);
+        let mut next = |to: &mut [u8]| {
+            if let Some(column) = columns.next() {
+                to.copy_from_slice(column);
+            }
+        };
+        for column in 0..Layout::<D>::REALS {
+            next(cast_slice_mut(chunk.column_mut(column)));
+        }
+        next(cast_slice_mut(chunk.ids_mut()));
+        next(cast_slice_mut(chunk.tags_mut()));
         chunk
     }
 
@@ -364,7 +365,9 @@ mod tests {
             let p = chunk.push_zeroed(id << 40, Tag { material: 1, body: 2, level: 3 });
             chunk.column_mut(Layout::<3>::WORK)[p] = -0.1 * id as f64;
         }
-        let back = Chunk::<3>::from_bytes(&chunk.to_bytes());
+        let mut bytes = Vec::new();
+        chunk.append_to(&mut bytes);
+        let back = Chunk::<3>::from_bytes(&bytes);
         assert_eq!(back.ids(), chunk.ids());
         assert_eq!(back.tags(), chunk.tags());
         for column in 0..Layout::<3>::REALS {
