@@ -57,16 +57,17 @@ impl<const D: usize> Solver<D> {
 
         let (plan, fields) = (&self.grid.plan, &self.grid.fields);
         let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
-        let each = blocks.filter(|(index, _)| fields.active[*index]).fold(empty_sums, |mut sums, (index, block)| {
-            for bit in bits(block.owned) {
-                let node = index * block_nodes(D) + bit as usize;
-                let row = fields.rows[node].0;
-                if row != [0.0; 4] {
-                    add_point(&mut sums, row[3], &row[..D], &plan.node_position(node as u32));
+        let each =
+            blocks.filter(|(index, _)| fields.active[*index]).fold(empty_sums, |mut sums, (index, block)| {
+                for bit in bits(block.owned) {
+                    let node = index * block_nodes(D) + bit as usize;
+                    let row = fields.rows[node].0;
+                    if row != [0.0; 4] {
+                        add_point(&mut sums, row[3], &row[..D], &plan.node_position(node as u32));
+                    }
                 }
-            }
-            sums
-        });
+                sums
+            });
         // Exact sums do not depend on how they are put together.
         let mut sums = each.reduce(empty_sums, |mut sums, others| {
             sums.iter_mut().zip(&others).for_each(|(sum, other)| sum.merge(other));
@@ -200,7 +201,8 @@ fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubl
         let members = Mask::from_bits((1 << LANES.min(chunk.len() - first)) - 1);
         // Columns have room for whole batches.
         let load = |column: usize| reals[column * stride + first..].first_chunk().map(Lanes::load);
-        let load = |column: usize| members.select(load(column).unwrap_or(Lanes::splat(0.0)), Lanes::splat(0.0));
+        let load =
+            |column: usize| members.select(load(column).unwrap_or(Lanes::splat(0.0)), Lanes::splat(0.0));
         let (mass, width) = (load(Layout::<D>::MASS), load(Layout::<D>::HALF) * 2.0);
         let volume = (0..D).fold(Lanes::splat(1.0), |volume, _| volume * width);
         let (mut speed_squared, mut height) = (Lanes::splat(0.0), Lanes::splat(0.0));
@@ -235,7 +237,8 @@ fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first:
     let mut left = (1u32 << tags.len()) - 1;
     while left != 0 {
         let index = material(left.trailing_zeros() as usize);
-        let same = (0..tags.len()).filter(|&lane| material(lane) == index).fold(0, |bits, lane| bits | 1 << lane);
+        let same =
+            (0..tags.len()).filter(|&lane| material(lane) == index).fold(0, |bits, lane| bits | 1 << lane);
         let values = physics.materials[usize::from(index)].energy(&elastic, D == 2);
         energy = Mask::from_bits(same).select(values, energy);
         left &= !same;

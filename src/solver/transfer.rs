@@ -16,12 +16,15 @@ use crate::grid::plan::Bin;
 use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, prefetch};
 use crate::kernel::{
     BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
 };
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place, Tag};
+
+/// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
+const READ_AHEAD: usize = 25;
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +105,12 @@ fn constrained<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Optio
     Some(&plan.constraints[bin.touched? as usize].nodes)
 }
 
+/// Asks for the first lines of the arena behind one, which is cleared next.
+fn read_ahead(rows: &[Row]) {
+    let next = rows.as_ptr_range().end.addr();
+    (0..READ_AHEAD).for_each(|line| prefetch(next + 64 * line));
+}
+
 /// The members of a bin.
 struct Selected<'a, const D: usize> {
     whole: Option<Select<'a>>,
@@ -176,6 +185,7 @@ impl<const D: usize> Solver<D> {
                 let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
                 arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
+                read_ahead(rows);
                 let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
                     let moments = nodes.map(|nodes| MomentSums { nodes, sums: &mut *sums });
