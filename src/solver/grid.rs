@@ -145,7 +145,7 @@ impl<const D: usize> Solver<D> {
     /// Moves particles to the leaves that contain them.
     pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {

@@ -11,7 +11,7 @@
 //! the caller tries the combinations of axes in turn.
 use super::super::chunk::Chunk;
 use super::merge::{Limits, of_level};
-use super::{Setting, ids};
+use super::{Setting, ids, patience};
 use crate::particle::chunk::Tag;
 
 /// Lower and upper corner of a leaf, m.
@@ -127,7 +127,11 @@ pub fn separated<const D: usize>(
         let siblings = siblings(chunk, level);
         for family in siblings.chunk_by(same_parent).filter(|family| family.len() < 1 << D) {
             let distance = greatest_distance(setting, limits, family[0].tag, level);
-            if are_torn(chunk, family, distance) {
+            let is_due = |sibling: &Sibling| {
+                let (tag, id) = (chunk.tags()[sibling.p as usize], chunk.ids()[sibling.p as usize]);
+                patience::is_due::<D>(tag, id, setting.turn)
+            };
+            if !family.iter().any(is_due) || are_torn(chunk, family, distance) {
                 continue;
             }
             for sibling in family {

@@ -2,7 +2,7 @@
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
-use super::{Setting, volume};
+use super::{Setting, patience, volume};
 
 /// How different particles may be that become one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,8 @@ pub struct Merged {
     /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
     /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
+    /// Identifiers, ascending, of particles that the limits keep apart.
+    pub refused: Vec<u64>,
 }
 
 /// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
@@ -69,23 +71,29 @@ pub fn merge<const D: usize>(
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
         for among_strangers in [false, true] {
-            let groups = match bounds {
+            let mut groups = match bounds {
                 _ if !among_strangers => families(chunk, level),
                 Some(bounds) => strangers(chunk, setting, limits, bounds, level),
                 None => continue,
             };
+            let is_due = |&p: &u32| {
+                let (tag, id) = (chunk.tags()[p as usize], chunk.ids()[p as usize]);
+                patience::is_due::<D>(tag, id, setting.turn)
+            };
+            groups.retain(|group| group.members.iter().any(is_due));
+            groups.retain(|group| may_merge(centre(chunk, group)));
             if groups.is_empty() {
                 continue;
             }
             unnamed.resize(chunk.len(), false);
-            let mixtures = mixtures(chunk, setting, limits, &groups, level - 1);
+            let mixtures = mixtures(chunk, setting, limits, groups, level - 1, &mut report.refused);
             let mut stays = vec![true; chunk.len()];
             let mut done = Vec::new();
-            for (number, group) in groups.iter().enumerate() {
-                let Some(energy) = mixtures.energy[number] else { continue };
-                if !may_merge(mixtures.chunk.position(number)) {
+            for (number, group) in mixtures.groups.iter().enumerate() {
+                let Some(energy) = mixtures.energy[number] else {
+                    report.refused.extend(group.members.iter().map(|&p| chunk.ids()[p as usize]));
                     continue;
-                }
+                };
                 group.members[1..].iter().for_each(|&p| stays[p as usize] = false);
                 unnamed[group.members[0] as usize] = !group.is_family;
                 done.push((group.members[0], number));
@@ -97,8 +105,19 @@ pub fn merge<const D: usize>(
             replace(chunk, &mut unnamed, &stays, &mut done, &mixtures.chunk);
         }
     }
+    report.refused.sort_unstable();
     report.unnamed = (0..).zip(unnamed).filter(|(_, unnamed)| *unnamed).map(|(p, _)| p).collect();
     report
+}
+
+/// Centre of mass of a group, m.
+fn centre<const D: usize>(chunk: &Chunk<D>, group: &Group) -> [f64; D] {
+    let masses = chunk.column(Layout::<D>::MASS);
+    let total: f64 = group.members.iter().map(|&p| masses[p as usize]).sum();
+    group.members.iter().fold([0.0; D], |centre, &p| {
+        let (x, share) = (chunk.position(p as usize), masses[p as usize] / total);
+        std::array::from_fn(|axis| f64::mul_add(share, x[axis], centre[axis]))
+    })
 }
 
 /// Writes the merged particles (index in the chunk, number in `merged`) over the first of their groups and takes
@@ -186,8 +205,8 @@ fn close<const D: usize>(chunk: &Chunk<D>, group: &mut Vec<u32>, groups: &mut Ve
     groups.extend(smallest.map(|id| Group::new(members, id, false)));
 }
 
-/// Index and packed tag of the particles made for a level.
+/// Index and packed tag, without count, of the particles made for a level.
 pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
-    let tags = (0..).zip(chunk.tags().iter().copied());
+    let tags = (0..).zip(chunk.tags().iter().copied().map(patience::plain));
     tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

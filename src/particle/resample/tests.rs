@@ -34,7 +34,7 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
-    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL }
+    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: 0 }
 }
 
 /// The domain as one leaf.
