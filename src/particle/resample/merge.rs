@@ -71,16 +71,13 @@ pub fn merge<const D: usize>(
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
         for among_strangers in [false, true] {
+            let due: Vec<u32> = patience::due(chunk, level, setting.turn).collect();
             let mut groups = match bounds {
-                _ if !among_strangers => families(chunk, level),
-                Some(bounds) => strangers(chunk, setting, limits, bounds, level),
+                _ if due.is_empty() => continue,
+                _ if !among_strangers => families(chunk, level, &due),
+                Some(bounds) => strangers(chunk, setting, limits, bounds, level, &due),
                 None => continue,
             };
-            let is_due = |&p: &u32| {
-                let (tag, id) = (chunk.tags()[p as usize], chunk.ids()[p as usize]);
-                patience::is_due::<D>(tag, id, setting.turn)
-            };
-            groups.retain(|group| group.members.iter().any(is_due));
             groups.retain(|group| may_merge(centre(chunk, group)));
             if groups.is_empty() {
                 continue;
@@ -147,9 +144,9 @@ fn replace<const D: usize>(
     }
 }
 
-/// Complete families of a level, by identifier. Children in the order of their numbers.
-fn families<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Group> {
-    let siblings = family::siblings(chunk, level);
+/// Complete families of a level with one of the given members, by identifier. Children in the order of their numbers.
+fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Group> {
+    let siblings = family::siblings(chunk, level, &family::parents(chunk, with.iter().copied()));
     let whole = siblings.chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
     whole
         .map(|siblings| Group::new(siblings.iter().map(|child| child.p).collect(), siblings[0].parent, true))
@@ -157,31 +154,38 @@ fn families<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Group> {
 }
 
 /// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
-/// body and cell.
+/// body and cell; in cells where one of the given ones is.
 fn strangers<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
     limits: &Limits,
     bounds: &Bounds<D>,
     level: u8,
+    with: &[u32],
 ) -> Vec<Group> {
-    let waiting = family::waiting(chunk, setting, limits, bounds, level);
-    let mut members: Vec<(u64, [i64; D], u32)> = of_level(chunk, level)
-        .filter(|(p, _)| waiting.binary_search(p).is_err())
-        .map(|(p, tag)| {
-            let spacing = 2.0 * setting.nominal(Tag::unpack(tag), level - 1);
-            (tag, chunk.position(p as usize).map(|x| (x / spacing).floor() as i64), p)
-        })
-        .collect();
+    let cell_of = |p: u32, tag: u64| {
+        let per_spacing = 0.5 / setting.nominal(Tag::unpack(tag), level - 1);
+        (tag, chunk.position(p as usize).map(|x| (x * per_spacing).floor() as i64))
+    };
+    let mut cells: Vec<(u64, [i64; D])> =
+        with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize]))).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let in_cells = of_level(chunk, level).map(|(p, tag)| (cell_of(p, tag), p));
+    let mut members: Vec<((u64, [i64; D]), u32)> =
+        in_cells.filter(|(cell, _)| cells.binary_search(cell).is_ok()).collect();
+    let parents = family::parents(chunk, members.iter().map(|(_, p)| *p));
+    let waiting = family::waiting(chunk, setting, limits, bounds, level, &parents);
+    members.retain(|(_, p)| waiting.binary_search(p).is_err());
     members.sort_unstable();
     let mut groups = Vec::new();
-    for cell in members.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0), level - 1);
+    for cell in members.chunk_by(|a, b| a.0 == b.0) {
+        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0.0), level - 1);
         // A lattice of equal parts fills the volume to round-off.
         let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 1e-9);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
-        for &(_, _, p) in cell {
+        for &(_, p) in cell {
             let part = volume(chunk, p as usize);
             if filled + part > room {
                 close(chunk, &mut group, &mut groups);
@@ -192,6 +196,7 @@ fn strangers<const D: usize>(
         }
         close(chunk, &mut group, &mut groups);
     }
+    groups.retain(|group| group.members.iter().any(|p| with.binary_search(p).is_ok()));
     groups
 }
 

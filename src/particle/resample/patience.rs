@@ -14,8 +14,8 @@ const SHIFT: u32 = 40;
 const BITS: u64 = 7 << SHIFT;
 /// Greatest count of a particle that limits keep from merging: tried at one regrid of 64.
 const REFUSED: u64 = 6;
-/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of four.
-const WAITING: u64 = 2;
+/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of 16.
+const WAITING: u64 = 4;
 /// Bits of the root that neighbours differ in: about as many particles as a leaf has.
 const NEIGHBOURS: u32 = 9;
 
@@ -28,6 +28,13 @@ pub fn plain(tag: u64) -> u64 {
 pub fn is_due<const D: usize>(tag: u64, id: u64, turn: u64) -> bool {
     let phase = turn.wrapping_add(ids::root::<D>(id) >> NEIGHBOURS);
     phase & ((1 << ((tag & BITS) >> SHIFT)) - 1) == 0
+}
+
+/// Particles of a chunk made for a level that are due.
+pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: u64) -> impl Iterator<Item = u32> {
+    let each = (0..).zip(chunk.tags().iter().zip(chunk.ids()));
+    let of_level = each.filter(move |(_, (tag, _))| Tag::unpack(**tag).level == level);
+    of_level.filter(move |(_, (tag, id))| is_due::<D>(**tag, **id, turn)).map(|(p, _)| p)
 }
 
 /// Whether a chunk in a leaf of a level has particles made for finer ones, and whether any of those is due.
@@ -123,7 +130,7 @@ mod tests {
     #[test]
     fn ever_more_rarely() {
         assert_eq!(turns(7, true), [0, 2, 4, 8, 16, 32, 64, 128, 192, 256, 320, 384]);
-        assert_eq!(turns(7, false)[..5], [0, 2, 4, 8, 12]);
+        assert_eq!(turns(7, false)[..7], [0, 2, 4, 8, 16, 32, 48]);
         // Other roots, other times.
         assert_eq!(turns(5 << NEIGHBOURS, true)[5..8], [59, 123, 187]);
     }
