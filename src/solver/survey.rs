@@ -145,7 +145,7 @@ mod tests {
             let most = values.iter().copied().fold(0.0, f64::max);
             assert_eq!(range(&values), [least, most]);
             assert_eq!(greatest(&values), most);
-            assert_eq!(sum(&values), values.iter().sum());
+            assert_eq!(sum(&values), values.iter().sum::<f64>());
         }
     }
 }

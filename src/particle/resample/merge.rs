@@ -11,20 +11,23 @@ pub struct Limits {
     /// wave speed of the undeformed material. The field is fitted to the centres as if these were boxes, so that a
     /// quarter of the affine part may count as difference as well.
     pub velocity: f64,
-    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm), and of the logarithm of the
-    /// plastic volume ratio.
+    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm).
     pub strain: f64,
+    /// Greatest difference from the mean of the logarithm of the plastic volume ratio: by how much some grains are
+    /// further apart than others.
+    pub volume: f64,
     /// Greatest difference of the first history variable (plastic strain) from the mean.
     pub history: f64,
-    /// Greatest half width of the merged box, and of a box about the boxes of the group, over that of an undeformed
+    /// Greatest half width of the merged box, and of a box about the boxes of a family, over that of an undeformed
     /// particle of the new level. Above 1, and below the stretch at which particles split, so that a merge does not
-    /// undo that.
+    /// undo that. A box about those of strangers may be wider by half: they share a cell of the lattice, out of which
+    /// halves of boxes stand.
     pub stretch: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { velocity: 0.005, strain: 0.02, history: 0.2, stretch: 1.5 }
+        Self { velocity: 0.005, strain: 0.02, volume: 0.1, history: 0.2, stretch: 1.5 }
     }
 }
 

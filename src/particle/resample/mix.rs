@@ -89,7 +89,9 @@ pub(super) fn mixtures<const D: usize>(
         out.ids_mut()[number] = group.id;
         out.tags_mut()[number] = tag.pack();
         let (mean, difference) = mix_matter(&mut out, number, chunk, setting, group, &strain[range]);
-        let close = difference.strain <= limits.strain && difference.history <= limits.history;
+        let close = difference.strain <= limits.strain
+            && difference.volume <= limits.volume
+            && difference.history <= limits.history;
         energy.push(close.then_some(motions[number].energy));
         strains.push(mean);
     }
@@ -98,8 +100,10 @@ pub(super) fn mixtures<const D: usize>(
     for (number, half) in setting.territories(&out, Select::All).iter().enumerate() {
         let tag = Tag::unpack(out.tags()[number]);
         // A box that just fits does so to round-off.
-        let greatest = limits.stretch * setting.nominal(tag, level) * (1.0 + 1e-9);
-        if half.iter().chain(&motions[number].reach).any(|&half| half > greatest) {
+        let nominal = setting.nominal(tag, level) * (1.0 + 1e-9);
+        let reach = if groups[number].is_family { limits.stretch } else { limits.stretch + 0.5 };
+        let exceeds = |halves: &[f64; D], limit: f64| halves.iter().any(|&half| half > limit * nominal);
+        if exceeds(half, limits.stretch) || exceeds(&motions[number].reach, reach) {
             energy[number] = None;
         }
         // Strangers that fill less than half of a particle of the level are still one of the finer level, which may
@@ -120,7 +124,7 @@ fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) ->
         group.members.iter().all(|&p| (values[p as usize] - first).abs() <= 2.0 * limit)
     };
     // Either may be as far from the mean on its own side.
-    within(Layout::<D>::HISTORY, limits.history) && within(Layout::<D>::HISTORY + 1, limits.strain)
+    within(Layout::<D>::HISTORY, limits.history) && within(Layout::<D>::HISTORY + 1, limits.volume)
 }
 
 /// Sum of the first `2^k` and the others, so that `2^k` equal numbers have an exact sum.
@@ -252,8 +256,10 @@ fn divide<const D: usize>(n: [[f64; D]; D], mut a: [[f64; D]; D]) -> [[f64; D]; 
 
 /// How the matter of the members of a group differs from the mean.
 struct Difference {
-    /// Of the Hencky strain, and of the logarithm of the plastic volume ratio.
+    /// Of the Hencky strain.
     strain: f64,
+    /// Of the logarithm of the plastic volume ratio.
+    volume: f64,
     /// Of the first history variable.
     history: f64,
 }
@@ -280,14 +286,15 @@ fn mix_matter<const D: usize>(
     let history = |i: usize| -> [f64; HISTORIES] { read(chunk, Layout::<D>::HISTORY, member(i)) };
     let mean_history = mean(&shares, history);
     let mut strain = mean(&shares, |i| strains[i]);
-    let mut difference = Difference { strain: 0.0, history: 0.0 };
+    let mut difference = Difference { strain: 0.0, volume: 0.0, history: 0.0 };
     for (i, own) in strains.iter().enumerate() {
         let square = (0..6).fold(0.0, |square, c| {
             let rest = own[c] - strain[c];
             f64::mul_add(if c < 3 { rest } else { 2.0 * rest }, rest, square)
         });
         let gain = (history(i)[1] - mean_history[1]).abs();
-        difference.strain = difference.strain.max(square.sqrt()).max(gain);
+        difference.strain = difference.strain.max(square.sqrt());
+        difference.volume = difference.volume.max(gain);
         difference.history = difference.history.max((history(i)[0] - mean_history[0]).abs());
     }
 
