@@ -3,11 +3,11 @@
 //! A million particles in blocks of their own, so that columns come from memory as in a run; eight
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of their leaf's
 //! particles, whose stencils touch constrained nodes.
-use agimp::kernel::spread::Constraints;
-use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g, stencil_bases};
+use agimp::kernel::constrained::ConstrainedNodes;
+use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
 use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use agimp::material::{Material, Parameters, build};
-use agimp::particle::chunk::{Chunk, Layout, Tag};
+use agimp::particle::chunk::{Chunk, Layout, Place, Tag};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -107,7 +107,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None);
+            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None, Place::default());
         }
         arena[100 % arena_nodes(D)]
     });
@@ -121,13 +121,28 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
-            greatest.max(g2p::gather(chunk, Select::All, &setting.frame, &scheme, DT, &fields))
+            greatest.max(g2p::gather(
+                chunk,
+                Select::All,
+                &setting.frame,
+                &scheme,
+                DT,
+                &fields,
+                Place::default(),
+            ))
         })
     });
 }
 
 /// Of how many particles in four a block beside a level jump has, and whether their stencils touch constrained nodes.
 const MIXES: [(u32, bool); 5] = [(4, false), (4, true), (3, false), (3, true), (1, true)];
+
+/// Three layers of constrained nodes, as beside a face.
+fn constrained() -> ConstrainedNodes {
+    ConstrainedNodes::new::<3>(
+        (0..arena_nodes(3)).filter(|node| node % 7 < 3).map(|node| (node, Row::default())),
+    )
+}
 
 /// The particles that a block of a level mix has, in each leaf: whole quarters along x, as beside a face.
 fn members(quarters: u32) -> Vec<u32> {
@@ -139,15 +154,23 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut arena = vec![Row::default(); arena_nodes(3)];
     let mut sums = vec![[Row::default(); 3]; arena_nodes(3)];
-    let (touched, second) = (vec![true; stencil_bases(3)], vec![Row::default(); arena_nodes(3)]);
+    let nodes = constrained();
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<3>()) {
             arena.fill(Row::default());
-            let constraints = Constraints { touched: &touched, second: &second };
-            let moments = jump.then_some(p2g::MomentSums { constraints, sums: &mut sums });
-            p2g::scatter(chunk, Select::List(&list), &setting.frame, &scheme, DT, &mut arena, moments);
+            let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut sums });
+            p2g::scatter(
+                chunk,
+                Select::List(&list),
+                &setting.frame,
+                &scheme,
+                DT,
+                &mut arena,
+                moments,
+                Place::default(),
+            );
         }
         arena[100]
     });
@@ -157,14 +180,22 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
 fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
-    let (touched, first) = (vec![true; stencil_bases(3)], vec![[Row::default(); 3]; arena_nodes(3)]);
+    let (nodes, first) = (constrained(), vec![[Row::default(); 3]; arena_nodes(3)]);
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
         let scheme = setting.scheme();
-        let moments = jump.then_some(g2p::Moments { touched: &touched, first: &first });
+        let moments = jump.then_some(g2p::Moments { nodes: &nodes, first: &first });
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
-            greatest.max(g2p::gather(chunk, Select::List(&list), &setting.frame, &scheme, DT, &fields))
+            greatest.max(g2p::gather(
+                chunk,
+                Select::List(&list),
+                &setting.frame,
+                &scheme,
+                DT,
+                &fields,
+                Place::default(),
+            ))
         })
     });
 }

@@ -32,4 +32,4 @@ pub use forest::Forest;
 pub use key::{Brick, MAX_LEVEL, MAX_ROOTS, Octant};
 pub use migrate::Shipment;
 pub use search::Region;
-pub use weight::Cuts;
+pub use weight::{CutAt, Cuts};

@@ -5,7 +5,7 @@ use std::ops::Range;
 use bytemuck::Pod;
 
 use crate::forest::owner;
-use crate::weight::{self, Cuts};
+use crate::weight::{self, CutAt, Cuts};
 use crate::{Comm, Forest, Octant};
 
 /// Which leaves a [`Forest::partition`] has moved, so that what belongs to them can follow.
@@ -21,15 +21,15 @@ pub struct Shipment {
 
 impl<const D: usize> Forest<D> {
     /// Collective. Moves the cuts between ranks so that each gets an equal share of the weight, up
-    /// to half a family, and moves the leaves accordingly. The tree stays.
+    /// to half a leaf or half a family, and moves the leaves accordingly. The tree stays.
     ///
     /// The new partition depends on the leaves, their `weights` and the number of ranks only, not
-    /// on the present one. Sibling leaves are kept on one rank. Ranks may end empty.
+    /// on the present one. Ranks may end empty.
     ///
     /// # Panics
     /// If there is not one weight per leaf or the sum of all weights exceeds 64 bits.
-    pub fn partition(&mut self, comm: &Comm, weights: &[u64]) -> Shipment {
-        let cuts = self.plan_partition(comm, weights);
+    pub fn partition(&mut self, comm: &Comm, weights: &[u64], at: CutAt) -> Shipment {
+        let cuts = self.plan_partition(comm, weights, at);
         self.partition_at(comm, cuts)
     }
 
@@ -38,8 +38,8 @@ impl<const D: usize> Forest<D> {
     ///
     /// # Panics
     /// As [`Forest::partition`].
-    pub fn plan_partition(&self, comm: &Comm, weights: &[u64]) -> Cuts {
-        weight::cuts(self, comm, weights)
+    pub fn plan_partition(&self, comm: &Comm, weights: &[u64], at: CutAt) -> Cuts {
+        weight::cuts(self, comm, weights, at)
     }
 
     /// Collective. Moves the cuts between ranks to the given places, and the leaves accordingly. The tree stays.
@@ -120,58 +120,79 @@ impl Shipment {
         self.kept.clone()
     }
 
-    /// Collective. Moves one list per old leaf and returns one list per new leaf. Lists of leaves
-    /// that stay are not copied; those of leaves that leave are freed while they are packed. May be
-    /// called any number of times, for different things.
+    /// Collective. Moves one list per old leaf and returns one list per new leaf; see [`Shipment::move_items`].
     ///
     /// # Panics
     /// If there is not one list per old leaf.
-    pub fn move_payload<T: Pod>(&self, comm: &Comm, mut per_leaf: Vec<Vec<T>>) -> Vec<Vec<T>> {
-        assert_eq!(per_leaf.len(), self.old_len, "one list per leaf");
-        let pack = |(to, range): &(usize, Range<usize>)| (*to, pack(&mut per_leaf[range.clone()]));
-        let outgoing = self.sends.iter().map(pack).collect();
+    pub fn move_payload<T: Pod>(&self, comm: &Comm, per_leaf: Vec<Vec<T>>) -> Vec<Vec<T>> {
+        let append = |list: &Vec<T>, bytes: &mut Vec<u8>| bytes.extend_from_slice(bytemuck::cast_slice(list));
+        self.move_items(comm, per_leaf, append, bytemuck::allocation::pod_collect_to_vec)
+    }
+
+    /// Collective. Moves one item per old leaf and returns one item per new leaf. Items of leaves that stay are not
+    /// touched; those of leaves that leave are `append`ed to a message, freed, and made anew from their bytes. May be
+    /// called any number of times, for different things.
+    ///
+    /// # Panics
+    /// If there is not one item per old leaf.
+    pub fn move_items<T>(
+        &self,
+        comm: &Comm,
+        per_leaf: Vec<T>,
+        append: impl Fn(&T, &mut Vec<u8>),
+        from_bytes: impl Fn(&[u8]) -> T,
+    ) -> Vec<T> {
+        assert_eq!(per_leaf.len(), self.old_len, "one item per leaf");
+        let (kept_old, kept_new) = self.kept();
+        let mut kept = Vec::with_capacity(kept_old.len());
+        let mut sends = self.sends.iter().peekable();
+        let mut outgoing = Vec::with_capacity(self.sends.len());
+        let mut items = per_leaf.into_iter().enumerate();
+        while let Some((leaf, item)) = items.next() {
+            if kept_old.contains(&leaf) {
+                kept.push(item);
+            } else if let Some((to, range)) = sends.next_if(|(_, range)| range.start == leaf) {
+                let rest = items.by_ref().take(range.len() - 1).map(|(_, item)| item);
+                outgoing.push((*to, pack(std::iter::once(item).chain(rest), range.len(), &append)));
+            }
+        }
         let received = comm.sparse_exchange(outgoing);
         assert!(
             received.iter().map(|(source, _)| source).eq(self.receives.iter().map(|(source, _)| source)),
-            "payload comes from the ranks that sent leaves"
+            "items come from the ranks that sent leaves"
         );
         let mut result = Vec::with_capacity(self.new_len);
-        let (kept_old, kept_new) = self.kept();
-        let mut kept = Some(per_leaf.drain(kept_old));
         for ((_, range), (_, bytes)) in self.receives.iter().zip(received) {
-            if range.start >= kept_new.start
-                && let Some(kept) = kept.take()
-            {
-                result.extend(kept);
+            if range.start >= kept_new.start {
+                result.append(&mut kept);
             }
-            unpack(&bytes, range.len(), &mut result);
+            unpack(&bytes, range.len(), &from_bytes, &mut result);
         }
-        result.extend(kept.into_iter().flatten());
-        assert_eq!(result.len(), self.new_len, "one list per new leaf");
+        result.append(&mut kept);
+        assert_eq!(result.len(), self.new_len, "one item per new leaf");
         result
     }
 }
 
-/// The lengths of the lists, then their items. Empties the lists.
-fn pack<T: Pod>(lists: &mut [Vec<T>]) -> Vec<u8> {
-    let items: usize = lists.iter().map(Vec::len).sum();
-    let mut bytes = Vec::with_capacity(8 * lists.len() + items * size_of::<T>());
-    for list in lists.iter() {
-        bytes.extend_from_slice(&(list.len() as u64).to_ne_bytes());
-    }
-    for list in lists {
-        bytes.extend_from_slice(bytemuck::cast_slice(&std::mem::take(list)));
+/// The lengths of the items in bytes, then their bytes.
+fn pack<T>(items: impl Iterator<Item = T>, count: usize, append: impl Fn(&T, &mut Vec<u8>)) -> Vec<u8> {
+    let mut bytes = vec![0; 8 * count];
+    for (number, item) in items.enumerate() {
+        let start = bytes.len();
+        append(&item, &mut bytes);
+        let length = (bytes.len() - start) as u64;
+        bytes[8 * number..][..8].copy_from_slice(&length.to_ne_bytes());
     }
     bytes
 }
 
-/// Inverse of [`pack`]: appends `count` lists.
-fn unpack<T: Pod>(bytes: &[u8], count: usize, lists: &mut Vec<Vec<T>>) {
-    let (lengths, mut items) = bytes.split_at(8 * count);
+/// Inverse of [`pack`]: appends `count` items.
+fn unpack<T>(bytes: &[u8], count: usize, from_bytes: impl Fn(&[u8]) -> T, items: &mut Vec<T>) {
+    let (lengths, mut rest) = bytes.split_at(8 * count);
     for length in bytemuck::allocation::pod_collect_to_vec::<u8, u64>(lengths) {
-        let (list, rest) = items.split_at(length as usize * size_of::<T>());
-        lists.push(bytemuck::allocation::pod_collect_to_vec(list));
-        items = rest;
+        let (item, after) = rest.split_at(length as usize);
+        items.push(from_bytes(item));
+        rest = after;
     }
-    assert!(items.is_empty(), "payload is as long as its lengths say");
+    assert!(rest.is_empty(), "items are as long as their lengths say");
 }

@@ -2,6 +2,15 @@
 
 use crate::{Brick, Comm, Forest, Octant};
 
+/// Where the curve may be cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CutAt {
+    /// Between leaves that are not siblings: families stay whole, as [`Forest::adapt`] needs them to coarsen.
+    Families,
+    /// Between any two leaves: shares are more even.
+    Leaves,
+}
+
 /// A place where the curve may be cut, between two leaves.
 #[derive(Clone, Copy, Debug)]
 struct Boundary {
@@ -39,12 +48,11 @@ impl Cuts {
 
 /// Collective. Cuts that share out the weight: cut `r` is the boundary nearest to `r / ranks` of
 /// the total weight (the earlier one of two equally near; next to the ideal place along the curve if
-/// leaves without weight leave a choice). Boundaries lie between leaves that are
-/// not siblings, so families stay whole. Depends on the leaves, their weights and the number of
+/// leaves without weight leave a choice). Depends on the leaves, their weights and the number of
 /// ranks only, not on the present partition. If all weights are 0, all count the same.
 ///
 /// One gather of five integers per rank and one reduction of two integers per rank.
-pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u64]) -> Cuts {
+pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u64], at: CutAt) -> Cuts {
     assert_eq!(weights.len(), forest.leaves.len(), "one weight per leaf");
     let leaves = &forest.leaves;
     let mut before = Vec::with_capacity(leaves.len());
@@ -53,8 +61,9 @@ pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u
         before.push(own_weight);
         own_weight = own_weight.checked_add(weight).expect("weights of a rank exceed 64 bits");
     }
-    // Whether the first leaf starts a run of siblings depends on the rank before; others are known.
-    let starts_run = |i: usize| !leaves[i].is_sibling(&leaves[i - 1]);
+    // Whether the curve may be cut before the first leaf depends on the rank before; others are known.
+    let may_part = |one: &Octant<D>, next: &Octant<D>| at == CutAt::Leaves || !one.is_sibling(next);
+    let starts_run = |i: usize| may_part(&leaves[i - 1], &leaves[i]);
     let second = (1..leaves.len()).find(|&i| starts_run(i));
     let summaries = comm.all_gather_u64(&[
         own_weight,
@@ -68,7 +77,7 @@ pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u
         .try_fold(0u64, |sum, s| sum.checked_add(s[0]))
         .expect("weights of all ranks exceed 64 bits");
     if total == 0 {
-        return cuts(forest, comm, &vec![1; leaves.len()]);
+        return cuts(forest, comm, &vec![1; leaves.len()], at);
     }
 
     // First boundary of each rank (if any) and weight before each rank, from the summaries.
@@ -78,7 +87,7 @@ pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u
     let (mut weight_before, mut last) = (0u64, None::<Octant<D>>);
     for summary in summaries.chunks_exact(SUMMARY) {
         let first = Octant::<D>::from_code(summary[1]);
-        let starts = first.is_some_and(|first| last.is_none_or(|last| !last.is_sibling(&first)));
+        let starts = first.is_some_and(|first| last.is_none_or(|last| may_part(&last, &first)));
         rank_before.push(weight_before);
         first_starts.push(starts);
         first_boundary.push(match first {

@@ -1,4 +1,7 @@
 //! Arenas: what the particles of each bin scattered, before nodes sum it up.
+use std::sync::Arc;
+
+use super::constrained::{ArenaConstraints, ArenaMoments};
 use super::plan::GridPlan;
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
@@ -17,8 +20,11 @@ pub struct Arenas<const D: usize> {
     moments: Vec<Moments<D>>,
     /// Per bin, number of its arena.
     slot: Vec<u32>,
-    /// Per bin, number of its moments.
-    moment_slot: Vec<u32>,
+    /// Per bin, its constrained nodes among `constraints`.
+    touched: Vec<Option<u32>>,
+    /// First of the moments of each bin, and their number at the end.
+    moment_start: Vec<u32>,
+    constraints: Arc<Vec<ArenaConstraints>>,
     /// Per bin, the nodes that its particles touch.
     windows: Vec<Window<D>>,
 }
@@ -29,7 +35,7 @@ pub struct Arena<'a, const D: usize> {
     /// Momentum and mass; values outside the window are left over from earlier steps.
     pub rows: &'a [Row],
     /// First moments, for bins that touch constrained nodes.
-    pub moments: Option<&'a [Moments<D>]>,
+    pub moments: Option<ArenaMoments<'a, D>>,
     /// The nodes that hold values.
     pub window: Window<D>,
 }
@@ -40,53 +46,62 @@ pub struct ArenaMut<'a, const D: usize> {
     pub bin: usize,
     /// Momentum and mass.
     pub rows: &'a mut [Row],
-    /// First moments, for bins that touch constrained nodes.
-    pub moments: Option<&'a mut [Moments<D>]>,
+    /// First moments of the constrained nodes, in the order of [`ArenaConstraints`].
+    pub moments: &'a mut [Moments<D>],
+}
+
+impl<const D: usize> Arena<'_, D> {
+    /// First moments of a node inside the window; `None` for bins without.
+    pub fn moments_at(&self, node: usize) -> Option<Moments<D>> {
+        self.moments.map(|moments| moments.at(node))
+    }
 }
 
 impl<const D: usize> ArenaMut<'_, D> {
-    /// Sets the nodes of a window to zero.
+    /// Sets the nodes of a window and all moments to zero.
     pub fn clear(&mut self, window: &Window<D>) {
-        window.for_each_run(|run| {
-            self.rows[run.clone()].fill(Row([0.0; 4]));
-            if let Some(moments) = &mut self.moments {
-                moments[run].fill([Row([0.0; 4]); D]);
-            }
-        });
+        window.for_each_run(|run| self.rows[run].fill(Row([0.0; 4])));
+        self.moments.fill([Row([0.0; 4]); D]);
     }
 }
 
 impl<const D: usize> Arenas<D> {
     /// Makes room for the bins that `window` gives nodes. Contents are left over from earlier steps.
     pub fn occupy(&mut self, plan: &GridPlan<D>, window: impl Fn(usize) -> Option<Window<D>>) {
-        let (mut slots, mut moment_slots) = (0, 0);
+        let (mut slots, mut moments) = (0, 0);
+        self.constraints = Arc::clone(&plan.constraints);
         self.slot.resize(plan.bins.len(), NONE);
-        self.moment_slot.resize(plan.bins.len(), NONE);
+        self.touched.resize(plan.bins.len(), None);
         self.windows.resize(plan.bins.len(), Window::EMPTY);
-        for (bin, touched) in plan.bins.iter().map(|bin| bin.touched.is_some()).enumerate() {
-            let window = window(bin);
+        self.moment_start.clear();
+        for (number, bin) in plan.bins.iter().enumerate() {
+            let window = window(number);
             let occupied = window.is_some();
-            self.windows[bin] = window.unwrap_or(Window::EMPTY);
-            self.slot[bin] = if occupied { slots } else { NONE };
-            self.moment_slot[bin] = if occupied && touched { moment_slots } else { NONE };
+            self.windows[number] = window.unwrap_or(Window::EMPTY);
+            self.slot[number] = if occupied { slots } else { NONE };
+            self.touched[number] = bin.touched.filter(|_| occupied);
+            self.moment_start.push(moments);
             slots += u32::from(occupied);
-            moment_slots += u32::from(occupied && touched);
+            moments +=
+                self.touched[number].map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
         }
-        let nodes = arena_nodes(D);
-        grow(&mut self.rows, slots as usize * nodes, Row([0.0; 4]));
-        grow(&mut self.moments, moment_slots as usize * nodes, [Row([0.0; 4]); D]);
+        self.moment_start.push(moments);
+        grow(&mut self.rows, slots as usize * arena_nodes(D), Row([0.0; 4]));
+        grow(&mut self.moments, moments as usize, [Row([0.0; 4]); D]);
     }
 
     /// The arenas of all occupied bins, mutable and disjoint, in bin order.
     pub fn each_mut(&mut self) -> Vec<ArenaMut<'_, D>> {
         let mut rows = self.rows.chunks_mut(arena_nodes(D));
-        let mut moments = self.moments.chunks_mut(arena_nodes(D));
+        let mut rest = &mut self.moments[..];
         let mut arenas = Vec::with_capacity(self.slot.len());
-        for (bin, (slot, moment_slot)) in self.slot.iter().zip(&self.moment_slot).enumerate() {
+        for (bin, slot) in self.slot.iter().enumerate() {
+            let count = self.moment_start[bin + 1] - self.moment_start[bin];
+            let (moments, others) = std::mem::take(&mut rest).split_at_mut(count as usize);
+            rest = others;
             if *slot != NONE
                 && let Some(rows) = rows.next()
             {
-                let moments = if *moment_slot == NONE { None } else { moments.next() };
                 arenas.push(ArenaMut { bin, rows, moments });
             }
         }
@@ -105,12 +120,16 @@ impl<const D: usize> Arenas<D> {
 
     /// The arena of a bin, if it is occupied.
     pub fn get(&self, bin: u32) -> Option<Arena<'_, D>> {
-        let (slot, moment_slot) = (self.slot[bin as usize], self.moment_slot[bin as usize]);
+        let (slot, bin) = (self.slot[bin as usize], bin as usize);
+        let moments = self.touched[bin].map(|table| ArenaMoments {
+            values: &self.moments[self.moment_start[bin] as usize..self.moment_start[bin + 1] as usize],
+            constraints: &self.constraints[table as usize],
+        });
         let nodes = arena_nodes(D);
         (slot != NONE).then(|| Arena {
             rows: &self.rows[slot as usize * nodes..][..nodes],
-            moments: (moment_slot != NONE).then(|| &self.moments[moment_slot as usize * nodes..][..nodes]),
-            window: self.windows[bin as usize],
+            moments,
+            window: self.windows[bin],
         })
     }
 

@@ -1,61 +1,86 @@
-//! Exchange of arenas between ranks: one message per neighbour and step.
-use partition::Octant;
+//! Exchange of partial sums between ranks: one message per neighbour and step.
+//!
+//! A rank that sums up a node which bins of others reach has asked their owners, once per plan, for the sums of
+//! the largest subtrees (see [`super::order`]) that these own alone. In each step an owner adds up its arenas over
+//! these nodes and sends the sums of those that its particles touch.
 use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
-use rustc_hash::FxHashMap;
+use partition::{MAX_LEVEL, Octant};
+use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
-use super::fields::add_moments;
-use super::mask::bits;
-use super::plan::{GridPlan, ReceivedBin, ReceivedNodes, arena_index};
-use super::window::Window;
+use super::feeders::NO_BIN;
+use super::mask::{bits, block_nodes};
+use super::plan::GridPlan;
+use super::region::Regions;
+use super::sources::Piece;
+use super::sums::{BlockSum, Scratch};
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
 const TAG: u16 = 11;
+/// Pieces that one task adds up.
+const TASK: usize = 16;
 
-/// An own bin and the nodes of it that one neighbour needs.
-struct SentBin {
-    bin: u32,
-    /// `(offset number of the block, nodes, constrained nodes)`.
-    parts: Vec<(u8, u64, u64)>,
+/// A sum that one neighbour needs of own bins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SentPiece {
+    /// The block.
+    pub block: u32,
+    /// Nodes that the neighbour needs.
+    pub nodes: u64,
+    /// Those that are constrained.
+    pub constrained: u64,
+    /// Keys of the bins, if not all that reach the block.
+    keys: Option<(u64, u64)>,
 }
 
-/// Exchange of arenas for one plan.
+/// Exchange of partial sums for one plan.
 pub struct ArenaExchange<const D: usize> {
     exchange: NeighbourExchange,
-    sent: Vec<Vec<SentBin>>,
+    sent: Vec<Vec<SentPiece>>,
     received_from: Vec<std::ops::Range<usize>>,
 }
 
-/// Parts of other ranks' arenas, as needed by the sums here.
+/// Partial sums of other ranks.
 #[derive(Debug, Default)]
-pub struct ReceivedArenas<const D: usize> {
+pub struct ReceivedSums<const D: usize> {
     rows: Vec<Row>,
     moments: Vec<Moments<D>>,
-    /// Nodes with values of each received bin; none if it is not occupied.
-    windows: Vec<Window<D>>,
-    parts: Vec<Vec<ReceivedPart>>,
+    pieces: Vec<Place>,
+    /// Nodes of each piece that have values.
+    touched: Vec<u64>,
 }
 
+/// Where a received piece is kept.
 #[derive(Clone, Copy, Debug)]
-struct ReceivedPart {
-    offset: u8,
+struct Place {
     nodes: u64,
     constrained: u64,
     first_row: usize,
     first_moment: usize,
 }
 
+/// What a message says of each piece in two bits.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Extent {
+    /// No particle touches it.
+    None = 0,
+    /// All nodes are there.
+    All = 1,
+    /// A mask of the nodes comes first.
+    Some = 2,
+}
+
 impl<const D: usize> ArenaExchange<D> {
-    /// Collective. Tells every neighbour which nodes of its bins are needed here.
-    pub fn new(comm: &Comm, plan: &GridPlan<D>) -> (Self, ReceivedArenas<D>) {
+    /// Collective. Tells every neighbour which sums of its bins are needed here.
+    pub fn new(comm: &Comm, plan: &GridPlan<D>) -> (Self, ReceivedSums<D>) {
         let mut requests: Vec<(usize, Vec<u64>)> = Vec::new();
-        for bin in &plan.received {
-            if requests.last().is_none_or(|(rank, _)| *rank != bin.rank) {
-                requests.push((bin.rank, Vec::new()));
+        for piece in &plan.pieces {
+            if requests.last().is_none_or(|(rank, _)| *rank != piece.rank) {
+                requests.push((piece.rank, Vec::new()));
             }
             if let Some((_, words)) = requests.last_mut() {
-                push_request(words, bin, &plan.tree.leaves()[bin.leaf as usize]);
+                push_request(words, piece, plan);
             }
         }
         let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
@@ -66,33 +91,43 @@ impl<const D: usize> ArenaExchange<D> {
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();
         ranks.dedup();
-        let own = plan.own_bins();
-        let mut sent: Vec<Vec<SentBin>> = ranks.iter().map(|_| Vec::new()).collect();
+        let mut sent: Vec<Vec<SentPiece>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
-                sent[neighbour] = read_requests(words, plan, &own);
+                sent[neighbour] = words.chunks_exact(5 + D).map(|words| read_request(words, plan)).collect();
             }
         }
         let received_from = ranks
             .iter()
             .map(|&rank| {
-                let start = plan.received.partition_point(|bin| bin.rank < rank);
-                start..plan.received.partition_point(|bin| bin.rank <= rank)
+                let start = plan.pieces.partition_point(|piece| piece.rank < rank);
+                start..plan.pieces.partition_point(|piece| piece.rank <= rank)
             })
             .collect();
         let exchange = NeighbourExchange::new(comm, ranks, TAG);
-        (Self { exchange, sent, received_from }, ReceivedArenas::new(plan))
+        (Self { exchange, sent, received_from }, ReceivedSums::new(plan))
     }
 
-    /// Ranks with which arenas are exchanged.
+    /// Ranks with which sums are exchanged.
     pub fn neighbours(&self) -> &[usize] {
         self.exchange.neighbours()
     }
 
-    /// Per bin of `bins` in all, whether some neighbour needs it.
-    pub fn sent_bins(&self, bins: usize) -> Vec<bool> {
-        let mut sent = vec![false; bins];
-        self.sent.iter().flatten().for_each(|bin| sent[bin.bin as usize] = true);
+    /// Per bin, whether some neighbour needs it.
+    pub fn sent_bins(&self, plan: &GridPlan<D>) -> Vec<bool> {
+        let mut sent = vec![false; plan.bins.len()];
+        let overlap = &Regions::of::<D>().overlap;
+        for piece in self.sent.iter().flatten() {
+            let inner = plan.feeders.inner::<D>(piece.block as usize).iter().copied().zip(0u8..);
+            let outer = plan.feeders.outer(piece.block as usize).iter();
+            let outer = outer.map(|outer| (outer.bin, outer.position));
+            for (bin, position) in inner.filter(|(bin, _)| *bin != NO_BIN).chain(outer) {
+                let is_asked = |(first, last)| (first..=last).contains(&plan.source_key(bin).0);
+                if overlap[position as usize] & piece.nodes != 0 && piece.keys.is_none_or(is_asked) {
+                    sent[bin as usize] = true;
+                }
+            }
+        }
         sent
     }
 
@@ -101,153 +136,190 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.traffic()
     }
 
-    /// Collective over neighbours. Starts sending what they need of the own arenas.
-    pub fn begin(&mut self, arenas: &Arenas<D>) -> Pending {
-        let outgoing = self.sent.iter().map(|bins| pack(bins, arenas)).collect();
-        self.exchange.begin(outgoing)
+    /// What each neighbour needs of the own bins.
+    pub(super) fn sent(&self) -> &[Vec<SentPiece>] {
+        &self.sent
     }
 
-    /// Collective over neighbours. Waits for the neighbours' arenas.
-    pub fn finish(&self, pending: Pending, received: &mut ReceivedArenas<D>) {
-        for (message, bins) in pending.finish().iter().zip(&self.received_from) {
-            received.unpack(message, bins.clone());
+    /// Not collective. Adds up what neighbours need of the own arenas: a message for each.
+    pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>) -> Vec<Vec<u8>> {
+        let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
+        let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
+            let mut extents = 0u64;
+            let mut values = Vec::new();
+            for (i, piece) in pieces.iter().enumerate() {
+                extents |= (packing.pack(piece, plan, arenas, &mut values) as u64) << (2 * i);
+            }
+            (extents, values)
+        });
+        let sums: Vec<(u64, Vec<f64>)> = sums.collect();
+        let mut sums = &sums[..];
+        let message = |pieces: &Vec<SentPiece>| {
+            let (own, rest) = sums.split_at(pieces.len().div_ceil(TASK));
+            sums = rest;
+            let mut message: Vec<u8> = Vec::new();
+            own.iter()
+                .for_each(|(extents, _)| message.extend_from_slice(&extents.to_ne_bytes()[..2 * TASK / 8]));
+            own.iter().for_each(|(_, values)| message.extend_from_slice(bytemuck::cast_slice(values)));
+            message
+        };
+        self.sent.iter().map(message).collect()
+    }
+
+    /// Collective over neighbours. Starts sending the messages packed.
+    pub fn begin(&mut self, messages: Vec<Vec<u8>>) -> Pending {
+        self.exchange.begin(messages)
+    }
+
+    /// Collective over neighbours. Waits for the neighbours' sums.
+    pub fn finish(&self, pending: Pending, received: &mut ReceivedSums<D>) {
+        for (message, pieces) in pending.finish().iter().zip(&self.received_from) {
+            received.unpack(message, pieces.clone());
         }
     }
 }
 
-impl<const D: usize> ReceivedArenas<D> {
+impl SentPiece {
+    /// What reaches the block of the piece from the bins that it asks for.
+    pub fn find<'a, const D: usize>(
+        &self,
+        plan: &'a GridPlan<D>,
+        arenas: &'a Arenas<D>,
+        scratch: &'a mut Scratch<D>,
+    ) -> BlockSum<'a, D> {
+        let keys = self.keys.map(|(first, last)| first..=last);
+        BlockSum::find(plan, arenas, None, scratch, self.block as usize, keys)
+    }
+}
+
+/// Memory that a thread reuses from piece to piece.
+struct Packing<const D: usize> {
+    scratch: Scratch<D>,
+    rows: Vec<Row>,
+    moments: Vec<Moments<D>>,
+}
+
+impl<const D: usize> Default for Packing<D> {
+    fn default() -> Self {
+        let nodes = block_nodes(D);
+        Self { scratch: Scratch::default(), rows: vec![ZERO; nodes], moments: vec![[ZERO; D]; nodes] }
+    }
+}
+
+impl<const D: usize> Packing<D> {
+    /// Appends a piece to a message.
+    fn pack(
+        &mut self,
+        piece: &SentPiece,
+        plan: &GridPlan<D>,
+        arenas: &Arenas<D>,
+        values: &mut Vec<f64>,
+    ) -> Extent {
+        let mut sum = piece.find(plan, arenas, &mut self.scratch);
+        let nodes = sum.own_nodes() & piece.nodes;
+        if nodes == 0 {
+            return Extent::None;
+        }
+        let is_all = nodes == piece.nodes;
+        if !is_all {
+            values.push(f64::from_bits(nodes));
+        }
+        sum.sum_rows(Regions::of::<D>().meeting::<D>(nodes), &mut self.rows);
+        for bit in bits(nodes) {
+            let Row(row) = self.rows[bit as usize];
+            values.extend_from_slice(&row[..D]);
+            values.push(row[3]);
+        }
+        sum.sum_moments(nodes & piece.constrained, &mut self.moments);
+        for bit in bits(nodes & piece.constrained) {
+            self.moments[bit as usize].iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
+        }
+        if is_all { Extent::All } else { Extent::Some }
+    }
+}
+
+impl<const D: usize> ReceivedSums<D> {
     fn new(plan: &GridPlan<D>) -> Self {
         let (mut rows, mut moments) = (0, 0);
-        let parts = plan
-            .received
-            .iter()
-            .map(|bin| {
-                let place = |&ReceivedNodes { offset, nodes, constrained, .. }: &ReceivedNodes| {
-                    let (first_row, first_moment) = (rows, moments);
-                    let part = ReceivedPart { offset, nodes, constrained, first_row, first_moment };
-                    rows += nodes.count_ones() as usize;
-                    moments += constrained.count_ones() as usize;
-                    part
-                };
-                bin.parts.iter().map(place).collect()
-            })
-            .collect();
+        let place = |piece: &Piece| {
+            let (first_row, first_moment) = (rows, moments);
+            rows += piece.nodes.count_ones() as usize;
+            moments += piece.constrained.count_ones() as usize;
+            Place { nodes: piece.nodes, constrained: piece.constrained, first_row, first_moment }
+        };
+        let pieces: Vec<Place> = plan.pieces.iter().map(place).collect();
         Self {
             rows: vec![ZERO; rows],
             moments: vec![[ZERO; D]; moments],
-            windows: vec![Window::EMPTY; plan.received.len()],
-            parts,
+            touched: vec![0; pieces.len()],
+            pieces,
         }
     }
 
-    /// Whether a received bin is occupied.
-    pub(super) fn is_occupied(&self, bin: u32) -> bool {
-        self.windows[bin as usize] != Window::EMPTY
+    /// Nodes of a piece that have values in this step.
+    pub(super) fn touched(&self, piece: u32) -> u64 {
+        self.touched[piece as usize]
     }
 
-    /// Adds part number `part` of a received arena to its block.
-    pub(super) fn add(&self, bin: u32, part: u32, rows: &mut [Row], moments: Option<&mut [Moments<D>]>) {
-        let part = self.parts[bin as usize][part as usize];
-        let inside = self.windows[bin as usize].nodes_of(part.offset as usize);
-        for (bit, from) in bits(part.nodes & inside).zip(&self.rows[part.first_row..]) {
-            for lane in 0..4 {
-                rows[bit as usize].0[lane] += from.0[lane];
-            }
-        }
-        if let Some(moments) = moments {
-            let constrained = bits(part.constrained & inside);
-            for (bit, from) in constrained.zip(&self.moments[part.first_moment..]) {
-                add_moments(&mut moments[bit as usize], from);
-            }
-        }
+    /// Momentum and mass of a touched node.
+    pub(super) fn row(&self, piece: u32, bit: u32) -> Row {
+        let before = self.touched[piece as usize] & ((1 << bit) - 1);
+        self.rows[self.pieces[piece as usize].first_row + before.count_ones() as usize]
     }
 
-    fn unpack(&mut self, message: &[u8], bins: std::ops::Range<usize>) {
-        let words = bins.len().div_ceil(64);
-        let (bitmap, values) = message.split_at(8 * words);
+    /// First moments of a touched constrained node.
+    pub(super) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
+        let place = &self.pieces[piece as usize];
+        let before = self.touched[piece as usize] & place.constrained & ((1 << bit) - 1);
+        self.moments[place.first_moment + before.count_ones() as usize]
+    }
+
+    fn unpack(&mut self, message: &[u8], pieces: std::ops::Range<usize>) {
+        let (extents, values) = message.split_at(pieces.len().div_ceil(TASK) * 2 * TASK / 8);
         let mut values = values.chunks_exact(8).map(|b| f64::from_ne_bytes(std::array::from_fn(|i| b[i])));
         let mut next = || values.next().unwrap_or(f64::NAN);
-        for (number, bin) in bins.enumerate() {
-            if bitmap[number / 8] >> (number % 8) & 1 == 0 {
-                self.windows[bin] = Window::EMPTY;
-                continue;
+        for (number, piece) in pieces.enumerate() {
+            let place = &self.pieces[piece];
+            let extent = extents[number / 4] >> (2 * (number % 4)) & 3;
+            let touched = match extent {
+                extent if extent == Extent::None as u8 => 0,
+                extent if extent == Extent::All as u8 => place.nodes,
+                _ => next().to_bits() & place.nodes,
+            };
+            self.touched[piece] = touched;
+            for row in &mut self.rows[place.first_row..][..touched.count_ones() as usize] {
+                for lane in 0..D {
+                    row.0[lane] = next();
+                }
+                row.0[3] = next();
             }
-            let window = Window::from_bits(next().to_bits());
-            self.windows[bin] = window;
-            for part in &self.parts[bin] {
-                let inside = window.nodes_of(part.offset as usize);
-                let rows = (part.nodes & inside).count_ones() as usize;
-                for row in &mut self.rows[part.first_row..][..rows] {
-                    for lane in 0..D {
-                        row.0[lane] = next();
-                    }
-                    row.0[3] = next();
-                }
-                let moments = (part.constrained & inside).count_ones() as usize;
-                for moments in &mut self.moments[part.first_moment..][..moments] {
-                    for row in moments.iter_mut() {
-                        for lane in 0..D {
-                            row.0[lane] = next();
-                        }
-                    }
-                }
+            let moments = (place.constrained & touched).count_ones() as usize;
+            for moments in &mut self.moments[place.first_moment..][..moments] {
+                moments.iter_mut().for_each(|row| (0..D).for_each(|lane| row.0[lane] = next()));
             }
         }
     }
 }
 
-/// Message to one neighbour: a bitmap of the occupied bins, then of each its window and the rows and moments
-/// in it.
-fn pack<const D: usize>(bins: &[SentBin], arenas: &Arenas<D>) -> Vec<u8> {
-    let mut bitmap = vec![0u8; 8 * bins.len().div_ceil(64)];
-    let mut values: Vec<f64> = Vec::new();
-    for (number, sent) in bins.iter().enumerate() {
-        let Some(arena) = arenas.get(sent.bin) else { continue };
-        bitmap[number / 8] |= 1 << (number % 8);
-        values.push(f64::from_bits(arena.window.to_bits()));
-        for &(offset, nodes, constrained) in &sent.parts {
-            let inside = arena.window.nodes_of(offset as usize);
-            for bit in bits(nodes & inside) {
-                let row = &arena.rows[arena_index::<D>(offset as usize, bit)].0;
-                values.extend_from_slice(&row[..D]);
-                values.push(row[3]);
-            }
-            if let Some(moments) = arena.moments {
-                for bit in bits(constrained & inside) {
-                    let moments = &moments[arena_index::<D>(offset as usize, bit)];
-                    moments.iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
-                }
-            }
-        }
-    }
-    bitmap.extend_from_slice(bytemuck::cast_slice(&values));
-    bitmap
+fn push_request<const D: usize>(words: &mut Vec<u64>, piece: &Piece, plan: &GridPlan<D>) {
+    let block = &plan.blocks[piece.block as usize];
+    words.push(u64::from(block.level));
+    words.extend(block.coord.map(u64::from));
+    words.extend([piece.nodes, piece.constrained, piece.first, piece.last]);
 }
 
-fn push_request<const D: usize>(words: &mut Vec<u64>, bin: &ReceivedBin<D>, leaf: &Octant<D>) {
-    words.push(leaf.key());
-    words.push(u64::from(bin.block.level) << 32 | bin.parts.len() as u64);
-    words.extend(bin.block.coord.map(u64::from));
-    for part in &bin.parts {
-        words.extend([u64::from(part.offset), part.nodes, part.constrained]);
+/// The piece that a neighbour asks for. Bins of this rank reach the nodes, so that it has their block.
+fn read_request<const D: usize>(words: &[u64], plan: &GridPlan<D>) -> SentPiece {
+    let level = words[0].min(u64::from(MAX_LEVEL)) as u8;
+    let coord = std::array::from_fn(|axis| words[1 + axis] as u32);
+    let [nodes, constrained, first, last] = std::array::from_fn(|i| words[1 + D + i]);
+    let place = |level: u8, coord: [u32; D]| (level, Octant { level, coord }.key(), coord);
+    let found =
+        plan.blocks.binary_search_by_key(&place(level, coord), |block| place(block.level, block.coord));
+    debug_assert!(found.is_ok(), "a sum of nodes that no own bin reaches");
+    let keys = (last != u64::MAX).then_some((first, last));
+    match found {
+        Ok(block) => SentPiece { block: block as u32, nodes, constrained, keys },
+        Err(_) => SentPiece { block: 0, nodes: 0, constrained: 0, keys },
     }
-}
-
-fn read_requests<const D: usize>(
-    words: &[u64],
-    plan: &GridPlan<D>,
-    own: &FxHashMap<(u32, Octant<D>), u32>,
-) -> Vec<SentBin> {
-    let mut sent = Vec::new();
-    let mut at = 0;
-    while at < words.len() {
-        let leaf = plan.tree.locate(words[at]).unwrap_or_default() as u32;
-        let (level, count) = ((words[at + 1] >> 32) as u8, words[at + 1] as u32 as usize);
-        let coord = std::array::from_fn(|axis| words[at + 2 + axis] as u32);
-        let parts =
-            words[at + 2 + D..][..3 * count].chunks_exact(3).map(|p| (p[0] as u8, p[1], p[2])).collect();
-        at += 2 + D + 3 * count;
-        sent.push(SentBin { bin: own[&(leaf, Octant { level, coord })], parts });
-    }
-    sent
 }

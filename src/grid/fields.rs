@@ -5,11 +5,11 @@
 use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
-use super::entries::Entries;
-use super::exchange::ReceivedArenas;
+use super::exchange::ReceivedSums;
 use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
-use super::plan::{GridPlan, NO_BLOCK, Source};
+use super::plan::{Block, GridPlan, NO_BLOCK};
+use super::sums::{BlockSum, Scratch, is_reached};
 use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
 
@@ -30,7 +30,24 @@ pub struct NodeFields<const D: usize> {
     dirty: Vec<bool>,
     /// First moment slot of each level.
     moment_start: Vec<usize>,
-    entries: Entries,
+}
+
+/// Blocks that one task adds up.
+const TASK: usize = 16;
+
+/// The first moments of the blocks of each task.
+fn moment_tasks<'a, const D: usize>(
+    plan: &GridPlan<D>,
+    moments: &'a mut [Moments<D>],
+) -> Vec<&'a mut [Moments<D>]> {
+    let mut rest = moments;
+    let slots = |blocks: &[Block<D>]| blocks.iter().filter(|block| block.moments.is_some()).count();
+    let task = |blocks: &[Block<D>]| {
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(slots(blocks) * block_nodes(D));
+        rest = others;
+        own
+    };
+    plan.blocks.chunks(TASK).map(task).collect()
 }
 
 /// Which blocks to sum.
@@ -38,7 +55,7 @@ pub struct NodeFields<const D: usize> {
 pub enum Part {
     /// Blocks to which own bins contribute alone.
     Interior,
-    /// Blocks that also need received arenas.
+    /// Blocks that also need the sums of other ranks.
     Seam,
 }
 
@@ -67,7 +84,6 @@ impl<const D: usize> NodeFields<D> {
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
             moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
-            entries: Entries::default(),
         }
     }
 
@@ -77,41 +93,41 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedArenas<D>, part: Part) {
-        self.entries.collect(plan, arenas, received, part);
-        let entries = &self.entries;
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>, part: Part) {
+        let received = (part == Part::Seam).then_some(received);
         let nodes = block_nodes(D);
-        let mut moments = self.moments.chunks_mut(nodes);
-        let flags = self.active.iter_mut().zip(&mut self.dirty);
-        let mut blocks = Vec::new();
-        let all = self.rows.chunks_mut(nodes).zip(&plan.blocks).zip(flags).enumerate();
-        for (index, ((rows, block), (active, dirty))) in all {
-            let moments = block.moments.and_then(|_| moments.next());
-            if plan.is_seam[index] == (part == Part::Seam) {
-                *active = !entries.of(index).is_empty();
-                if *active || *dirty {
-                    blocks.push((index, BlockMut { rows, moments }));
+        let rows = self.rows.par_chunks_mut(TASK * nodes);
+        let flags = self.active.par_chunks_mut(TASK).zip(self.dirty.par_chunks_mut(TASK));
+        let moments = moment_tasks(plan, &mut self.moments);
+        let tasks = rows.zip(flags).zip(moments).enumerate();
+        tasks.for_each_init(Scratch::default, |scratch, (task, ((rows, (active, dirty)), moments))| {
+            let mut moments = moments.chunks_mut(nodes);
+            let flags = active.iter_mut().zip(dirty);
+            for (index, (rows, (active, dirty))) in (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags)) {
+                let block = &plan.blocks[index];
+                let mut moments = block.moments.and_then(|_| moments.next());
+                if plan.is_seam(index) != (part == Part::Seam) {
+                    continue;
                 }
-                *dirty = *active;
-            }
-        }
-        blocks.into_par_iter().with_min_len(16).for_each(|(index, mut block)| {
-            block.rows.fill(ZERO);
-            if let Some(moments) = &mut block.moments {
-                moments.fill([ZERO; D]);
-            }
-            let entries = entries.of(index);
-            for &(source, place) in entries {
-                match source {
-                    Source::Own(bin) => {
-                        if let Some(arena) = arenas.get(bin.0) {
-                            block.add(arena.rows, arena.moments, &arena.window, place as u8);
+                *active = false;
+                if block.sum != 0 {
+                    let mut sum = BlockSum::find(plan, arenas, received, scratch, index, None);
+                    *active = !sum.is_empty();
+                    if *active {
+                        sum.sum_rows(u32::MAX, rows);
+                        if let Some(moments) = &mut moments {
+                            moments.fill([ZERO; D]);
+                            sum.sum_moments(block.constrained & block.sum, moments);
                         }
                     }
-                    Source::Received(bin) => {
-                        received.add(bin, place, block.rows, block.moments.as_deref_mut());
+                }
+                if *dirty && !*active {
+                    rows.fill(ZERO);
+                    if let Some(moments) = &mut moments {
+                        moments.fill([ZERO; D]);
                     }
                 }
+                *dirty = *active;
             }
         });
     }
@@ -191,12 +207,8 @@ impl<const D: usize> NodeFields<D> {
 
     /// Marks the blocks that occupied bins touch, and the blocks of their constraint parents.
     fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
-        self.needed.fill(false);
-        for (_, bin) in plan.bins.iter().enumerate().filter(|(number, _)| arenas.is_occupied(*number)) {
-            for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
-                self.needed[block as usize] = true;
-            }
-        }
+        let needed = self.needed.par_iter_mut().enumerate().with_min_len(64);
+        needed.for_each(|(block, needed)| *needed = is_reached(plan, arenas, block));
         for links in plan.prolongation.iter().rev() {
             for linked in &links.blocks {
                 if self.needed[linked.block as usize] {
@@ -210,13 +222,10 @@ impl<const D: usize> NodeFields<D> {
     /// touch constrained nodes their first moments.
     pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
-        let has_moments = bin.touched.is_some();
+        let constraints = bin.touched.map(|table| &plan.constraints[table as usize]);
         // Blocks on all sides give all nodes of the window a value.
         if bin.around[..offset_count(D)].contains(&NO_BLOCK) {
             window.for_each_run(|run| arena.rows[run].fill(ZERO));
-        }
-        if has_moments {
-            window.for_each_run(|run| arena.moments[run].fill([ZERO; D]));
         }
         let nodes = block_nodes(D);
         for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
@@ -225,16 +234,13 @@ impl<const D: usize> NodeFields<D> {
             }
             let rows = &self.rows[block as usize * nodes..][..nodes];
             let block = &plan.blocks[block as usize];
-            let moments = block.moments.filter(|_| has_moments);
-            let moments = moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
             let Some(shared) = window.shared(index) else { continue };
             copy_rows(shared, rows, &mut arena.rows);
-            if let Some(moments) = moments {
-                shared.for_each_run(|run| {
-                    for i in (0..run.len).filter(|i| block.constrained >> (run.block + i) & 1 == 1) {
-                        arena.moments[run.arena + i] = moments[run.block + i];
-                    }
-                });
+            if let Some(constraints) = constraints {
+                let moments = block.moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
+                for (bit, number) in constraints.of_block(index, u64::MAX) {
+                    arena.moments[number] = moments.map_or([ZERO; D], |moments| moments[bit as usize]);
+                }
             }
         }
     }
@@ -358,22 +364,6 @@ impl<const D: usize> BlockMut<'_, D> {
             slots[at] = moments;
         }
     }
-
-    /// Adds the part of an arena that lies in this block.
-    fn add(&mut self, rows: &[Row], moments: Option<&[Moments<D>]>, window: &Window<D>, offset: u8) {
-        let Some(shared) = window.shared(offset as usize) else { return };
-        let (to, from) = (&mut self.rows[..block_nodes(D)], &rows[..arena_nodes(D)]);
-        shared.for_each_run(|run| {
-            let to = &mut to[run.block..][..run.len];
-            to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| to.add(from));
-        });
-        if let (Some(to), Some(from)) = (&mut self.moments, moments) {
-            shared.for_each_run(|run| {
-                let to = &mut to[run.block..][..run.len];
-                to.iter_mut().zip(&from[run.arena..][..run.len]).for_each(|(to, from)| add_moments(to, from));
-            });
-        }
-    }
 }
 
 /// Velocities around one bin, for the gather.
@@ -381,21 +371,12 @@ impl<const D: usize> BlockMut<'_, D> {
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`; zero at real nodes.
+    /// First moments `V_j` of the constrained nodes, by their number in the arena.
     pub moments: Vec<Moments<D>>,
 }
 
 impl<const D: usize> Default for VelocityArena<D> {
     fn default() -> Self {
         Self { rows: vec![ZERO; arena_nodes(D)], moments: vec![[ZERO; D]; arena_nodes(D)] }
-    }
-}
-
-/// Adds one node's moments.
-pub(super) fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
-    for axis in 0..D {
-        for lane in 0..3 {
-            to[axis].0[lane] += from[axis].0[lane];
-        }
     }
 }

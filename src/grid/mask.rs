@@ -70,14 +70,24 @@ pub fn bit_of_node<const D: usize>(node: [u32; D]) -> u32 {
 /// Product of one set of coordinates per axis (bit `k` of `sets[axis]` allows coordinate `k`).
 pub fn product<const D: usize>(sets: [u8; D]) -> u64 {
     let full = if D == 2 { 0xffff } else { u64::MAX };
-    sets.iter().enumerate().fold(full, |mask, (axis, &set)| {
-        let repeated = (0..4).map(|k| (u64::from(set >> k & 1) * SLICE[axis]) << (k << (2 * axis)));
-        mask & repeated.fold(0, |slices, slice| slices | slice)
-    })
+    (0..D).fold(full, |mask, axis| mask & ALONG[axis][usize::from(sets[axis] & 0b1111)])
 }
 
-/// Nodes whose coordinate along each axis is 0.
-const SLICE: [u64; 3] = [0x1111_1111_1111_1111, 0x000f_000f_000f_000f, 0xffff];
+/// Nodes whose coordinate along an axis is in a set.
+const ALONG: [[u64; 16]; 3] = {
+    // Nodes whose coordinate along each axis is 0.
+    let slice = [0x1111_1111_1111_1111, 0x000f_000f_000f_000f, 0xffff];
+    let mut along = [[0; 16]; 3];
+    let mut entry = 0;
+    while entry < 3 * 16 * 4 {
+        let (axis, set, k) = (entry / 64, entry / 4 % 16, entry % 4);
+        if set >> k & 1 == 1 {
+            along[axis][set] |= slice[axis] << (k << (2 * axis));
+        }
+        entry += 1;
+    }
+    along
+};
 
 /// The nodes of block `bin + offset` that lie in the arena of `bin`: the arena reaches from one node below
 /// the block to the second node above it.

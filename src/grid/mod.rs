@@ -6,21 +6,25 @@
 pub mod arena;
 pub mod census;
 pub mod closure;
+pub mod constrained;
 pub mod constraint;
 pub mod direct;
-mod entries;
 pub mod exchange;
+pub mod feeders;
 pub mod fields;
 pub mod known;
 pub mod links;
 pub mod mask;
+mod order;
 pub mod plan;
 pub mod reach;
-mod sources;
+pub mod region;
+pub mod sources;
+mod sums;
 pub mod window;
 
 pub use exchange::ArenaExchange;
 pub use fields::NodeFields;
 pub use known::{Cover, KnownTree};
-pub use plan::{BinId, GridPlan};
+pub use plan::GridPlan;
 pub use window::Window;

@@ -1,25 +1,23 @@
 //! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
 
+use std::sync::Arc;
+
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
+use super::constrained::{ArenaConstraints, Tables, has_constrained};
 use super::constraint::node_coord;
+use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
-use super::mask::{
-    arena_overlap, bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted,
-};
-use super::reach::potential_bins;
-use crate::kernel::{ARENA_EDGE, Row};
+use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
+use super::sources::{Part, Piece};
+use crate::kernel::ARENA_EDGE;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;
-
-/// Number of a bin of this rank.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct BinId(pub u32);
 
 /// A block of `4^D` nodes.
 #[derive(Clone, Copy, Debug)]
@@ -50,43 +48,8 @@ pub struct Bin<const D: usize> {
     pub block: Octant<D>,
     /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
     pub around: [u32; 27],
-    /// Which stencils (by base, see [`GridPlan::touched`]) reach a constrained node, if any does.
+    /// Its constrained nodes among [`GridPlan::constraints`], if it has any.
     pub touched: Option<u32>,
-}
-
-/// Where an arena comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// An own bin.
-    Own(BinId),
-    /// A received bin: number among [`GridPlan::received`].
-    Received(u32),
-}
-
-/// A bin of another rank that contributes here, with the nodes needed of it.
-#[derive(Clone, Debug)]
-pub struct ReceivedBin<const D: usize> {
-    /// Owner.
-    pub rank: usize,
-    /// Known leaf whose particles it takes.
-    pub leaf: u32,
-    /// Level and block coordinate of the arena.
-    pub block: Octant<D>,
-    /// Needed nodes by block.
-    pub parts: Vec<ReceivedNodes>,
-}
-
-/// Nodes of a received bin that fall into one block.
-#[derive(Clone, Copy, Debug)]
-pub struct ReceivedNodes {
-    /// The block.
-    pub block: u32,
-    /// Offset number of the block from the bin.
-    pub offset: u8,
-    /// Needed nodes.
-    pub nodes: u64,
-    /// Those that are constrained.
-    pub constrained: u64,
 }
 
 /// The grid of one rank. Valid for one revision of the forest.
@@ -105,11 +68,12 @@ pub struct GridPlan<const D: usize> {
     pub bins: Vec<Bin<D>>,
     /// First bin of each own leaf, and the number of bins at the end.
     pub leaf_start: Vec<u32>,
-    /// Bins of other ranks that contribute to sums here, by rank, leaf and bin.
-    pub received: Vec<ReceivedBin<D>>,
-    /// All bins whose arenas enter sums here, in canonical order: by source leaf along the curve, level, and
-    /// curve position of the block.
-    pub sources: Vec<Source>,
+    /// Which own bins reach each block.
+    pub feeders: Feeders,
+    /// Sums that this rank needs of others, by rank.
+    pub pieces: Vec<Piece>,
+    pub(super) parts: Vec<Part>,
+    pub(super) part_start: Vec<u32>,
     /// Per level, restriction into its nodes from constrained nodes one level finer.
     pub restriction: Vec<Links>,
     /// Per level, prolongation into its constrained nodes from one level coarser.
@@ -118,12 +82,8 @@ pub struct GridPlan<const D: usize> {
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of blocks with first moments.
     pub moment_blocks: usize,
-    /// Per block, whether received arenas contribute to it.
-    pub is_seam: Vec<bool>,
-    /// Per table of [`Bin::touched`], the second moments `S` of the arena's nodes, m².
-    pub second: Vec<Vec<Row>>,
-    /// Tables of [`Bin::touched`], each `(BLOCK + 1)^D` long: base `-1..=3` per axis, first axis fastest.
-    pub touched: Vec<Vec<bool>>,
+    /// Constrained nodes of arenas, for [`Bin::touched`].
+    pub constraints: Arc<Vec<ArenaConstraints>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -133,10 +93,10 @@ impl<const D: usize> GridPlan<D> {
     pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);
         let mut rounds = 0;
-        let needed = loop {
+        let (needed, bins) = loop {
             let closure = Closure::compute(&tree);
             if !comm.any(!closure.missing.is_empty()) {
-                break closure.blocks;
+                break (closure.blocks, closure.bins);
             }
             rounds += 1;
             tree.add(&forest.leaves_in(comm, &closure.missing));
@@ -148,39 +108,38 @@ impl<const D: usize> GridPlan<D> {
             level_start: Vec::new(),
             bins: Vec::new(),
             leaf_start: Vec::new(),
-            received: Vec::new(),
-            sources: Vec::new(),
+            feeders: Feeders::default(),
+            pieces: Vec::new(),
+            parts: Vec::new(),
+            part_start: Vec::new(),
             restriction: Vec::new(),
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
             moment_blocks: 0,
-            is_seam: Vec::new(),
-            second: Vec::new(),
-            touched: Vec::new(),
+            constraints: Arc::default(),
             rounds,
             tree,
         };
         plan.list_blocks(&needed);
         let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
-        plan.list_bins(&number);
-        plan.list_received(comm.rank());
-        plan.list_sources();
+        plan.list_bins(&number, &bins);
+        plan.feeders = Feeders::new(&plan.tree, &plan.bins, plan.blocks.len());
+        plan.list_pieces(comm.rank());
         plan.link_levels(&number);
         plan.find_face_nodes();
-        plan.is_seam = vec![false; plan.blocks.len()];
-        for part in plan.received.iter().flat_map(|bin| &bin.parts) {
-            plan.is_seam[part.block as usize] = true;
-        }
         let spread = plan.constraint_spread();
-        plan.second = vec![Vec::new(); plan.touched.len()];
-        for number in 0..plan.bins.len() {
-            if let Some(table) = plan.bins[number].touched
-                && plan.second[table as usize].is_empty()
-            {
-                plan.second[table as usize] = plan.arena_of(&plan.bins[number].around, &spread);
+        let (mut tables, mut number) = (Tables::default(), Vec::new());
+        for bin in &mut plan.bins {
+            if let Some(of_block) = bin.touched {
+                // So far blocks are numbered, in the order of the first bin that has them.
+                if of_block as usize == number.len() {
+                    number.push(tables.number(&plan.blocks, &bin.around, &spread));
+                }
+                bin.touched = Some(number[of_block as usize]);
             }
         }
+        plan.constraints = Arc::new(tables.finish());
         plan
     }
 
@@ -217,8 +176,10 @@ impl<const D: usize> GridPlan<D> {
         self.tree.heap_bytes()
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
-            + self.sources.capacity() * size_of::<Source>()
-            + self.second.iter().map(|table| table.capacity() * size_of::<Row>()).sum::<usize>()
+            + self.feeders.heap_bytes()
+            + self.pieces.capacity() * size_of::<Piece>()
+            + self.parts.capacity() * size_of::<Part>()
+            + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
 
     fn list_blocks(&mut self, needed: &NeededBlocks<D>) {
@@ -269,14 +230,13 @@ impl<const D: usize> GridPlan<D> {
             .fold(0, |mask, bit| mask | 1 << bit)
     }
 
-    fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
-        let first = self.tree.first_own();
-        let own = self.tree.leaves().len() - self.tree.ghost_len();
+    fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>, bins: &[Vec<Octant<D>>]) {
         // Bins of several leaves may have one block; what depends on the block is made once.
         let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
-        for leaf in 0..own {
+        let mut constrained = 0;
+        for (leaf, blocks) in bins.iter().enumerate() {
             self.leaf_start.push(self.bins.len() as u32);
-            for block in potential_bins(&self.tree, first + leaf) {
+            for &block in blocks {
                 if let Some(&same) = of_block.get(&block) {
                     let same = self.bins[same as usize].clone();
                     self.bins.push(Bin { leaf: leaf as u32, ..same });
@@ -291,52 +251,12 @@ impl<const D: usize> GridPlan<D> {
                         *slot = found;
                     }
                 }
-                let touched = self.touched_bases(&around);
+                let touched = has_constrained(&self.blocks, &around).then_some(constrained);
+                constrained += u32::from(touched.is_some());
                 self.bins.push(Bin { leaf: leaf as u32, block, around, touched });
             }
         }
         self.leaf_start.push(self.bins.len() as u32);
-    }
-
-    /// Table of the stencil bases that reach a constrained node, or `None` if there is no such base.
-    fn touched_bases(&mut self, around: &[u32; 27]) -> Option<u32> {
-        let mut constrained = vec![false; ARENA_EDGE.pow(D as u32)];
-        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
-            if block != NO_BLOCK {
-                let mask = self.blocks[block as usize].constrained & arena_overlap::<D>(offset(index));
-                for bit in bits(mask) {
-                    constrained[arena_index::<D>(index, bit)] = true;
-                }
-            }
-        }
-        if !constrained.contains(&true) {
-            return None;
-        }
-        // Along each axis in turn, a base reaches what the three nodes from it reach.
-        let mut reached = constrained;
-        for axis in 0..D {
-            let step = ARENA_EDGE.pow(axis as u32);
-            for node in 0..reached.len() {
-                if node / step % ARENA_EDGE < ARENA_EDGE - 2 {
-                    reached[node] |= reached[node + step] | reached[node + 2 * step];
-                }
-            }
-        }
-        let bases = ARENA_EDGE - 2;
-        let table: Vec<bool> = (0..bases.pow(D as u32))
-            .map(|base| {
-                let node = |axis: u32| base / bases.pow(axis) % bases * ARENA_EDGE.pow(axis);
-                reached[(0..D as u32).map(node).sum::<usize>()]
-            })
-            .collect();
-        self.touched.push(table);
-        Some(self.touched.len() as u32 - 1)
-    }
-
-    /// Own bins by known source leaf and block.
-    pub(super) fn own_bins(&self) -> FxHashMap<(u32, Octant<D>), u32> {
-        let first = self.tree.first_own() as u32;
-        self.bins.iter().enumerate().map(|(i, bin)| ((first + bin.leaf, bin.block), i as u32)).collect()
     }
 
     fn find_face_nodes(&mut self) {
@@ -356,22 +276,6 @@ impl<const D: usize> GridPlan<D> {
                 }
             }
         }
-    }
-
-    /// The rows of moment nodes as they stand in the arena of a bin; zero elsewhere.
-    fn arena_of(&self, around: &[u32; 27], rows: &[Row]) -> Vec<Row> {
-        let mut arena = vec![Row([0.0; 4]); ARENA_EDGE.pow(D as u32)];
-        let nodes = block_nodes(D);
-        for (index, &block) in around.iter().enumerate().take(offset_count(D)) {
-            if block == NO_BLOCK {
-                continue;
-            }
-            let Some(slot) = self.blocks[block as usize].moments else { continue };
-            for bit in bits(arena_overlap::<D>(offset(index))) {
-                arena[arena_index::<D>(index, bit)] = rows[slot as usize * nodes + bit as usize];
-            }
-        }
-        arena
     }
 
     /// Place of a node's first moments, if its block has any.

@@ -1,54 +1,209 @@
-//! Which bins enter the sums of a rank, and in which order.
+//! Which sums a rank asks of others.
+//!
+//! For every region of every block whose sums it needs, a rank knows all bins that may contribute, own and others. In the tree
+//! of their keys it looks for the largest subtrees of one owner: these are the pieces that it asks for.
 use partition::Octant;
 use rustc_hash::FxHashMap;
 
-use super::mask::{arena_overlap, box_offsets, offset, offset_count, opposite, shifted};
-use super::plan::{BinId, GridPlan, ReceivedBin, ReceivedNodes, Source};
+use super::feeders::NO_BIN;
+use super::mask::{box_offsets, offset, offset_count, shifted};
+use super::order::each_subtree;
+use super::plan::{Block, GridPlan};
 use super::reach::bin_sources;
+use super::region::Regions;
+
+/// What another rank's bins in a subtree contribute to nodes of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// The other rank.
+    pub rank: usize,
+    /// The block.
+    pub block: u32,
+    /// Nodes that are needed.
+    pub nodes: u64,
+    /// Those that are constrained.
+    pub constrained: u64,
+    /// Least key in the subtree; 0 and the greatest possible key where the subtree holds all that the rank
+    /// contributes.
+    pub first: u64,
+    /// Greatest key in the subtree.
+    pub last: u64,
+}
+
+/// What a piece adds to a region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// The region.
+    pub region: u8,
+    /// Number of the piece.
+    pub piece: u32,
+    /// A key of the subtree that it is in this region.
+    pub key: u64,
+}
+
+/// A bin that may contribute to a block.
+struct Candidate {
+    key: u64,
+    tie: u64,
+    rank: usize,
+    position: u8,
+}
 
 impl<const D: usize> GridPlan<D> {
-    /// Lists the bins of other ranks that enter sums here, with the nodes needed of each.
-    pub(super) fn list_received(&mut self, rank: usize) {
-        // (source leaf, bin, part)
-        let mut needed: Vec<(u32, Octant<D>, ReceivedNodes)> = Vec::new();
-        let mut feeding: FxHashMap<Octant<D>, Vec<usize>> = FxHashMap::default();
-        let mut is_inner: FxHashMap<Octant<D>, bool> = FxHashMap::default();
-        for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| block.sum != 0) {
-            for towards in 0..offset_count(D) {
-                let Some(coord) = shifted(block.coord, offset::<D>(towards)) else { continue };
-                let seen_from_bin = opposite(D, towards);
-                let nodes = block.sum & arena_overlap::<D>(offset(seen_from_bin));
-                if nodes == 0 {
-                    continue;
-                }
-                let bin = Octant { level: block.level, coord };
-                let remote = feeding.entry(bin).or_insert_with(|| {
-                    let start = bin.ancestor(self.tree.coarsest_reaching(bin.level));
-                    if *is_inner.entry(start).or_insert_with(|| self.is_inner(&start)) {
-                        return Vec::new();
-                    }
-                    let mut leaves = bin_sources(&self.tree, bin.level, bin.coord);
-                    leaves.retain(|&leaf| self.tree.owner(leaf) != rank);
-                    leaves
-                });
-                let constrained = nodes & block.constrained;
-                let offset = seen_from_bin as u8;
-                let part = ReceivedNodes { block: index as u32, offset, nodes, constrained };
-                needed.extend(remote.iter().map(|&leaf| (leaf as u32, bin, part)));
+    /// Key of a bin in the order of sums, and its place among bins with the same.
+    pub fn source_key(&self, bin: u32) -> (u64, u64) {
+        let bin = &self.bins[bin as usize];
+        source_key(&self.tree.leaves()[self.tree.first_own() + bin.leaf as usize], &bin.block)
+    }
+
+    /// Lists the pieces that this rank needs of others, by rank, and where they enter.
+    pub(super) fn list_pieces(&mut self, rank: usize) {
+        let mut search = RemoteBins::default();
+        // Pieces as they are found, and where they enter: block and part.
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut parts: Vec<(u32, Part)> = Vec::new();
+        let mut candidates = Vec::new();
+        for block in 0..self.blocks.len() {
+            candidates.clear();
+            search.add_remote(self, rank, block, &mut candidates);
+            if !candidates.is_empty() {
+                self.add_own(rank, block, &mut candidates);
+                candidates.sort_unstable_by_key(|candidate| (candidate.key, candidate.tie));
+                self.cut_pieces(rank, block, &candidates, &mut pieces, &mut parts);
             }
         }
-        needed.sort_unstable_by_key(|(leaf, bin, part)| (*leaf, bin.level, bin.key(), part.offset));
-        for (leaf, block, part) in needed {
-            match self.received.last_mut() {
-                Some(last) if (last.leaf, last.block) == (leaf, block) => last.parts.push(part),
-                _ => {
-                    let rank = self.tree.owner(leaf as usize);
-                    self.received.push(ReceivedBin { rank, leaf, block, parts: vec![part] });
-                }
-            }
+        // Both sides list the pieces of two ranks in the order found.
+        let mut by_rank: Vec<u32> = (0..pieces.len() as u32).collect();
+        by_rank.sort_by_key(|&piece| pieces[piece as usize].rank);
+        let mut place = vec![0; pieces.len()];
+        by_rank.iter().zip(0..).for_each(|(&piece, at)| place[piece as usize] = at);
+        self.pieces = by_rank.iter().map(|&piece| pieces[piece as usize]).collect();
+        self.part_start = vec![0; self.blocks.len() + 1];
+        for (block, part) in parts {
+            self.part_start[block as usize + 1] += 1;
+            self.parts.push(Part { piece: place[part.piece as usize], ..part });
+        }
+        for block in 0..self.blocks.len() {
+            self.part_start[block + 1] += self.part_start[block];
         }
     }
 
+    /// Parts of pieces that enter the sum of a block.
+    pub fn parts(&self, block: usize) -> &[Part] {
+        &self.parts[self.part_start[block] as usize..self.part_start[block + 1] as usize]
+    }
+
+    /// Whether other ranks contribute to the sum of a block.
+    pub fn is_seam(&self, block: usize) -> bool {
+        self.part_start[block] != self.part_start[block + 1]
+    }
+
+    /// Own bins that may contribute to a block.
+    fn add_own(&self, rank: usize, block: usize, candidates: &mut Vec<Candidate>) {
+        let inner = self.feeders.inner::<D>(block).iter().copied().zip(0u8..);
+        let inner = inner.filter(|(bin, _)| *bin != NO_BIN);
+        let outer = self.feeders.outer(block).iter().map(|outer| (outer.bin, outer.position));
+        candidates.extend(inner.chain(outer).map(|(bin, position)| {
+            let (key, tie) = self.source_key(bin);
+            Candidate { key, tie, rank, position }
+        }));
+    }
+
+    /// Cuts what reaches a block into pieces of other ranks.
+    fn cut_pieces(
+        &self,
+        rank: usize,
+        block: usize,
+        candidates: &[Candidate],
+        pieces: &mut Vec<Piece>,
+        parts: &mut Vec<(u32, Part)>,
+    ) {
+        let regions = Regions::of::<D>();
+        let Block { sum, constrained, .. } = self.blocks[block];
+        let known = pieces.len();
+        let mut found: Vec<(usize, u64, u64)> = Vec::new();
+        for region in 0..offset_count(D) {
+            let nodes = regions.nodes[region] & sum;
+            if nodes == 0 {
+                continue;
+            }
+            let reaches = |candidate: &&Candidate| regions.positions[region] >> candidate.position & 1 == 1;
+            let here: Vec<&Candidate> = candidates.iter().filter(reaches).collect();
+            found.clear();
+            each_subtree(&here, &|candidate| candidate.key, &|candidate| candidate.rank, &mut |subtree| {
+                if let [first, ..] = subtree
+                    && first.rank != rank
+                {
+                    found.push((first.rank, first.key, subtree[subtree.len() - 1].key));
+                }
+            });
+            for &(owner, first, last) in &found {
+                let is_all = found.iter().filter(|(other, ..)| *other == owner).count() == 1;
+                let (from, to) = if is_all { (0, u64::MAX) } else { (first, last) };
+                let is_same = |piece: &Piece| (piece.rank, piece.first, piece.last) == (owner, from, to);
+                let piece = known + pieces[known..].iter().position(is_same).unwrap_or(pieces.len() - known);
+                if piece == pieces.len() {
+                    let block = block as u32;
+                    pieces.push(Piece {
+                        rank: owner,
+                        block,
+                        nodes: 0,
+                        constrained: 0,
+                        first: from,
+                        last: to,
+                    });
+                }
+                pieces[piece].nodes |= nodes;
+                pieces[piece].constrained |= nodes & constrained;
+                parts.push((block as u32, Part { region: region as u8, piece: piece as u32, key: first }));
+            }
+        }
+    }
+}
+
+/// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies, or, if
+/// that is outside, where the leaf lies. So what a leaf contributes is together, and so is what a rank contributes.
+fn source_key<const D: usize>(leaf: &Octant<D>, block: &Octant<D>) -> (u64, u64) {
+    let place = block.key();
+    (if leaf.contains(block) { place } else { leaf.key() }, place)
+}
+
+/// Search for bins of other ranks; remembers what it has found.
+#[derive(Default)]
+struct RemoteBins<const D: usize> {
+    remote: FxHashMap<Octant<D>, Vec<usize>>,
+    is_inner: FxHashMap<Octant<D>, bool>,
+}
+
+impl<const D: usize> RemoteBins<D> {
+    /// Bins of other ranks that may contribute to the sums of a block.
+    fn add_remote(&mut self, plan: &GridPlan<D>, rank: usize, block: usize, candidates: &mut Vec<Candidate>) {
+        let (tree, block) = (&plan.tree, &plan.blocks[block]);
+        let regions = Regions::of::<D>();
+        for position in 0..offset_count(D) {
+            if block.sum & regions.overlap[position] == 0 {
+                continue;
+            }
+            let Some(coord) = shifted(block.coord, offset::<D>(position)) else { continue };
+            let bin = Octant { level: block.level, coord };
+            let leaves = self.remote.entry(bin).or_insert_with(|| {
+                let start = bin.ancestor(tree.coarsest_reaching(bin.level));
+                if *self.is_inner.entry(start).or_insert_with(|| plan.is_inner(&start)) {
+                    return Vec::new();
+                }
+                let mut leaves = bin_sources(tree, bin.level, bin.coord);
+                leaves.retain(|&leaf| tree.owner(leaf) != rank);
+                leaves
+            });
+            candidates.extend(leaves.iter().map(|&leaf| {
+                let (key, tie) = source_key(&tree.leaves()[leaf], &bin);
+                Candidate { key, tie, rank: tree.owner(leaf), position: position as u8 }
+            }));
+        }
+    }
+}
+
+impl<const D: usize> GridPlan<D> {
     /// Whether all leaves that may feed bins inside `start` are own leaves.
     fn is_inner(&self, start: &Octant<D>) -> bool {
         let mut around = box_offsets::<D>(self.tree.reach_in_leaves());
@@ -58,17 +213,5 @@ impl<const D: usize> GridPlan<D> {
                 !self.tree.contains(start.level, coord) || self.tree.is_own(&beside)
             })
         })
-    }
-
-    /// Puts own and received bins into canonical order.
-    pub(super) fn list_sources(&mut self) {
-        let first = self.tree.first_own() as u32;
-        let own = self.bins.iter().zip(0..);
-        let own = own.map(|(bin, number)| (first + bin.leaf, bin.block, Source::Own(BinId(number))));
-        let received = self.received.iter().zip(0..);
-        let received = received.map(|(bin, number)| (bin.leaf, bin.block, Source::Received(number)));
-        let mut sources: Vec<(u32, Octant<D>, Source)> = own.chain(received).collect();
-        sources.sort_unstable_by_key(|(leaf, block, _)| (*leaf, block.level, block.key()));
-        self.sources = sources.into_iter().map(|(_, _, source)| source).collect();
     }
 }

@@ -133,8 +133,11 @@ pub struct Record {
     pub levels: Vec<LevelCount>,
     /// Largest cost of a rank over the mean cost.
     pub imbalance: f64,
-    /// The same for the best cuts of the curve that keep families of leaves whole.
+    /// The same for new cuts of the curve.
     pub possible_imbalance: f64,
+    /// New partitions since the start of this process.
+    #[serde(default)]
+    pub partitions: u64,
     /// What single ranks hold and send.
     pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
@@ -177,6 +180,8 @@ pub struct Contribution<'a, const D: usize> {
     pub imbalance: f64,
     /// The same for new cuts.
     pub possible_imbalance: f64,
+    /// New partitions since the start of this process (the same on all ranks).
+    pub partitions: u64,
     /// Relative mass error (the same on all ranks).
     pub mass_error: f64,
     /// Dynamic refinement (the same on all ranks).
@@ -249,6 +254,7 @@ impl Record {
             levels: (0..LEVELS).filter(|&l| counts[l] > 0).map(level).collect(),
             imbalance: mine.imbalance,
             possible_imbalance: mine.possible_imbalance,
+            partitions: mine.partitions,
             per_rank: PerRank {
                 leaves: rest[0],
                 ghost_leaves: rest[1],
@@ -339,6 +345,7 @@ mod tests {
             levels: vec![LevelCount { level: 3, leaves: 8, particles: 200_000 }],
             imbalance: 1.01,
             possible_imbalance: 1.005,
+            partitions: 3,
             per_rank: PerRank {
                 leaves: spread,
                 ghost_leaves: spread,

@@ -1,10 +1,10 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
 use super::simd::{LANES, Lanes, Mask, prefetch};
-use crate::particle::chunk::Layout;
+use crate::particle::chunk::{Chunk, Layout, Place};
 
-/// How far ahead columns are asked for, in particles: a batch at a time is too many streams for the
-/// processor to foresee.
+/// How far ahead columns are asked for, in particles, in the next chunk where this one ends: a batch at a time is too
+/// many streams for the processor to foresee, and in 2D a column is over after a few lines.
 const AHEAD: usize = 2 * LANES;
 
 /// Up to [`LANES`] particles. Lanes that are no members compute something that is never stored.
@@ -15,6 +15,8 @@ pub(super) struct Batch {
     lanes: u32,
     /// Lane i is particle `index[0] + i`, member or not.
     contiguous: bool,
+    /// What a later batch will read.
+    ahead: Place,
 }
 
 /// All lanes are members.
@@ -29,12 +31,37 @@ pub(super) struct Batches<'a> {
     stride: usize,
     /// Members taken so far.
     taken: usize,
+    place: Place,
+    next: Place,
 }
 
 impl<'a> Batches<'a> {
-    /// Batches of a selection from a chunk of `len` particles in columns of `stride` numbers.
-    pub fn new(select: Select<'a>, len: usize, stride: usize) -> Self {
-        Self { select, len, stride, taken: 0 }
+    /// Batches of a selection from a chunk. `next` is the place of the chunk to be read after it.
+    pub fn new<const D: usize>(select: Select<'a>, chunk: &Chunk<D>, next: Place) -> Self {
+        let place = chunk.place();
+        Self { select, len: chunk.len(), stride: chunk.capacity(), taken: 0, place, next }
+    }
+
+    /// The next particles of the chunk. Columns have room for whole batches.
+    #[inline(always)]
+    fn whole(&self) -> Batch {
+        let first = self.taken;
+        let count = (self.len - first).min(LANES);
+        let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
+        Batch { index, lanes: ALL >> (LANES - count), contiguous: true, ahead: self.ahead(first) }
+    }
+
+    /// Where to read ahead while the particles from `first` on are at work.
+    #[inline(always)]
+    fn ahead(&self, first: usize) -> Place {
+        let rows = self.len.next_multiple_of(LANES);
+        let (place, particle) = match first + AHEAD {
+            particle if particle < rows => (self.place, particle),
+            particle if self.next.columns != 0 => (self.next, particle - rows),
+            _ => (self.place, first),
+        };
+        let bytes = particle * size_of::<f64>();
+        Place { columns: place.columns + bytes, stride: place.stride, tags: place.tags + bytes }
     }
 }
 
@@ -49,11 +76,9 @@ impl Iterator for Batches<'_> {
                 if first >= self.len {
                     return None;
                 }
-                // Columns have room for whole batches.
-                let count = (self.len - first).min(LANES);
+                let batch = self.whole();
                 self.taken += LANES;
-                let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
-                Some(Batch { index, lanes: ALL >> (LANES - count), contiguous: true })
+                Some(batch)
             }
             Select::List(list) => {
                 let rest = &list[self.taken..];
@@ -62,17 +87,37 @@ impl Iterator for Batches<'_> {
                 }
                 let (batch, count) = Batch::of_list(rest, self.stride);
                 self.taken += count;
-                Some(batch)
+                Some(Batch { ahead: self.ahead(rest[0] as usize), ..batch })
             }
         }
     }
 }
 
 impl Batch {
+    /// Particles of a chunk from `first` on, as many as there are.
+    #[inline(always)]
+    pub fn from_chunk<const D: usize>(chunk: &Chunk<D>, first: usize) -> Self {
+        let batches = Batches { taken: first, ..Batches::new(Select::All, chunk, Place::default()) };
+        batches.whole()
+    }
+
     /// The first particles of a list, and their number. Where at least half of the next [`LANES`] particles of the chunk
     /// are on the list, as is usual beside level jumps, these are read as they stand; elsewhere they are picked.
-    #[inline(never)]
+    #[inline(always)]
     fn of_list(list: &[u32], stride: usize) -> (Self, usize) {
+        let first = list[0];
+        if let Some(next) = list.first_chunk::<LANES>()
+            && next[LANES - 1] == first + LANES as u32 - 1
+        {
+            let batch = Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() };
+            return (batch, LANES);
+        }
+        Self::of_gaps(list, stride)
+    }
+
+    /// As [`Batch::of_list`], for lists with gaps.
+    #[inline(never)]
+    fn of_gaps(list: &[u32], stride: usize) -> (Self, usize) {
         let first = list[0];
         let end = first + LANES as u32;
         let (mut index, mut lanes, mut count, mut least) = ([first; LANES], 0, 0, first);
@@ -86,7 +131,7 @@ impl Batch {
             least = p + 1;
         }
         if (count >= LANES / 2 || count == list.len()) && end as usize <= stride {
-            return (Self { index, lanes, contiguous: true }, count);
+            return (Self { index, lanes, contiguous: true, ahead: Place::default() }, count);
         }
         (Self::from_indices(list, |&p| p), list.len().min(LANES))
     }
@@ -96,7 +141,7 @@ impl Batch {
     pub fn from_indices<T>(list: &[T], particle: impl Fn(&T) -> u32) -> Self {
         let count = list.len().min(LANES);
         let index: [u32; LANES] = std::array::from_fn(|lane| particle(&list[lane.min(count - 1)]));
-        Self { index, lanes: ALL >> (LANES - count), contiguous: false }
+        Self { index, lanes: ALL >> (LANES - count), contiguous: false, ahead: Place::default() }
     }
 
     /// Lanes that are members, in order.
@@ -128,19 +173,24 @@ impl Batch {
         self.index[lane] as usize
     }
 
+    /// Asks for what a later batch will read of a column.
+    #[inline(always)]
+    fn read_ahead(&self, column: usize) {
+        prefetch(self.ahead.columns.wrapping_add(column * self.ahead.stride));
+    }
+
     /// Reads a column.
     #[inline(always)]
     pub fn load(&self, reals: &[f64], stride: usize, column: usize) -> Lanes {
-        let column = column * stride;
         if self.contiguous {
-            let start = column + self.particle(0);
-            prefetch(reals, start + AHEAD);
+            let start = column * stride + self.particle(0);
+            self.read_ahead(column);
             match reals[start..start + LANES].first_chunk() {
                 Some(values) => Lanes::load(values),
                 None => Lanes::splat(0.0),
             }
         } else {
-            self.load_scattered(reals, column)
+            self.load_scattered(reals, column * stride)
         }
     }
 
@@ -152,15 +202,14 @@ impl Batch {
     /// Writes a column.
     #[inline(always)]
     pub fn store(&self, reals: &mut [f64], stride: usize, column: usize, values: Lanes) {
-        let column = column * stride;
         if self.contiguous {
-            let start = column + self.particle(0);
-            prefetch(reals, start + AHEAD);
+            let start = column * stride + self.particle(0);
+            self.read_ahead(column);
             if let Some(to) = reals[start..start + LANES].first_chunk_mut() {
                 self.merged(values, Lanes::load(to)).store(to);
             }
         } else {
-            self.store_scattered(reals, column, values);
+            self.store_scattered(reals, column * stride, values);
         }
     }
 
@@ -185,6 +234,7 @@ impl Batch {
     /// Material index of each lane.
     #[inline(always)]
     pub fn materials(&self, tags: &[u64]) -> [u16; LANES] {
+        prefetch(self.ahead.tags);
         // The material is the low half word of a packed tag.
         std::array::from_fn(|lane| tags[self.particle(lane)] as u16)
     }

@@ -7,7 +7,7 @@ use super::math::{exp, ln};
 use super::simd::{LANES, Lanes, Mask};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 /// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small that
 /// what a box then has outside the domain is below round-off.
@@ -40,6 +40,20 @@ pub fn full_half_widths<const D: usize>(
     collect(chunk, select, cell, f64::INFINITY, extent, scheme, out);
 }
 
+/// [`full_half_widths`] of [`LANES`] particles from `first` on; lanes behind the last particle hold anything.
+pub fn full_half_widths_from<const D: usize>(
+    chunk: &Chunk<D>,
+    first: usize,
+    cell: f64,
+    extent: &[f64; D],
+    scheme: &Scheme,
+) -> [Lanes; D] {
+    let (reals, stride) = chunk.reals();
+    let batch = Batch::from_chunk(chunk, first);
+    let position = batch.positions(reals, stride);
+    of_batch(reals, stride, chunk.tags(), &batch, &position, cell, f64::INFINITY, extent, scheme)
+}
+
 fn collect<const D: usize>(
     chunk: &Chunk<D>,
     select: Select,
@@ -51,7 +65,7 @@ fn collect<const D: usize>(
 ) {
     out.clear();
     let (reals, stride) = chunk.reals();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half = of_batch(reals, stride, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
         let half = half.map(Lanes::to_array);

@@ -8,18 +8,19 @@
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches};
+use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Place};
 
-/// Moments of the arena's nodes at level jumps.
+/// First moments of the constrained nodes of an arena.
 #[derive(Clone, Copy)]
 pub struct Moments<'a, const D: usize> {
-    /// Whether a stencil touches a constrained node; index of [`super::stencil_bases`].
-    pub touched: &'a [bool],
-    /// First moments V: row k of a node is column k, `(V_xk, V_yk, V_zk, unused)`.
+    /// The constrained nodes.
+    pub nodes: &'a ConstrainedNodes,
+    /// Per constrained node, row k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
     pub first: &'a [[Row; D]],
 }
 
@@ -76,7 +77,8 @@ impl<const D: usize> Gathered<D> {
 }
 
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if any is not finite.
+/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `next` is the place of the chunk
+/// that will be read after this one.
 pub fn gather<const D: usize>(
     chunk: &mut Chunk<D>,
     select: Select,
@@ -84,15 +86,16 @@ pub fn gather<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     fields: &Fields<D>,
+    next: Place,
 ) -> f64 {
-    let len = chunk.len();
+    let batches = Batches::new(select, chunk, next);
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
     let plain = fields.increment.is_none() && fields.moments.is_none();
     let cell = frame.cell;
     let mut weights = Weights::new();
     let mut sums = Sums::new();
     let mut greatest = Lanes::splat(0.0);
-    for batch in Batches::new(select, len, stride) {
+    for batch in batches {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
@@ -164,7 +167,7 @@ pub fn interpolate<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
@@ -232,13 +235,12 @@ impl<const D: usize> Sums<D> {
             self.increment[lane] = mean(weights, lane, &increment[first..]);
         }
         if let Some(moments) = &fields.moments
-            && moments.touched[weights.base(lane)]
+            && moments.nodes.are_touched(weights, lane)
         {
-            let nodes = &moments.first[first..][..super::stencil_span(D)];
             let mut sum = [F64x4::splat(0.0); D];
-            weights.for_each_node(lane, |node, weight| {
+            moments.nodes.for_each(weights, lane, |node, weight| {
                 for k in 0..D {
-                    sum[k] = weight.mul_add(F64x4::new(nodes[node][k].0), sum[k]);
+                    sum[k] = weight.mul_add(F64x4::new(moments.first[node][k].0), sum[k]);
                 }
             });
             for k in 0..D {

@@ -9,6 +9,7 @@ use self::simd::{F64x4, Lanes};
 use crate::material::Material;
 
 mod batch;
+pub mod constrained;
 pub mod domain;
 pub mod g2p;
 pub mod math;
@@ -49,7 +50,13 @@ impl Row {
     /// Adds another row.
     #[inline(always)]
     pub fn add(&mut self, other: &Self) {
-        self.0 = (F64x4::new(self.0) + F64x4::new(other.0)).to_array();
+        *self = self.plus(other);
+    }
+
+    /// The sum of two rows.
+    #[inline(always)]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self((F64x4::new(self.0) + F64x4::new(other.0)).to_array())
     }
 }
 
@@ -69,7 +76,7 @@ pub struct Frame<const D: usize> {
 pub enum Select<'a> {
     /// All, in the order of the chunk.
     All,
-    /// These, in this order; no index twice.
+    /// These; ascending, no index twice.
     List(&'a [u32]),
 }
 

@@ -15,26 +15,26 @@
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
 use super::batch::{Batch, Batches};
+use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, LANES, Lanes};
-use super::spread::Constraints;
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Place};
 
-/// First moments `A = Σ w m C` of the nodes, gathered only from stencils that touch a constrained
-/// node.
+/// First moments `A = Σ w m C` of the constrained nodes of an arena.
 pub struct MomentSums<'a, const D: usize> {
-    /// Whether a stencil touches a constrained node, and their second moments.
-    pub constraints: Constraints<'a>,
-    /// Per arena node, row k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
+    /// The constrained nodes, with their second moments.
+    pub nodes: &'a ConstrainedNodes,
+    /// Per constrained node, row k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
     pub sums: &'a mut [[Row; D]],
 }
 
 /// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also first
-/// moments where a stencil touches a constrained node.
+/// moments of the constrained nodes.
 ///
 /// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
-/// the arena, which holds when its centre lies in the block.
+/// the arena, which holds when its centre lies in the block. `next` is the place of the chunk that will be read after
+/// this one.
 pub fn scatter<const D: usize>(
     chunk: &Chunk<D>,
     select: Select,
@@ -43,11 +43,12 @@ pub fn scatter<const D: usize>(
     dt: f64,
     arena: &mut [Row],
     moments: Option<MomentSums<D>>,
+    next: Place,
 ) {
     // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
     match moments {
-        None => scatter_all(chunk, select, frame, scheme, dt, arena, None),
-        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments),
+        None => scatter_all(chunk, select, frame, scheme, dt, arena, None, next),
+        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments, next),
     }
 }
 
@@ -83,18 +84,19 @@ fn scatter_all<const D: usize>(
     dt: f64,
     arena: &mut [Row],
     mut moments: Option<MomentSums<D>>,
+    next: Place,
 ) {
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut prepared = Prepared::new();
-    for batch in Batches::new(select, chunk.len(), stride) {
+    for batch in Batches::new(select, chunk, next) {
         let position = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
         if let Some(moments) = &moments {
-            moments.constraints.add_spread(&prepared.weights, &batch, &mut spread);
+            moments.nodes.add_spread(&prepared.weights, &batch, &mut spread);
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(&batch, arena, moments.as_mut());
@@ -187,10 +189,10 @@ impl<const D: usize> Prepared<D> {
         for lane in batch.members() {
             let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
-            if let Some(moments) = moments.as_deref_mut()
-                && moments.constraints.touched[self.weights.base(lane)]
-            {
-                self.add_moments(lane, &mut moments.sums[first..first + span]);
+        }
+        if let Some(moments) = moments.as_deref_mut() {
+            for lane in batch.members() {
+                self.add_moments(lane, moments);
             }
         }
     }
@@ -234,13 +236,12 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
-    fn add_moments(&self, lane: usize, nodes: &mut [[Row; D]]) {
-        let nodes = &mut nodes[..super::stencil_span(D)];
-        let affine: [F64x4; D] = std::array::from_fn(|k| self.affine[k][lane]);
-        self.weights.for_each_node(lane, |node, weight| {
+    #[inline(always)]
+    fn add_moments(&self, lane: usize, moments: &mut MomentSums<D>) {
+        moments.nodes.for_each(&self.weights, lane, |node, weight| {
+            let sums = &mut moments.sums[node];
             for k in 0..D {
-                let sum = &mut nodes[node][k].0;
-                *sum = weight.mul_add(affine[k], F64x4::new(*sum)).to_array();
+                sums[k].0 = weight.mul_add(self.affine[k][lane], F64x4::new(sums[k].0)).to_array();
             }
         });
     }

@@ -83,6 +83,18 @@ pub struct Chunk<const D: usize> {
     tags: Vec<u64>,
 }
 
+/// Where the columns of a chunk lie in memory: from the chunk that comes next, kernels fetch the first lines while they
+/// are still at work on this one. Holds no borrow; an address that is no longer right costs time and nothing else.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    /// Address of the first column; 0 if there are no particles.
+    pub columns: usize,
+    /// Bytes from column to column.
+    pub stride: usize,
+    /// Address of the tags.
+    pub tags: usize,
+}
+
 /// Capacities are multiples of this, so that a batch of lanes never reads past a column.
 const CAPACITY_STEP: usize = 8;
 
@@ -144,6 +156,15 @@ impl<const D: usize> Chunk<D> {
     /// the latter.
     pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
         (cast_slice_mut(&mut self.lines), self.capacity, &self.tags[..self.len])
+    }
+
+    /// Where the columns lie in memory.
+    pub fn place(&self) -> Place {
+        if self.is_empty() {
+            return Place::default();
+        }
+        let stride = self.capacity * size_of::<f64>();
+        Place { columns: self.lines.as_ptr().addr(), stride, tags: self.tags.as_ptr().addr() }
     }
 
     /// Identifiers, unique over the run.
@@ -209,34 +230,35 @@ impl<const D: usize> Chunk<D> {
         first
     }
 
-    /// All columns as bytes, to send the particles to another rank of the same job.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut words: Vec<u64> = Vec::with_capacity(1 + self.len * (Layout::<D>::REALS + 2));
-        words.push(self.len as u64);
+    /// Appends all columns as bytes, to send the particles to another rank of the same job.
+    pub fn append_to(&self, bytes: &mut Vec<u8>) {
+        bytes.reserve(8 * self.len * (Layout::<D>::REALS + 2));
         for column in 0..Layout::<D>::REALS {
-            words.extend(self.column(column).iter().map(|value| value.to_bits()));
+            bytes.extend_from_slice(cast_slice(self.column(column)));
         }
-        words.extend(self.ids());
-        words.extend(self.tags());
-        bytemuck::cast_slice(&words).to_vec()
+        bytes.extend_from_slice(cast_slice(self.ids()));
+        bytes.extend_from_slice(cast_slice(self.tags()));
     }
 
-    /// The particles that [`Chunk::to_bytes`] packed; empty if the bytes are not of that form.
+    /// The particles that [`Chunk::append_to`] packed; empty if the bytes are not of that form.
     pub fn from_bytes(bytes: &[u8]) -> Self {
-        let mut words = bytes.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
-        let len = words.next().unwrap_or(0) as usize;
-        if bytes.len() != 8 * (1 + len * (Layout::<D>::REALS + 2)) {
-            return Self::new();
-        }
+        let len = bytes.len() / (8 * (Layout::<D>::REALS + 2));
         let mut chunk = Self::with_capacity(len);
-        chunk.extend_zeroed(len);
-        for column in 0..Layout::<D>::REALS {
-            for (value, word) in chunk.column_mut(column).iter_mut().zip(&mut words) {
-                *value = f64::from_bits(word);
-            }
+        if bytes.len() != 8 * len * (Layout::<D>::REALS + 2) || len == 0 {
+            return chunk;
         }
-        chunk.ids_mut().iter_mut().zip(&mut words).for_each(|(id, word)| *id = word);
-        chunk.tags_mut().iter_mut().zip(&mut words).for_each(|(tag, word)| *tag = word);
+        chunk.extend_zeroed(len);
+        let mut columns = bytes.chunks_exact(8 * len);
+        let mut next = |to: &mut [u8]| {
+            if let Some(column) = columns.next() {
+                to.copy_from_slice(column);
+            }
+        };
+        for column in 0..Layout::<D>::REALS {
+            next(cast_slice_mut(chunk.column_mut(column)));
+        }
+        next(cast_slice_mut(chunk.ids_mut()));
+        next(cast_slice_mut(chunk.tags_mut()));
         chunk
     }
 
@@ -258,6 +280,23 @@ impl<const D: usize> Chunk<D> {
             self.tags[to] = self.tags[from];
         }
         self.len = len;
+        self.give_back();
+    }
+
+    /// Gives back room once an eighth of what is needed stands empty, as in leaves that the material leaves.
+    fn give_back(&mut self) {
+        if self.len == 0 {
+            *self = Self::new();
+        } else if self.capacity > self.len + self.len / 8 + 4 * CAPACITY_STEP {
+            let mut smaller = Self::with_capacity(self.len + self.len / 32);
+            smaller.len = self.len;
+            for column in 0..Layout::<D>::REALS {
+                smaller.column_mut(column).copy_from_slice(self.column(column));
+            }
+            smaller.ids_mut().copy_from_slice(self.ids());
+            smaller.tags_mut().copy_from_slice(self.tags());
+            *self = smaller;
+        }
     }
 
     /// A chunk whose particle `q` is particle `source[q]` of this one.
@@ -293,11 +332,11 @@ impl<const D: usize> Chunk<D> {
         self.capacity = capacity;
     }
 
-    /// Room for `extra` more; grows by a sixteenth at least, since memory per particle is the limit.
+    /// Room for `extra` more; grows by little, since memory per particle is the limit.
     fn grow_for(&mut self, extra: usize) {
         let needed = self.len + extra;
         if needed > self.capacity {
-            self.reserve_exact(needed.max(self.capacity + self.capacity / 16 + CAPACITY_STEP));
+            self.reserve_exact(needed.max(self.capacity + self.capacity / 32 + CAPACITY_STEP));
         }
     }
 }
@@ -326,7 +365,9 @@ mod tests {
             let p = chunk.push_zeroed(id << 40, Tag { material: 1, body: 2, level: 3 });
             chunk.column_mut(Layout::<3>::WORK)[p] = -0.1 * id as f64;
         }
-        let back = Chunk::<3>::from_bytes(&chunk.to_bytes());
+        let mut bytes = Vec::new();
+        chunk.append_to(&mut bytes);
+        let back = Chunk::<3>::from_bytes(&bytes);
         assert_eq!(back.ids(), chunk.ids());
         assert_eq!(back.tags(), chunk.tags());
         for column in 0..Layout::<3>::REALS {

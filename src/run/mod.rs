@@ -111,7 +111,7 @@ impl RunError {
 }
 
 /// Steps between looks at the imbalance.
-const BALANCE_EVERY: u64 = 20;
+const BALANCE_EVERY: u64 = 10;
 
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///

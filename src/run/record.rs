@@ -156,6 +156,7 @@ impl Recorder {
                 census: solver.census(),
                 imbalance: solver.imbalance().0,
                 possible_imbalance: solver.possible_imbalance().0,
+                partitions: solver.partitions,
                 mass_error,
                 resampled: books.map(|books| Resampled {
                     regrids: solver.regrids,

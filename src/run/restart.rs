@@ -10,7 +10,8 @@ use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::{self, Scalars, directory};
 use crate::job::Problem;
-use crate::solver::rebalance::leaf_weight;
+use crate::particle::Chunk;
+use crate::solver::rebalance::{cut_at, leaf_weight};
 use crate::solver::{Clock, Solver};
 
 /// Where a run goes on from.
@@ -149,10 +150,8 @@ pub fn solver<const D: usize>(
     let restored = snapshot::read::<D>(comm, &path, Some(problem.digest))?;
     let mut forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves))?;
     let weights: Vec<u64> = restored.chunks.iter().map(leaf_weight).collect();
-    let payload = restored.chunks.iter().map(crate::particle::Chunk::to_bytes).collect();
-    let shipment = forest.partition(comm, &weights);
-    let arrived: Vec<Vec<u8>> = shipment.move_payload(comm, payload);
-    let chunks = arrived.iter().map(|bytes| crate::particle::Chunk::from_bytes(bytes)).collect();
+    let shipment = forest.partition(comm, &weights, cut_at(problem.adaptivity.as_ref()));
+    let chunks = shipment.move_items(comm, restored.chunks, Chunk::append_to, Chunk::from_bytes);
     let header = restored.header;
     let clock = Clock {
         step: header.step,

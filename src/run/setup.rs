@@ -7,7 +7,7 @@ use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::seed::{SeedError, check_counts, count_leaf, fill_leaf};
-use crate::solver::rebalance::leaf_cost;
+use crate::solver::rebalance::{cut_at, leaf_cost};
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
 
@@ -107,7 +107,7 @@ fn partition_by_seeds<const D: usize>(
     let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
     let even = || vec![1; forest.leaves().len()];
     let weights = counted.as_ref().map_or_else(|_| even(), Clone::clone);
-    forest.partition(comm, &weights);
+    forest.partition(comm, &weights, cut_at(problem.adaptivity.as_ref()));
     counted.map(|_| ())
 }
 

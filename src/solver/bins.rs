@@ -8,6 +8,7 @@
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
+use super::sides::{Side, Sides};
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::Bin;
@@ -17,15 +18,25 @@ use crate::kernel::SubBox;
 use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout};
 
-/// Particles of a leaf from which on its own bin counts as touching all nodes.
-const CROWDED: usize = 128;
+/// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
+/// more than it saves.
+const fn crowded(d: usize) -> usize {
+    if d == 2 { 32 } else { 128 }
+}
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]
-struct NearLeaf<const D: usize> {
-    level: u8,
-    lower: [f64; D],
-    upper: [f64; D],
+pub(super) struct NearLeaf<const D: usize> {
+    pub level: u8,
+    pub lower: [f64; D],
+    pub upper: [f64; D],
+}
+
+impl<const D: usize> NearLeaf<D> {
+    /// How far beyond its faces boxes count as touching them, m.
+    pub fn slack(&self) -> [f64; D] {
+        self.upper.map(|x| 16.0 * f64::EPSILON * x)
+    }
 }
 
 /// Particles and parts of boxes in one bin, in canonical order.
@@ -37,11 +48,44 @@ pub struct Members<const D: usize> {
     pub parts: Vec<SubBox<D>>,
     /// Nodes that all these touch.
     pub window: Window<D>,
+    /// Least and greatest lower face of the boxes along each axis, m.
+    lower_faces: [[f64; D]; 2],
 }
 
 impl<const D: usize> Default for Members<D> {
     fn default() -> Self {
-        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY }
+        let lower_faces = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
+        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY, lower_faces }
+    }
+}
+
+impl<const D: usize> Members<D> {
+    fn clear(&mut self) {
+        let (whole, parts) = (std::mem::take(&mut self.whole), std::mem::take(&mut self.parts));
+        *self = Self { whole, parts, ..Self::default() };
+        self.whole.clear();
+        self.parts.clear();
+    }
+
+    /// Grows the window to a box, in cells of edge `cell`. The kernel limits half widths to half a cell.
+    fn include(&mut self, cell: f64, centre: [f64; D], half: [f64; D]) {
+        let [least, greatest] = &mut self.lower_faces;
+        for axis in 0..D {
+            let face = centre[axis] - half[axis].min(0.5 * cell);
+            least[axis] = least[axis].min(face);
+            greatest[axis] = greatest[axis].max(face);
+        }
+    }
+
+    /// Makes the window from all boxes that were included.
+    fn close(&mut self, plan: &GridPlan<D>, bin: &Bin<D>) {
+        if self.lower_faces[0][0] <= self.lower_faces[1][0] {
+            let cell = plan.cell(bin.block.level);
+            for faces in self.lower_faces {
+                let corner = bin.block.coord.map(|c| f64::from(4 * c));
+                self.window.include(std::array::from_fn(|axis| faces[axis] / cell - corner[axis]));
+            }
+        }
     }
 }
 
@@ -53,7 +97,7 @@ pub struct LeafBins<const D: usize> {
     /// Particles whose box is cut, in order; a part's slot points here.
     pub cut: Vec<u32>,
     near: Vec<NearLeaf<D>>,
-    beside_finer: bool,
+    sides: Option<Sides<D>>,
 }
 
 /// Particle lists of the bins of one rank.
@@ -74,8 +118,9 @@ pub struct BinMissing {
 
 /// Half widths of the boxes of a chunk, and their bound.
 pub trait BoxWidths<const D: usize>: Sync {
-    /// Lists the half widths of all boxes in a leaf with cells of edge `cell`.
-    fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>);
+    /// Half widths of the boxes of [`LANES`] particles from `first` on in a leaf with cells of edge `cell`, m; lanes behind
+    /// the last particle are of no use.
+    fn of_batch(&self, chunk: &Chunk<D>, first: usize, cell: f64) -> [Lanes; D];
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
     /// Whether the kernels find the same half widths from the particles' state. If not, every box is
@@ -108,14 +153,11 @@ impl<const D: usize> BinLists<D> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
         let given = !widths.are_known_to_kernels();
         // All leaves, also after a failure: the others must not keep the lists of the step before.
-        let sorted = leaves.with_min_len(8).map_init(Vec::new, |halves, (leaf, ((bins, sorted), own))| {
+        let sorted = leaves.with_min_len(8).map(|(leaf, ((bins, sorted), own))| {
             let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
-            *sorted = given || bins.beside_finer || widths.bound(chunk) > 0.5 * cell;
-            if *sorted {
-                widths.list(chunk, cell, halves);
-                bins.sort(plan, leaf, own, chunk, halves, given)?;
-            }
-            Ok(())
+            let bound = widths.bound(chunk);
+            *sorted = given || bins.sides.is_some() || bound > 0.5 * cell;
+            if *sorted { bins.sort(plan, leaf, own, chunk, widths, bound) } else { Ok(()) }
         });
         sorted.reduce(|| Ok(()), Result::and)
     }
@@ -182,12 +224,14 @@ impl<const D: usize> LeafBins<D> {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
         let around = leaves_around(tree, known);
-        let beside_finer = around.iter().any(|&leaf| tree.leaves()[leaf].level > here.level);
-        let mut leaf =
-            Self { members: vec![Members::default(); bins], cut: Vec::new(), near: Vec::new(), beside_finer };
+        let members = vec![Members::default(); bins];
+        let mut leaf = Self { members, cut: Vec::new(), near: Vec::new(), sides: None };
         // All others need it only if boxes get wider than a cell.
-        if beside_finer {
+        if around.iter().any(|&leaf| tree.leaves()[leaf].level > here.level) {
             leaf.find_near(plan, around);
+            let bins = &plan.bins[plan.leaf_bins(known - tree.first_own())];
+            let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
+            leaf.sides = Some(Sides::new(own, here, cell, &leaf.near, bins));
         }
         leaf
     }
@@ -202,43 +246,94 @@ impl<const D: usize> LeafBins<D> {
         leaf: usize,
         own: &NearLeaf<D>,
         chunk: &Chunk<D>,
-        halves: &[[f64; D]],
-        given: bool,
+        widths: &impl BoxWidths<D>,
+        bound: f64,
     ) -> Result<(), BinMissing> {
         if self.near.is_empty() {
             self.find_near(plan, leaves_around(&plan.tree, plan.tree.first_own() + leaf));
         }
         self.cut.clear();
-        for members in &mut self.members {
-            members.whole.clear();
-            members.parts.clear();
-            members.window = Window::EMPTY;
+        self.members.iter_mut().for_each(Members::clear);
+        let crowded = chunk.len() >= crowded(D);
+        let cells = [plan.cell(own.level), plan.cell(own.level + 1)];
+        let given = !widths.are_known_to_kernels();
+        let sides = self.sides.clone().filter(|_| !given);
+        // Of most batches it is known without their half widths that they stay inside.
+        let bound_is_narrow = is_narrow([bound], cells[0]);
+        let bound = [Lanes::splat(bound); D];
+        for first in (0..chunk.len()).step_by(LANES) {
+            let lanes = LANES.min(chunk.len() - first);
+            let position = positions(chunk, first);
+            let all = first as u32..(first + lanes) as u32;
+            if let Some(sides) = &sides
+                && crowded
+                && bound_is_narrow
+                && sides.side(sides.crossings(&position, &bound).of_any()) == Side::Own
+            {
+                self.members[0].whole.extend(all);
+                continue;
+            }
+            let half = widths.of_batch(chunk, first, cells[0]);
+            let crossings = sides.as_ref().map(|sides| sides.crossings(&position, &half));
+            let narrow = cells.map(|cell| narrow_lanes(&half, cell));
+            let (position, half) = (position.map(Lanes::to_array), half.map(Lanes::to_array));
+            for (lane, p) in all.enumerate() {
+                let centre = std::array::from_fn(|axis| position[axis][lane]);
+                let half = std::array::from_fn(|axis| half[axis][lane]);
+                let side = sides.as_ref().zip(crossings).map(|(sides, crossings)| {
+                    let bin = match sides.side(crossings.of_lane(lane)) {
+                        Side::Own if narrow[0] >> lane & 1 == 1 => Some(0),
+                        Side::Finer if narrow[1] >> lane & 1 == 1 => sides.child_bin(&centre),
+                        Side::Own | Side::Finer | Side::Other => None,
+                    };
+                    bin.zip(Some(cells[usize::from(bin != Some(0))]))
+                });
+                if let Some(Some((bin, cell))) = side {
+                    let members = &mut self.members[bin];
+                    members.whole.push(p);
+                    if bin != 0 || !crowded {
+                        members.include(cell, centre, half);
+                    }
+                } else {
+                    let sorted = self.sort_one(plan, leaf, own, p, centre, half, given);
+                    sorted.map_err(|()| BinMissing { id: chunk.ids()[p as usize] })?;
+                }
+            }
         }
-        // So many particles touch nearly all nodes; to find out which they miss would cost more than it saves.
-        let crowded = chunk.len() >= CROWDED;
+        for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+            members.close(plan, bin);
+        }
         if crowded {
             self.members[0].window = Window::FULL;
         }
-        for (p, &half) in halves.iter().enumerate() {
-            let centre = chunk.position(p);
-            let level = self.finest_level(own, centre, half);
-            if !given && is_narrow(half, plan.cell(level)) {
-                // The first bin of a leaf is its own block's.
-                let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
-                let bin = bin.ok_or(BinMissing { id: chunk.ids()[p] })?;
-                self.members[bin].whole.push(p as u32);
-                if bin != 0 || !crowded {
-                    self.include(plan, leaf, bin, centre, half);
-                }
-                continue;
-            }
-            let slot = self.cut.len() as u32;
-            self.cut.push(p as u32);
-            let (fraction, spread) = (1.0, [0.0; D]);
-            let whole = SubBox { particle: p as u32, slot, centre, half, fraction, spread };
-            self.cut_box(plan, leaf, own, whole).map_err(|()| BinMissing { id: chunk.ids()[p] })?;
-        }
         Ok(())
+    }
+
+    /// Sorts one box, held against all leaves around.
+    fn sort_one(
+        &mut self,
+        plan: &GridPlan<D>,
+        leaf: usize,
+        own: &NearLeaf<D>,
+        particle: u32,
+        centre: [f64; D],
+        half: [f64; D],
+        given: bool,
+    ) -> Result<(), ()> {
+        let level = self.finest_level(own, centre, half);
+        let cell = plan.cell(level);
+        if !given && is_narrow(half, cell) {
+            // The first bin of a leaf is its own block's.
+            let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
+            let members = &mut self.members[bin.ok_or(())?];
+            members.whole.push(particle);
+            members.include(cell, centre, half);
+            return Ok(());
+        }
+        let slot = self.cut.len() as u32;
+        self.cut.push(particle);
+        let (fraction, spread) = (1.0, [0.0; D]);
+        self.cut_box(plan, leaf, own, SubBox { particle, slot, centre, half, fraction, spread })
     }
 
     /// Halves a box along the axes on which it is too wide, until each part fits the level it overlaps.
@@ -256,7 +351,7 @@ impl<const D: usize> LeafBins<D> {
         if count == 0 {
             let bin = self.bin(plan, leaf, level, part.centre).ok_or(())?;
             self.members[bin].parts.push(part);
-            self.include(plan, leaf, bin, part.centre, part.half);
+            self.members[bin].include(cell, part.centre, part.half);
             return Ok(());
         }
         let half: [f64; D] = std::array::from_fn(|axis| part.half[axis] * if wide[axis] { 0.5 } else { 1.0 });
@@ -272,21 +367,10 @@ impl<const D: usize> LeafBins<D> {
         Ok(())
     }
 
-    /// Grows the window of a bin to a box.
-    fn include(&mut self, plan: &GridPlan<D>, leaf: usize, bin: usize, centre: [f64; D], half: [f64; D]) {
-        let block = &plan.bins[plan.leaf_bins(leaf).start + bin].block;
-        let cell = plan.cell(block.level);
-        // The kernel limits half widths to half a cell.
-        let lowest = std::array::from_fn(|axis| {
-            (centre[axis] - half[axis].min(0.5 * cell)) / cell - f64::from(4 * block.coord[axis])
-        });
-        self.members[bin].window.include(lowest);
-    }
-
     /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
     /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
     fn finest_level(&self, own: &NearLeaf<D>, centre: [f64; D], half: [f64; D]) -> u8 {
-        let slack = own.upper.map(|x| 16.0 * f64::EPSILON * x);
+        let slack = own.slack();
         let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis] - slack[axis]);
         let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis] + slack[axis]);
         if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
@@ -320,6 +404,21 @@ impl<const D: usize> LeafBins<D> {
             })
         })
     }
+}
+
+/// Positions of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
+fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
+    let (reals, stride) = chunk.reals();
+    std::array::from_fn(|axis| {
+        let column = &reals[(Layout::<D>::POSITION + axis) * stride + first..];
+        column.first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load)
+    })
+}
+
+/// Lanes of which [`is_narrow`] holds.
+fn narrow_lanes<const D: usize>(half: &[Lanes; D], cell: f64) -> u32 {
+    let limit = Lanes::splat(0.5 * cell * (1.0 + 8.0 * f64::EPSILON));
+    half.iter().fold(!0, |lanes, half| lanes & half.le(limit).bits())
 }
 
 /// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not

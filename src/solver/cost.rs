@@ -5,10 +5,10 @@
 //! in which nodes are summed and updated give the cost of a leaf. Costs steer the partition, which changes no bit
 //! of the state.
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 use super::Solver;
 use super::phases::Phase;
+use super::rebalance::thread_time;
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 
@@ -86,9 +86,9 @@ impl Costs {
         if !self.measuring {
             return work();
         }
-        let start = Instant::now();
+        let start = thread_time();
         let result = work();
-        self.nanoseconds[leaf].fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        self.nanoseconds[leaf].fetch_add((thread_time() - start).as_nanos() as u64, Ordering::Relaxed);
         result
     }
 

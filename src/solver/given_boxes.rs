@@ -14,6 +14,7 @@ use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
+use crate::kernel::simd::Lanes;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -60,9 +61,12 @@ struct Halves<const D: usize> {
 }
 
 impl<const D: usize> BoxWidths<D> for Halves<D> {
-    fn list(&self, chunk: &Chunk<D>, _cell: f64, out: &mut Vec<[f64; D]>) {
-        out.clear();
-        out.extend(chunk.ids().iter().map(|&id| self.halves[id as usize]));
+    fn of_batch(&self, chunk: &Chunk<D>, first: usize, _cell: f64) -> [Lanes; D] {
+        let last = chunk.len() - 1;
+        std::array::from_fn(|axis| {
+            let half = |lane| self.halves[chunk.ids()[last.min(first + lane)] as usize][axis];
+            Lanes::new(std::array::from_fn(half))
+        })
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {

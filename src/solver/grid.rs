@@ -1,6 +1,7 @@
 //! What lives on the grid for one tree and one partition, and the exchanges of a step.
 use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
+use rayon::prelude::*;
 
 use super::bins::BinLists;
 use super::increment::Increments;
@@ -11,7 +12,7 @@ use super::transfer::{extent, width_bound};
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::census::{Census, surface_bytes};
-use crate::grid::exchange::ReceivedArenas;
+use crate::grid::exchange::ReceivedSums;
 use crate::grid::known::Allowance;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields};
 use crate::kernel::Scheme;
@@ -25,7 +26,7 @@ pub struct Grid<const D: usize> {
     pub(super) fields: NodeFields<D>,
     pub(super) increments: Increments,
     pub(super) exchange: ArenaExchange<D>,
-    pub(super) received: ReceivedArenas<D>,
+    pub(super) received: ReceivedSums<D>,
     pub(super) migration: Migration<D>,
     pub(super) lists: BinLists<D>,
     /// Per bin, whether a neighbour needs it.
@@ -48,11 +49,19 @@ impl<const D: usize> Grid<D> {
             increments: Increments::default(),
             migration: Migration::new(comm, &plan, neighbours, physics.leaving),
             lists: BinLists::new(&plan),
-            is_sent: exchange.sent_bins(plan.bins.len()),
+            is_sent: exchange.sent_bins(&plan),
             exchange,
             received,
             plan,
         }
+    }
+
+    /// Gives back the memory of what the next step fills anew.
+    pub(super) fn clear(&mut self) {
+        self.arenas = Arenas::default();
+        self.increments = Increments::default();
+        self.fields.rows = Vec::new();
+        self.fields.moments = Vec::new();
     }
 
     /// What the particles scattered last.
@@ -60,8 +69,8 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// What other ranks have sent of theirs.
-    pub fn received(&self) -> &ReceivedArenas<D> {
+    /// What other ranks have sent of their sums.
+    pub fn received(&self) -> &ReceivedSums<D> {
         &self.received
     }
 
@@ -92,9 +101,10 @@ impl<const D: usize> Solver<D> {
     /// Not collective. [`needed_reach`] of this rank's particles.
     pub(super) fn local_reach(&self) -> u32 {
         let scheme = self.physics.scheme();
-        let leaves = self.forest.leaves().iter().zip(&self.chunks);
+        let root_edge = self.physics.root_edge;
+        let leaves = self.forest.leaves().par_iter().zip(&self.chunks).with_min_len(32);
         let reaches = leaves.map(|(leaf, chunk)| {
-            let cell = self.physics.root_edge / f64::from(4u32 << leaf.level);
+            let cell = root_edge / f64::from(4u32 << leaf.level);
             needed_reach(&scheme, chunk, cell)
         });
         reaches.max().unwrap_or(0)
@@ -114,16 +124,17 @@ impl<const D: usize> Solver<D> {
         &self.grid
     }
 
-    /// Starts sending the arenas that neighbours need.
+    /// Starts sending the sums that neighbours need.
     pub(super) fn send_arenas(&mut self) -> Pending {
         let grid = &mut self.grid;
         let before = grid.exchange.traffic().bytes;
-        let pending = self.phases.time(Phase::Exchange, || grid.exchange.begin(&grid.arenas));
+        let messages = self.phases.time(Phase::Sum, || grid.exchange.pack(&grid.plan, &grid.arenas));
+        let pending = self.phases.time(Phase::Exchange, || grid.exchange.begin(messages));
         self.arena_bytes = grid.exchange.traffic().bytes - before;
         pending
     }
 
-    /// Collective. What this rank holds of the tree and sends in the exchange of arenas done last.
+    /// Collective. What this rank holds of the tree and sends in the exchange done last.
     pub fn census(&self) -> Census {
         let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
         Census {
@@ -131,12 +142,12 @@ impl<const D: usize> Solver<D> {
             ghost_leaves: tree.ghost_len() as u64,
             neighbours: exchange.neighbours().len() as u64,
             arena_bytes: self.arena_bytes,
-            surface_bytes: surface_bytes(&self.comm, &self.grid.plan, &self.grid.arenas),
+            surface_bytes: surface_bytes(exchange, &self.grid.plan, &self.grid.arenas),
             grid_bytes: self.grid.heap_bytes() as u64,
         }
     }
 
-    /// Waits for the arenas of neighbours.
+    /// Waits for the sums of neighbours.
     pub(super) fn receive_arenas(&mut self, pending: Pending) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));

@@ -7,11 +7,12 @@ use partition::comm::{Comm, NeighbourExchange, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use super::records::{append_all, push_record, record_words};
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::simd::{LANES, Lanes, Mask};
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Layout};
 
 const TAG: u16 = 12;
 
@@ -147,56 +148,81 @@ impl<const D: usize> Migration<D> {
         chunks: &mut [Chunk<D>],
         found: Vec<Leavers>,
     ) -> Result<Moved, MigrateError> {
-        let first = tree.first_own();
         let mut error = None;
         let mut moved = Moved::default();
-        let mut outgoing: Vec<Vec<u8>> = self.exchange.neighbours().iter().map(|_| Vec::new()).collect();
-        let leaving = found.iter().flatten().map(Vec::len).sum();
-        let mut staged = Chunk::<D>::with_capacity(leaving);
-        let mut staged_leaf = Vec::with_capacity(leaving);
-        let mut leavers = Vec::with_capacity(chunks.len());
+        let mut leaving: Vec<(usize, Vec<(u32, Destination)>)> = Vec::new();
         for (leaf, found) in found.into_iter().enumerate() {
-            let found = found.unwrap_or_else(|found| {
-                error.get_or_insert(found);
-                Vec::new()
-            });
-            for (p, destination) in &found {
-                let Destination::Leaf(to) = destination else {
-                    moved.deleted += 1;
-                    continue;
-                };
-                let to = *to as usize;
-                if let Some(local) = tree.local(to) {
-                    staged.push_from(&chunks[leaf], *p as usize);
-                    staged_leaf.push(local);
-                    moved.local += 1;
-                } else if let Ok(neighbour) = self.exchange.neighbours().binary_search(&tree.owner(to)) {
-                    pack(&mut outgoing[neighbour], tree.leaves()[to].key(), &chunks[leaf], *p as usize);
-                    moved.sent += 1;
-                } else {
-                    error.get_or_insert_with(|| too_far(&chunks[leaf], *p as usize));
+            match found {
+                Ok(found) if found.is_empty() => {}
+                Ok(found) => leaving.push((leaf, found)),
+                Err(found) => {
+                    error.get_or_insert(found);
                 }
             }
-            leavers.push(found);
+        }
+        let records: Vec<Vec<u64>> = leaving
+            .par_iter()
+            .with_min_len(16)
+            .map(|(leaf, found)| {
+                let mut records = Vec::with_capacity(found.len() * record_words::<D>());
+                for (p, destination) in found {
+                    if let Destination::Leaf(to) = *destination {
+                        push_record(&mut records, u64::from(to), &chunks[*leaf], *p as usize);
+                    }
+                }
+                records
+            })
+            .collect();
+
+        let neighbours = self.exchange.neighbours();
+        let mut outgoing: Vec<Vec<u8>> = neighbours.iter().map(|_| Vec::new()).collect();
+        let mut own: Vec<(u32, &[u64])> = Vec::new();
+        for record in records.iter().flat_map(|records| records.chunks_exact(record_words::<D>())) {
+            let to = record[0] as usize;
+            if let Some(local) = tree.local(to) {
+                own.push((local as u32, record));
+                moved.local += 1;
+            } else if let Ok(neighbour) = neighbours.binary_search(&tree.owner(to)) {
+                let message = &mut outgoing[neighbour];
+                // The other rank has its own numbers of leaves.
+                message.extend_from_slice(&tree.leaves()[to].key().to_ne_bytes());
+                message.extend_from_slice(bytemuck::cast_slice(&record[1..]));
+                moved.sent += 1;
+            } else {
+                error.get_or_insert_with(|| stray::<D>(record));
+            }
         }
         let pending = self.exchange.begin(outgoing);
-        chunks.par_iter_mut().zip(&leavers).filter(|(_, gone)| !gone.is_empty()).for_each(|(chunk, gone)| {
-            chunk.remove(&gone.iter().map(|(p, _)| *p).collect::<Vec<u32>>());
-        });
-        let rank = chunks.first().map_or(0, |_| tree.owner(first));
-        let messages = pending.finish();
-        let split = self.exchange.neighbours().partition_point(|&neighbour| neighbour < rank);
-        for message in &messages[..split] {
-            unpack(message, tree, chunks);
+        let mut gone = vec![Vec::new(); chunks.len()];
+        for (leaf, found) in leaving {
+            moved.deleted += found.iter().filter(|(_, to)| matches!(to, Destination::Gone)).count() as u64;
+            gone[leaf] = found.into_iter().map(|(p, _)| p).collect();
         }
-        for (p, leaf) in staged_leaf.into_iter().enumerate() {
-            chunks[leaf].push_from(&staged, p);
-        }
-        for message in &messages[split..] {
-            unpack(message, tree, chunks);
-        }
+        let some = chunks.par_iter_mut().zip(&gone).with_min_len(32).filter(|(_, gone)| !gone.is_empty());
+        some.for_each(|(chunk, gone)| chunk.remove(gone));
+
+        let rank = chunks.first().map_or(0, |_| tree.owner(tree.first_own()));
+        let messages: Vec<Vec<u64>> =
+            pending.finish().iter().map(|bytes| bytemuck::allocation::pod_collect_to_vec(bytes)).collect();
+        let (before, after) =
+            messages.split_at(self.exchange.neighbours().partition_point(|&neighbour| neighbour < rank));
+        let arrivals: Vec<(u32, &[u64])> =
+            of_messages::<D>(before, tree).chain(own).chain(of_messages::<D>(after, tree)).collect();
+        append_all(chunks, &arrivals);
         error.map_or(Ok(moved), Err)
     }
+}
+
+/// Own leaf and record of each particle in messages from other ranks.
+fn of_messages<'a, const D: usize>(
+    messages: &'a [Vec<u64>],
+    tree: &'a KnownTree<D>,
+) -> impl Iterator<Item = (u32, &'a [u64])> {
+    let records = messages.iter().flat_map(|words| words.chunks_exact(record_words::<D>()));
+    records.filter_map(|record| {
+        let leaf = tree.locate(record[0]).and_then(|known| tree.local(known))?;
+        Some((leaf as u32, record))
+    })
 }
 
 /// Particles that leave a leaf, ascending, with where they go.
@@ -321,37 +347,13 @@ pub fn leaf_box<const D: usize>(leaf: &Octant<D>, root_edge: f64) -> ([f64; D], 
     (leaf.coord.map(|c| f64::from(c) * edge), leaf.coord.map(|c| f64::from(c + 1) * edge))
 }
 
+/// The error of a particle whose new leaf belongs to a rank that is no neighbour.
+fn stray<const D: usize>(record: &[u64]) -> MigrateError {
+    let column = |column: usize| f64::from_bits(record[1 + column]);
+    let position = (0..D).map(|axis| column(Layout::<D>::POSITION + axis)).collect();
+    MigrateError::TooFar { id: record[1 + Layout::<D>::REALS], position }
+}
+
 fn too_far<const D: usize>(chunk: &Chunk<D>, p: usize) -> MigrateError {
     MigrateError::TooFar { id: chunk.ids()[p], position: chunk.position(p).to_vec() }
-}
-
-/// Bytes of one particle in a message: key of its new leaf, columns, id, tag.
-const fn record_bytes<const D: usize>() -> usize {
-    8 * (Layout::<D>::REALS + 3)
-}
-
-fn pack<const D: usize>(message: &mut Vec<u8>, key: u64, chunk: &Chunk<D>, p: usize) {
-    message.extend_from_slice(&key.to_ne_bytes());
-    let (reals, stride) = chunk.reals();
-    for column in 0..Layout::<D>::REALS {
-        message.extend_from_slice(&reals[column * stride + p].to_ne_bytes());
-    }
-    message.extend_from_slice(&chunk.ids()[p].to_ne_bytes());
-    message.extend_from_slice(&chunk.tags()[p].to_ne_bytes());
-}
-
-fn unpack<const D: usize>(message: &[u8], tree: &KnownTree<D>, chunks: &mut [Chunk<D>]) {
-    for record in message.chunks_exact(record_bytes::<D>()) {
-        let mut words = record.chunks_exact(8).map(|b| u64::from_ne_bytes(std::array::from_fn(|i| b[i])));
-        let mut next = || words.next().unwrap_or_default();
-        let leaf = tree.locate(next()).and_then(|known| tree.local(known));
-        let Some(chunk) = leaf.map(|leaf| &mut chunks[leaf]) else { continue };
-        let p = chunk.push_zeroed(0, Tag { material: 0, body: 0, level: 0 });
-        let (reals, stride) = chunk.reals_mut();
-        for column in 0..Layout::<D>::REALS {
-            reals[column * stride + p] = f64::from_bits(next());
-        }
-        chunk.ids_mut()[p] = next();
-        chunk.tags_mut()[p] = next();
-    }
 }

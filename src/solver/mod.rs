@@ -11,8 +11,10 @@ mod indicators;
 pub mod migrate;
 pub mod phases;
 pub mod rebalance;
+mod records;
 pub mod regrid;
 pub mod resample;
+mod sides;
 mod surroundings;
 mod survey;
 pub mod time_step;
@@ -29,7 +31,7 @@ use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
-use self::rebalance::{LastPartition, Moment};
+use self::rebalance::{LastPartition, thread_time};
 use self::regrid::Recall;
 use self::resample::Books;
 use self::survey::Survey;
@@ -150,6 +152,8 @@ pub struct Solver<const D: usize> {
     arena_bytes: u64,
     costs: Costs,
     partitioned: LastPartition,
+    /// New partitions since the start of this process.
+    pub partitions: u64,
 }
 
 impl<const D: usize> Solver<D> {
@@ -162,9 +166,9 @@ impl<const D: usize> Solver<D> {
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
-        let start = Moment::now();
+        let start = thread_time();
         let grid = Grid::build(comm, &forest, &physics, 0);
-        let partitioned = LastPartition::at_start(clock.step, start.elapsed());
+        let partitioned = LastPartition::since(start);
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -184,6 +188,7 @@ impl<const D: usize> Solver<D> {
             arena_bytes: 0,
             costs: Costs::new(clock.step),
             partitioned,
+            partitions: 0,
         };
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
@@ -242,7 +247,12 @@ impl<const D: usize> Solver<D> {
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
         self.sent_before = self.traffic();
+        // Fresh memory costs as much as the first scatter into it.
+        let arenas = std::mem::take(&mut self.grid.arenas);
+        // The new one shall not stand beside all of the old one.
+        self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
+        self.grid.arenas = arenas;
     }
 
     /// Collective. Reach that the boxes of all ranks need.

@@ -1,19 +1,31 @@
 //! Partition of leaves by their cost.
-use std::time::Instant;
+//!
+//! When to make a new one: like a debtor who settles when what is owed equals the fee, ranks take new cuts when the time
+//! that the present ones have lost since they were made reaches what a new partition takes. While imbalance grows
+//! evenly, that is the interval with the least sum of both.
+use std::time::{Duration, Instant};
+
+use partition::{CutAt, Cuts};
 
 use super::Solver;
 pub use super::cost::{leaf_cost, leaf_weight};
 use super::phases::Phase;
+use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
 
 /// Imbalance below which nothing is done.
-const LIMIT: f64 = 1.02;
-/// A new partition is expected to serve as long as the last one has, within these numbers of steps.
-const HORIZON: std::ops::RangeInclusive<u64> = 100..=2000;
+const LIMIT: f64 = 1.01;
+/// Imbalance from which on the price does not matter, if new cuts take away half of it.
+const CEILING: f64 = 1.04;
 
 /// Greatest cost of a rank over the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imbalance(pub f64);
+
+/// Where the curve may be cut: trees that may become coarser need families whole.
+pub fn cut_at<const D: usize>(adaptivity: Option<&Adaptivity<D>>) -> CutAt {
+    if adaptivity.is_some() { CutAt::Families } else { CutAt::Leaves }
+}
 
 /// What the decision to partition anew rests on; the same on all ranks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,63 +34,41 @@ struct Prospect {
     now: f64,
     /// Imbalance with new cuts.
     then: f64,
-    /// Seconds of a step now.
-    step: f64,
+    /// Seconds lost to imbalance since the last partition, against new cuts.
+    lost: f64,
     /// Seconds that the last new partition took.
     price: f64,
-    /// Steps since then.
-    age: u64,
 }
 
 impl Prospect {
-    /// Whether the steps to come are expected to save more than a new partition takes.
     fn pays(self) -> bool {
-        let saved_per_step = self.step * (1.0 - self.then / self.now);
-        saved_per_step * self.age.clamp(*HORIZON.start(), *HORIZON.end()) as f64 > self.price
+        let helps = self.then - 1.0 <= 0.5 * (self.now - 1.0);
+        self.then < self.now && (self.lost > self.price || self.now > CEILING && helps)
     }
 }
 
-/// Time that this thread has run. What other programs take of the machine does not count, where the system tells.
-fn running_time() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(text.split_whitespace().next()?.parse::<u64>().ok()? as f64 * 1e-9)
+/// Processor time of this thread: what other programs take of the machine does not count.
+pub(super) fn thread_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
 }
 
-/// A moment in the run of this thread.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moment {
-    wall: Instant,
-    running: Option<f64>,
-}
-
-impl Moment {
-    pub fn now() -> Self {
-        Self { wall: Instant::now(), running: running_time() }
-    }
-
-    /// Seconds since then.
-    pub fn elapsed(&self) -> f64 {
-        match (self.running, running_time()) {
-            (Some(then), Some(now)) => now - then,
-            _ => self.wall.elapsed().as_secs_f64(),
-        }
-    }
-}
-
-/// When the current partition was made and what that took.
+/// What the current partition has cost, in seconds of processor time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LastPartition {
-    step: u64,
-    /// Seconds; at first those of building the grid.
+    /// Of making it; at first of building the grid.
     price: f64,
-    /// Time and step of the last look.
-    looked: (Moment, u64),
+    /// Lost to its imbalance so far.
+    lost: f64,
+    /// Time of the last look.
+    looked: Duration,
 }
 
 impl LastPartition {
-    /// The partition with which a run starts or goes on.
-    pub fn at_start(step: u64, price: f64) -> Self {
-        Self { step, price, looked: (Moment::now(), step) }
+    /// The partition with which a run starts or goes on, made since `start`.
+    pub fn since(start: Duration) -> Self {
+        let now = thread_time();
+        Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now }
     }
 }
 
@@ -94,46 +84,48 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Imbalance that a new partition would have.
     pub fn possible_imbalance(&self) -> Imbalance {
-        Imbalance(self.forest.plan_partition(&self.comm, &self.leaf_costs()).imbalance())
+        Imbalance(self.plan_partition().imbalance())
     }
 
-    /// Collective. Measures costs and partitions anew if that is expected to pay. Changes no bit of the state.
-    /// Returns whether leaves have moved.
+    /// Collective. Measures costs and partitions anew if that pays. Changes no bit of the state. Returns whether
+    /// leaves have moved.
     pub fn balance(&mut self) -> bool {
         self.agree_on_costs();
         let now = self.imbalance().0;
-        let (moment, steps) = self.partitioned.looked;
-        let step = moment.elapsed() / (self.clock.step - steps).max(1) as f64;
-        self.partitioned.looked = (Moment::now(), self.clock.step);
+        let time = thread_time();
+        let since = (time - self.partitioned.looked).as_secs_f64();
+        self.partitioned.looked = time;
         if now <= LIMIT {
             return false;
         }
-        let mut slowest = [step, self.partitioned.price];
+        let mut slowest = [since, self.partitioned.price];
         self.comm.max_f64s(&mut slowest);
-        let cuts = self.forest.plan_partition(&self.comm, &self.leaf_costs());
-        let [step, price] = slowest;
-        let age = self.clock.step - self.partitioned.step;
-        let pays = Prospect { now, then: cuts.imbalance(), step, price, age }.pays();
-        let moved = pays && self.move_leaves(cuts);
-        self.partitioned.looked.0 = Moment::now();
-        moved
+        let [since, price] = slowest;
+        let cuts = self.plan_partition();
+        let then = cuts.imbalance();
+        self.partitioned.lost += since * (1.0 - then / now).max(0.0);
+        let pays = Prospect { now, then, lost: self.partitioned.lost, price }.pays();
+        pays && self.move_leaves(cuts)
     }
 
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
     /// grid where tree or partition have changed. Changes no bit of the state.
     pub fn rebalance(&mut self) {
-        let cuts = self.forest.plan_partition(&self.comm, &self.leaf_costs());
+        let cuts = self.plan_partition();
         self.move_leaves(cuts);
     }
 
-    fn move_leaves(&mut self, cuts: partition::Cuts) -> bool {
-        let (start, moment) = (Instant::now(), Moment::now());
+    /// Collective. Where new cuts would lie by current costs.
+    fn plan_partition(&self) -> Cuts {
+        self.forest.plan_partition(&self.comm, &self.leaf_costs(), cut_at(self.physics.adaptivity.as_ref()))
+    }
+
+    fn move_leaves(&mut self, cuts: Cuts) -> bool {
+        let (wall, start) = (Instant::now(), thread_time());
         let shipment = self.forest.partition_at(&self.comm, cuts);
-        self.partitioned.step = self.clock.step;
         if shipment.changed() {
-            let payload = std::mem::take(&mut self.chunks).iter().map(Chunk::to_bytes).collect();
-            let arrived: Vec<Vec<u8>> = shipment.move_payload(&self.comm, payload);
-            self.chunks = arrived.iter().map(|bytes| Chunk::from_bytes(bytes)).collect();
+            let chunks = std::mem::take(&mut self.chunks);
+            self.chunks = shipment.move_items(&self.comm, chunks, Chunk::append_to, Chunk::from_bytes);
         }
         // The tree may have changed before, even if no leaf moves now.
         if self.grid.plan.revision != self.forest.revision() {
@@ -141,8 +133,9 @@ impl<const D: usize> Solver<D> {
             self.costs.forget(self.chunks.len());
             self.rebuild_grid(self.agreed_reach());
         }
-        self.partitioned.price = moment.elapsed();
-        self.phases.book(Phase::Regrid, start.elapsed());
+        self.partitioned = LastPartition::since(start);
+        self.partitions += u64::from(shipment.changed());
+        self.phases.book(Phase::Regrid, wall.elapsed());
         shipment.changed()
     }
 }
@@ -153,13 +146,13 @@ mod tests {
 
     #[test]
     fn a_partition_that_brings_nothing_is_not_made() {
-        let prospect = Prospect { now: 1.3, then: 1.3, step: 1.0, price: 1e-9, age: 1000 };
-        assert!(!prospect.pays());
-        assert!(!Prospect { then: 1.4, ..prospect }.pays());
-        assert!(Prospect { then: 1.04, ..prospect }.pays());
-        // 4 % of 100 steps for the price of five: not yet; of 130 steps: yes.
-        let small = Prospect { now: 1.0, then: 0.96, step: 1.0, price: 5.0, age: 1 };
-        assert!(!small.pays());
-        assert!(Prospect { age: 130, ..small }.pays());
+        let prospect = Prospect { now: 1.03, then: 1.01, lost: 2.0, price: 1.0 };
+        assert!(prospect.pays());
+        assert!(!Prospect { then: 1.03, ..prospect }.pays());
+        assert!(!Prospect { lost: 0.5, ..prospect }.pays());
+        // Beyond the ceiling at any price, but only where it helps.
+        let dear = Prospect { now: 1.06, price: 1e9, ..prospect };
+        assert!(dear.pays());
+        assert!(!Prospect { then: 1.05, ..dear }.pays());
     }
 }

@@ -169,7 +169,8 @@ impl<const D: usize> Solver<D> {
         // One step more than the interval, as particles may have come from next door in this one.
         let interval = (adaptivity.every + 1) as f64 * self.clock.dt;
         let per_edge = f64::from(1u32 << finest) / self.physics.root_edge;
-        let way = |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
+        let way =
+            |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
         let leaves = self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.surveys).enumerate();
         let each = leaves.with_min_len(64).map(|(number, ((leaf, chunk), survey))| {
             let values = &values[number * count..][..count];

@@ -102,12 +102,11 @@ impl Surroundings {
             MassRange::of::<D>(fields, number, block.value & !block.constrained & mask & on_leaf)
         };
         // Most leaves have as much mass on all nodes of all blocks around, the nodes beyond the arena included.
-        let wide = blocks().fold(MassRange::NONE, |range, (index, &number)| {
-            match of_level >> index & 1 == 1 {
+        let wide =
+            blocks().fold(MassRange::NONE, |range, (index, &number)| match of_level >> index & 1 == 1 {
                 true => range.with(masses[number as usize]),
                 false => range.with(range_of(index, number, arena_overlap::<D>(offset(index)))),
-            }
-        });
+            });
         if !wide.has_gap() {
             return false;
         }

@@ -106,7 +106,10 @@ fn range(values: &[f64]) -> [f64; 2] {
         range = [values.min(range[0]), values.max(range[1])];
     }
     let [least, greatest] = range.map(Lanes::to_array);
-    [least.iter().chain(rest).copied().fold(0.0, f64::min), greatest.iter().chain(rest).copied().fold(0.0, f64::max)]
+    [
+        least.iter().chain(rest).copied().fold(0.0, f64::min),
+        greatest.iter().chain(rest).copied().fold(0.0, f64::max),
+    ]
 }
 
 /// Greatest of the values, 0 among them.

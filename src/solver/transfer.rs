@@ -14,14 +14,18 @@ use crate::grid::GridPlan;
 use crate::grid::arena::ArenaMut;
 use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
+use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::spread::Constraints;
+use crate::kernel::simd::{Lanes, prefetch};
 use crate::kernel::{
     BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
 };
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Tag};
+use crate::particle::chunk::{Layout, Place, Tag};
+
+/// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
+const READ_AHEAD: usize = 25;
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,8 +80,8 @@ struct Widths<'a, const D: usize> {
 }
 
 impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
-    fn list(&self, chunk: &Chunk<D>, cell: f64, out: &mut Vec<[f64; D]>) {
-        domain::full_half_widths(chunk, Select::All, cell, &self.extent, &self.scheme, out);
+    fn of_batch(&self, chunk: &Chunk<D>, first: usize, cell: f64) -> [Lanes; D] {
+        domain::full_half_widths_from(chunk, first, cell, &self.extent, &self.scheme)
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
@@ -98,9 +102,14 @@ pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>)
 }
 
 /// Constrained nodes in the arena of a bin, if there are any.
-fn constraints<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Option<Constraints<'a>> {
-    let table = bin.touched? as usize;
-    Some(Constraints { touched: &plan.touched[table], second: &plan.second[table] })
+fn constrained<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Option<&'a ConstrainedNodes> {
+    Some(&plan.constraints[bin.touched? as usize].nodes)
+}
+
+/// Asks for the first lines of the arena behind one, which is cleared next.
+fn read_ahead(rows: &[Row]) {
+    let next = rows.as_ptr_range().end.addr();
+    (0..READ_AHEAD).for_each(|line| prefetch(next + 64 * line));
 }
 
 /// The members of a bin.
@@ -137,7 +146,7 @@ pub(super) fn sort_with<const D: usize>(
         let sorted = grid.lists.sort(&grid.plan, chunks, widths);
         let plan = &grid.plan;
         grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
-            spread::of_parts(chunk, parts, &frame(plan, bin), constraints(plan, bin), each);
+            spread::of_parts(chunk, parts, &frame(plan, bin), constrained(plan, bin), each);
         });
         let lists = &grid.lists;
         grid.arenas.occupy(plan, |bin| {
@@ -176,16 +185,16 @@ impl<const D: usize> Solver<D> {
                 let chunk = &chunks[leaf];
                 let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
                 arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
-                let (frame, rows, mut sums) = (frame(plan, bin), arena.rows, arena.moments);
-                let constraints = constraints(plan, bin);
+                let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
+                read_ahead(rows);
+                let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
-                    let sums = sums.as_deref_mut().zip(constraints);
-                    let moments = sums.map(|(sums, constraints)| MomentSums { constraints, sums });
-                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments);
+                    let moments = nodes.map(|nodes| MomentSums { nodes, sums: &mut *sums });
+                    let next = chunks.get(leaf + 1).map_or(Place::default(), Chunk::place);
+                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments, next);
                 }
                 if !selected.parts.is_empty() {
-                    let moments =
-                        sums.zip(constraints).map(|(sums, constraints)| MomentSums { constraints, sums });
+                    let moments = nodes.map(|nodes| MomentSums { nodes, sums });
                     p2g::scatter_sub_boxes(chunk, selected.parts, &frame, &scheme, dt, rows, moments);
                 }
             };
@@ -218,8 +227,8 @@ impl<const D: usize> Solver<D> {
                 let selected = Selected::of(lists, leaf, number, chunk);
                 let bin = &plan.bins[bin];
                 if let Some(whole) = selected.whole {
-                    let (frame, constraints) = (frame(plan, bin), constraints(plan, bin));
-                    spread::of_particles(chunk, whole, &frame, &scheme, constraints, |p, spread| {
+                    let (frame, nodes) = (frame(plan, bin), constrained(plan, bin));
+                    spread::of_particles(chunk, whole, &frame, &scheme, nodes, |p, spread| {
                         spreads[p] = spread;
                     });
                 }
@@ -280,6 +289,7 @@ impl<const D: usize> Solver<D> {
         let watch = watch.unwrap_or_default();
         self.surveys.resize(chunks.len(), Survey::default());
         let surveys = &mut self.surveys;
+        let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(surveys).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
@@ -288,6 +298,7 @@ impl<const D: usize> Solver<D> {
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
                 let mut signal: f64 = 0.0;
+                let next = places.get(leaf + 1).copied().unwrap_or_default();
                 for (number, bin) in plan.leaf_bins(leaf).enumerate() {
                     let selected = Selected::of(lists, leaf, number, chunk);
                     if selected.is_empty() {
@@ -300,27 +311,26 @@ impl<const D: usize> Solver<D> {
                     }
                     let bin = &plan.bins[bin];
                     let frame = frame(plan, bin);
-                    let moments = bin.touched.map(|table| Moments {
-                        touched: &plan.touched[table as usize],
-                        first: &arena.moments,
-                    });
+                    let moments =
+                        constrained(plan, bin).map(|nodes| Moments { nodes, first: &arena.moments });
                     let increment = changes.map(|_| &increments[..]);
                     let nodes = Fields { velocity: &arena.rows, increment, moments };
                     g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
-                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes));
+                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes, next));
                     }
                 }
                 signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
             };
-            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
-                costs.time(leaf, || {
-                    watch.before(chunk, survey);
-                    let signal = gather_leaf(scratch, leaf, chunk);
-                    watch.after(chunk, dt, survey);
-                    signal
-                })
-            });
+            let speeds =
+                leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
+                    costs.time(leaf, || {
+                        watch.before(chunk, survey);
+                        let signal = gather_leaf(scratch, leaf, chunk);
+                        watch.after(chunk, dt, survey);
+                        signal
+                    })
+                });
             speeds.collect_into_vec(signal);
         });
     }

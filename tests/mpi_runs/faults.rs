@@ -138,7 +138,8 @@ fn a_failure_while_writing_names_the_step() {
     assert_eq!(output.status.code(), Some(1), "{shown}");
     let messages: Vec<&str> = shown.lines().filter(|line| line.starts_with("agimp:")).collect();
     assert_eq!(messages.len(), 1, "one message: {shown}");
-    for part in ["step ", "time ", "out/collapse_2d/collapse_2d.checkpoint_"] {
+    // Which file it was depends on the moment: a checkpoint, a table, or the directory when old files are looked for.
+    for part in ["step ", "time ", "out/collapse_2d"] {
         assert!(messages[0].contains(part), "'{part}' is missing: {}", messages[0]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use partition::{Brick, Comm, Forest, MAX_LEVEL, Mark, Octant};
+use partition::{Brick, Comm, CutAt, Forest, MAX_LEVEL, Mark, Octant};
 
 /// All leaves of a tree.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,9 +77,9 @@ impl<const D: usize> Oracle<D> {
         self.leaves.extend(children(leaf));
     }
 
-    /// Number of leaves of each rank for these weights: runs of siblings are whole, each cut is
-    /// nearest to its ideal place.
-    pub fn shares(&self, ranks: usize, weight: impl Fn(&Octant<D>) -> u64) -> Vec<usize> {
+    /// Number of leaves of each rank for these weights: each cut is nearest to its ideal place, between families
+    /// runs of siblings are whole.
+    pub fn shares(&self, ranks: usize, at: CutAt, weight: impl Fn(&Octant<D>) -> u64) -> Vec<usize> {
         let leaves: Vec<_> = self.leaves.iter().copied().collect();
         let mut weights: Vec<u64> = leaves.iter().map(weight).collect();
         if weights.iter().all(|&w| w == 0) {
@@ -92,7 +92,7 @@ impl<const D: usize> Oracle<D> {
         for i in 0..=leaves.len() {
             let torn =
                 |i: usize| leaves[i].parent().is_some() && leaves[i].parent() == leaves[i - 1].parent();
-            if i == 0 || i == leaves.len() || !torn(i) {
+            if i == 0 || i == leaves.len() || at == CutAt::Leaves || !torn(i) {
                 places.push((before, i));
             }
             before += weights.get(i).unwrap_or(&0);

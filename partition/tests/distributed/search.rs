@@ -1,6 +1,6 @@
 //! Scenarios of searching leaves of other ranks.
 
-use partition::{Brick, Comm, Forest, MAX_LEVEL, Octant, Region};
+use partition::{Brick, Comm, CutAt, Forest, MAX_LEVEL, Octant, Region};
 
 use crate::launch::report;
 use crate::oracle::all_leaves;
@@ -35,7 +35,7 @@ pub fn random_queries<const D: usize>(comm: &Comm) {
             forest.balance(comm);
         }
         let weights: Vec<u64> = forest.leaves().iter().map(|o| hash(seed, o.code()) % 10).collect();
-        forest.partition(comm, &weights);
+        forest.partition(comm, &weights, CutAt::Families);
         forest.is_valid(comm).expect("valid");
         let all = all_leaves(comm, &forest);
         let mut found_in_total = 0;

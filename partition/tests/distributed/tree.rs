@@ -1,6 +1,6 @@
 //! Scenarios that change trees and partitions.
 
-use partition::{Brick, Comm, Forest, ForestError, MAX_LEVEL, Mark, Octant, Region, correspondence};
+use partition::{Brick, Comm, CutAt, Forest, ForestError, MAX_LEVEL, Mark, Octant, Region, correspondence};
 
 use crate::launch::report;
 use crate::oracle::{Oracle, all_leaves, assert_same};
@@ -115,11 +115,24 @@ fn balance<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &mut Ora
 }
 
 fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracle<D>, seed: u64) {
+    // Families last: what follows may coarsen.
+    for at in [CutAt::Leaves, CutAt::Families] {
+        share_out_at(comm, forest, oracle, seed, at);
+    }
+}
+
+fn share_out_at<const D: usize>(
+    comm: &Comm,
+    forest: &mut Forest<D>,
+    oracle: &Oracle<D>,
+    seed: u64,
+    at: CutAt,
+) {
     let old = forest.leaves().to_vec();
     let weights: Vec<u64> = old.iter().map(|leaf| weight(seed, leaf)).collect();
     let (revision, checksum) = (forest.revision(), forest.checksum(comm));
-    let cuts = forest.plan_partition(comm, &weights);
-    assert_eq!(cuts, forest.plan_partition(comm, &weights));
+    let cuts = forest.plan_partition(comm, &weights, at);
+    assert_eq!(cuts, forest.plan_partition(comm, &weights, at));
     let imbalance = cuts.imbalance();
     let shipment = forest.partition_at(comm, cuts);
     assert_same(comm, forest, oracle, "partition");
@@ -128,10 +141,11 @@ fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracl
     assert_eq!(shipment.changed(), comm.any(old != forest.leaves()));
     let all = all_leaves(comm, forest);
     let shares: Vec<usize> = all.iter().map(Vec::len).collect();
-    assert_eq!(shares, oracle.shares(comm.size(), |leaf| weight(seed, leaf)));
+    assert_eq!(shares, oracle.shares(comm.size(), at, |leaf| weight(seed, leaf)));
     for (rank, leaves) in all.iter().enumerate() {
         for after in all[rank + 1..].iter().filter_map(|l| l.first()).take(1) {
-            assert!(leaves.last().is_none_or(|last| !last.is_sibling(after)), "a family is torn");
+            let torn = leaves.last().is_some_and(|last| last.is_sibling(after));
+            assert!(at == CutAt::Leaves || !torn, "a family is torn");
         }
     }
 
@@ -153,7 +167,7 @@ fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracl
     assert!(tags[to].iter().all(|tag| tag[..] == [comm.rank() as u8]));
     // Once more with the same weights: nothing to do.
     let weights: Vec<u64> = forest.leaves().iter().map(|leaf| weight(seed, leaf)).collect();
-    let again = forest.partition(comm, &weights);
+    let again = forest.partition(comm, &weights, at);
     assert!(!again.changed() && again.sends().is_empty() && again.receives().is_empty());
 }
 
@@ -165,7 +179,7 @@ pub fn uniform(comm: &Comm) {
             let mut forest = Forest::uniform(comm, brick, level);
             assert_same(comm, &forest, &Oracle::uniform(brick, level), "uniform");
             let weights = vec![17; forest.leaves().len()];
-            assert!(!forest.partition(comm, &weights).changed(), "{roots:?} level {level}");
+            assert!(!forest.partition(comm, &weights, CutAt::Families).changed(), "{roots:?} level {level}");
             forest.is_valid(comm).expect("valid");
             report(comm, format_args!("{:016x}", forest.checksum(comm)));
         }

@@ -29,18 +29,17 @@ mod avx;
 #[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
 mod portable;
 
-/// Asks the processor to fetch the cache line of `values[index]`; a hint without effect on results.
+/// Asks the processor to fetch the cache line at an address, which need not be valid; a hint without effect on results.
 #[inline(always)]
-pub fn prefetch(values: &[f64], index: usize) {
+pub fn prefetch(address: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: a prefetch of any address is allowed, and never faults; `wrapping_add` makes no claim
-        // that the address lies within the slice.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(values.as_ptr().wrapping_add(index).cast()) };
+        // SAFETY: a prefetch of any address is allowed, and never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(core::ptr::without_provenance(address)) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (values, index);
+    let _ = address;
 }
 
 /// One number for each of [`LANES`] particles.

@@ -1,10 +1,11 @@
 //! Scatter and gather together, against a plain scalar definition.
+use super::constrained::ConstrainedNodes;
 use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
 use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use crate::material::{Material, Parameters, build};
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 mod parts;
 
@@ -127,7 +128,7 @@ fn scatter_equals_definition<const D: usize>(transfer: Transfer) {
     let mut half = Vec::new();
     domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
     let mut arena = vec![Row::default(); arena_nodes(D)];
-    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None);
+    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let at = |column: usize, p: usize| chunk.column(column)[p];
     // C = B D⁻¹ with APIC, the gradient itself with TPIC.
     let spreads: Vec<[f64; D]> = (0..chunk.len())
@@ -188,7 +189,7 @@ fn affine_field<const D: usize>() {
     let before = particles::<D>(45, 9, 1);
     let mut chunk = before.clone();
     let fields = Fields { velocity: &velocity, increment: None, moments: None };
-    let speed = gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+    let speed = gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
     assert!(speed > materials[0].wave_speed() * 0.8 && speed < materials[0].wave_speed() * 1.5);
     let mut half = Vec::new();
     domain::half_widths(&before, Select::All, CELL, &frame.extent, &scheme, &mut half);
@@ -302,12 +303,12 @@ fn steps_conserve<const D: usize>() {
     let mass: f64 = chunk.column(Layout::<D>::MASS).iter().sum();
     for _ in 0..50 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena, None);
+        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena, None, Place::default());
         assert!((arena.iter().map(|row| row.0[3]).sum::<f64>() - mass).abs() < 1e-13 * mass);
         assert!(close(&momenta_of_nodes(&arena), &before, 1e-12));
         divide_by_mass(&mut arena);
         let fields = Fields { velocity: &arena, increment: None, moments: None };
-        gather(&mut chunk, Select::All, &frame, &scheme, 10.0 * DT, &fields);
+        gather(&mut chunk, Select::All, &frame, &scheme, 10.0 * DT, &fields, Place::default());
         // A particle moves along its new velocity, which changes no angular momentum.
         let after = momenta(&chunk);
         assert!(close(&after, &before, 1e-12), "{before:?} {after:?}");
@@ -337,14 +338,14 @@ fn batches_do_not_matter<const D: usize>() {
         .collect();
     let fields = Fields { velocity: &velocity, increment: None, moments: None };
     let mut all = start.clone();
-    gather(&mut all, Select::All, &frame, &scheme, DT, &fields);
+    gather(&mut all, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut split = start.clone();
     let (even, odd): (Vec<u32>, Vec<u32>) = (0..53).partition(|p| p % 2 == 0);
-    gather(&mut split, Select::List(&odd), &frame, &scheme, DT, &fields);
-    gather(&mut split, Select::List(&even), &frame, &scheme, DT, &fields);
+    gather(&mut split, Select::List(&odd), &frame, &scheme, DT, &fields, Place::default());
+    gather(&mut split, Select::List(&even), &frame, &scheme, DT, &fields, Place::default());
     let mut single = start.clone();
     for p in 0..53 {
-        gather(&mut single, Select::List(&[p]), &frame, &scheme, DT, &fields);
+        gather(&mut single, Select::List(&[p]), &frame, &scheme, DT, &fields, Place::default());
     }
     for p in 0..53 {
         assert_eq!(bits(&all, p), bits(&split, p));
@@ -353,7 +354,7 @@ fn batches_do_not_matter<const D: usize>() {
     let sum = |select: &[Select]| {
         let mut arena = vec![Row::default(); arena_nodes(D)];
         for &select in select {
-            scatter(&all, select, &frame, &scheme, DT, &mut arena, None);
+            scatter(&all, select, &frame, &scheme, DT, &mut arena, None, Place::default());
         }
         arena
     };

@@ -32,7 +32,7 @@ fn parts_equal_the_whole<const D: usize>() {
     }
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut other = arena.clone();
-    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None);
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let mut sums = vec![[0.0; D]; parted.len()];
     spread::of_parts(&parted, &parts, &frame, None, |part, own| {
         let part = &parts[part];
@@ -52,7 +52,7 @@ fn parts_equal_the_whole<const D: usize>() {
         }
     }
     let fields = Fields { velocity: &arena, increment: None, moments: None };
-    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields);
+    gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
     gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
@@ -77,23 +77,17 @@ fn moments_follow<const D: usize>() {
     let start = particles::<D>(19, 15, 1);
     let mut half = Vec::new();
     domain::half_widths(&start, Select::All, CELL, &frame.extent, &scheme, &mut half);
-    let touched: Vec<bool> = (0..stencil_bases(D)).map(|base| base % 2 == 0).collect();
-    let base = |p: usize| {
-        (0..D).rev().fold(0, |index, k| {
-            let lower = ((start.position(p)[k] - half[p][k]) / CELL - 4.0).floor();
-            index * BASES + (lower + 1.0) as usize
-        })
-    };
     let nodes = arena_nodes(D);
+    let listed: Vec<usize> = (0..nodes).filter(|node| node % 3 != 1).rev().collect();
     let scattered = |second: &[Row]| {
-        let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![[Row::default(); D]; nodes]);
-        let constraints = spread::Constraints { touched: &touched, second };
-        let moments = MomentSums { constraints, sums: &mut sums };
-        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments));
+        let constrained = ConstrainedNodes::new::<D>(listed.iter().map(|&node| (node, second[node])));
+        let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![[Row::default(); D]; listed.len()]);
+        let moments = MomentSums { nodes: &constrained, sums: &mut sums };
+        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments), Place::default());
         (arena, sums)
     };
     let mut plain = vec![Row::default(); nodes];
-    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None);
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None, Place::default());
     // Second moments of zero change nothing.
     assert_eq!(plain, scattered(&vec![Row::default(); nodes]).0);
     let mut numbers = Numbers(12);
@@ -103,7 +97,7 @@ fn moments_follow<const D: usize>() {
     let affine: Vec<[[f64; D]; D]> = (0..start.len())
         .map(|p| {
             let mut spread = spread(start.position(p), half[p]);
-            for node in (0..nodes).filter(|_| touched[base(p)]) {
+            for &node in &listed {
                 let (w, _) = definition(position::<D>(node), start.position(p), half[p]);
                 (0..D).for_each(|k| spread[k] += w * second[node].0[k]);
             }
@@ -126,30 +120,34 @@ fn moments_follow<const D: usize>() {
                     let stress = start.column(Layout::<D>::STRESS + symmetric_index::<D>(i, k))[p];
                     momentum[i] += w * mass * affine[p][i][k] * (x_j[k] - x[k]);
                     momentum[i] -= DT * volume * stress * gradient[k];
-                    expected[k] += if touched[base(p)] { w * mass * affine[p][i][k] } else { 0.0 };
+                    expected[k] += w * mass * affine[p][i][k];
                 }
             }
             assert!((arena[node].0[i] - momentum[i]).abs() < 1e-13);
+            let Some(number) = listed.iter().position(|&listed| listed == node) else { continue };
             for k in 0..D {
-                assert!((sums[node][k].0[i] - expected[k]).abs() < 1e-13 * expected[k].abs().max(1.0));
+                assert!((sums[number][k].0[i] - expected[k]).abs() < 1e-13 * expected[k].abs().max(1.0));
             }
         }
     }
     let (zero, one) = (vec![[Row::default(); D]; nodes], vec![[Row([0.5; 4]); D]; nodes]);
+    let constrained = ConstrainedNodes::new::<D>(listed.iter().map(|&node| (node, Row::default())));
     let run = |moments: Option<Moments<D>>| {
         let mut chunk = start.clone();
         let fields = Fields { velocity: &plain, increment: None, moments };
-        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields);
+        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
         chunk
     };
     let without = run(None);
-    let with_zero = run(Some(Moments { touched: &touched, first: &zero }));
-    let with_one = run(Some(Moments { touched: &touched, first: &one }));
+    let with_zero = run(Some(Moments { nodes: &constrained, first: &zero }));
+    let with_one = run(Some(Moments { nodes: &constrained, first: &one }));
     for p in 0..start.len() {
         assert_eq!(bits(&without, p), bits(&with_zero, p));
+        let weight = |&node: &usize| definition(position::<D>(node), start.position(p), half[p]).0;
+        let share: f64 = listed.iter().map(weight).sum();
         for column in Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D {
             let (plain, moved) = (without.column(column)[p], with_one.column(column)[p]);
-            let expected = if touched[base(p)] { plain + 0.5 } else { plain };
+            let expected = plain + 0.5 * share;
             assert!((moved - expected).abs() < 1e-14, "{moved} {expected}");
         }
     }
@@ -208,7 +206,7 @@ fn flip_and_tpic() {
     let fields = Fields { velocity: &velocity, increment: Some(&increment), moments: None };
     let mut chunk = start.clone();
     let flip = Transfer::Flip { blend: 0.75 };
-    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields);
+    gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields, Place::default());
     for p in 0..start.len() {
         for i in 0..3 {
             let old = start.column(Layout::<3>::VELOCITY + i)[p];
@@ -220,7 +218,15 @@ fn flip_and_tpic() {
         }
     }
     let mut chunk = start.clone();
-    gather(&mut chunk, Select::All, &frame, &scheme(&materials, Transfer::Tpic), DT, &fields);
+    gather(
+        &mut chunk,
+        Select::All,
+        &frame,
+        &scheme(&materials, Transfer::Tpic),
+        DT,
+        &fields,
+        Place::default(),
+    );
     assert!(chunk.column(Layout::<3>::AFFINE).iter().all(|c| c.abs() < 1e-9));
 }
 
@@ -234,14 +240,14 @@ fn checksum<const D: usize>() -> u64 {
     let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for _ in 0..4 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None);
+        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
         for row in &mut arena {
             row.0.iter().for_each(|&x| add(x));
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
             row.0 = row.0.map(|x| x * inverse);
         }
         let fields = Fields { velocity: &arena, increment: None, moments: None };
-        add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields));
+        add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default()));
     }
     for p in 0..chunk.len() {
         bits(&chunk, p).into_iter().for_each(|x| add(f64::from_bits(x)));

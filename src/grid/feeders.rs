@@ -1,0 +1,76 @@
+//! Which own bins reach each block.
+use super::known::KnownTree;
+use super::mask::{offset_count, opposite};
+use super::plan::{Bin, NO_BLOCK};
+
+/// No own bin.
+pub const NO_BIN: u32 = u32::MAX;
+
+/// Own bins by the blocks that they reach.
+#[derive(Clone, Debug, Default)]
+pub struct Feeders {
+    /// By block and position, the bin whose block lies in its source leaf.
+    inner: Vec<u32>,
+    /// First of the other bins of each block, and their number at the end.
+    outer_start: Vec<u32>,
+    outer: Vec<Outer>,
+}
+
+/// A bin whose block lies outside its source leaf.
+#[derive(Clone, Copy, Debug)]
+pub struct Outer {
+    /// The bin.
+    pub bin: u32,
+    /// Its position.
+    pub position: u8,
+}
+
+impl Feeders {
+    /// Not collective. The bins around each of `blocks` blocks.
+    pub fn new<const D: usize>(tree: &KnownTree<D>, bins: &[Bin<D>], blocks: usize) -> Self {
+        let positions = offset_count(D);
+        let first = tree.first_own();
+        let mut feeders = Self {
+            inner: vec![NO_BIN; blocks * positions],
+            outer_start: vec![0; blocks + 1],
+            outer: Vec::new(),
+        };
+        let mut outer: Vec<(u32, Outer)> = Vec::new();
+        for (number, bin) in (0..).zip(bins) {
+            let is_inner = tree.leaves()[first + bin.leaf as usize].contains(&bin.block);
+            for (towards, &block) in bin.around.iter().enumerate().take(positions) {
+                if block == NO_BLOCK {
+                    continue;
+                }
+                let position = opposite(D, towards);
+                if is_inner {
+                    feeders.inner[block as usize * positions + position] = number;
+                } else {
+                    feeders.outer_start[block as usize + 1] += 1;
+                    outer.push((block, Outer { bin: number, position: position as u8 }));
+                }
+            }
+        }
+        for block in 0..blocks {
+            feeders.outer_start[block + 1] += feeders.outer_start[block];
+        }
+        outer.sort_by_key(|(block, _)| *block);
+        feeders.outer = outer.into_iter().map(|(_, outer)| outer).collect();
+        feeders
+    }
+
+    /// By position, the bins whose blocks lie in their source leaves; [`NO_BIN`] where there is none.
+    pub fn inner<const D: usize>(&self, block: usize) -> &[u32] {
+        &self.inner[block * offset_count(D)..][..offset_count(D)]
+    }
+
+    /// All others that reach the block.
+    pub fn outer(&self, block: usize) -> &[Outer] {
+        &self.outer[self.outer_start[block] as usize..self.outer_start[block + 1] as usize]
+    }
+
+    /// Heap bytes held.
+    pub fn heap_bytes(&self) -> usize {
+        (self.inner.capacity() + self.outer_start.capacity()) * 4 + self.outer.capacity() * size_of::<Outer>()
+    }
+}

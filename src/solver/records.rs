@@ -1,0 +1,82 @@
+//! Particles on their way between leaves: one record of 64-bit words each.
+use rayon::prelude::*;
+
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
+pub const fn record_words<const D: usize>() -> usize {
+    Layout::<D>::REALS + 3
+}
+
+/// Appends the record of particle `p`.
+pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
+    records.push(way);
+    let (reals, stride) = chunk.reals();
+    records.extend((0..Layout::<D>::REALS).map(|column| reals[column * stride + p].to_bits()));
+    records.extend([chunk.ids()[p], chunk.tags()[p]]);
+}
+
+/// Appends the particle of a record to a chunk.
+fn push_particle<const D: usize>(chunk: &mut Chunk<D>, record: &[u64]) {
+    let [_, columns @ .., id, tag] = record else { return };
+    let p = chunk.push_zeroed(*id, Tag::unpack(*tag));
+    let (reals, stride) = chunk.reals_mut();
+    for (column, word) in columns.iter().enumerate() {
+        reals[column * stride + p] = f64::from_bits(*word);
+    }
+    chunk.tags_mut()[p] = *tag;
+}
+
+/// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given.
+pub fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
+    // Sorted by counting, so that chunks can take theirs at the same time.
+    let mut start = vec![0u32; chunks.len() + 1];
+    for &(chunk, _) in arrivals {
+        start[chunk as usize + 1] += 1;
+    }
+    for chunk in 0..chunks.len() {
+        start[chunk + 1] += start[chunk];
+    }
+    let mut next = start.clone();
+    let mut order = vec![0u32; arrivals.len()];
+    for (number, &(chunk, _)) in arrivals.iter().enumerate() {
+        order[next[chunk as usize] as usize] = number as u32;
+        next[chunk as usize] += 1;
+    }
+    let ranges = start.par_windows(2);
+    let some = chunks.par_iter_mut().zip(ranges).with_min_len(32).filter(|(_, range)| range[0] < range[1]);
+    some.for_each(|(chunk, range)| {
+        for &number in &order[range[0] as usize..range[1] as usize] {
+            push_particle(chunk, arrivals[number as usize].1);
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_come_back_in_order() {
+        let mut source = Chunk::<2>::new();
+        for id in 0..20 {
+            let p = source.push_zeroed(id, Tag { material: id as u16, body: 1, level: 2 });
+            source.column_mut(Layout::<2>::MASS)[p] = id as f64;
+        }
+        let mut records = Vec::new();
+        (0..20).rev().for_each(|p| push_record(&mut records, p as u64 % 3, &source, p));
+        let arrivals: Vec<(u32, &[u64])> =
+            records.chunks_exact(record_words::<2>()).map(|record| (record[0] as u32, record)).collect();
+        let mut chunks = vec![Chunk::<2>::new(); 4];
+        append_all(&mut chunks, &arrivals);
+        for (to, chunk) in chunks.iter().enumerate() {
+            let expected: Vec<u64> = (0..20).rev().filter(|id| to < 3 && id % 3 == to as u64).collect();
+            assert_eq!(chunk.ids(), expected);
+            for (p, &id) in expected.iter().enumerate() {
+                assert_eq!(chunk.column(Layout::<2>::MASS)[p], id as f64);
+                let tag = Tag { material: id as u16, body: 1, level: 2 };
+                assert_eq!(Tag::unpack(chunk.tags()[p]), tag);
+            }
+        }
+    }
+}
