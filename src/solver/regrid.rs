@@ -40,8 +40,19 @@ impl<const D: usize> Wish<D> {
 pub(super) struct Recall<const D: usize> {
     /// See there.
     pub surroundings: Surroundings,
-    /// Wishes with which the tree of this revision stays as it is.
-    settled: Option<(u64, Vec<Wish<D>>)>,
+    /// With what the tree stays as it is.
+    settled: Option<Settled<D>>,
+}
+
+/// What was wanted when nothing came of it.
+#[derive(Clone, Debug)]
+struct Settled<const D: usize> {
+    /// Revision of the forest.
+    revision: u64,
+    /// Wishes of own leaves.
+    wishes: Vec<Wish<D>>,
+    /// What requests from everywhere meant for them.
+    marks: Vec<Mark>,
 }
 
 /// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
@@ -143,20 +154,22 @@ impl<const D: usize> Solver<D> {
     fn change_tree(&mut self) -> Option<Vec<u8>> {
         let wishes = self.wishes();
         let revision = self.forest.revision();
-        let settled = self.recall.settled.as_ref();
-        let is_new = settled.is_none_or(|(then, before)| *then != revision || *before != wishes);
-        if !self.comm.any(is_new) {
+        let settled = self.recall.settled.as_ref().filter(|settled| settled.revision == revision);
+        if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
             return None;
         }
         let adaptivity = self.physics.adaptivity.as_ref()?;
         let requests = self.requests(adaptivity, &wishes);
         let requests = self.forest.to_owners(&self.comm, &requests);
-        let followed = self.followed(adaptivity, &requests);
+        let marks = self.marks(adaptivity, &self.forest, &requests, true);
+        let is_new = self.comm.any(settled.is_none_or(|settled| settled.marks != marks));
+        let followed = is_new.then(|| self.followed(adaptivity, &requests, &marks));
         // 2:1 balance may take back what was coarsened.
-        if !self.comm.any(followed.leaves() != self.forest.leaves()) {
-            self.recall.settled = Some((revision, wishes));
+        let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
+        let Some(followed) = followed else {
+            self.recall.settled = Some(Settled { revision, wishes, marks });
             return None;
-        }
+        };
         let old = std::mem::replace(&mut self.forest, followed);
         Some(self.move_to_leaves(old.leaves()))
     }
@@ -217,37 +230,41 @@ impl<const D: usize> Solver<D> {
         requests
     }
 
-    /// Collective. The tree with own leaves refined to what is requested, families coarsened by one level where nothing
-    /// objects, and balanced.
-    fn followed(&self, adaptivity: &Adaptivity<D>, requests: &[Request<D>]) -> Forest<D> {
-        let mut forest = self.forest.clone();
-        let mut changed = false;
-        let mut may_coarsen = true;
-        loop {
-            let least = |leaf: &Octant<D>| {
-                let (lower, upper) = leaf_box(leaf, self.physics.root_edge);
-                adaptivity.least_level(&Aabb::new(lower, upper))
-            };
-            let mut wanted: Vec<u8> = forest.leaves().iter().map(least).collect();
-            for (region, level) in requests {
-                forest.own_leaves_in(region, &mut |leaf| wanted[leaf] = wanted[leaf].max(*level as u8));
-            }
-            let each = forest.leaves().iter().zip(&wanted);
-            let marks: Vec<Mark> = each
-                .map(|(leaf, &wanted)| match wanted.cmp(&leaf.level) {
-                    std::cmp::Ordering::Greater => Mark::Refine,
-                    std::cmp::Ordering::Less if may_coarsen => Mark::Coarsen,
-                    _ => Mark::Keep,
-                })
-                .collect();
-            if !forest.adapt(&self.comm, &marks) {
-                break;
-            }
-            // The partition keeps families together until the tree changes, so only the first pass may coarsen.
-            may_coarsen = false;
-            changed = true;
+    /// Not collective. What requests mean for each own leaf of a tree.
+    fn marks(
+        &self,
+        adaptivity: &Adaptivity<D>,
+        forest: &Forest<D>,
+        requests: &[Request<D>],
+        may_coarsen: bool,
+    ) -> Vec<Mark> {
+        let least = |leaf: &Octant<D>| {
+            let (lower, upper) = leaf_box(leaf, self.physics.root_edge);
+            adaptivity.least_level(&Aabb::new(lower, upper))
+        };
+        let mut wanted: Vec<u8> = forest.leaves().iter().map(least).collect();
+        for (region, level) in requests {
+            forest.own_leaves_in(region, &mut |leaf| wanted[leaf] = wanted[leaf].max(*level as u8));
         }
-        if changed && self.physics.graded {
+        let each = forest.leaves().iter().zip(&wanted);
+        each.map(|(leaf, &wanted)| match wanted.cmp(&leaf.level) {
+            std::cmp::Ordering::Greater => Mark::Refine,
+            std::cmp::Ordering::Less if may_coarsen => Mark::Coarsen,
+            _ => Mark::Keep,
+        })
+        .collect()
+    }
+
+    /// Collective. The tree with own leaves refined to what is requested, families coarsened by one level where nothing
+    /// objects, and balanced. `marks` are those of the first pass.
+    fn followed(&self, adaptivity: &Adaptivity<D>, requests: &[Request<D>], marks: &[Mark]) -> Forest<D> {
+        let mut forest = self.forest.clone();
+        if !forest.adapt(&self.comm, marks) {
+            return forest;
+        }
+        // The partition keeps families together until the tree changes, so only the first pass may coarsen.
+        while forest.adapt(&self.comm, &self.marks(adaptivity, &forest, requests, false)) {}
+        if self.physics.graded {
             forest.balance(&self.comm);
         }
         forest
