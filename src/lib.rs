@@ -10,6 +10,7 @@ pub mod io;
 pub mod job;
 pub mod kernel;
 pub mod material;
+pub mod memory;
 pub mod particle;
 pub mod run;
 pub mod solver;

@@ -1,4 +1,6 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
+use rustc_hash::FxHashMap;
+
 use super::arena::Moments;
 use super::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
 use super::plan::{Block, NO_BLOCK, arena_index};
@@ -30,11 +32,20 @@ pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32
     shared(blocks, around).any(|(_, _, nodes)| nodes != 0)
 }
 
-impl ArenaConstraints {
-    /// The constrained nodes around a bin; `second` holds the second moments of all blocks that have moments.
-    pub(super) fn new<const D: usize>(blocks: &[Block<D>], around: &[u32; 27], second: &[Row]) -> Self {
+/// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
+#[derive(Default)]
+pub(super) struct Tables {
+    /// By what a table is made from.
+    numbers: FxHashMap<Vec<u64>, u32>,
+    tables: Vec<ArenaConstraints>,
+}
+
+impl Tables {
+    /// Number of the table for the constrained nodes around a bin; `second` holds the second moments of all blocks that
+    /// have moments.
+    pub fn number<const D: usize>(&mut self, blocks: &[Block<D>], around: &[u32; 27], second: &[Row]) -> u32 {
         let mut parts = vec![(0, 0); offset_count(D)];
-        let mut nodes = Vec::new();
+        let mut nodes: Vec<(usize, Row)> = Vec::new();
         for (index, block, constrained) in shared(blocks, around) {
             parts[index] = (constrained, nodes.len() as u16);
             let slot = blocks[block as usize].moments;
@@ -43,9 +54,21 @@ impl ArenaConstraints {
                 (arena_index::<D>(index, bit), moments.unwrap_or_default())
             }));
         }
-        Self { nodes: ConstrainedNodes::new::<D>(nodes), parts }
+        let moments = nodes.iter().flat_map(|(_, row)| row.0.map(f64::to_bits));
+        let content: Vec<u64> = parts.iter().map(|(nodes, _)| *nodes).chain(moments).collect();
+        *self.numbers.entry(content).or_insert_with(|| {
+            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(nodes), parts });
+            self.tables.len() as u32 - 1
+        })
     }
 
+    /// The tables by number.
+    pub fn finish(self) -> Vec<ArenaConstraints> {
+        self.tables
+    }
+}
+
+impl ArenaConstraints {
     /// Those of the nodes `inside` of the block at offset number `index`, with their numbers.
     pub fn of_block(&self, index: usize, inside: u64) -> impl Iterator<Item = (u32, usize)> {
         let (nodes, first) = self.parts[index];

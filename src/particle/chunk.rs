@@ -280,6 +280,23 @@ impl<const D: usize> Chunk<D> {
             self.tags[to] = self.tags[from];
         }
         self.len = len;
+        self.give_back();
+    }
+
+    /// Gives back room once an eighth of what is needed stands empty, as in leaves that the material leaves.
+    fn give_back(&mut self) {
+        if self.len == 0 {
+            *self = Self::new();
+        } else if self.capacity > self.len + self.len / 8 + 4 * CAPACITY_STEP {
+            let mut smaller = Self::with_capacity(self.len + self.len / 32);
+            smaller.len = self.len;
+            for column in 0..Layout::<D>::REALS {
+                smaller.column_mut(column).copy_from_slice(self.column(column));
+            }
+            smaller.ids_mut().copy_from_slice(self.ids());
+            smaller.tags_mut().copy_from_slice(self.tags());
+            *self = smaller;
+        }
     }
 
     /// A chunk whose particle `q` is particle `source[q]` of this one.
@@ -315,11 +332,11 @@ impl<const D: usize> Chunk<D> {
         self.capacity = capacity;
     }
 
-    /// Room for `extra` more; grows by a sixteenth at least, since memory per particle is the limit.
+    /// Room for `extra` more; grows by little, since memory per particle is the limit.
     fn grow_for(&mut self, extra: usize) {
         let needed = self.len + extra;
         if needed > self.capacity {
-            self.reserve_exact(needed.max(self.capacity + self.capacity / 16 + CAPACITY_STEP));
+            self.reserve_exact(needed.max(self.capacity + self.capacity / 32 + CAPACITY_STEP));
         }
     }
 }

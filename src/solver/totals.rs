@@ -1,12 +1,14 @@
 //! Exact sums over particles and real nodes, for history and checks.
 //!
-//! Every sum is exact before it is rounded once, so it does not depend on ranks, threads or order.
+//! Sums over nodes are exact before they are rounded once. Particles are added up leaf by leaf, in their order and with twice
+//! the usual precision, and the sums of the leaves exactly. So no sum depends on ranks and threads.
 use partition::comm::Comm;
+use rayon::prelude::*;
 
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::simd::{LANES, Lanes};
+use crate::kernel::simd::{LANES, Lanes, Mask};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// Components of a torque or angular momentum, for both dimensions.
@@ -53,16 +55,24 @@ impl<const D: usize> Solver<D> {
         let sorted = self.sort_into_bins();
         self.nodes_from_particles(0.0);
 
-        let mut sums = vec![ExactSum::new(); 7];
-        for (index, block) in self.grid.plan.blocks.iter().enumerate() {
-            let first = index * block_nodes(D);
-            for bit in bits(block.owned) {
-                let node = first as u32 + bit;
-                let row = self.grid.fields.rows[node as usize].0;
-                let position = self.grid.plan.node_position(node);
-                add_point(&mut sums, row[3], &row[..D], &position);
-            }
-        }
+        let (plan, fields) = (&self.grid.plan, &self.grid.fields);
+        let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
+        let each =
+            blocks.filter(|(index, _)| fields.active[*index]).fold(empty_sums, |mut sums, (index, block)| {
+                for bit in bits(block.owned) {
+                    let node = index * block_nodes(D) + bit as usize;
+                    let row = fields.rows[node].0;
+                    if row != [0.0; 4] {
+                        add_point(&mut sums, row[3], &row[..D], &plan.node_position(node as u32));
+                    }
+                }
+                sums
+            });
+        // Exact sums do not depend on how they are put together.
+        let mut sums = each.reduce(empty_sums, |mut sums, others| {
+            sums.iter_mut().zip(&others).for_each(|(sum, other)| sum.merge(other));
+            sums
+        });
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         let of = |i: usize| sums[i].to_f64();
         sorted?;
@@ -77,6 +87,11 @@ impl<const D: usize> Solver<D> {
     pub fn particle_totals(&self) -> ParticleTotals {
         particle_totals(&self.comm, &self.physics, &self.chunks)
     }
+}
+
+/// Mass, momentum and angular momentum of nothing.
+fn empty_sums() -> Vec<ExactSum> {
+    vec![ExactSum::new(); 7]
 }
 
 /// Adds mass, momentum and angular momentum of a point to seven sums.
@@ -100,12 +115,13 @@ pub fn particle_totals<const D: usize>(
     physics: &Physics<D>,
     chunks: &[Chunk<D>],
 ) -> ParticleTotals {
-    let mut sums = vec![ExactSum::new(); 8];
-    let mut count = [0u64];
-    for chunk in chunks {
-        count[0] += chunk.len() as u64;
-        add_chunk(&mut sums, physics, chunk);
+    let of_leaves: Vec<[Doubled; SUMS]> =
+        chunks.par_iter().with_min_len(4).map(|chunk| leaf_totals(physics, chunk)).collect();
+    let mut sums = vec![ExactSum::new(); SUMS];
+    for leaf in &of_leaves {
+        sums.iter_mut().zip(leaf).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
     }
+    let mut count = [chunks.iter().map(|chunk| chunk.len() as u64).sum()];
     ExactSum::sum_over_ranks(comm, &mut sums);
     comm.sum_u64(&mut count);
     let of = |i: usize| sums[i].to_f64();
@@ -120,49 +136,112 @@ pub fn particle_totals<const D: usize>(
     }
 }
 
-fn add_chunk<const D: usize>(sums: &mut [ExactSum], physics: &Physics<D>, chunk: &Chunk<D>) {
-    let column = |c: usize| chunk.column(c);
-    let (mass, half) = (column(Layout::<D>::MASS), column(Layout::<D>::HALF));
-    let work = column(Layout::<D>::WORK);
-    let energy = elastic_energy(physics, chunk);
-    for p in 0..chunk.len() {
-        let volume = (0..D).fold(1.0, |volume, _| volume * 2.0 * half[p]);
-        let mut speed_squared = 0.0;
-        let mut height = 0.0;
-        for axis in 0..D {
-            let v = column(Layout::<D>::VELOCITY + axis)[p];
-            sums[1 + axis].add(mass[p] * v);
-            speed_squared = f64::mul_add(v, v, speed_squared);
-            height = physics.gravity[axis].mul_add(column(Layout::<D>::POSITION + axis)[p], height);
+/// Number of sums over particles.
+const SUMS: usize = 8;
+
+/// A sum of twice the usual precision: the rounding errors of `high` add up in `low` (Knuth's two-sum).
+#[derive(Clone, Copy, Debug, Default)]
+struct Doubled {
+    high: f64,
+    low: f64,
+}
+
+impl Doubled {
+    fn add(&mut self, other: Self) {
+        let sum = self.high + other.high;
+        let part = sum - self.high;
+        let error = (self.high - (sum - part)) + (other.high - part);
+        *self = Self { high: sum, low: self.low + (error + other.low) };
+    }
+
+    /// Adds this to an exact sum. Without the errors, which are no numbers, where the sum is not finite.
+    fn enter(&self, sum: &mut ExactSum) {
+        sum.add(self.high);
+        if self.low.is_finite() {
+            sum.add(self.low);
         }
-        sums[0].add(mass[p]);
-        sums[4].add(0.5 * mass[p] * speed_squared);
-        sums[5].add(volume * energy[p]);
-        sums[6].add(-mass[p] * height);
-        sums[7].add(volume * work[p]);
     }
 }
 
-/// Elastic energy of each particle per reference volume, J/m³.
-fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> Vec<f64> {
-    let mut energy = vec![0.0; chunk.len()];
+/// [`Doubled`] for each lane.
+#[derive(Clone, Copy)]
+struct DoubledLanes {
+    high: Lanes,
+    low: Lanes,
+}
+
+impl DoubledLanes {
+    fn new() -> Self {
+        Self { high: Lanes::splat(0.0), low: Lanes::splat(0.0) }
+    }
+
+    fn add(&mut self, value: Lanes) {
+        let sum = self.high + value;
+        let part = sum - self.high;
+        self.low += (self.high - (sum - part)) + (value - part);
+        self.high = sum;
+    }
+
+    /// All lanes together.
+    fn total(self) -> Doubled {
+        let (high, low) = (self.high.to_array(), self.low.to_array());
+        let lanes = high.into_iter().zip(low).map(|(high, low)| Doubled { high, low });
+        lanes.fold(Doubled::default(), |mut total, lane| {
+            total.add(lane);
+            total
+        })
+    }
+}
+
+/// Sums over the particles of one leaf, in their order.
+fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubled; SUMS] {
+    let mut sums = [DoubledLanes::new(); SUMS];
+    let (reals, stride) = chunk.reals();
     for first in (0..chunk.len()).step_by(LANES) {
-        let at = |lane: usize| (first + lane).min(chunk.len() - 1);
-        let elastic = std::array::from_fn(|c| {
-            Lanes::new(std::array::from_fn(|lane| match c {
-                _ if c < Layout::<D>::SYMMETRIC => chunk.column(Layout::<D>::LEFT_CAUCHY_GREEN + c)[at(lane)],
-                _ => 0.0,
-            }))
-        });
-        for lane in 0..LANES.min(chunk.len() - first) {
-            let material = usize::from(Tag::unpack(chunk.tags()[first + lane]).material);
-            // Lanes of one material share the call in practice; mixed batches repeat it per lane.
-            if lane == 0 || Tag::unpack(chunk.tags()[first + lane - 1]).material != material as u16 {
-                let values = physics.materials[material].energy(&elastic, D == 2).to_array();
-                energy[first + lane..(first + LANES).min(chunk.len())]
-                    .copy_from_slice(&values[lane..LANES.min(chunk.len() - first)]);
-            }
+        let members = Mask::from_bits((1 << LANES.min(chunk.len() - first)) - 1);
+        // Columns have room for whole batches.
+        let load = |column: usize| reals[column * stride + first..].first_chunk().map(Lanes::load);
+        let load =
+            |column: usize| members.select(load(column).unwrap_or(Lanes::splat(0.0)), Lanes::splat(0.0));
+        let (mass, width) = (load(Layout::<D>::MASS), load(Layout::<D>::HALF) * 2.0);
+        let volume = (0..D).fold(Lanes::splat(1.0), |volume, _| volume * width);
+        let (mut speed_squared, mut height) = (Lanes::splat(0.0), Lanes::splat(0.0));
+        for axis in 0..D {
+            let v = load(Layout::<D>::VELOCITY + axis);
+            sums[1 + axis].add(mass * v);
+            speed_squared = v.mul_add(v, speed_squared);
+            height = Lanes::splat(physics.gravity[axis]).mul_add(load(Layout::<D>::POSITION + axis), height);
         }
+        sums[0].add(mass);
+        sums[4].add(mass * 0.5 * speed_squared);
+        let energy = volume * elastic_energy(physics, chunk, first);
+        sums[5].add(members.select(energy, Lanes::splat(0.0)));
+        sums[6].add(-mass * height);
+        sums[7].add(volume * load(Layout::<D>::WORK));
+    }
+    sums.map(DoubledLanes::total)
+}
+
+/// Elastic energy of the particles from `first` on per reference volume, J/m³.
+fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first: usize) -> Lanes {
+    let (reals, stride) = chunk.reals();
+    let mut elastic = [Lanes::splat(0.0); 6];
+    for (c, elastic) in elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
+        let column = &reals[(Layout::<D>::LEFT_CAUCHY_GREEN + c) * stride + first..];
+        *elastic = column.first_chunk().map_or(*elastic, Lanes::load);
+    }
+    let tags = &chunk.tags()[first..chunk.len().min(first + LANES)];
+    let material = |lane: usize| Tag::unpack(tags[lane]).material;
+    let mut energy = Lanes::splat(0.0);
+    // A batch of one material, as nearly all are, takes one pass.
+    let mut left = (1u32 << tags.len()) - 1;
+    while left != 0 {
+        let index = material(left.trailing_zeros() as usize);
+        let same =
+            (0..tags.len()).filter(|&lane| material(lane) == index).fold(0, |bits, lane| bits | 1 << lane);
+        let values = physics.materials[usize::from(index)].energy(&elastic, D == 2);
+        energy = Mask::from_bits(same).select(values, energy);
+        left &= !same;
     }
     energy
 }

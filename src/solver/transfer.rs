@@ -5,6 +5,7 @@ use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
 use super::contact::SUMS;
 use super::grid::Grid;
 use super::phases::{Phase, Phases};
+use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
@@ -16,12 +17,15 @@ use crate::grid::plan::Bin;
 use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, prefetch};
 use crate::kernel::{
     BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
 };
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place, Tag};
+
+/// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
+const READ_AHEAD: usize = 25;
 
 /// Which bins a scatter treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +106,12 @@ fn constrained<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Optio
     Some(&plan.constraints[bin.touched? as usize].nodes)
 }
 
+/// Asks for the first lines of the arena behind one, which is cleared next.
+fn read_ahead(rows: &[Row]) {
+    let next = rows.as_ptr_range().end.addr();
+    (0..READ_AHEAD).for_each(|line| prefetch(next + 64 * line));
+}
+
 /// The members of a bin.
 struct Selected<'a, const D: usize> {
     whole: Option<Select<'a>>,
@@ -116,6 +126,9 @@ impl<'a, const D: usize> Selected<'a, D> {
             return Self { whole, parts: &[] };
         };
         let members = &bins.members[number];
+        if number == 0 && members.whole.len() == chunk.len() && !chunk.is_empty() {
+            return Self { whole: Some(Select::All), parts: &[] };
+        }
         let whole = (!members.whole.is_empty()).then_some(Select::List(&members.whole));
         Self { whole, parts: &members.parts }
     }
@@ -176,6 +189,7 @@ impl<const D: usize> Solver<D> {
                 let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
                 arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
+                read_ahead(rows);
                 let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
                     let moments = nodes.map(|nodes| MomentSums { nodes, sums: &mut *sums });
@@ -273,9 +287,14 @@ impl<const D: usize> Solver<D> {
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
+        let adaptivity = self.physics.adaptivity.as_ref();
+        let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
+        let watch = watch.unwrap_or_default();
+        self.surveys.resize(chunks.len(), Survey::default());
+        let surveys = &mut self.surveys;
         let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().enumerate();
+            let leaves = chunks.par_iter_mut().zip(surveys).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
                 let Scratch { arena, increments, gathered } = scratch;
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
@@ -306,9 +325,15 @@ impl<const D: usize> Solver<D> {
                 }
                 signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
             };
-            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                costs.time(leaf, || gather_leaf(scratch, leaf, chunk))
-            });
+            let speeds =
+                leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
+                    costs.time(leaf, || {
+                        watch.before(chunk, survey);
+                        let signal = gather_leaf(scratch, leaf, chunk);
+                        watch.after(chunk, dt, survey);
+                        signal
+                    })
+                });
             speeds.collect_into_vec(signal);
         });
     }
