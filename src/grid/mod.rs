@@ -15,7 +15,7 @@ pub mod fields;
 pub mod known;
 pub mod links;
 pub mod mask;
-mod order;
+pub mod order;
 pub mod plan;
 pub mod reach;
 pub mod region;
