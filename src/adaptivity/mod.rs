@@ -5,7 +5,7 @@
 //! wants that, and coarsened when none objects. The solver finds the values and changes the tree
 //! (`solver/regrid.rs`); nothing here knows of trees and ranks.
 use crate::boundary::motion::Motion;
-use crate::geometry::Shape;
+use crate::geometry::{Aabb, Shape, Side};
 use crate::particle::resample::Limits;
 
 /// Dynamic refinement as a job asks for it.
@@ -29,6 +29,31 @@ pub struct Adaptivity<const D: usize> {
     pub nominal: Vec<f64>,
 }
 
+impl<const D: usize> Adaptivity<D> {
+    /// Finest level that a leaf can have.
+    pub fn finest_level(&self) -> u8 {
+        let criteria = self.criteria.iter().map(|criterion| criterion.level);
+        criteria.chain(self.regions.iter().map(|(_, level)| *level)).fold(self.base_level, u8::max)
+    }
+
+    /// Level that a leaf with this box has in any case.
+    pub fn least_level(&self, leaf_box: &Aabb<D>) -> u8 {
+        least_level(self.base_level, self.regions.iter().map(|(shape, level)| (shape, *level)), leaf_box)
+    }
+}
+
+/// Greatest level among `base` and those of the regions that a box meets.
+pub fn least_level<'a, const D: usize>(
+    base: u8,
+    regions: impl Iterator<Item = (&'a Shape<D>, u8)>,
+    leaf_box: &Aabb<D>,
+) -> u8 {
+    regions.fold(base, |least, (shape, level)| {
+        let is_met = level > least && shape.classify(leaf_box) != Side::Outside;
+        if is_met { level } else { least }
+    })
+}
+
 /// One reason for fine leaves.
 #[derive(Clone, Debug)]
 pub struct Criterion<const D: usize> {
@@ -43,7 +68,7 @@ pub struct Criterion<const D: usize> {
 }
 
 /// What a criterion finds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Value {
     /// In the leaf.
     pub leaf: f64,

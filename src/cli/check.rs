@@ -2,9 +2,13 @@
 use super::{Failure, bytes, grouped};
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::Motion;
-use crate::job::estimate::{Estimate, estimate};
+use crate::job::estimate::{Estimate, LevelCount, estimate};
 use crate::job::{self, AnyProblem, Problem};
+use crate::particle::chunk::Tag;
 use crate::particle::seed::check_counts;
+use crate::run::setup;
+use partition::MAX_LEVEL;
+use partition::comm::World;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -32,8 +36,37 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
 fn report<const D: usize>(arguments: &Arguments, problem: &Problem<D>) -> Result<(), Failure> {
     let estimate = estimate(problem)?;
     check_counts(problem, &estimate.particles)?;
-    write(&mut std::io::stdout().lock(), arguments, problem, &estimate)?;
+    let is_refined = problem.adaptivity.is_some() && estimate.total_particles() <= MOST;
+    let estimate = match is_refined {
+        true => refined(problem, estimate)?,
+        false => estimate,
+    };
+    write(&mut std::io::stdout().lock(), arguments, problem, &estimate, is_refined)?;
     Ok(())
+}
+
+/// Particles up to which a job with criteria is set up, since these look at the particles themselves.
+const MOST: u64 = 2_000_000;
+
+/// The estimate for the tree that the criteria make at the start.
+fn refined<const D: usize>(problem: &Problem<D>, estimate: Estimate) -> Result<Estimate, Failure> {
+    let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
+    let comm = world.comm();
+    let solver = setup::solver(comm, problem).map_err(|error| Failure::Run(error.to_string()))?;
+    let mut bodies = vec![0; problem.bodies.len()];
+    let mut levels = [[0; 3]; MAX_LEVEL as usize + 1];
+    for (leaf, chunk) in solver.forest.leaves().iter().zip(&solver.chunks) {
+        let level = &mut levels[usize::from(leaf.level)];
+        let here = [1, u64::from(!chunk.is_empty()), chunk.len() as u64];
+        level.iter_mut().zip(here).for_each(|(sum, here)| *sum += here);
+        chunk.tags().iter().for_each(|&tag| bodies[usize::from(Tag::unpack(tag).body)] += 1);
+    }
+    comm.sum_u64(&mut bodies);
+    comm.sum_u64(levels.as_flattened_mut());
+    let finest = levels.iter().rposition(|[leaves, ..]| *leaves > 0).unwrap_or(0);
+    let levels = levels[..=finest].iter();
+    let levels = levels.map(|&[leaves, filled, particles]| LevelCount { leaves, filled, particles });
+    Ok(estimate.for_tree(problem, bodies, levels.collect()))
 }
 
 fn write<const D: usize>(
@@ -41,6 +74,7 @@ fn write<const D: usize>(
     arguments: &Arguments,
     problem: &Problem<D>,
     estimate: &Estimate,
+    is_refined: bool,
 ) -> std::io::Result<()> {
     if !problem.title.is_empty() {
         writeln!(out, "{}", problem.title)?;
@@ -79,7 +113,7 @@ fn write<const D: usize>(
         )?;
     }
     if let Some(adaptivity) = &problem.adaptivity {
-        write_refinement(out, problem, adaptivity)?;
+        write_refinement(out, problem, adaptivity, is_refined)?;
     }
     let ranks = f64::from(arguments.ranks);
     writeln!(
@@ -110,6 +144,7 @@ fn write_refinement<const D: usize>(
     out: &mut impl Write,
     problem: &Problem<D>,
     adaptivity: &Adaptivity<D>,
+    is_refined: bool,
 ) -> std::io::Result<()> {
     let merging = if adaptivity.merge.is_some() { "split and merge" } else { "split" };
     writeln!(
@@ -122,9 +157,10 @@ fn write_refinement<const D: usize>(
     }
     writeln!(
         out,
-        "  Counts and memory are those of the job's tree, before criteria make it finer; time step and steps are for"
+        "  Counts and memory are those {}; time step and steps are for the finest level",
+        if is_refined { "at the start, with the criteria" } else { "of the job's tree, before the criteria" }
     )?;
-    writeln!(out, "  the finest level that criteria want.")
+    writeln!(out, "  that criteria want.")
 }
 
 /// A criterion in words.

@@ -18,7 +18,7 @@ use super::known::{Cover, KnownTree};
 use super::mask::{
     arena_overlap, bits, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
 };
-use super::reach::{SourceSearch, bin_container, interior, potential_bins};
+use super::reach::{SourceSearch, bin_container, interior, own_bins};
 
 /// Node sets of one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub type NeededBlocks<const D: usize> = BTreeMap<(u8, [u32; D]), NodeSets>;
 pub struct Closure<const D: usize> {
     /// The needed blocks.
     pub blocks: NeededBlocks<D>,
+    /// Bins of each own leaf.
+    pub bins: Vec<Vec<Octant<D>>>,
     /// Where the rank must learn the leaves before the sets can be trusted; empty when done.
     pub missing: Vec<Region<D>>,
 }
@@ -90,7 +92,8 @@ impl<const D: usize> Closure<D> {
             levels: vec![FxHashMap::default(); deepest as usize + 1],
             received: FxHashMap::default(),
         };
-        builder.touch_own_bins();
+        let bins = own_bins(tree);
+        builder.touch_own_bins(&bins);
         builder.add_parents();
         builder.add_children();
         let missing = builder.missing();
@@ -102,7 +105,7 @@ impl<const D: usize> Closure<D> {
                 blocks.iter().map(move |(&coord, &sets)| ((level as u8, coord), sets))
             })
             .collect();
-        Self { blocks, missing }
+        Self { blocks, bins, missing }
     }
 }
 
@@ -116,9 +119,11 @@ impl<const D: usize> Builder<'_, D> {
     }
 
     /// Value nodes: all nodes in the arenas of the own leaves' bins.
-    fn touch_own_bins(&mut self) {
-        for leaf in self.tree.own_leaves() {
-            for bin in potential_bins(self.tree, leaf) {
+    fn touch_own_bins(&mut self, bins: &[Vec<Octant<D>>]) {
+        let mut touched: FxHashSet<Octant<D>> = FxHashSet::default();
+        for bins in bins {
+            // Most bins beside level jumps are those of several leaves.
+            for bin in bins.iter().filter(|bin| touched.insert(**bin)) {
                 for index in 0..offset_count(D) {
                     let Some(coord) = shifted(bin.coord, offset::<D>(index)) else { continue };
                     let inside = self.overlaps[index] & nodes_in_domain(self.tree, bin.level, coord);

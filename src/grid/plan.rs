@@ -13,7 +13,6 @@ use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
 use super::links::Links;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
-use super::reach::potential_bins;
 use super::sources::{Part, Piece};
 use crate::kernel::ARENA_EDGE;
 
@@ -94,10 +93,10 @@ impl<const D: usize> GridPlan<D> {
     pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);
         let mut rounds = 0;
-        let needed = loop {
+        let (needed, bins) = loop {
             let closure = Closure::compute(&tree);
             if !comm.any(!closure.missing.is_empty()) {
-                break closure.blocks;
+                break (closure.blocks, closure.bins);
             }
             rounds += 1;
             tree.add(&forest.leaves_in(comm, &closure.missing));
@@ -124,7 +123,7 @@ impl<const D: usize> GridPlan<D> {
         plan.list_blocks(&needed);
         let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
-        plan.list_bins(&number);
+        plan.list_bins(&number, &bins);
         plan.feeders = Feeders::new(&plan.tree, &plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.link_levels(&number);
@@ -231,15 +230,13 @@ impl<const D: usize> GridPlan<D> {
             .fold(0, |mask, bit| mask | 1 << bit)
     }
 
-    fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
-        let first = self.tree.first_own();
-        let own = self.tree.leaves().len() - self.tree.ghost_len();
+    fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>, bins: &[Vec<Octant<D>>]) {
         // Bins of several leaves may have one block; what depends on the block is made once.
         let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
         let mut constrained = 0;
-        for leaf in 0..own {
+        for (leaf, blocks) in bins.iter().enumerate() {
             self.leaf_start.push(self.bins.len() as u32);
-            for block in potential_bins(&self.tree, first + leaf) {
+            for &block in blocks {
                 if let Some(&same) = of_block.get(&block) {
                     let same = self.bins[same as usize].clone();
                     self.bins.push(Bin { leaf: leaf as u32, ..same });

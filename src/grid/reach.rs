@@ -3,14 +3,17 @@
 //!
 //! The two answers come from different ranks and must agree. Both rest on `Reach`, which a rank can decide
 //! from the leaves near the bin.
+use std::cell::OnceCell;
+
 use partition::{MAX_LEVEL, Octant, Region};
+use rayon::prelude::*;
 
 use super::known::{Cover, KnownTree};
 use super::mask::{box_offsets, offset, offset_count, shifted};
 
 /// Bins of known leaf `leaf` inside itself: its own block first, then every block inside it, on the level of
 /// a finer leaf that it touches, by level and curve position.
-pub fn inner_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
+fn inner_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
     let here = tree.leaves()[leaf];
     let mut finer: Vec<Octant<D>> =
         finer_neighbours(tree, here).flat_map(|other| blocks_beside(here, other)).collect();
@@ -20,21 +23,33 @@ pub fn inner_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octan
     finer
 }
 
-/// Bins that particles of known leaf `leaf` can scatter to: first those inside it, then those of other leaves
-/// that parts of its boxes can reach, by level and curve position.
-pub fn potential_bins<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<Octant<D>> {
-    let mut bins = inner_bins(tree, leaf);
+/// See [`own_bins`]; `inner` gives [`inner_bins`] of each leaf.
+fn potential_bins<'a, const D: usize>(
+    tree: &KnownTree<D>,
+    leaf: usize,
+    inner: impl Fn(usize) -> &'a [Octant<D>],
+) -> Vec<Octant<D>> {
+    let mut bins = inner(leaf).to_vec();
     let Some(reach) = Reach::of(tree, leaf) else { return bins };
     let mut outer = Vec::new();
     for other in leaves_around(tree, leaf) {
         if other != leaf && reach.region.overlaps(&tree.leaves()[other]) {
-            outer.extend(inner_bins(tree, other).into_iter().filter(|bin| reach.includes(tree, bin)));
+            outer.extend(inner(other).iter().copied().filter(|bin| reach.includes(bin)));
         }
     }
     outer.sort_unstable_by_key(|bin: &Octant<D>| (bin.level, bin.key()));
     outer.dedup();
     bins.extend(outer);
     bins
+}
+
+/// Bins that the particles of each own leaf can scatter to: first those inside it, then those of other leaves that
+/// parts of its boxes can reach, by level and curve position.
+pub fn own_bins<const D: usize>(tree: &KnownTree<D>) -> Vec<Vec<Octant<D>>> {
+    let all = (0..tree.leaves().len()).into_par_iter().with_min_len(16);
+    let inner: Vec<Vec<Octant<D>>> = all.map(|leaf| inner_bins(tree, leaf)).collect();
+    let own = tree.own_leaves().into_par_iter().with_min_len(16);
+    own.map(|leaf| potential_bins(tree, leaf, |other| &inner[other])).collect()
 }
 
 /// Known leaves in the octants of the leaf's size around it, itself included, as far as boxes can reach;
@@ -97,7 +112,7 @@ pub fn bin_sources<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; 
     let mut sources = SourceSearch::of(tree, bin).near;
     sources.sort_unstable();
     sources.dedup();
-    sources.retain(|&leaf| leaf == container || Reach::around(tree, leaf).includes(tree, &bin));
+    sources.retain(|&leaf| leaf == container || Reach::around(tree, leaf).includes(&bin));
     sources
 }
 
@@ -152,31 +167,38 @@ fn half_cells<const D: usize>(tree: &KnownTree<D>) -> u32 {
 /// A box at most one own cell wide is cut into parts only if it overlaps a finer leaf; its parts then lie
 /// within half a cell of its leaf and within a cell of the finer leaf. If boxes wider than a cell occur
 /// anywhere, every leaf may have them, up to [`KnownTree::reach`] cells.
-struct Reach<const D: usize> {
+struct Reach<'a, const D: usize> {
+    tree: &'a KnownTree<D>,
     leaf: Octant<D>,
     region: Extent<D>,
     any_box: bool,
+    /// Finer leaves around, once somebody has asked.
+    finer: OnceCell<Vec<Octant<D>>>,
 }
 
-impl<const D: usize> Reach<D> {
+impl<'a, const D: usize> Reach<'a, D> {
     /// `None` if all boxes of the leaf are transferred whole.
-    fn of(tree: &KnownTree<D>, leaf: usize) -> Option<Self> {
+    fn of(tree: &'a KnownTree<D>, leaf: usize) -> Option<Self> {
         let reach = Self::around(tree, leaf);
-        (reach.any_box || finer_neighbours(tree, reach.leaf).next().is_some()).then_some(reach)
+        (reach.any_box || !reach.finer().is_empty()).then_some(reach)
+    }
+
+    fn finer(&self) -> &[Octant<D>] {
+        self.finer.get_or_init(|| finer_neighbours(self.tree, self.leaf).collect())
     }
 
     /// As [`Reach::of`], but not empty for leaves whose boxes are transferred whole.
-    fn around(tree: &KnownTree<D>, leaf: usize) -> Self {
+    fn around(tree: &'a KnownTree<D>, leaf: usize) -> Self {
         let leaf = tree.leaves()[leaf];
         let region = Extent::grown(&leaf, half_cells(tree), leaf.level);
-        Self { leaf, region, any_box: tree.reach() > 0 }
+        Self { tree, leaf, region, any_box: tree.reach() > 0, finer: OnceCell::new() }
     }
 
     /// Whether a part can lie in the bin. Decided from leaves at most one block away from the bin, which
     /// every rank knows that needs the bin's sums. Beyond two levels a cell of the leaf is wider than a block
     /// of the bin; since the bin lies beside a leaf of its level, there is then a finer leaf near enough
     /// anyway.
-    fn includes(&self, tree: &KnownTree<D>, bin: &Octant<D>) -> bool {
+    fn includes(&self, bin: &Octant<D>) -> bool {
         if !self.region.overlaps(bin) {
             return false;
         }
@@ -184,8 +206,7 @@ impl<const D: usize> Reach<D> {
             return true;
         }
         let near_bin = Extent::grown(bin, 2, self.leaf.level);
-        finer_neighbours(tree, self.leaf)
-            .any(|finer| self.region.overlaps(&finer) && near_bin.overlaps(&finer))
+        self.finer().iter().any(|finer| self.region.overlaps(finer) && near_bin.overlaps(finer))
     }
 }
 

@@ -53,6 +53,7 @@ pub(super) fn adaptivity<const D: usize>(
     let limits = Limits {
         velocity: merge.velocity,
         strain: merge.strain,
+        volume: merge.volume,
         history: merge.plastic_strain,
         stretch: merge.stretch,
     };

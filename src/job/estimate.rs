@@ -10,8 +10,8 @@ use std::collections::HashSet;
 /// Size and cost of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Particles of each body, in the order of the job; on the tree that the job gives, as criteria of dynamic refinement
-    /// need the particles themselves.
+    /// Particles of each body, in the order of the job; on the tree that the job gives, unless that of
+    /// [`Estimate::for_tree`] is another, since criteria of dynamic refinement need the particles themselves.
     pub particles: Vec<u64>,
     /// Leaves of that tree by level, from level 0 to the finest one.
     pub levels: Vec<LevelCount>,
@@ -44,6 +44,18 @@ impl Estimate {
     /// Particles of all bodies.
     pub fn total_particles(&self) -> u64 {
         self.particles.iter().sum()
+    }
+
+    /// The estimate for a tree with these particles and leaves, which criteria have refined.
+    pub fn for_tree<const D: usize>(
+        mut self,
+        problem: &Problem<D>,
+        particles: Vec<u64>,
+        levels: Vec<LevelCount>,
+    ) -> Self {
+        (self.particles, self.levels) = (particles, levels);
+        add_bytes(problem, &mut self);
+        self
     }
 
     /// Leaves of all levels.

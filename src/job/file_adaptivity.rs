@@ -59,6 +59,11 @@ pub struct Merge {
     #[serde(default = "default_strain")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub strain: f64,
+    /// Greatest difference from the mean logarithm of the plastic volume ratio: by how much some grains are further
+    /// apart than others.
+    #[serde(default = "default_volume")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub volume: f64,
     /// Greatest difference from the mean plastic strain.
     #[serde(default = "default_plastic")]
     #[schemars(range(min = 0.0, max = 100.0))]
@@ -75,6 +80,7 @@ impl Default for Merge {
             enabled: true,
             velocity: default_velocity(),
             strain: default_strain(),
+            volume: default_volume(),
             plastic_strain: default_plastic(),
             stretch: default_stretch(),
         }
@@ -91,6 +97,10 @@ fn default_velocity() -> f64 {
 
 fn default_strain() -> f64 {
     0.02
+}
+
+fn default_volume() -> f64 {
+    0.1
 }
 
 fn default_plastic() -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
-use crate::adaptivity::Adaptivity;
+use crate::adaptivity::{Adaptivity, least_level};
 use crate::boundary::Collider;
 pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
@@ -129,13 +129,8 @@ impl<const D: usize> Problem<D> {
     /// True when the job wants the leaf finer: a region that it crosses or lies in asks for a deeper
     /// level.
     pub fn wants_refinement(&self, octant: &Octant<D>) -> bool {
-        if octant.level < self.tree.base_level {
-            return true;
-        }
-        let cell = self.octant_box(octant);
-        self.tree.regions.iter().any(|region| {
-            octant.level < region.level && region.shape.classify(&cell) != crate::geometry::Side::Outside
-        })
+        let regions = self.tree.regions.iter().map(|region| (&region.shape, region.level));
+        octant.level < least_level(self.tree.base_level, regions, &self.octant_box(octant))
     }
 }
 

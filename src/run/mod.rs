@@ -235,7 +235,9 @@ impl<'a, const D: usize> Run<'a, D> {
                 let checkpoint = self.checkpoint()?;
                 return Ok(Outcome::Stopped { checkpoint });
             }
-            self.balance();
+            if self.solver.clock.time < self.problem.time.end {
+                self.balance();
+            }
         }
         Ok(Outcome::Finished(Box::new(self.finish()?)))
     }

@@ -56,6 +56,14 @@ impl<const D: usize> Grid<D> {
         }
     }
 
+    /// Gives back the memory of what the next step fills anew.
+    pub(super) fn clear(&mut self) {
+        self.arenas = Arenas::default();
+        self.increments = Increments::default();
+        self.fields.rows = Vec::new();
+        self.fields.moments = Vec::new();
+    }
+
     /// What the particles scattered last.
     pub fn arenas(&self) -> &Arenas<D> {
         &self.arenas
@@ -148,7 +156,7 @@ impl<const D: usize> Solver<D> {
     /// Moves particles to the leaves that contain them.
     pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {

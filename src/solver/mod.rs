@@ -15,6 +15,8 @@ mod records;
 pub mod regrid;
 pub mod resample;
 mod sides;
+mod surroundings;
+mod survey;
 pub mod time_step;
 pub mod totals;
 pub mod transfer;
@@ -30,7 +32,9 @@ use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
 use self::phases::{Phase, Phases};
 use self::rebalance::{LastPartition, thread_time};
+use self::regrid::Recall;
 use self::resample::Books;
+use self::survey::Survey;
 use self::time_step::StepControl;
 use self::transfer::Reach;
 use crate::adaptivity::Adaptivity;
@@ -138,8 +142,10 @@ pub struct Solver<const D: usize> {
     pub books: Books,
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
-    /// Mean plastic strain rate in each own leaf in the last step, 1/s, where a criterion asked for it.
-    plastic_rate: Vec<f64>,
+    /// What was noted of each own leaf in the last step.
+    surveys: Vec<Survey<D>>,
+    /// What regrids remember; nothing that a bit depends on.
+    recall: Recall<D>,
     /// What grids of earlier trees and partitions have sent.
     sent_before: Traffic,
     /// Bytes of the last exchange of arenas.
@@ -176,7 +182,8 @@ impl<const D: usize> Solver<D> {
             deleted: 0,
             books: Books::default(),
             regrids: 0,
-            plastic_rate: Vec::new(),
+            surveys: Vec::new(),
+            recall: Recall::default(),
             sent_before: Traffic::default(),
             arena_bytes: 0,
             costs: Costs::new(clock.step),
@@ -214,9 +221,7 @@ impl<const D: usize> Solver<D> {
         let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
-        let plastic = self.plastic_strain_sums();
         self.gather(dt);
-        self.note_plastic_rate(plastic, dt);
         let moved = self.migrate();
         let reach = self.local_reach();
 
@@ -244,6 +249,8 @@ impl<const D: usize> Solver<D> {
         self.sent_before = self.traffic();
         // Fresh memory costs as much as the first scatter into it.
         let arenas = std::mem::take(&mut self.grid.arenas);
+        // The new one shall not stand beside all of the old one.
+        self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
         self.grid.arenas = arenas;
     }

@@ -131,7 +131,7 @@ impl<const D: usize> Solver<D> {
         if self.grid.plan.revision != self.forest.revision() {
             self.signal = vec![0.0; self.chunks.len()];
             self.costs.forget(self.chunks.len());
-            self.rebuild_grid(self.grid.plan.tree.reach());
+            self.rebuild_grid(self.agreed_reach());
         }
         self.partitioned = LastPartition::since(start);
         self.partitions += u64::from(shipment.changed());

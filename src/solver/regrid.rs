@@ -2,23 +2,57 @@
 use std::time::Instant;
 
 use partition::comm::Disagreement;
-use partition::{MAX_LEVEL, Mark, Octant, Region, correspondence};
+use partition::{Forest, MAX_LEVEL, Mark, Octant, Region, correspondence};
+use rayon::prelude::*;
 
-use super::migrate::{MigrateError, Moved, position_key};
+use super::migrate::{MigrateError, Moved, leaf_box, position_key};
 use super::phases::Phase;
+use super::surroundings::Surroundings;
+use super::survey::Survey;
 use super::{Solver, StepError};
 use crate::adaptivity::{Adaptivity, Value};
+use crate::geometry::Aabb;
 use crate::particle::Chunk;
 
 /// A region with the level that all leaves which meet it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
 
+/// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What creeps at
+/// rest shall not refine its surroundings.
+const CREEP: f64 = 0.025;
+
 /// What a leaf wants for itself and the leaves around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Wish<const D: usize> {
-    /// Levels, ascending, each with its own width of buffer.
-    levels: Vec<u8>,
-    /// Way that the material can go down and up along each axis until the tree changes next, on the finest lattice.
+    /// Levels, a bit each; each has its own width of buffer.
+    levels: u32,
+    /// Way that the material can go down and up along each axis until the tree changes next, in edges of the finest
+    /// leaves that the job can have. Fractions would not change which leaves it meets.
     way: [[u32; D]; 2],
+}
+
+impl<const D: usize> Wish<D> {
+    const NONE: Self = Self { levels: 0, way: [[0; D]; 2] };
+}
+
+/// What regrids remember from one time to the next. It saves work and changes no bit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recall<const D: usize> {
+    /// See there.
+    pub surroundings: Surroundings,
+    /// With what the tree stays as it is.
+    settled: Option<Settled<D>>,
+}
+
+/// What was wanted when nothing came of it.
+#[derive(Clone, Debug)]
+struct Settled<const D: usize> {
+    /// Revision of the forest.
+    revision: u64,
+    /// Wishes of own leaves.
+    wishes: Vec<Wish<D>>,
+    /// What requests from everywhere meant for them.
+    marks: Vec<Mark>,
 }
 
 /// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
@@ -52,27 +86,35 @@ impl<const D: usize> Solver<D> {
             _ => return Ok(false),
         }
         let (start, phases) = (Instant::now(), self.phases);
+        if self.surveys.len() != self.chunks.len() {
+            self.survey_now();
+        }
         let levels_before = self.change_tree();
         let is_new = levels_before.is_some();
-        let from = levels_before.unwrap_or_else(|| self.forest.leaves().iter().map(|l| l.level).collect());
-        let split = self.split_particles(&from);
+        let mut looks = self.look_at_levels();
+        let split = self.split_particles(&looks, levels_before.as_deref());
         if is_new {
             self.rebalance();
-            self.plastic_rate.clear();
-            let reach = self.agreed_reach();
-            if reach != self.grid.plan.tree.reach() {
-                self.rebuild_grid(reach);
-            }
+            self.surveys.clear();
         }
-        let merged = self.merge_particles();
-        let changed = self.comm.any(is_new || split || merged);
+        if is_new || split {
+            looks = self.look_at_levels();
+        }
+        let is_due = self.physics.adaptivity.as_ref().is_some_and(|adaptivity| adaptivity.merge.is_some())
+            && looks.iter().any(|look| look.due || look.stale);
+        let is_due = self.comm.any(is_due);
+        let merged = is_due && self.merge_particles(&looks);
+        let mut changed = self.comm.any(is_new || split || merged);
         if changed {
             // Boxes of children may reach over the faces of their leaf, and with them their centres.
             let moved = self.migrate();
             let moved: Result<Moved, StepError> = moved.map_err(|error: MigrateError| error.into());
             self.comm.agree(moved)?;
         }
-        let changed = self.reunite_families()? || changed;
+        if is_due {
+            changed |= self.reunite_families(&looks)?;
+            self.count_tries(&looks);
+        }
         if changed {
             self.signal = self.chunks.iter().map(|chunk| self.signal_at_rest(chunk)).collect();
             let bound = self.comm.min_f64(self.local_bound());
@@ -92,6 +134,7 @@ impl<const D: usize> Solver<D> {
             return false;
         }
         self.nodes_of_state();
+        self.survey_now();
         self.change_tree().is_some()
     }
 
@@ -109,23 +152,54 @@ impl<const D: usize> Solver<D> {
     /// Collective. Refines and coarsens, and moves particles to the leaves that contain them; the partition stays. If
     /// any leaf of any rank changed: the level of the leaf that each own leaf's particles come from.
     fn change_tree(&mut self) -> Option<Vec<u8>> {
-        let adaptivity = self.physics.adaptivity.as_ref()?;
-        let requests = self.requests(adaptivity);
-        let requests = self.forest.to_owners(&self.comm, &requests);
-        let old = self.forest.leaves().to_vec();
-        if !self.follow(&requests) {
+        let wishes = self.wishes();
+        let revision = self.forest.revision();
+        let settled = self.recall.settled.as_ref().filter(|settled| settled.revision == revision);
+        if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
             return None;
         }
-        let is_new = old != self.forest.leaves();
-        self.comm.any(is_new).then(|| self.move_to_leaves(&old))
+        let adaptivity = self.physics.adaptivity.as_ref()?;
+        let requests = self.requests(adaptivity, &wishes);
+        let requests = self.forest.to_owners(&self.comm, &requests);
+        let marks = self.marks(adaptivity, &self.forest, &requests, true);
+        let is_new = self.comm.any(settled.is_none_or(|settled| settled.marks != marks));
+        let followed = is_new.then(|| self.followed(adaptivity, &requests, &marks));
+        // 2:1 balance may take back what was coarsened.
+        let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
+        let Some(followed) = followed else {
+            self.recall.settled = Some(Settled { revision, wishes, marks });
+            return None;
+        };
+        let old = std::mem::replace(&mut self.forest, followed);
+        Some(self.move_to_leaves(old.leaves()))
     }
 
-    /// Collective. What the criteria want for and around each occupied leaf.
-    fn requests(&self, adaptivity: &Adaptivity<D>) -> Vec<Request<D>> {
-        let indicators = self.indicators(&adaptivity.criteria);
-        let wishes: Vec<Wish<D>> =
-            indicators.iter().enumerate().map(|(leaf, values)| self.wish(adaptivity, leaf, values)).collect();
+    /// Collective. What each own leaf wants.
+    fn wishes(&mut self) -> Vec<Wish<D>> {
+        let values = self.indicators();
+        let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
+        let (count, finest) = (adaptivity.criteria.len(), adaptivity.finest_level());
+        // One step more than the interval, as particles may have come from next door in this one.
+        let interval = (adaptivity.every + 1) as f64 * self.clock.dt;
+        let per_edge = f64::from(1u32 << finest) / self.physics.root_edge;
+        let way =
+            |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
+        let leaves = self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.surveys).enumerate();
+        let each = leaves.with_min_len(64).map(|(number, ((leaf, chunk), survey))| {
+            let values = &values[number * count..][..count];
+            let levels = if chunk.is_empty() { 0 } else { wanted_levels(adaptivity, leaf.level, values) };
+            match levels {
+                0 => Wish::NONE,
+                _ => Wish { levels, way: survey.velocity.map(|side| side.map(way)) },
+            }
+        });
+        each.collect()
+    }
+
+    /// Not collective. What the wishes mean for the leaves around.
+    fn requests(&self, adaptivity: &Adaptivity<D>, wishes: &[Wish<D>]) -> Vec<Request<D>> {
         let leaves = self.forest.leaves();
+        let edge = 1 << (MAX_LEVEL - adaptivity.finest_level());
         let mut requests = Vec::new();
         let mut leaf = 0;
         while leaf < leaves.len() {
@@ -141,85 +215,59 @@ impl<const D: usize> Solver<D> {
             let way = wishes[members.clone()].iter().fold([[0; D]; 2], |most: [[u32; D]; 2], wish| {
                 std::array::from_fn(|side| std::array::from_fn(|a| most[side][a].max(wish.way[side][a])))
             });
-            for &level in &wishes[leaf].levels {
+            let mut widest = None;
+            for level in (0..=MAX_LEVEL).rev().filter(|level| wishes[leaf].levels >> level & 1 == 1) {
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
-                let growth = way.map(|side| side.map(|way| buffer.saturating_add(way)));
-                requests.push((grown(&octant, growth), u32::from(level)));
+                // What is wanted finer as far away needs no second request.
+                if widest.replace(buffer) != Some(buffer) {
+                    let growth =
+                        way.map(|side| side.map(|way| buffer.saturating_add(way.saturating_mul(edge))));
+                    requests.push((grown(&octant, growth), u32::from(level)));
+                }
             }
             leaf = members.end;
         }
         requests
     }
 
-    /// What one leaf wants.
-    fn wish(&self, adaptivity: &Adaptivity<D>, leaf: usize, values: &[Value]) -> Wish<D> {
-        let own = self.forest.leaves()[leaf].level;
-        let each = adaptivity.criteria.iter().zip(values);
-        let mut levels: Vec<u8> = each
-            .map(|(criterion, &value)| criterion.wanted_level(value, own))
-            .filter(|&level| level > adaptivity.base_level)
-            .collect();
-        levels.sort_unstable();
-        levels.dedup();
-        if levels.is_empty() {
-            return Wish { levels, way: [[0; D]; 2] };
-        }
-        // Material must not leave the buffer before the next time.
-        let interval = adaptivity.every as f64 * self.clock.dt;
-        let unit = self.physics.root_edge / f64::from(1u32 << MAX_LEVEL);
-        let way = |velocity: f64| (velocity.abs() * interval / unit).ceil() as u32;
-        Wish { levels, way: self.velocity_range(leaf).map(|side| side.map(way)) }
-    }
-
-    /// Collective. Refines own leaves to what is requested, coarsens families by one level where nothing objects, and
-    /// balances. Returns whether any rank changed something on the way.
-    fn follow(&mut self, requests: &[Request<D>]) -> bool {
-        let mut changed = false;
-        let mut may_coarsen = true;
-        loop {
-            let wanted = self.wanted_levels(requests);
-            let marks: Vec<Mark> = self
-                .forest
-                .leaves()
-                .iter()
-                .zip(&wanted)
-                .map(|(leaf, &wanted)| match wanted.cmp(&leaf.level) {
-                    std::cmp::Ordering::Greater => Mark::Refine,
-                    std::cmp::Ordering::Less if may_coarsen => Mark::Coarsen,
-                    _ => Mark::Keep,
-                })
-                .collect();
-            if !self.forest.adapt(&self.comm, &marks) {
-                break;
-            }
-            // The partition keeps families together until the tree changes, so only the first pass may coarsen.
-            may_coarsen = false;
-            changed = true;
-        }
-        if changed && self.physics.graded {
-            self.forest.balance(&self.comm);
-        }
-        changed
-    }
-
-    /// Least level of each own leaf.
-    fn wanted_levels(&self, requests: &[Request<D>]) -> Vec<u8> {
-        let mut wanted: Vec<u8> =
-            self.forest.leaves().iter().map(|leaf| self.permanent_level(leaf)).collect();
+    /// Not collective. What requests mean for each own leaf of a tree.
+    fn marks(
+        &self,
+        adaptivity: &Adaptivity<D>,
+        forest: &Forest<D>,
+        requests: &[Request<D>],
+        may_coarsen: bool,
+    ) -> Vec<Mark> {
+        let least = |leaf: &Octant<D>| {
+            let (lower, upper) = leaf_box(leaf, self.physics.root_edge);
+            adaptivity.least_level(&Aabb::new(lower, upper))
+        };
+        let mut wanted: Vec<u8> = forest.leaves().iter().map(least).collect();
         for (region, level) in requests {
-            self.forest.own_leaves_in(region, &mut |leaf| wanted[leaf] = wanted[leaf].max(*level as u8));
+            forest.own_leaves_in(region, &mut |leaf| wanted[leaf] = wanted[leaf].max(*level as u8));
         }
-        wanted
+        let each = forest.leaves().iter().zip(&wanted);
+        each.map(|(leaf, &wanted)| match wanted.cmp(&leaf.level) {
+            std::cmp::Ordering::Greater => Mark::Refine,
+            std::cmp::Ordering::Less if may_coarsen => Mark::Coarsen,
+            _ => Mark::Keep,
+        })
+        .collect()
     }
 
-    /// Level that a leaf has in any case.
-    fn permanent_level(&self, leaf: &Octant<D>) -> u8 {
-        let Some(adaptivity) = &self.physics.adaptivity else { return leaf.level };
-        let (lower, upper) = super::migrate::leaf_box(leaf, self.physics.root_edge);
-        let leaf_box = crate::geometry::Aabb::new(lower, upper);
-        let regions = adaptivity.regions.iter();
-        let met = regions.filter(|(shape, _)| shape.classify(&leaf_box) != crate::geometry::Side::Outside);
-        met.map(|(_, level)| *level).fold(adaptivity.base_level, u8::max)
+    /// Collective. The tree with own leaves refined to what is requested, families coarsened by one level where nothing
+    /// objects, and balanced. `marks` are those of the first pass.
+    fn followed(&self, adaptivity: &Adaptivity<D>, requests: &[Request<D>], marks: &[Mark]) -> Forest<D> {
+        let mut forest = self.forest.clone();
+        if !forest.adapt(&self.comm, marks) {
+            return forest;
+        }
+        // The partition keeps families together until the tree changes, so only the first pass may coarsen.
+        while forest.adapt(&self.comm, &self.marks(adaptivity, &forest, requests, false)) {}
+        if self.physics.graded {
+            forest.balance(&self.comm);
+        }
+        forest
     }
 
     /// Moves particles from old leaves to those that contain them now. Returns the level of the old leaf of each.
@@ -228,24 +276,31 @@ impl<const D: usize> Solver<D> {
         let mut sources = std::mem::take(&mut self.chunks);
         let mut levels = vec![0; new.len()];
         let mut chunks: Vec<Chunk<D>> = new.iter().map(|_| Chunk::new()).collect();
+        // Nothing is known of leaves that change: they get a closer look.
+        let mut surveys = vec![Survey { width: f64::INFINITY, ..Survey::default() }; new.len()];
         let (roots, root_edge) = (self.forest.brick().roots, self.physics.root_edge);
         for (from, to) in correspondence(old, new) {
             let finest = old[from.clone()].iter().map(|leaf| leaf.level).max().unwrap_or(0);
             levels[to.clone()].fill(finest);
             if from.len() == 1 && to.len() == 1 {
                 chunks[to.start] = std::mem::take(&mut sources[from.start]);
+                surveys[to.start] = self.surveys[from.start];
                 continue;
             }
-            for source in &sources[from] {
+            let room = sources[from.clone()].iter().map(Chunk::len).sum::<usize>();
+            chunks[to.clone()].iter_mut().for_each(|chunk| chunk.reserve_exact(room / to.len()));
+            for source in &mut sources[from] {
                 for p in 0..source.len() {
                     let key = position_key(source.position(p), roots, root_edge);
                     let inside = self.forest.find(key).filter(|leaf| to.contains(leaf));
                     // All particles of a leaf lie in it, and the new leaves cover the old.
                     chunks[inside.unwrap_or(to.start)].push_from(source, p);
                 }
+                *source = Chunk::new();
             }
         }
         self.chunks = chunks;
+        self.surveys = surveys;
         levels
     }
 
@@ -253,9 +308,13 @@ impl<const D: usize> Solver<D> {
     pub fn refinement(&mut self) -> Option<Refinement> {
         self.physics.adaptivity.as_ref()?;
         self.nodes_of_state();
+        self.survey_now();
+        let values = self.indicators();
         let adaptivity = self.physics.adaptivity.as_ref()?;
+        let count = adaptivity.criteria.len();
         let (mut urgency, mut wanted) = (Vec::new(), Vec::new());
-        for (values, leaf) in self.indicators(&adaptivity.criteria).iter().zip(self.forest.leaves()) {
+        for (number, (leaf, chunk)) in self.forest.leaves().iter().zip(&self.chunks).enumerate() {
+            let values = if chunk.is_empty() { &[] } else { &values[number * count..][..count] };
             let each = || adaptivity.criteria.iter().zip(values);
             urgency.push(each().map(|(c, &value)| c.urgency(value.leaf)).fold(0.0, f64::max));
             let levels = each().map(|(c, &value)| c.wanted_level(value, leaf.level));
@@ -263,4 +322,11 @@ impl<const D: usize> Solver<D> {
         }
         Some(Refinement { urgency, wanted })
     }
+}
+
+/// Levels, a bit each, that the criteria want for a leaf of `level`.
+fn wanted_levels<const D: usize>(adaptivity: &Adaptivity<D>, level: u8, values: &[Value]) -> u32 {
+    let each = adaptivity.criteria.iter().zip(values);
+    let levels = each.map(|(criterion, &value)| criterion.wanted_level(value, level));
+    levels.filter(|&level| level > adaptivity.base_level).fold(0, |bits, level| bits | 1 << level)
 }

@@ -4,12 +4,14 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 
 use super::migrate::leaf_box;
+use super::survey::widest;
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::kernel::Scheme;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
 use crate::particle::resample::family::separated;
+use crate::particle::resample::patience::{self, Look};
 use crate::particle::resample::{Merged, Setting, ids, merge, needs_split, split};
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
@@ -87,18 +89,19 @@ pub(super) struct Resampling<'a, const D: usize> {
     extent: [f64; D],
     nominal: &'a [f64],
     stretch: Option<f64>,
+    turn: u64,
 }
 
 impl<'a, const D: usize> Resampling<'a, D> {
     /// For a domain with its upper corner at `extent` (m); `None` if the job wants particles left alone.
-    pub fn new(physics: &'a Physics<D>, scheme: &'a Scheme<'a>, extent: [f64; D]) -> Option<Self> {
+    pub fn new(physics: &'a Physics<D>, scheme: &'a Scheme<'a>, extent: [f64; D], step: u64) -> Option<Self> {
         let adaptivity = physics.adaptivity.as_ref()?;
         let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
-        Some(Self { scheme, extent, nominal, stretch })
+        Some(Self { scheme, extent, nominal, stretch, turn: step / adaptivity.every })
     }
 
     fn setting(&self, level: u8) -> Setting<'a, D> {
-        Setting { scheme: self.scheme, extent: self.extent, level, nominal: self.nominal }
+        Setting { scheme: self.scheme, extent: self.extent, level, nominal: self.nominal, turn: self.turn }
     }
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
@@ -121,7 +124,7 @@ impl<'a, const D: usize> Resampling<'a, D> {
     fn fit(&self, chunk: &mut Chunk<D>, level: u8, from: u8) -> Splits {
         let mut done = Splits::default();
         loop {
-            let stretch = self.stretch.filter(|&stretch| self.may_exceed(chunk, level, stretch));
+            let stretch = self.stretch.filter(|&stretch| self.may_exceed(widest(chunk), level, stretch));
             let wanted = needs_split(chunk, &self.setting(level), stretch);
             if wanted.which.is_empty() {
                 done.refused += wanted.refused;
@@ -131,18 +134,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
         }
     }
 
-    /// Whether a box may be wider than `stretch` times that of an undeformed particle of a level: a quick bound from
-    /// the columns of a chunk, so that most leaves need no closer look.
-    fn may_exceed(&self, chunk: &Chunk<D>, level: u8, stretch: f64) -> bool {
-        let greatest = |column: usize| chunk.column(column).iter().copied().fold(0.0, f64::max);
-        let first = Layout::<D>::LEFT_CAUCHY_GREEN;
-        // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
-        // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
-        // where a model has one.
-        let elastic = (first..first + 3).map(greatest).fold(0.0, f64::max);
-        let plastic = greatest(Layout::<D>::HISTORY + 1);
-        let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
-        let width = greatest(Layout::<D>::HALF) * elastic.sqrt().max(isotropic);
+    /// Whether boxes up to `width` (m) may be wider than `stretch` times that of an undeformed particle of a level.
+    fn may_exceed(&self, width: f64, level: u8, stretch: f64) -> bool {
         let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
         width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
     }
@@ -169,11 +162,6 @@ impl<'a, const D: usize> Resampling<'a, D> {
     }
 }
 
-/// Whether a chunk has particles made for a finer level than this.
-fn has_finer<const D: usize>(chunk: &Chunk<D>, level: u8) -> bool {
-    chunk.tags().iter().any(|&tag| Tag::unpack(tag).level > level)
-}
-
 /// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d
 /// is the distance to the node below, m². The first part is that of the box, the second that of linear
 /// interpolation between two nodes.
@@ -193,15 +181,30 @@ fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
 }
 
 impl<const D: usize> Solver<D> {
+    /// Not collective. How the particles of each own leaf fit it.
+    pub(super) fn look_at_levels(&self) -> Vec<Look> {
+        let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
+        let turn = self.clock.step / adaptivity.every;
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(64);
+        leaves.map(|(chunk, leaf)| patience::look(chunk, leaf.level, turn)).collect()
+    }
+
     /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the cells that
-    /// the affine state in leaf i comes from. Returns whether any was split.
-    pub(super) fn split_particles(&mut self, from: &[u8]) -> bool {
+    /// the affine state in leaf i comes from, if the tree has changed. Returns whether any was split.
+    pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> bool {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else { return false };
-        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(from).with_min_len(16);
-        let done: Vec<Splits> =
-            leaves.map(|((chunk, leaf), &from)| resampling.fit(chunk, leaf.level, from)).collect();
+        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent, self.clock.step) else {
+            return false;
+        };
+        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.surveys).enumerate();
+        let done = leaves.with_min_len(64).filter_map(|(number, ((chunk, leaf), survey))| {
+            let too_wide = |stretch| resampling.may_exceed(survey.width, leaf.level, stretch);
+            let is_wanted = looks[number].coarser || resampling.stretch.is_some_and(too_wide);
+            let from = from.map_or(leaf.level, |from| from[number]);
+            is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
+        });
+        let done: Vec<Splits> = done.collect();
         let books = &mut self.books;
         // A refusal is told again at each regrid, so the count is that of now.
         books.refused = 0;
@@ -210,12 +213,17 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
-    /// finer leaf; strangers only on demand. Returns per leaf those that are to be named.
-    fn merge_in_leaves(&mut self, among_strangers: bool) -> Vec<Merged> {
+    /// finer leaf, in the wanted leaves; strangers only on demand. Returns per leaf those that are to be named.
+    fn merge_in_leaves(
+        &mut self,
+        among_strangers: bool,
+        is_wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Merged> {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else { return Vec::new() };
-        let Some(limits) = self.physics.adaptivity.as_ref().and_then(|a| a.merge) else { return Vec::new() };
+        let resampling = Resampling::new(&self.physics, &scheme, extent, self.clock.step);
+        let limits = self.physics.adaptivity.as_ref().and_then(|a| a.merge);
+        let Some((resampling, limits)) = resampling.zip(limits) else { return Vec::new() };
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
         let root_edge = self.physics.root_edge;
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).enumerate().with_min_len(8);
@@ -223,13 +231,14 @@ impl<const D: usize> Solver<D> {
             .map(|(number, (chunk, leaf)): (usize, (&mut Chunk<D>, &Octant<D>))| {
                 let mut energies = Vec::new();
                 let mut merged = Merged::default();
-                if has_finer(chunk, leaf.level) {
+                if is_wanted(number) {
                     let cell = plan.cell(leaf.level);
                     let is_far = |x: [f64; D]| !lists.is_finer_within(number, &x, cell);
                     let setting = resampling.setting(leaf.level);
                     let bounds = leaf_box(leaf, root_edge);
                     let bounds = among_strangers.then_some(&bounds);
                     merged = merge(chunk, &setting, &limits, bounds, is_far, &mut |e| energies.push(e));
+                    patience::count_refused(chunk, &merged.refused);
                 }
                 (merged, energies)
             })
@@ -250,17 +259,19 @@ impl<const D: usize> Solver<D> {
     ///
     /// # Errors
     /// On all ranks when a particle could not be moved.
-    pub(super) fn reunite_families(&mut self) -> Result<bool, Disagreement> {
+    pub(super) fn reunite_families(&mut self, looks: &[Look]) -> Result<bool, Disagreement> {
         let Some(adaptivity) = &self.physics.adaptivity else { return Ok(false) };
         let Some(limits) = adaptivity.merge else { return Ok(false) };
         let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else { return Ok(false) };
+        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent, self.clock.step) else {
+            return Ok(false);
+        };
         let root_edge = self.physics.root_edge;
-        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(8);
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(looks).with_min_len(8);
         let apart: Vec<Vec<(u32, [f64; D])>> = leaves
-            .map(|(chunk, leaf)| match has_finer(chunk, leaf.level) {
+            .map(|((chunk, leaf), look)| match look.due {
                 true => {
                     let bounds = leaf_box(leaf, root_edge);
                     separated(chunk, &resampling.setting(leaf.level), &limits, &bounds, axes)
@@ -272,17 +283,22 @@ impl<const D: usize> Solver<D> {
             return Ok(false);
         }
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let before: Vec<usize> = chunks.iter().map(Chunk::len).collect();
         let gathered = grid.migration.gather(&grid.plan.tree, chunks, &apart);
         let gathered = gathered.map_err(StepError::from);
-        let merged = self.merge_in_leaves(false).iter().any(|report| report.merged > 0);
+        // Where somebody came; numbers tell unless as many went.
+        let came: Vec<bool> = (self.chunks.iter().zip(&before).zip(&apart))
+            .map(|((chunk, &before), apart)| chunk.len() != before || !apart.is_empty())
+            .collect();
+        let merged = self.merge_in_leaves(false, |leaf| came[leaf]).iter().any(|report| report.merged > 0);
         let returned = self.migrate().map_err(StepError::from);
         self.comm.agree(gathered.and(returned))?;
         Ok(self.comm.any(merged))
     }
 
     /// Collective. Merges particles in leaves that are coarser than they are. Returns whether this rank merged any.
-    pub(super) fn merge_particles(&mut self) -> bool {
-        let reports = self.merge_in_leaves(true);
+    pub(super) fn merge_particles(&mut self, looks: &[Look]) -> bool {
+        let reports = self.merge_in_leaves(true, |leaf| looks[leaf].due);
         // Groups that are no family get roots of their own, counted along the curve.
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
         let mut total = [strangers];
@@ -298,6 +314,16 @@ impl<const D: usize> Solver<D> {
             self.books.next_root += total[0];
         }
         reports.iter().any(|report| report.merged > 0)
+    }
+
+    /// Not collective. After all merges of a regrid: counts those that were tried in vain.
+    pub(super) fn count_tries(&mut self, looks: &[Look]) {
+        let Some(adaptivity) = &self.physics.adaptivity else { return };
+        let turn = self.clock.step / adaptivity.every;
+        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).with_min_len(64);
+        leaves.filter(|(_, look)| look.due || look.stale).for_each(|((chunk, leaf), _)| {
+            patience::count(chunk, leaf.level, turn);
+        });
     }
 
     /// Collective. The root after the highest that any living particle's identifier has.

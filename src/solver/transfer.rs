@@ -5,6 +5,7 @@ use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
 use super::contact::SUMS;
 use super::grid::Grid;
 use super::phases::{Phase, Phases};
+use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
@@ -286,9 +287,14 @@ impl<const D: usize> Solver<D> {
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
+        let adaptivity = self.physics.adaptivity.as_ref();
+        let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
+        let watch = watch.unwrap_or_default();
+        self.surveys.resize(chunks.len(), Survey::default());
+        let surveys = &mut self.surveys;
         let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().enumerate();
+            let leaves = chunks.par_iter_mut().zip(surveys).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
                 let Scratch { arena, increments, gathered } = scratch;
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
@@ -319,9 +325,15 @@ impl<const D: usize> Solver<D> {
                 }
                 signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
             };
-            let speeds = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                costs.time(leaf, || gather_leaf(scratch, leaf, chunk))
-            });
+            let speeds =
+                leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
+                    costs.time(leaf, || {
+                        watch.before(chunk, survey);
+                        let signal = gather_leaf(scratch, leaf, chunk);
+                        watch.after(chunk, dt, survey);
+                        signal
+                    })
+                });
             speeds.collect_into_vec(signal);
         });
     }

@@ -113,9 +113,17 @@ fn over_a_disc() {
     on_ranks("sweeps::over_a_disc", &[1], |comm| sweeps::<2>(comm, body, 130, 1000));
 }
 
+const BALL: &str = "particles_per_cell = 1\nshape = { kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }\n\
+                    velocity = [0.5, 0.2, -0.3]\nangular_velocity = [2, -3, 5]";
+
 #[test]
 fn over_a_ball() {
-    let body = "particles_per_cell = 1\nshape = { kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }\n\
-                velocity = [0.5, 0.2, -0.3]\nangular_velocity = [2, -3, 5]";
-    on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, body, 10, 70));
+    on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, BALL, 40, 250));
+}
+
+/// As [`over_a_ball`]; takes minutes.
+#[test]
+#[ignore = "the long form of over_a_ball"]
+fn over_a_ball_a_thousand_times() {
+    on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, BALL, 170, 1000));
 }

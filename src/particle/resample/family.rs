@@ -11,7 +11,7 @@
 //! the caller tries the combinations of axes in turn.
 use super::super::chunk::Chunk;
 use super::merge::{Limits, of_level};
-use super::{Setting, ids};
+use super::{Setting, ids, patience};
 use crate::particle::chunk::Tag;
 
 /// Lower and upper corner of a leaf, m.
@@ -30,11 +30,20 @@ pub(super) struct Sibling {
     pub p: u32,
 }
 
-/// Particles of a level that have a parent, by parent and number.
-pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Sibling> {
+/// Parents of some particles, ascending.
+pub(super) fn parents<const D: usize>(chunk: &Chunk<D>, of: impl Iterator<Item = u32>) -> Vec<u64> {
+    let parent = |p: u32| ids::parent::<D>(chunk.ids()[p as usize]);
+    let mut parents: Vec<u64> = of.filter_map(parent).map(|(parent, _)| parent).collect();
+    parents.sort_unstable();
+    parents.dedup();
+    parents
+}
+
+/// Particles of a level that have one of the parents (ascending), by parent and number.
+pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8, parents: &[u64]) -> Vec<Sibling> {
     let with_parent = |(p, tag): (u32, u64)| {
         let (parent, number) = ids::parent::<D>(chunk.ids()[p as usize])?;
-        Some(Sibling { parent, tag, number, p })
+        parents.binary_search(&parent).is_ok().then_some(Sibling { parent, tag, number, p })
     };
     let mut siblings: Vec<Sibling> = of_level(chunk, level).filter_map(with_parent).collect();
     siblings.sort_unstable();
@@ -80,15 +89,17 @@ fn parents_of_split<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<u64> {
     parents
 }
 
-/// Indices, ascending, of particles of a level whose siblings may still come, so that they are no strangers.
+/// Indices, ascending, of particles of a level with one of the parents (ascending) whose siblings may still come, so
+/// that they are no strangers.
 pub(super) fn waiting<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
     limits: &Limits,
     (lower, upper): &Bounds<D>,
     level: u8,
+    parents: &[u64],
 ) -> Vec<u32> {
-    let siblings = siblings(chunk, level);
+    let siblings = siblings(chunk, level, parents);
     let parents_of_split = parents_of_split(chunk, level);
     let mut waiting = Vec::new();
     for family in siblings.chunk_by(same_parent) {
@@ -124,7 +135,8 @@ pub fn separated<const D: usize>(
     let finest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).max().unwrap_or(0);
     let mut separated = Vec::new();
     for level in setting.level + 1..=finest {
-        let siblings = siblings(chunk, level);
+        let due = parents(chunk, patience::due(chunk, level, setting.turn));
+        let siblings = siblings(chunk, level, &due);
         for family in siblings.chunk_by(same_parent).filter(|family| family.len() < 1 << D) {
             let distance = greatest_distance(setting, limits, family[0].tag, level);
             if are_torn(chunk, family, distance) {

@@ -2,7 +2,7 @@
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
-use super::{Setting, volume};
+use super::{Setting, patience, volume};
 
 /// How different particles may be that become one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,20 +11,23 @@ pub struct Limits {
     /// wave speed of the undeformed material. The field is fitted to the centres as if these were boxes, so that a
     /// quarter of the affine part may count as difference as well.
     pub velocity: f64,
-    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm), and of the logarithm of the
-    /// plastic volume ratio.
+    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm).
     pub strain: f64,
+    /// Greatest difference from the mean of the logarithm of the plastic volume ratio: by how much some grains are
+    /// further apart than others.
+    pub volume: f64,
     /// Greatest difference of the first history variable (plastic strain) from the mean.
     pub history: f64,
-    /// Greatest half width of the merged box, and of a box about the boxes of the group, over that of an undeformed
+    /// Greatest half width of the merged box, and of a box about the boxes of a family, over that of an undeformed
     /// particle of the new level. Above 1, and below the stretch at which particles split, so that a merge does not
-    /// undo that.
+    /// undo that. A box about those of strangers may be wider by half: they share a cell of the lattice, out of which
+    /// halves of boxes stand.
     pub stretch: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { velocity: 0.005, strain: 0.02, history: 0.2, stretch: 1.5 }
+        Self { velocity: 0.005, strain: 0.02, volume: 0.1, history: 0.2, stretch: 1.5 }
     }
 }
 
@@ -41,6 +44,8 @@ pub struct Merged {
     /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
     /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
+    /// Identifiers, ascending, of particles that the limits keep apart.
+    pub refused: Vec<u64>,
 }
 
 /// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
@@ -69,23 +74,26 @@ pub fn merge<const D: usize>(
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
         for among_strangers in [false, true] {
-            let groups = match bounds {
-                _ if !among_strangers => families(chunk, level),
-                Some(bounds) => strangers(chunk, setting, limits, bounds, level),
+            let due: Vec<u32> = patience::due(chunk, level, setting.turn).collect();
+            let mut groups = match bounds {
+                _ if due.is_empty() => continue,
+                _ if !among_strangers => families(chunk, level, &due),
+                Some(bounds) => strangers(chunk, setting, limits, bounds, level, &due),
                 None => continue,
             };
+            groups.retain(|group| may_merge(centre(chunk, group)));
             if groups.is_empty() {
                 continue;
             }
             unnamed.resize(chunk.len(), false);
-            let mixtures = mixtures(chunk, setting, limits, &groups, level - 1);
+            let mixtures = mixtures(chunk, setting, limits, groups, level - 1, &mut report.refused);
             let mut stays = vec![true; chunk.len()];
             let mut done = Vec::new();
-            for (number, group) in groups.iter().enumerate() {
-                let Some(energy) = mixtures.energy[number] else { continue };
-                if !may_merge(mixtures.chunk.position(number)) {
+            for (number, group) in mixtures.groups.iter().enumerate() {
+                let Some(energy) = mixtures.energy[number] else {
+                    report.refused.extend(group.members.iter().map(|&p| chunk.ids()[p as usize]));
                     continue;
-                }
+                };
                 group.members[1..].iter().for_each(|&p| stays[p as usize] = false);
                 unnamed[group.members[0] as usize] = !group.is_family;
                 done.push((group.members[0], number));
@@ -97,8 +105,19 @@ pub fn merge<const D: usize>(
             replace(chunk, &mut unnamed, &stays, &mut done, &mixtures.chunk);
         }
     }
+    report.refused.sort_unstable();
     report.unnamed = (0..).zip(unnamed).filter(|(_, unnamed)| *unnamed).map(|(p, _)| p).collect();
     report
+}
+
+/// Centre of mass of a group, m.
+fn centre<const D: usize>(chunk: &Chunk<D>, group: &Group) -> [f64; D] {
+    let masses = chunk.column(Layout::<D>::MASS);
+    let total: f64 = group.members.iter().map(|&p| masses[p as usize]).sum();
+    group.members.iter().fold([0.0; D], |centre, &p| {
+        let (x, share) = (chunk.position(p as usize), masses[p as usize] / total);
+        std::array::from_fn(|axis| f64::mul_add(share, x[axis], centre[axis]))
+    })
 }
 
 /// Writes the merged particles (index in the chunk, number in `merged`) over the first of their groups and takes
@@ -128,9 +147,9 @@ fn replace<const D: usize>(
     }
 }
 
-/// Complete families of a level, by identifier. Children in the order of their numbers.
-fn families<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Group> {
-    let siblings = family::siblings(chunk, level);
+/// Complete families of a level with one of the given members, by identifier. Children in the order of their numbers.
+fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Group> {
+    let siblings = family::siblings(chunk, level, &family::parents(chunk, with.iter().copied()));
     let whole = siblings.chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
     whole
         .map(|siblings| Group::new(siblings.iter().map(|child| child.p).collect(), siblings[0].parent, true))
@@ -138,31 +157,38 @@ fn families<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<Group> {
 }
 
 /// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
-/// body and cell.
+/// body and cell; in cells where one of the given ones is.
 fn strangers<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
     limits: &Limits,
     bounds: &Bounds<D>,
     level: u8,
+    with: &[u32],
 ) -> Vec<Group> {
-    let waiting = family::waiting(chunk, setting, limits, bounds, level);
-    let mut members: Vec<(u64, [i64; D], u32)> = of_level(chunk, level)
-        .filter(|(p, _)| waiting.binary_search(p).is_err())
-        .map(|(p, tag)| {
-            let spacing = 2.0 * setting.nominal(Tag::unpack(tag), level - 1);
-            (tag, chunk.position(p as usize).map(|x| (x / spacing).floor() as i64), p)
-        })
-        .collect();
+    let cell_of = |p: u32, tag: u64| {
+        let per_spacing = 0.5 / setting.nominal(Tag::unpack(tag), level - 1);
+        (tag, chunk.position(p as usize).map(|x| (x * per_spacing).floor() as i64))
+    };
+    let mut cells: Vec<(u64, [i64; D])> =
+        with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize]))).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let in_cells = of_level(chunk, level).map(|(p, tag)| (cell_of(p, tag), p));
+    let mut members: Vec<((u64, [i64; D]), u32)> =
+        in_cells.filter(|(cell, _)| cells.binary_search(cell).is_ok()).collect();
+    let parents = family::parents(chunk, members.iter().map(|(_, p)| *p));
+    let waiting = family::waiting(chunk, setting, limits, bounds, level, &parents);
+    members.retain(|(_, p)| waiting.binary_search(p).is_err());
     members.sort_unstable();
     let mut groups = Vec::new();
-    for cell in members.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0), level - 1);
+    for cell in members.chunk_by(|a, b| a.0 == b.0) {
+        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0.0), level - 1);
         // A lattice of equal parts fills the volume to round-off.
         let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 1e-9);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
-        for &(_, _, p) in cell {
+        for &(_, p) in cell {
             let part = volume(chunk, p as usize);
             if filled + part > room {
                 close(chunk, &mut group, &mut groups);
@@ -173,6 +199,7 @@ fn strangers<const D: usize>(
         }
         close(chunk, &mut group, &mut groups);
     }
+    groups.retain(|group| group.members.iter().any(|p| with.binary_search(p).is_ok()));
     groups
 }
 
@@ -186,8 +213,8 @@ fn close<const D: usize>(chunk: &Chunk<D>, group: &mut Vec<u32>, groups: &mut Ve
     groups.extend(smallest.map(|id| Group::new(members, id, false)));
 }
 
-/// Index and packed tag of the particles made for a level.
+/// Index and packed tag, without count, of the particles made for a level.
 pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
-    let tags = (0..).zip(chunk.tags().iter().copied());
+    let tags = (0..).zip(chunk.tags().iter().copied().map(patience::plain));
     tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

@@ -30,62 +30,101 @@ impl Group {
 
 /// Merged particles, one per group.
 pub(super) struct Mixtures<const D: usize> {
-    /// The particles.
+    /// The groups within the limits of what is quick to find, in their order.
+    pub groups: Vec<Group>,
+    /// Their particles.
     pub chunk: Chunk<D>,
-    /// Kinetic energy that the merge would remove, J; `None` if the group is not within the limits.
+    /// Kinetic energy that the merge would remove, J; `None` if the group is not within the other limits either.
     pub energy: Vec<Option<f64>>,
 }
 
-/// Merges each group into a particle of a level, and says which may do so.
+/// Merges each group into a particle of a level, and says which may do so. Identifiers of the others are appended to
+/// `refused`.
 pub(super) fn mixtures<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
     limits: &Limits,
-    groups: &[Group],
+    mut groups: Vec<Group>,
     level: u8,
+    refused: &mut Vec<u64>,
 ) -> Mixtures<D> {
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
+    let mut out = chunk.gathered(&groups.iter().map(|group| group.members[0]).collect::<Vec<u32>>());
+    let mut motions = Vec::with_capacity(groups.len());
+    let mut start = 0;
+    for (number, group) in groups.iter().enumerate() {
+        let range = start..start + group.members.len();
+        start = range.end;
+        motions.push(mix_motion(&mut out, number, chunk, setting, group, &half[range]));
+    }
+    // What a member differs from the others in most often takes least time to find.
+    let is_close = |number: usize| {
+        let group = &groups[number];
+        let material = usize::from(Tag::unpack(chunk.tags()[group.members[0] as usize]).material);
+        let speed = limits.velocity * setting.scheme.materials[material].wave_speed();
+        motions[number].difference <= speed && is_alike(chunk, group, limits)
+    };
+    let close: Vec<u32> = (0..groups.len() as u32).filter(|&number| is_close(number as usize)).collect();
+    let mut out = out.gathered(&close);
+    let motions: Vec<&Motion<D>> = close.iter().map(|&number| &motions[number as usize]).collect();
+    let mut number = 0..;
+    groups.retain(|group| {
+        let stays = number.next().is_some_and(|number| close.binary_search(&number).is_ok());
+        if !stays {
+            refused.extend(group.members.iter().map(|&p| chunk.ids()[p as usize]));
+        }
+        stays
+    });
+
+    let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let strain = hencky(chunk, &members);
-    let firsts: Vec<u32> = groups.iter().map(|group| group.members[0]).collect();
-    let mut out = Mixtures { chunk: chunk.gathered(&firsts), energy: Vec::with_capacity(groups.len()) };
+    let mut energy = Vec::with_capacity(groups.len());
     let mut strains = Vec::with_capacity(groups.len());
-    let mut reaches = Vec::with_capacity(groups.len());
     let mut start = 0;
     for (number, group) in groups.iter().enumerate() {
         let range = start..start + group.members.len();
         start = range.end;
         let tag = Tag { level, ..Tag::unpack(chunk.tags()[group.members[0] as usize]) };
-        out.chunk.ids_mut()[number] = group.id;
-        out.chunk.tags_mut()[number] = tag.pack();
-
-        let motion = mix_motion(&mut out.chunk, number, chunk, setting, group, &half[range.clone()]);
-        let (mean, difference) = mix_matter(&mut out.chunk, number, chunk, setting, group, &strain[range]);
-        let speed = limits.velocity * setting.scheme.materials[usize::from(tag.material)].wave_speed();
-        let close = motion.difference <= speed
-            && difference.strain <= limits.strain
+        out.ids_mut()[number] = group.id;
+        out.tags_mut()[number] = tag.pack();
+        let (mean, difference) = mix_matter(&mut out, number, chunk, setting, group, &strain[range]);
+        let close = difference.strain <= limits.strain
+            && difference.volume <= limits.volume
             && difference.history <= limits.history;
-        out.energy.push(close.then_some(motion.energy));
+        energy.push(close.then_some(motions[number].energy));
         strains.push(mean);
-        reaches.push(motion.reach);
     }
-    restore(&mut out.chunk, setting, &strains);
+    restore(&mut out, setting, &strains);
 
-    for (number, half) in setting.territories(&out.chunk, Select::All).iter().enumerate() {
-        let tag = Tag::unpack(out.chunk.tags()[number]);
+    for (number, half) in setting.territories(&out, Select::All).iter().enumerate() {
+        let tag = Tag::unpack(out.tags()[number]);
         // A box that just fits does so to round-off.
-        let greatest = limits.stretch * setting.nominal(tag, level) * (1.0 + 1e-9);
-        if half.iter().chain(&reaches[number]).any(|&half| half > greatest) {
-            out.energy[number] = None;
+        let nominal = setting.nominal(tag, level) * (1.0 + 1e-9);
+        let reach = if groups[number].is_family { limits.stretch } else { limits.stretch + 0.5 };
+        let exceeds = |halves: &[f64; D], limit: f64| halves.iter().any(|&half| half > limit * nominal);
+        if exceeds(half, limits.stretch) || exceeds(&motions[number].reach, reach) {
+            energy[number] = None;
         }
         // Strangers that fill less than half of a particle of the level are still one of the finer level, which may
         // merge again; else it would split into crumbs as soon as it meets finer cells.
         let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
-        if !groups[number].is_family && volume(&out.chunk, number) < 0.5 * whole * (1.0 - 1e-9) {
-            out.chunk.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
+        if !groups[number].is_family && volume(&out, number) < 0.5 * whole * (1.0 - 1e-9) {
+            out.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
         }
     }
-    out
+    Mixtures { groups, chunk: out, energy }
+}
+
+/// Whether the history of each member is about that of the first, so that it may be about the mean.
+fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) -> bool {
+    let within = |column: usize, limit: f64| {
+        let values = chunk.column(column);
+        let first = values[group.members[0] as usize];
+        group.members.iter().all(|&p| (values[p as usize] - first).abs() <= 2.0 * limit)
+    };
+    // Either may be as far from the mean on its own side.
+    within(Layout::<D>::HISTORY, limits.history) && within(Layout::<D>::HISTORY + 1, limits.volume)
 }
 
 /// Sum of the first `2^k` and the others, so that `2^k` equal numbers have an exact sum.
@@ -217,8 +256,10 @@ fn divide<const D: usize>(n: [[f64; D]; D], mut a: [[f64; D]; D]) -> [[f64; D]; 
 
 /// How the matter of the members of a group differs from the mean.
 struct Difference {
-    /// Of the Hencky strain, and of the logarithm of the plastic volume ratio.
+    /// Of the Hencky strain.
     strain: f64,
+    /// Of the logarithm of the plastic volume ratio.
+    volume: f64,
     /// Of the first history variable.
     history: f64,
 }
@@ -245,14 +286,15 @@ fn mix_matter<const D: usize>(
     let history = |i: usize| -> [f64; HISTORIES] { read(chunk, Layout::<D>::HISTORY, member(i)) };
     let mean_history = mean(&shares, history);
     let mut strain = mean(&shares, |i| strains[i]);
-    let mut difference = Difference { strain: 0.0, history: 0.0 };
+    let mut difference = Difference { strain: 0.0, volume: 0.0, history: 0.0 };
     for (i, own) in strains.iter().enumerate() {
         let square = (0..6).fold(0.0, |square, c| {
             let rest = own[c] - strain[c];
             f64::mul_add(if c < 3 { rest } else { 2.0 * rest }, rest, square)
         });
         let gain = (history(i)[1] - mean_history[1]).abs();
-        difference.strain = difference.strain.max(square.sqrt()).max(gain);
+        difference.strain = difference.strain.max(square.sqrt());
+        difference.volume = difference.volume.max(gain);
         difference.history = difference.history.max((history(i)[0] - mean_history[0]).abs());
     }
 

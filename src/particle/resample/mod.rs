@@ -11,6 +11,7 @@ pub mod family;
 pub mod ids;
 mod merge;
 mod mix;
+pub mod patience;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,8 @@ pub struct Setting<'a, const D: usize> {
     /// Half width of an undeformed particle of level 0 by body, m: half a cell of level 0 over the particles per cell
     /// and direction. On level k it is this over 2^k.
     pub nominal: &'a [f64],
+    /// Number of the regrid, which says who is tried for a merge (see [`patience`]).
+    pub turn: u64,
 }
 
 impl<const D: usize> Setting<'_, D> {

@@ -11,7 +11,7 @@ const EXTENT: f64 = 8.0;
 const NOMINAL: [f64; 1] = [CELL / 4.0];
 /// Elastic, von Mises, Drucker-Prager.
 const KINDS: u16 = 3;
-const OPEN: Limits = Limits { velocity: 1e9, strain: 1e9, history: 1e9, stretch: 4.0 };
+const OPEN: Limits = Limits { velocity: 1e9, strain: 1e9, volume: 1e9, history: 1e9, stretch: 4.0 };
 
 fn materials() -> Vec<Box<dyn Material>> {
     let elastic = parameters::Elastic { young: 1e6, poisson: 0.3 };
@@ -34,7 +34,7 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
-    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL }
+    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: 0 }
 }
 
 /// The domain as one leaf.
@@ -244,7 +244,7 @@ fn merging_undoes_splitting<const D: usize>(seed: u64, transfer: Transfer) {
     }
     let original = chunk.clone();
     let added = split_all(&mut chunk, &setting(&scheme, 2));
-    let limits = Limits { velocity: 0.1, strain: 1e-9, history: 1e-9, stretch: 1.2 };
+    let limits = Limits { velocity: 0.1, strain: 1e-9, volume: 1e-9, history: 1e-9, stretch: 1.2 };
     let (report, removed) = merge_all(&mut chunk, &setting(&scheme, 1), &limits);
     let number = original.len() as u64;
     assert_eq!((report.merged, report.families, &report.unnamed), (number, number, &vec![]));
@@ -362,7 +362,7 @@ fn undeformed_particles_stay_undeformed_to_the_last_bit() {
 fn limits_are_respected() {
     let materials = materials();
     let scheme = scheme(&materials, Transfer::Apic);
-    let limits = Limits { velocity: 0.1, strain: 1e-3, history: 1e-3, stretch: 1.2 };
+    let limits = Limits { velocity: 0.1, strain: 1e-3, volume: 1e-3, history: 1e-3, stretch: 1.2 };
     let speed = materials[1].wave_speed();
     let mut family = particles::<2>(4, 1, 1, Some(1)).gathered(&[0]);
     split_all(&mut family, &setting(&scheme, 2));

@@ -1,0 +1,184 @@
+//! What leaves have around them, found once per tree, and how much mass the nodes there have.
+use partition::comm::Comm;
+use partition::{Forest, Octant, Region};
+use rayon::prelude::*;
+
+use crate::grid::known::{Cover, KnownTree};
+use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count, product, shifted};
+use crate::grid::plan::NO_BLOCK;
+use crate::grid::{GridPlan, NodeFields};
+use crate::particle::Chunk;
+
+/// Share of the greatest node mass nearby below which a node counts as free of material. A full node in a
+/// corner of three walls has an eighth.
+const NEXT_TO_NOTHING: f64 = 0.1;
+
+/// The surroundings of each own leaf, for one tree and partition.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Surroundings {
+    /// Revision of the forest that this is for.
+    revision: Option<u64>,
+    /// Own leaves that touch leaf i: `touching[start[i]..start[i + 1]]`.
+    touching: Vec<u32>,
+    start: Vec<u32>,
+    /// Whether leaves of other ranks may touch the leaf.
+    at_seam: Vec<bool>,
+    /// Which of the blocks around the leaf's own bin (a bit by offset number) are leaves of its level.
+    of_level: Vec<u32>,
+}
+
+impl Surroundings {
+    /// Not collective. Finds everything anew if the tree or the partition has changed.
+    pub fn update<const D: usize>(&mut self, forest: &Forest<D>, plan: &GridPlan<D>) {
+        if self.revision == Some(forest.revision()) {
+            return;
+        }
+        let leaves = forest.leaves().par_iter().with_min_len(16);
+        let each: Vec<(Vec<u32>, bool, u32)> = leaves
+            .map(|leaf| {
+                let mut touching = Vec::new();
+                forest.own_leaves_in(&Region::of(leaf), &mut |other| touching.push(other as u32));
+                touching.sort_unstable();
+                (touching, !is_inside(&plan.tree, leaf), of_level(&plan.tree, leaf))
+            })
+            .collect();
+        self.start = vec![0];
+        self.touching.clear();
+        for (touching, ..) in &each {
+            self.touching.extend(touching);
+            self.start.push(self.touching.len() as u32);
+        }
+        self.at_seam = each.iter().map(|each| each.1).collect();
+        self.of_level = each.iter().map(|each| each.2).collect();
+        self.revision = Some(forest.revision());
+    }
+
+    /// Own leaves that touch an own leaf, itself included.
+    pub fn touching(&self, leaf: usize) -> &[u32] {
+        &self.touching[self.start[leaf] as usize..self.start[leaf + 1] as usize]
+    }
+
+    /// Collective. Whether each own leaf touches one without particles.
+    pub fn beside_empty<const D: usize>(
+        &self,
+        forest: &Forest<D>,
+        comm: &Comm,
+        chunks: &[Chunk<D>],
+    ) -> Vec<bool> {
+        let mut beside = vec![false; chunks.len()];
+        let mut requests: Vec<(Region<D>, u32)> = Vec::new();
+        for leaf in (0..chunks.len()).filter(|&leaf| chunks[leaf].is_empty()) {
+            self.touching(leaf).iter().for_each(|&other| beside[other as usize] = true);
+            if self.at_seam[leaf] {
+                requests.push((Region::of(&forest.leaves()[leaf]), 0));
+            }
+        }
+        if comm.size() > 1 {
+            for (region, _) in forest.to_owners(comm, &requests) {
+                forest.own_leaves_in(&region, &mut |leaf| beside[leaf] = true);
+            }
+        }
+        beside
+    }
+
+    /// Whether any real node in the arena of a leaf's own bin is free of material. Only nodes on the leaf and on leaves
+    /// of its level count: the lattice goes on over finer leaves, but what is there has its mass on finer nodes.
+    pub fn is_exposed<const D: usize>(
+        &self,
+        leaf: usize,
+        plan: &GridPlan<D>,
+        fields: &NodeFields<D>,
+        masses: &[MassRange],
+    ) -> bool {
+        let around = &plan.bins[plan.leaf_start[leaf] as usize].around;
+        let of_level = self.of_level[leaf];
+        let blocks = || {
+            let numbers = around.iter().enumerate().take(offset_count(D));
+            numbers.filter(|&(_, &number)| number != NO_BLOCK)
+        };
+        let range_of = |index: usize, number: u32, mask: u64| {
+            let block = &plan.blocks[number as usize];
+            let on_leaf = if of_level >> index & 1 == 1 { u64::MAX } else { on_leaf::<D>(index) };
+            MassRange::of::<D>(fields, number, block.value & !block.constrained & mask & on_leaf)
+        };
+        // Most leaves have as much mass on all nodes of all blocks around, the nodes beyond the arena included.
+        let wide =
+            blocks().fold(MassRange::NONE, |range, (index, &number)| match of_level >> index & 1 == 1 {
+                true => range.with(masses[number as usize]),
+                false => range.with(range_of(index, number, arena_overlap::<D>(offset(index)))),
+            });
+        if !wide.has_gap() {
+            return false;
+        }
+        let mut range = MassRange::NONE;
+        blocks().any(|(index, &number)| {
+            range = range.with(range_of(index, number, arena_overlap::<D>(offset(index))));
+            range.has_gap()
+        })
+    }
+}
+
+/// Nodes of the block at an offset that lie on the leaf itself: on its upper faces, where the block begins.
+fn on_leaf<const D: usize>(index: usize) -> u64 {
+    product::<D>(offset::<D>(index).map(|beside| match beside {
+        0 => 0b1111,
+        1 => 0b0001,
+        _ => 0,
+    }))
+}
+
+/// Whether all leaves that touch the leaf are own leaves.
+fn is_inside<const D: usize>(tree: &KnownTree<D>, leaf: &Octant<D>) -> bool {
+    (0..offset_count(D)).all(|index| {
+        shifted(leaf.coord, offset::<D>(index)).is_none_or(|coord| {
+            !tree.contains(leaf.level, coord) || tree.is_own(&Octant { level: leaf.level, coord })
+        })
+    })
+}
+
+/// Offsets, as bits, at which there is a leaf of the same level.
+fn of_level<const D: usize>(tree: &KnownTree<D>, leaf: &Octant<D>) -> u32 {
+    let is_of_level = |&index: &usize| {
+        shifted(leaf.coord, offset::<D>(index)).is_some_and(|coord| match tree.cover(leaf.level, coord) {
+            Cover::Leaf(other) => tree.leaves()[other].level == leaf.level,
+            Cover::Outside | Cover::Finer(_) | Cover::Unknown => false,
+        })
+    };
+    (0..offset_count(D)).filter(is_of_level).fold(0, |bits, index| bits | 1 << index)
+}
+
+/// Least and greatest mass of some nodes, kg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MassRange {
+    least: f64,
+    greatest: f64,
+}
+
+impl MassRange {
+    const NONE: Self = Self { least: f64::INFINITY, greatest: 0.0 };
+
+    fn with(self, other: Self) -> Self {
+        Self { least: self.least.min(other.least), greatest: self.greatest.max(other.greatest) }
+    }
+
+    /// Whether some of the nodes are free of material. More nodes never undo that.
+    fn has_gap(self) -> bool {
+        self.least < NEXT_TO_NOTHING * self.greatest
+    }
+
+    fn of<const D: usize>(fields: &NodeFields<D>, block: u32, nodes: u64) -> Self {
+        let rows = &fields.rows[block as usize * block_nodes(D)..][..block_nodes(D)];
+        bits(nodes).fold(Self::NONE, |range, bit| {
+            let mass = rows[bit as usize].0[3];
+            range.with(Self { least: mass, greatest: mass })
+        })
+    }
+
+    /// Of all real nodes of each block.
+    pub fn of_blocks<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<Self> {
+        let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
+        blocks
+            .map(|(number, block)| Self::of::<D>(fields, number as u32, block.value & !block.constrained))
+            .collect()
+    }
+}

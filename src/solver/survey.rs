@@ -1,0 +1,154 @@
+//! What the solver notes of each leaf's particles right after G2P, while they are in the cache: what refinement
+//! criteria and splitting will ask for. Looking at them again later would cost more than all the rest of a regrid that
+//! changes nothing.
+use super::Solver;
+use crate::adaptivity::{Adaptivity, Kind};
+use crate::kernel::simd::{LANES, Lanes};
+use crate::particle::chunk::{Chunk, Layout};
+
+/// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
+/// leaf that it comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Survey<const D: usize> {
+    /// Least and greatest velocity along each axis, 0 among them, m/s. Nodes would not do: those with next to no mass
+    /// may be very fast.
+    pub velocity: [[f64; D]; 2],
+    /// Greatest plastic strain.
+    pub plastic_strain: f64,
+    /// Bound on the half width of any box, m.
+    pub width: f64,
+    /// Mean rate of the plastic strain in the last step, 1/s.
+    pub plastic_rate: f64,
+}
+
+impl<const D: usize> Default for Survey<D> {
+    fn default() -> Self {
+        Self { velocity: [[0.0; D]; 2], plastic_strain: 0.0, width: 0.0, plastic_rate: 0.0 }
+    }
+}
+
+/// What to note.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Watch {
+    /// Velocities.
+    velocity: bool,
+    /// Greatest plastic strain.
+    strain: bool,
+    /// Widths of boxes.
+    width: bool,
+    /// Rate of the plastic strain.
+    rate: bool,
+}
+
+impl Watch {
+    /// What a job wants to know after a step of that number (the first is 1).
+    pub fn after_step<const D: usize>(adaptivity: &Adaptivity<D>, step: u64) -> Self {
+        let has = |wanted: fn(&Kind<D>) -> bool| adaptivity.criteria.iter().any(|c| wanted(&c.kind));
+        // Files show the rate whenever they are written.
+        let rate = has(|kind| matches!(kind, Kind::PlasticStrainRate));
+        if !step.is_multiple_of(adaptivity.every) {
+            return Self { rate, ..Self::default() };
+        }
+        let strain = has(|kind| matches!(kind, Kind::PlasticStrain));
+        Self { velocity: true, strain, width: adaptivity.split_stretch.is_some(), rate }
+    }
+
+    /// To be called before the leaf's particles advance.
+    pub fn before<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
+        if self.rate {
+            survey.plastic_rate = sum(chunk.column(Layout::<D>::HISTORY));
+        }
+    }
+
+    /// To be called after the leaf's particles have advanced by `dt` (s).
+    pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, survey: &mut Survey<D>) {
+        if self.rate {
+            let gain = sum(chunk.column(Layout::<D>::HISTORY)) - survey.plastic_rate;
+            survey.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
+        }
+        self.look(chunk, survey);
+    }
+
+    /// What follows from the state alone.
+    fn look<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
+        if self.velocity {
+            let ranges: [[f64; 2]; D] =
+                std::array::from_fn(|axis| range(chunk.column(Layout::<D>::VELOCITY + axis)));
+            survey.velocity = std::array::from_fn(|side| ranges.map(|range| range[side]));
+        }
+        if self.strain {
+            survey.plastic_strain = greatest(chunk.column(Layout::<D>::HISTORY));
+        }
+        if self.width {
+            survey.width = widest(chunk);
+        }
+    }
+}
+
+/// A bound on the half widths of a chunk's boxes, m.
+pub(super) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+    // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
+    // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
+    // where a model has one.
+    let elastic = (first..first + 3).map(|column| greatest(chunk.column(column))).fold(0.0, f64::max);
+    let plastic = greatest(chunk.column(Layout::<D>::HISTORY + 1));
+    let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
+    greatest(chunk.column(Layout::<D>::HALF)) * elastic.sqrt().max(isotropic)
+}
+
+/// Least and greatest of the values, 0 among them.
+fn range(values: &[f64]) -> [f64; 2] {
+    let (batches, rest) = values.as_chunks::<LANES>();
+    let mut range = [Lanes::splat(0.0); 2];
+    for batch in batches {
+        let values = Lanes::load(batch);
+        range = [values.min(range[0]), values.max(range[1])];
+    }
+    let [least, greatest] = range.map(Lanes::to_array);
+    [
+        least.iter().chain(rest).copied().fold(0.0, f64::min),
+        greatest.iter().chain(rest).copied().fold(0.0, f64::max),
+    ]
+}
+
+/// Greatest of the values, 0 among them.
+fn greatest(values: &[f64]) -> f64 {
+    let (batches, rest) = values.as_chunks::<LANES>();
+    let most = batches.iter().fold(Lanes::splat(0.0), |most, batch| Lanes::load(batch).max(most));
+    most.to_array().iter().chain(rest).copied().fold(0.0, f64::max)
+}
+
+/// Sum in an order that follows from the number of values.
+fn sum(values: &[f64]) -> f64 {
+    let (batches, rest) = values.as_chunks::<LANES>();
+    let sums = batches.iter().fold(Lanes::splat(0.0), |sum, batch| Lanes::load(batch) + sum);
+    sums.to_array().iter().chain(rest).sum()
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Notes the state as it is now; rates stay.
+    pub(super) fn survey_now(&mut self) {
+        let Some(adaptivity) = &self.physics.adaptivity else { return };
+        let watch = Watch::after_step(adaptivity, 0);
+        self.surveys.resize(self.chunks.len(), Survey::default());
+        self.surveys.iter_mut().zip(&self.chunks).for_each(|(survey, chunk)| watch.look(chunk, survey));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_any_number_of_values() {
+        for len in 0..40 {
+            let values: Vec<f64> = (0..len).map(|i| f64::from((i * 7 + 3) % 40 - 20)).collect();
+            let least = values.iter().copied().fold(0.0, f64::min);
+            let most = values.iter().copied().fold(0.0, f64::max);
+            assert_eq!(range(&values), [least, most]);
+            assert_eq!(greatest(&values), most);
+            assert_eq!(sum(&values), values.iter().sum::<f64>());
+        }
+    }
+}
