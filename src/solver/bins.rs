@@ -7,9 +7,8 @@
 //! same way; its weights are the mean of theirs.
 use rayon::prelude::*;
 
-use super::migrate::leaf_box;
-use super::sides::{Side, Sides};
-use crate::grid::KnownTree;
+use super::members::Members;
+use super::sides::{NearLeaf, Side, Sides, near_leaf};
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::Bin;
 use crate::grid::reach::leaves_around;
@@ -22,72 +21,6 @@ use crate::particle::chunk::{Chunk, Layout};
 /// more than it saves.
 const fn crowded(d: usize) -> usize {
     if d == 2 { 32 } else { 128 }
-}
-
-/// A leaf near a leaf.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NearLeaf<const D: usize> {
-    pub level: u8,
-    pub lower: [f64; D],
-    pub upper: [f64; D],
-}
-
-impl<const D: usize> NearLeaf<D> {
-    /// How far beyond its faces boxes count as touching them, m.
-    pub fn slack(&self) -> [f64; D] {
-        self.upper.map(|x| 16.0 * f64::EPSILON * x)
-    }
-}
-
-/// Particles and parts of boxes in one bin, in canonical order.
-#[derive(Clone, Debug)]
-pub struct Members<const D: usize> {
-    /// Particles whose box is transferred whole.
-    pub whole: Vec<u32>,
-    /// Parts of boxes; their slots count the leaf's particles that are cut.
-    pub parts: Vec<SubBox<D>>,
-    /// Nodes that all these touch.
-    pub window: Window<D>,
-    /// Least and greatest lower face of the boxes along each axis, m.
-    lower_faces: [[f64; D]; 2],
-}
-
-impl<const D: usize> Default for Members<D> {
-    fn default() -> Self {
-        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY, lower_faces: Self::NO_FACES }
-    }
-}
-
-impl<const D: usize> Members<D> {
-    const NO_FACES: [[f64; D]; 2] = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
-
-    fn clear(&mut self) {
-        self.whole.clear();
-        self.parts.clear();
-        self.window = Window::EMPTY;
-        self.lower_faces = Self::NO_FACES;
-    }
-
-    /// Grows the window to a box, in cells of edge `cell`. The kernel limits half widths to half a cell.
-    fn include(&mut self, cell: f64, centre: [f64; D], half: [f64; D]) {
-        let [least, greatest] = &mut self.lower_faces;
-        for axis in 0..D {
-            let face = centre[axis] - half[axis].min(0.5 * cell);
-            least[axis] = least[axis].min(face);
-            greatest[axis] = greatest[axis].max(face);
-        }
-    }
-
-    /// Makes the window from all boxes that were included.
-    fn close(&mut self, plan: &GridPlan<D>, bin: &Bin<D>) {
-        if self.lower_faces[0][0] <= self.lower_faces[1][0] {
-            let cell = plan.cell(bin.block.level);
-            for faces in self.lower_faces {
-                let corner = bin.block.coord.map(|c| f64::from(4 * c));
-                self.window.include(std::array::from_fn(|axis| faces[axis] / cell - corner[axis]));
-            }
-        }
-    }
 }
 
 /// Bins of one own leaf whose particles do not all share the leaf's own bin.
@@ -428,12 +361,6 @@ fn narrow_lanes<const D: usize>(half: &[Lanes; D], cell: f64) -> u32 {
 /// than a few units of the last place.
 fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
     half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 8.0 * f64::EPSILON))
-}
-
-fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) -> NearLeaf<D> {
-    let leaf = tree.leaves()[known];
-    let (lower, upper) = leaf_box(&leaf, root_edge);
-    NearLeaf { level: leaf.level, lower, upper }
 }
 
 /// Greatest half width without deformation in a chunk, m.

@@ -4,10 +4,36 @@
 //! each with its answer in a table.
 use partition::Octant;
 
-use super::bins::NearLeaf;
+use super::migrate::leaf_box;
+use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::Bin;
 use crate::kernel::simd::Lanes;
+
+/// A leaf near a leaf.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NearLeaf<const D: usize> {
+    /// Its level.
+    pub level: u8,
+    /// Lower corner relative to that of the domain, m.
+    pub lower: [f64; D],
+    /// Upper corner relative to the domain's lower corner, m.
+    pub upper: [f64; D],
+}
+
+impl<const D: usize> NearLeaf<D> {
+    /// How far beyond its faces boxes count as touching them, m.
+    pub fn slack(&self) -> [f64; D] {
+        self.upper.map(|x| 16.0 * f64::EPSILON * x)
+    }
+}
+
+/// A known leaf.
+pub(super) fn near_leaf<const D: usize>(tree: &KnownTree<D>, known: usize, root_edge: f64) -> NearLeaf<D> {
+    let leaf = tree.leaves()[known];
+    let (lower, upper) = leaf_box(&leaf, root_edge);
+    NearLeaf { level: leaf.level, lower, upper }
+}
 
 /// On which level a box at most a cell wide scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
