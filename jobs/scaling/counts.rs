@@ -224,7 +224,7 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
         "# Scaling\n\n\
          Written by `jobs/scaling/run counts`: counts, not times. Ranks share the cores of one machine, which changes \
          no count. The job is `jobs/scaling/block.toml`, a box full of sand with a floor of cells half as wide, one particle \
-         per cell. Bytes are those of one exchange of arenas; `bytes / surface` divides them by the bytes of the distinct \
+         per cell. Bytes are those of one exchange of sums; `bytes / surface` divides them by the bytes of the distinct \
          nodes that cross between each pair of ranks. Measured times are in [performance.md](performance.md).\n\n\
          ## One cube on more and more ranks\n\n\
          4096 leaves and a finer floor; in the last two rows eight times as many.\n\n{}\n\
@@ -236,7 +236,7 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
          all runs), with the greatest relative error in brackets:\n\n\
          - ghost leaves: a layer of {:.1} leaves around a cube of n, (n^(1/3) + {:.1})^3 - n\n\
          - bytes per step: {:.0} n^(2/3) + {:.0} n^(1/3) ({:.0} %)\n\
-         - messages per step: 2 for each neighbour, one with arenas and one with particles, and one reduction \
+         - messages per step: 2 for each neighbour, one with sums and one with particles, and one reduction \
          (log2 P messages); at most {:.0} neighbours were seen\n\
          - memory: 272 B per particle + {:.0} MB + {:.1} kB per leaf or ghost leaf ({:.0} %); from 16 to 64 ranks with \
          the same leaves {:.0} kB more for each rank of the job, which holds MPI's memory shared on one machine too\n\n\
@@ -289,7 +289,7 @@ fn plot(page: &Path, counts: &[(&str, Count)], fits: &Fits) -> Result<(), Failur
         [n, fits.bytes_at(n) / 1e3]
     });
     let chart = Chart {
-        title: "Bytes of arenas per rank and step, 8 to 64 ranks",
+        title: "Bytes of sums per rank and step, 8 to 64 ranks",
         labels: ["leaves per rank", "kB"],
         logarithmic: [true, true],
         series: vec![

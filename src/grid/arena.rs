@@ -50,13 +50,6 @@ pub struct ArenaMut<'a, const D: usize> {
     pub moments: &'a mut [Moments<D>],
 }
 
-impl<const D: usize> Arena<'_, D> {
-    /// First moments of a node inside the window; `None` for bins without.
-    pub fn moments_at(&self, node: usize) -> Option<Moments<D>> {
-        self.moments.map(|moments| moments.at(node))
-    }
-}
-
 impl<const D: usize> ArenaMut<'_, D> {
     /// Sets the nodes of a window and all moments to zero.
     pub fn clear(&mut self, window: &Window<D>) {
@@ -116,6 +109,13 @@ impl<const D: usize> Arenas<D> {
     /// Whether a bin is occupied.
     pub fn is_occupied(&self, bin: usize) -> bool {
         self.slot[bin] != NONE
+    }
+
+    /// Momentum and mass in the arena of a bin, if it is occupied.
+    #[inline(always)]
+    pub fn rows(&self, bin: u32) -> Option<&[Row]> {
+        let slot = self.slot[bin as usize];
+        (slot != NONE).then(|| &self.rows[slot as usize * arena_nodes(D)..][..arena_nodes(D)])
     }
 
     /// The arena of a bin, if it is occupied.

@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 use super::arena::Arenas;
 use super::exchange::ArenaExchange;
 use super::plan::GridPlan;
-use super::sums::Scratch;
+use super::sums::{Scratch, Sources};
 
 /// Counts of one rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,12 +39,14 @@ pub fn surface_bytes<const D: usize>(
     plan: &GridPlan<D>,
     arenas: &Arenas<D>,
 ) -> u64 {
+    let strays = &plan.feeders.strays(plan, arenas);
+    let own = Sources { plan, arenas, strays, received: None };
     let mut scratch = Scratch::default();
     let mut total = 0;
     for pieces in exchange.sent() {
         let mut needed: FxHashMap<u32, Needed> = FxHashMap::default();
         for piece in pieces {
-            let nodes = piece.find(plan, arenas, &mut scratch).own_nodes() & piece.nodes;
+            let nodes = piece.find(own, &mut scratch).own_nodes() & piece.nodes;
             let block = needed.entry(piece.block).or_default();
             block.rows |= nodes;
             block.moments |= nodes & piece.constrained;

@@ -92,10 +92,11 @@ pub struct ArenaMoments<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> ArenaMoments<'a, D> {
-    /// Moments of the constrained nodes among `inside` of the block at offset number `index`, by node bit.
-    pub fn of_block(self, index: usize, inside: u64) -> impl Iterator<Item = (u32, &'a Moments<D>)> {
-        let numbers = self.constraints.of_block(index, inside);
-        numbers.map(move |(bit, number)| (bit, &self.values[number]))
+    /// Moments of the arena's constrained nodes in the block at offset number `index`, in the order of their bits; those
+    /// of other blocks follow.
+    pub fn from_block(self, index: usize) -> &'a [Moments<D>] {
+        let (_, first) = self.constraints.parts[index];
+        &self.values[usize::from(first)..]
     }
 
     /// Moments of a node of the arena; zero if it is not constrained.

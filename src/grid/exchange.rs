@@ -13,7 +13,7 @@ use super::mask::{bits, block_nodes};
 use super::plan::GridPlan;
 use super::region::Regions;
 use super::sources::Piece;
-use super::sums::{BlockSum, Scratch};
+use super::sums::{BlockSum, Scratch, Sources};
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -143,12 +143,14 @@ impl<const D: usize> ArenaExchange<D> {
 
     /// Not collective. Adds up what neighbours need of the own arenas: a message for each.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>) -> Vec<Vec<u8>> {
+        let strays = &plan.feeders.strays(plan, arenas);
+        let own = Sources { plan, arenas, strays, received: None };
         let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
         let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
             let mut extents = 0u64;
             let mut values = Vec::new();
             for (i, piece) in pieces.iter().enumerate() {
-                extents |= (packing.pack(piece, plan, arenas, &mut values) as u64) << (2 * i);
+                extents |= (packing.pack(piece, own, &mut values) as u64) << (2 * i);
             }
             (extents, values)
         });
@@ -183,12 +185,11 @@ impl SentPiece {
     /// What reaches the block of the piece from the bins that it asks for.
     pub fn find<'a, const D: usize>(
         &self,
-        plan: &'a GridPlan<D>,
-        arenas: &'a Arenas<D>,
+        own: Sources<'a, D>,
         scratch: &'a mut Scratch<D>,
     ) -> BlockSum<'a, D> {
         let keys = self.keys.map(|(first, last)| first..=last);
-        BlockSum::find(plan, arenas, None, scratch, self.block as usize, keys)
+        BlockSum::find(own, scratch, self.block as usize, keys)
     }
 }
 
@@ -208,14 +209,8 @@ impl<const D: usize> Default for Packing<D> {
 
 impl<const D: usize> Packing<D> {
     /// Appends a piece to a message.
-    fn pack(
-        &mut self,
-        piece: &SentPiece,
-        plan: &GridPlan<D>,
-        arenas: &Arenas<D>,
-        values: &mut Vec<f64>,
-    ) -> Extent {
-        let mut sum = piece.find(plan, arenas, &mut self.scratch);
+    fn pack(&mut self, piece: &SentPiece, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
+        let mut sum = piece.find(own, &mut self.scratch);
         let nodes = sum.own_nodes() & piece.nodes;
         if nodes == 0 {
             return Extent::None;

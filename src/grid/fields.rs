@@ -9,7 +9,7 @@ use super::exchange::ReceivedSums;
 use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
 use super::plan::{Block, GridPlan, NO_BLOCK};
-use super::sums::{BlockSum, Scratch, is_reached};
+use super::sums::{BlockSum, Scratch, Sources};
 use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
 
@@ -94,7 +94,8 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
     pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>, part: Part) {
-        let received = (part == Part::Seam).then_some(received);
+        let strays = &plan.feeders.strays(plan, arenas);
+        let sources = Sources { plan, arenas, strays, received: (part == Part::Seam).then_some(received) };
         let nodes = block_nodes(D);
         let rows = self.rows.par_chunks_mut(TASK * nodes);
         let flags = self.active.par_chunks_mut(TASK).zip(self.dirty.par_chunks_mut(TASK));
@@ -111,7 +112,7 @@ impl<const D: usize> NodeFields<D> {
                 }
                 *active = false;
                 if block.sum != 0 {
-                    let mut sum = BlockSum::find(plan, arenas, received, scratch, index, None);
+                    let mut sum = BlockSum::find(sources, scratch, index, None);
                     *active = !sum.is_empty();
                     if *active {
                         sum.sum_rows(u32::MAX, rows);
@@ -207,8 +208,10 @@ impl<const D: usize> NodeFields<D> {
 
     /// Marks the blocks that occupied bins touch, and the blocks of their constraint parents.
     fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
+        let strays = &plan.feeders.strays(plan, arenas);
+        let own = Sources { plan, arenas, strays, received: None };
         let needed = self.needed.par_iter_mut().enumerate().with_min_len(64);
-        needed.for_each(|(block, needed)| *needed = is_reached(plan, arenas, block));
+        needed.for_each(|(block, needed)| *needed = own.reach(block));
         for links in plan.prolongation.iter().rev() {
             for linked in &links.blocks {
                 if self.needed[linked.block as usize] {

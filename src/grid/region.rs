@@ -66,7 +66,7 @@ pub struct Regions {
     /// Number of bins that reach each region.
     pub bins: [usize; MOST_REGIONS],
     /// Nodes of the block in the arena of the bin at each position.
-    pub overlap: [u64; MOST_REGIONS],
+    pub overlap: [u64; 32],
     orders: Vec<Order>,
 }
 
@@ -100,7 +100,7 @@ impl Regions {
             nodes: [0; MOST_REGIONS],
             positions: [0; MOST_REGIONS],
             bins: [0; MOST_REGIONS],
-            overlap: [0; MOST_REGIONS],
+            overlap: [0; 32],
             orders: vec![[[Slot::default(); MOST_BINS]; MOST_REGIONS]; 1 << (D + D * (D - 1) / 2)],
         };
         for region in 0..offset_count(D) {

@@ -3,7 +3,7 @@ use std::ops::RangeInclusive;
 
 use super::arena::{Arenas, Moments};
 use super::exchange::ReceivedSums;
-use super::feeders::NO_BIN;
+use super::feeders::{NO_BIN, Strays};
 use super::mask::{bits, block_nodes, opposite};
 use super::order::{Origin, Term, arrange, fold};
 use super::plan::GridPlan;
@@ -22,6 +22,16 @@ pub(super) struct Scratch<const D: usize> {
     terms: Vec<Term>,
     rows: Vec<(u32, [Row; MOST_BINS])>,
     moments: Vec<(u32, Moments<D>)>,
+}
+
+/// All that is summed in a step.
+#[derive(Clone, Copy)]
+pub(super) struct Sources<'a, const D: usize> {
+    pub plan: &'a GridPlan<D>,
+    pub arenas: &'a Arenas<D>,
+    pub strays: &'a Strays,
+    /// Sums of other ranks, where they are wanted.
+    pub received: Option<&'a ReceivedSums<D>>,
 }
 
 /// What reaches one block in this step.
@@ -48,13 +58,12 @@ pub(super) struct BlockSum<'a, const D: usize> {
 impl<'a, const D: usize> BlockSum<'a, D> {
     /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and from other ranks.
     pub fn find(
-        plan: &'a GridPlan<D>,
-        arenas: &'a Arenas<D>,
-        received: Option<&'a ReceivedSums<D>>,
+        sources: Sources<'a, D>,
         scratch: &'a mut Scratch<D>,
         block: usize,
         keys: Option<RangeInclusive<u64>>,
     ) -> Self {
+        let Sources { plan, arenas, strays, received } = sources;
         let regions = Regions::of::<D>();
         scratch.outer.clear();
         let mut sum = Self {
@@ -76,22 +85,24 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             if bin == NO_BIN {
                 continue;
             }
-            let Some(arena) = arenas.get(bin) else { continue };
+            let Some(rows) = arenas.rows(bin) else { continue };
             if keys.is_some() && !is_wanted(plan.bins[bin as usize].block.key()) {
                 continue;
             }
-            if arena.window != Window::FULL {
-                let touched = arena.window.nodes_of(opposite(D, position));
+            let window = arenas.window(bin as usize);
+            if window != Window::FULL {
+                let touched = window.nodes_of(opposite(D, position));
                 if touched == 0 {
                     continue;
                 }
                 sum.touched[position] = touched;
                 sum.partial |= 1 << position;
             }
-            sum.rows[position] = arena.rows;
+            sum.rows[position] = rows;
             sum.occupied |= 1 << position;
         }
-        for outer in plan.feeders.outer(block) {
+        let outer = if strays.reach(block) { plan.feeders.outer(block) } else { &[] };
+        for outer in outer {
             if !arenas.is_occupied(outer.bin as usize) {
                 continue;
             }
@@ -169,12 +180,13 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         }
         let slots = &self.order[region];
         let deep = D == 3;
+        let is_reached = self.occupied & self.regions.positions[region] != 0;
         let size = [part_len(X), part_len(Y), if deep { part_len(Z) } else { 1 }];
         let count = part_bins(X) * part_bins(Y) * if deep { part_bins(Z) } else { 1 };
         let span = size[0] + ARENA_EDGE * (size[1] - 1 + ARENA_EDGE * (size[2] - 1));
         let mut from: [&[Row]; MOST_BINS] = [&ZEROS[..span]; MOST_BINS];
         let partial = self.partial & self.regions.positions[region] != 0;
-        for (from, slot) in from.iter_mut().zip(slots).take(count) {
+        for (from, slot) in from.iter_mut().zip(slots).take(if is_reached { count } else { 0 }) {
             let position = slot.position as usize % 32;
             if partial && self.partial >> position & 1 == 1 {
                 let nodes = self.regions.nodes[region];
@@ -231,17 +243,64 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         self.scratch.rows = stack;
     }
 
-    /// Writes the sums of first moments at `nodes`.
+    /// Writes the sums of first moments at `nodes`, all of them constrained.
     pub fn sum_moments(&mut self, nodes: u64, to: &mut [Moments<D>]) {
-        let mut stack = std::mem::take(&mut self.scratch.moments);
-        for region in bits(u64::from(self.regions.meeting::<D>(nodes))) {
-            self.list_terms(region as usize);
-            for bit in bits(nodes & self.regions.nodes[region as usize]) {
-                let sum = fold(&self.scratch.terms, &mut stack, |term| self.moments(term, bit), add_moments);
-                let mut sum = sum.unwrap_or([ZERO; D]);
-                sum.iter_mut().for_each(|row| row.add(&ZERO));
-                to[bit as usize] = sum;
+        if nodes == 0 {
+            return;
+        }
+        let mut from: [&[Moments<D>]; 32] = [&[]; 32];
+        for position in bits(u64::from(self.occupied)) {
+            let bin = self.plan.feeders.inner::<D>(self.block)[position as usize];
+            if let Some(moments) = self.arenas.get(bin).and_then(|arena| arena.moments) {
+                from[position as usize] = moments.from_block(opposite(D, position as usize));
             }
+        }
+        for region in bits(u64::from(self.regions.meeting::<D>(nodes))) {
+            let wanted = nodes & self.regions.nodes[region as usize];
+            if self.mixed >> region & 1 == 1 {
+                self.fold_moments(region as usize, wanted, to);
+            } else {
+                self.add_moments(region as usize, wanted, &from, to);
+            }
+        }
+    }
+
+    /// The moments at nodes of a region that whole arenas reach alone; `from` has those of each position.
+    fn add_moments(&self, region: usize, nodes: u64, from: &[&[Moments<D>]; 32], to: &mut [Moments<D>]) {
+        let none = [ZERO; D];
+        let constrained = self.plan.blocks[self.block].constrained;
+        let count = self.regions.bins[region];
+        for bit in bits(nodes) {
+            let below = constrained & ((1 << bit) - 1);
+            let mut at = [&none; MOST_BINS];
+            for (at, slot) in at.iter_mut().zip(&self.order[region]).take(count) {
+                let position = slot.position as usize % 32;
+                // The whole arena has moments; they are zero where particles touch nothing.
+                let number = (below & self.regions.overlap[position]).count_ones() as usize;
+                if let Some(found) = from[position].get(number) {
+                    *at = found;
+                }
+            }
+            to[bit as usize] = std::array::from_fn(|axis| {
+                let pair = |slot: usize| at[slot][axis].plus(&at[slot + 1][axis]);
+                let sum = match count {
+                    1 => at[0][axis],
+                    2 => pair(0),
+                    4 => pair(0).plus(&pair(2)),
+                    _ => pair(0).plus(&pair(2)).plus(&pair(4).plus(&pair(6))),
+                };
+                sum.plus(&ZERO)
+            });
+        }
+    }
+
+    /// The moments at nodes of a region that more than whole arenas reach.
+    fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Moments<D>]) {
+        self.list_terms(region);
+        let mut stack = std::mem::take(&mut self.scratch.moments);
+        for bit in bits(nodes) {
+            let sum = fold(&self.scratch.terms, &mut stack, |term| self.moments(term, bit), add_moments);
+            to[bit as usize] = sum.unwrap_or([ZERO; D]).map(|row| row.plus(&ZERO));
         }
         self.scratch.moments = stack;
     }
@@ -289,7 +348,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         match (term.origin, self.received) {
             (Origin::Bin { bin, position }, _) => {
                 let node = arena_node::<D>(position as usize, bit);
-                self.arenas.get(bin).map_or(ZERO, |arena| arena.rows[node])
+                self.arenas.rows(bin).map_or(ZERO, |rows| rows[node])
             }
             (Origin::Piece(piece), Some(received)) => received.row(piece, bit),
             (Origin::Piece(_), None) => ZERO,
@@ -302,7 +361,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             _ if term.touched >> bit & 1 == 0 => None,
             (Origin::Bin { bin, position }, _) => {
                 let node = arena_node::<D>(position as usize, bit);
-                self.arenas.get(bin).and_then(|arena| arena.moments_at(node))
+                self.arenas.get(bin).and_then(|arena| arena.moments).map(|moments| moments.at(node))
             }
             (Origin::Piece(piece), received) => received.map(|received| received.moments(piece, bit)),
         };
@@ -315,9 +374,10 @@ fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
     to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
 }
 
-/// Whether any own bin that reaches a block is occupied.
-pub(super) fn is_reached<const D: usize>(plan: &GridPlan<D>, arenas: &Arenas<D>, block: usize) -> bool {
-    let inner = plan.feeders.inner::<D>(block).iter().copied().filter(|&bin| bin != NO_BIN);
-    let mut all = inner.chain(plan.feeders.outer(block).iter().map(|outer| outer.bin));
-    all.any(|bin| arenas.is_occupied(bin as usize))
+impl<const D: usize> Sources<'_, D> {
+    /// Whether an own bin that reaches the block is occupied.
+    pub fn reach(&self, block: usize) -> bool {
+        let mut inner = self.plan.feeders.inner::<D>(block).iter();
+        self.strays.reach(block) || inner.any(|&bin| bin != NO_BIN && self.arenas.is_occupied(bin as usize))
+    }
 }

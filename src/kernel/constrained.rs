@@ -10,24 +10,12 @@ use super::{ARENA_EDGE, Row, arena_nodes, stencil_bases};
 /// Place of a node that is not constrained.
 const NONE: u16 = u16::MAX;
 
-/// A node of a stencil.
-#[derive(Clone, Copy)]
-struct StencilNode {
-    /// Number along each axis, 0 to 2.
-    along: [u8; 3],
-    /// Place in the arena from the first node of the stencil on.
-    arena: u8,
-}
-
-/// The nodes of a stencil, `a + 3 b (+ 9 c)`; padded, so that no index is out of bounds.
-const STENCIL: [StencilNode; 32] = {
-    let mut nodes = [StencilNode { along: [0; 3], arena: 0 }; 32];
+/// Nodes of a stencil, `a + 3 b (+ 9 c)`, in the arena from its first node on; padded, so that no index is out of bounds.
+const STENCIL: [u8; 32] = {
+    let mut nodes = [0; 32];
     let mut node = 0;
     while node < 27 {
-        let along = [node % 3, node / 3 % 3, node / 9];
-        let arena = along[0] + ARENA_EDGE * (along[1] + ARENA_EDGE * along[2]);
-        nodes[node] =
-            StencilNode { along: [along[0] as u8, along[1] as u8, along[2] as u8], arena: arena as u8 };
+        nodes[node] = (node % 3 + ARENA_EDGE * (node / 3 % 3 + ARENA_EDGE * (node / 9))) as u8;
         node += 1;
     }
     nodes
@@ -57,7 +45,7 @@ impl ConstrainedNodes {
             let lowest: usize =
                 (0..D).map(|k| base / edge.pow(k as u32) % edge * ARENA_EDGE.pow(k as u32)).sum();
             let nodes = STENCIL.iter().take(3usize.pow(D as u32)).enumerate();
-            let constrained = nodes.filter(|(_, node)| place[lowest + usize::from(node.arena)] != NONE);
+            let constrained = nodes.filter(|(_, node)| place[lowest + usize::from(**node)] != NONE);
             constrained.fold(0, |bits, (bit, _)| bits | 1 << bit)
         };
         Self { stencils: (0..stencil_bases(D)).map(stencil).collect(), place, second }
@@ -83,7 +71,18 @@ impl ConstrainedNodes {
         4 * self.stencils.capacity() + 2 * self.place.capacity() + size_of::<Row>() * self.second.capacity()
     }
 
-    /// Calls `f` with number and weight of each constrained node in the stencil of a lane.
+    /// Whether the stencil of any member of a batch has constrained nodes; if so, the weights of all nodes are made ready.
+    #[inline(always)]
+    pub(super) fn prepare<const D: usize>(&self, weights: &mut Weights<D>, batch: &Batch) -> bool {
+        let touched = batch.members().any(|lane| self.stencils[weights.base(lane)] != 0);
+        if touched {
+            weights.fill_nodes();
+        }
+        touched
+    }
+
+    /// Calls `f` with number and weight of each constrained node in the stencil of a lane of a batch that
+    /// [`ConstrainedNodes::prepare`] has been called for.
     #[inline(always)]
     pub(super) fn for_each<const D: usize>(
         &self,
@@ -92,41 +91,23 @@ impl ConstrainedNodes {
         mut f: impl FnMut(usize, F64x4),
     ) {
         let mut left = self.stencils[weights.base(lane)];
-        if left == 0 {
-            return;
-        }
         let places = &self.place[weights.first(lane)..];
         while left != 0 {
-            let StencilNode { along, arena } = STENCIL[left.trailing_zeros() as usize];
+            let node = left.trailing_zeros() as usize;
             left &= left - 1;
-            let [a, b, c] = along.map(usize::from);
-            let across = if D == 3 { weights.product[b][c][lane] } else { weights.axis[1].weight[b][lane] };
-            let weight = weights.axis[0].weight[a][lane] * across;
-            f(usize::from(places[usize::from(arena)]), F64x4::splat(weight));
+            let place = places[usize::from(STENCIL[node])];
+            f(usize::from(place), F64x4::splat(weights.nodes[node][lane]));
         }
     }
 
-    /// Whether the stencil of a lane has constrained nodes.
-    #[inline(always)]
-    pub(super) fn are_touched<const D: usize>(&self, weights: &Weights<D>, lane: usize) -> bool {
-        self.stencils[weights.base(lane)] != 0
-    }
-
-    /// Adds `Σ w S` of the members of a batch.
-    #[inline(always)]
+    /// Adds `Σ w S` of the members of a batch that [`ConstrainedNodes::prepare`] has been called for.
+    #[inline(never)]
     pub(super) fn add_spread<const D: usize>(
         &self,
         weights: &Weights<D>,
         batch: &Batch,
         spread: &mut [Lanes; D],
     ) {
-        if batch.members().any(|lane| self.are_touched(weights, lane)) {
-            self.add_some_spread(weights, batch, spread);
-        }
-    }
-
-    #[inline(never)]
-    fn add_some_spread<const D: usize>(&self, weights: &Weights<D>, batch: &Batch, spread: &mut [Lanes; D]) {
         let mut values: [[f64; LANES]; D] = spread.map(Lanes::to_array);
         for lane in batch.members() {
             let mut sum = F64x4::splat(0.0);

@@ -90,7 +90,6 @@ pub fn gather<const D: usize>(
 ) -> f64 {
     let batches = Batches::new(select, chunk, next);
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
-    let plain = fields.increment.is_none() && fields.moments.is_none();
     let cell = frame.cell;
     let mut weights = Weights::new();
     let mut sums = Sums::new();
@@ -100,9 +99,7 @@ pub fn gather<const D: usize>(
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        for lane in batch.members() {
-            sums.gather(&weights, lane, fields, plain);
-        }
+        sums.gather(&mut weights, &batch, fields);
         greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
     }
     largest(greatest)
@@ -125,8 +122,8 @@ pub fn gather_sub_boxes<const D: usize>(
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
+        sums.gather(&mut weights, &batch, fields);
         for (lane, part) in parts.iter().enumerate() {
-            sums.gather(&weights, lane, fields, false);
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }
     }
@@ -217,26 +214,29 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// One lane, with all that the fields offer. `plain` says that there are velocities
-    /// only.
+    /// The members of a batch, with all that the fields offer.
     #[inline(always)]
-    fn gather(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>, plain: bool) {
+    fn gather(&mut self, weights: &mut Weights<D>, batch: &Batch, fields: &Fields<D>) {
         let span = super::stencil_span(D);
-        let first = weights.first(lane);
-        self.contract(weights, lane, &fields.velocity[first..first + span]);
-        if !plain {
-            self.gather_others(weights, lane, fields);
+        for lane in batch.members() {
+            let first = weights.first(lane);
+            self.contract(weights, lane, &fields.velocity[first..first + span]);
+        }
+        if let Some(increment) = fields.increment {
+            for lane in batch.members() {
+                self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
+            }
+        }
+        if let Some(moments) = &fields.moments
+            && moments.nodes.prepare(weights, batch)
+        {
+            self.add_moments(weights, batch, moments);
         }
     }
 
-    fn gather_others(&mut self, weights: &Weights<D>, lane: usize, fields: &Fields<D>) {
-        let first = weights.first(lane);
-        if let Some(increment) = fields.increment {
-            self.increment[lane] = mean(weights, lane, &increment[first..]);
-        }
-        if let Some(moments) = &fields.moments
-            && moments.nodes.are_touched(weights, lane)
-        {
+    #[inline(never)]
+    fn add_moments(&mut self, weights: &Weights<D>, batch: &Batch, moments: &Moments<D>) {
+        for lane in batch.members() {
             let mut sum = [F64x4::splat(0.0); D];
             moments.nodes.for_each(weights, lane, |node, weight| {
                 for k in 0..D {

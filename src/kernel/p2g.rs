@@ -71,7 +71,9 @@ pub fn scatter_sub_boxes<const D: usize>(
         let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]));
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
-        prepared.add(&batch, arena, moments.as_mut());
+        let touching =
+            moments.as_mut().filter(|moments| moments.nodes.prepare(&mut prepared.weights, &batch));
+        prepared.add(&batch, arena, touching);
     }
 }
 
@@ -95,11 +97,13 @@ fn scatter_all<const D: usize>(
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
-        if let Some(moments) = &moments {
+        let touching =
+            moments.as_mut().filter(|moments| moments.nodes.prepare(&mut prepared.weights, &batch));
+        if let Some(moments) = &touching {
             moments.nodes.add_spread(&prepared.weights, &batch, &mut spread);
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
-        prepared.add(&batch, arena, moments.as_mut());
+        prepared.add(&batch, arena, touching);
     }
 }
 
@@ -182,18 +186,16 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
-    /// Adds the members of a batch in order.
+    /// Adds the members of a batch in order; with `moments` where any of their stencils has constrained nodes.
     #[inline(always)]
-    fn add(&self, batch: &Batch, arena: &mut [Row], mut moments: Option<&mut MomentSums<D>>) {
+    fn add(&self, batch: &Batch, arena: &mut [Row], moments: Option<&mut MomentSums<D>>) {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
         }
-        if let Some(moments) = moments.as_deref_mut() {
-            for lane in batch.members() {
-                self.add_moments(lane, moments);
-            }
+        if let Some(moments) = moments {
+            batch.members().for_each(|lane| self.add_moments(lane, moments));
         }
     }
 

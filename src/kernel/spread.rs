@@ -27,7 +27,7 @@ pub fn of_particles<const D: usize>(
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        let spread = complete(&weights, &batch, constraints);
+        let spread = complete(&mut weights, &batch, constraints);
         for lane in batch.members() {
             each(batch.particle(lane), spread.map(|axis| axis[lane]));
         }
@@ -49,7 +49,7 @@ pub fn of_parts<const D: usize>(
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        let spread = complete(&weights, &batch, constraints);
+        let spread = complete(&mut weights, &batch, constraints);
         for lane in batch.members() {
             each(first + lane, spread.map(|axis| axis[lane]));
         }
@@ -57,12 +57,14 @@ pub fn of_parts<const D: usize>(
 }
 
 fn complete<const D: usize>(
-    weights: &Weights<D>,
+    weights: &mut Weights<D>,
     batch: &Batch,
     constraints: Option<&ConstrainedNodes>,
 ) -> [[f64; LANES]; D] {
     let mut spread = weights.spread;
-    if let Some(constraints) = constraints {
+    if let Some(constraints) = constraints
+        && constraints.prepare(weights, batch)
+    {
         constraints.add_spread(weights, batch, &mut spread);
     }
     spread.map(Lanes::to_array)

@@ -24,6 +24,8 @@ pub(super) struct Weights<const D: usize> {
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
     pub spread: [Lanes; D],
+    /// Weights node by node, `a + 3 b (+ 9 c)`; only after [`Weights::fill_nodes`].
+    pub nodes: [[f64; LANES]; 27],
 }
 
 /// 2^52: integers added to it stand in the low bits.
@@ -38,6 +40,7 @@ impl<const D: usize> Weights<D> {
             axis: [Factors { weight: none, arm: none, slope: none }; D],
             product: [none; 3],
             spread: [Lanes::splat(0.0); D],
+            nodes: [[0.0; LANES]; 27],
         }
     }
 
@@ -75,6 +78,20 @@ impl<const D: usize> Weights<D> {
         }
         (first + Lanes::splat(TWO_52)).store(&mut self.first);
         (base + Lanes::splat(TWO_52)).store(&mut self.base);
+    }
+
+    /// Multiplies out the weights of all nodes, which most batches can do without.
+    #[inline(never)]
+    pub fn fill_nodes(&mut self) {
+        for c in 0..if D == 3 { 3 } else { 1 } {
+            for b in 0..3 {
+                let across = Lanes::load(if D == 3 { &self.product[b][c] } else { &self.axis[1].weight[b] });
+                for a in 0..3 {
+                    let along = Lanes::load(&self.axis[0].weight[a]);
+                    (along * across).store(&mut self.nodes[a + 3 * (b + 3 * c)]);
+                }
+            }
+        }
     }
 
     /// Index of the lowest node in the arena.

@@ -54,17 +54,18 @@ pub struct Members<const D: usize> {
 
 impl<const D: usize> Default for Members<D> {
     fn default() -> Self {
-        let lower_faces = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
-        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY, lower_faces }
+        Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY, lower_faces: Self::NO_FACES }
     }
 }
 
 impl<const D: usize> Members<D> {
+    const NO_FACES: [[f64; D]; 2] = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
+
     fn clear(&mut self) {
-        let (whole, parts) = (std::mem::take(&mut self.whole), std::mem::take(&mut self.parts));
-        *self = Self { whole, parts, ..Self::default() };
         self.whole.clear();
         self.parts.clear();
+        self.window = Window::EMPTY;
+        self.lower_faces = Self::NO_FACES;
     }
 
     /// Grows the window to a box, in cells of edge `cell`. The kernel limits half widths to half a cell.
@@ -156,7 +157,8 @@ impl<const D: usize> BinLists<D> {
         let sorted = leaves.with_min_len(8).map(|(leaf, ((bins, sorted), own))| {
             let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
             let bound = widths.bound(chunk);
-            *sorted = given || bins.sides.is_some() || bound > 0.5 * cell;
+            // An empty leaf has nothing to list.
+            *sorted = !chunk.is_empty() && (given || bins.sides.is_some() || bound > 0.5 * cell);
             if *sorted { bins.sort(plan, leaf, own, chunk, widths, bound) } else { Ok(()) }
         });
         sorted.reduce(|| Ok(()), Result::and)

@@ -118,7 +118,7 @@ fn counts<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
 
 /// New cost of a class: `new` mixed with what was found before.
 fn smoothed(old: u64, new: u64) -> u64 {
-    if old == 0 { new } else { (3 * old + new).div_ceil(4) }.max(1)
+    if old == 0 { new } else { (7 * old + new).div_ceil(8) }.max(1)
 }
 
 /// Time of a class and the particles that took it, over all ranks, in units of cost per particle.
@@ -151,7 +151,7 @@ impl<const D: usize> Solver<D> {
     /// Collective. Turns what all ranks have measured since the last call into costs.
     pub(super) fn agree_on_costs(&mut self) {
         let materials = self.physics.materials.len();
-        let seconds = self.phases.total(&[Phase::Sort, Phase::Sum, Phase::Nodes]);
+        let seconds = self.phases.running_time(&[Phase::Sort, Phase::Sum, Phase::Nodes]);
         let steps = self.clock.step - self.costs.agreed_step;
         let units = |seconds: f64| (seconds / UNIT) as u64;
         // By material and kind: time, particles; then time and number of leaves in node work.
@@ -206,7 +206,7 @@ mod tests {
         costs.take_in(&[10_000, 30_000, 900, 1000, 1000, 3, 5000, 50], 1);
         assert_eq!(costs.particle, [[10, 30, 20]]);
         assert_eq!(costs.leaf, 100);
-        costs.take_in(&[50_000, 30_000, 0, 1000, 1000, 0, 5000, 50], 1);
+        costs.take_in(&[90_000, 30_000, 0, 1000, 1000, 0, 5000, 50], 1);
         assert_eq!(costs.particle, [[20, 30, 25]]);
         // Nothing was measured: everything stays.
         costs.take_in(&[0; 8], 1);

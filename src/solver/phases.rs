@@ -1,6 +1,8 @@
 //! Wall time by phase of the step.
 use std::time::{Duration, Instant};
 
+use super::rebalance::thread_time;
+
 /// Phases of a run whose wall time is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
@@ -62,22 +64,22 @@ impl Phase {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Phases {
     seconds: [f64; Phase::ALL.len()],
-    total: [f64; Phase::ALL.len()],
+    running: [f64; Phase::ALL.len()],
 }
 
 impl Phases {
     /// Runs `work` and books its wall time.
     pub fn time<R>(&mut self, phase: Phase, work: impl FnOnce() -> R) -> R {
-        let start = Instant::now();
+        let (start, running) = (Instant::now(), thread_time());
         let result = work();
         self.book(phase, start.elapsed());
+        self.running[phase as usize] += (thread_time() - running).as_secs_f64();
         result
     }
 
     /// Books wall time measured elsewhere.
     pub fn book(&mut self, phase: Phase, time: Duration) {
         self.seconds[phase as usize] += time.as_secs_f64();
-        self.total[phase as usize] += time.as_secs_f64();
     }
 
     /// Seconds booked so far, in the order of [`Phase::ALL`].
@@ -85,9 +87,9 @@ impl Phases {
         self.seconds
     }
 
-    /// Seconds booked for some phases since the start; [`Phases::clear`] does not touch them.
-    pub fn total(&self, phases: &[Phase]) -> f64 {
-        phases.iter().map(|&phase| self.total[phase as usize]).sum()
+    /// Processor time of this thread in some phases since the start, s; [`Phases::clear`] does not touch it.
+    pub fn running_time(&self, phases: &[Phase]) -> f64 {
+        phases.iter().map(|&phase| self.running[phase as usize]).sum()
     }
 
     /// Begins a new report.

@@ -126,6 +126,9 @@ impl<'a, const D: usize> Selected<'a, D> {
             return Self { whole, parts: &[] };
         };
         let members = &bins.members[number];
+        if number == 0 && members.whole.len() == chunk.len() && !chunk.is_empty() {
+            return Self { whole: Some(Select::All), parts: &[] };
+        }
         let whole = (!members.whole.is_empty()).then_some(Select::List(&members.whole));
         Self { whole, parts: &members.parts }
     }
