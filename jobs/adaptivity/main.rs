@@ -25,50 +25,62 @@ struct Scene {
     job: &'static str,
     /// What to compare.
     headline: Headline,
+    /// Whether the uniform run of the job as it is takes so long that all levels are one lower unless that is wanted.
+    is_long: bool,
 }
 
 const SCENES: [Scene; 3] = [
-    Scene { job: "column_collapse_tall", headline: Headline::Collapse },
-    Scene { job: "cylinder_in_sand", headline: Headline::Penetration },
-    Scene { job: "taylor_bar", headline: Headline::Bar },
+    Scene { job: "column_collapse_tall", headline: Headline::Collapse, is_long: true },
+    Scene { job: "cylinder_in_sand", headline: Headline::Penetration, is_long: false },
+    Scene { job: "taylor_bar", headline: Headline::Bar, is_long: true },
 ];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let Some((page, rest)) = arguments.split_first() else {
-        eprintln!("usage: adaptivity PAGE.md [--quick] [SCENE...]");
+        eprintln!("usage: adaptivity PAGE.md [--quick | --full] [SCENE...]");
         return ExitCode::from(2);
     };
     let (flags, names): (Vec<&String>, Vec<&String>) = rest.iter().partition(|text| text.starts_with('-'));
     let unknown = flags
         .iter()
-        .find(|flag| **flag != "--quick")
+        .find(|flag| !["--quick", "--full"].contains(&flag.as_str()))
         .or_else(|| names.iter().find(|name| SCENES.iter().all(|scene| scene.job != name.as_str())));
     if let Some(unknown) = unknown {
-        eprintln!("found \"{unknown}\"; expected --quick or scenes of {}", SCENES.map(|s| s.job).join(", "));
+        eprintln!(
+            "found \"{unknown}\"; expected --quick, --full or scenes of {}",
+            SCENES.map(|s| s.job).join(", ")
+        );
         return ExitCode::from(2);
     }
-    let quick = !flags.is_empty();
+    let [quick, full] = ["--quick", "--full"].map(|known| flags.iter().any(|flag| *flag == known));
+    if quick && full {
+        eprintln!("found both --quick and --full; expected one");
+        return ExitCode::from(2);
+    }
     let folder = PathBuf::from("target/adaptivity");
     checked(std::fs::create_dir_all(&folder), folder.display());
     let floor = runs::memory_of_an_empty_job(&folder);
-    let mut text = page::head(quick, floor);
+    let mut text = page::head(floor);
     for scene in SCENES.iter().filter(|scene| names.is_empty() || names.iter().any(|name| *name == scene.job))
     {
-        text.push_str(&compare(scene, quick, floor, &folder));
+        let is_lower = quick || scene.is_long && !full;
+        text.push_str(&compare(scene, is_lower, floor, &folder));
     }
+    let regrid = Path::new("jobs/adaptivity/regrid.md");
+    text.push_str(&checked(std::fs::read_to_string(regrid), regrid.display()));
     checked(std::fs::write(page, text), page);
     println!("{page} written");
     ExitCode::SUCCESS
 }
 
-/// Runs a scene in both ways; its section of the page.
-fn compare(scene: &Scene, quick: bool, floor: f64, folder: &Path) -> String {
+/// Runs a scene in both ways, with all levels one lower if `is_lower`; its section of the page.
+fn compare(scene: &Scene, is_lower: bool, floor: f64, folder: &Path) -> String {
     let path = Path::new("jobs").join(scene.job).with_extension("toml");
     let text = checked(std::fs::read_to_string(&path), path.display());
     let job: toml::Table = checked(toml::from_str(&text), path.display());
-    let levels = checked(derive::Levels::of(&job, quick), path.display());
-    let adaptive = derive::adaptive(&job, quick);
+    let levels = checked(derive::Levels::of(&job, is_lower), path.display());
+    let adaptive = derive::adaptive(&job, is_lower);
     let uniform = derive::uniform(&job, &levels);
     let results = [("adaptive", adaptive), ("uniform", uniform)].map(|(kind, job)| {
         println!("{} {kind}", scene.job);
@@ -78,5 +90,5 @@ fn compare(scene: &Scene, quick: bool, floor: f64, folder: &Path) -> String {
     });
     let about = Path::new("jobs/adaptivity").join(scene.job).with_extension("md");
     let about = checked(std::fs::read_to_string(&about), about.display());
-    page::section(scene, &about, &job, &levels, &results, floor)
+    page::section(scene, &about, &job, is_lower, &levels, &results, floor)
 }

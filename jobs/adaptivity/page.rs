@@ -11,18 +11,13 @@ use crate::runs::Run;
 pub type Result = (Run, Vec<(&'static str, f64)>);
 
 /// What the page is about. `floor`: resident memory of an empty job, bytes.
-pub fn head(quick: bool, floor: f64) -> String {
+pub fn head(floor: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let version = if quick {
-        "Written by `jobs/adaptivity/compare --quick`: all levels are one lower than in the jobs, so cells are twice as wide, \
-         and so are the layers of leaves beside what needs fine ones"
-    } else {
-        "Written by `jobs/adaptivity/compare`"
-    };
     format!(
         "# What refinement gains\n\n\
-         {version}. Each scene runs twice on one rank with {cores} threads: as it is in `jobs/`, and with cells of the \
-         finest level everywhere and no refinement. All levels make the same time step, that of the finest with particles, so what \
+         Written by `jobs/adaptivity/compare`. Each scene runs twice on one rank with {cores} threads: as it is in `jobs/`, and \
+         with cells of the finest level everywhere and no refinement. Where it says so, all levels are one lower than in the \
+         job, so cells are twice as wide, and so are the layers of leaves beside what needs fine ones. All levels make the same time step, that of the finest with particles, so what \
          refinement can gain is bounded by the ratio of the particle-steps, the sum of the particles over all steps.\n\n\
          Memory is the greatest resident memory in the telemetry. {:.0} MB of it are the program itself with its \
          libraries, measured with a job of next to no particles; the row below is without it. Processor \
@@ -36,6 +31,7 @@ pub fn section(
     scene: &Scene,
     about: &str,
     job: &Table,
+    is_lower: bool,
     levels: &Levels,
     results: &[Result; 2],
     floor: f64,
@@ -46,9 +42,10 @@ pub fn section(
     let _ = writeln!(text, "## {title}\n\n`jobs/{}.toml`. {}", scene.job, about.trim());
     let _ = writeln!(
         text,
-        "\nLevels {} to {}; cells of the coarsest are {} times as wide as those of the finest.\n",
+        "\nLevels {} to {}{}; cells of the coarsest are {} times as wide as those of the finest.\n",
         levels.base,
         levels.finest,
+        if is_lower { ", one lower than in the job" } else { "" },
         1 << (levels.finest - levels.base)
     );
     let _ = writeln!(text, "| | refined | finest everywhere | ratio |\n| --- | --- | --- | --- |");

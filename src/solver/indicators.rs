@@ -79,6 +79,8 @@ impl<const D: usize> State<'_, D> {
             Kind::VelocityGradient => self.velocity_gradient(leaf),
             Kind::PlasticStrain => self.surveys[leaf].plastic_strain,
             Kind::PlasticStrainRate => self.surveys[leaf].plastic_rate,
+            // Only leaves that may have something to say get a close look.
+            Kind::Stretch if self.surveys[leaf].stretch < criterion.coarsen => self.surveys[leaf].stretch,
             Kind::Stretch => self.greatest_stretch(leaf),
             Kind::Material(material) => {
                 let found = chunk.tags().iter().any(|&tag| Tag::unpack(tag).material == *material);

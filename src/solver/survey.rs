@@ -17,13 +17,15 @@ pub(super) struct Survey<const D: usize> {
     pub plastic_strain: f64,
     /// Bound on the half width of any box, m.
     pub width: f64,
+    /// Bound on the width of any box over its undeformed width.
+    pub stretch: f64,
     /// Mean rate of the plastic strain in the last step, 1/s.
     pub plastic_rate: f64,
 }
 
 impl<const D: usize> Default for Survey<D> {
     fn default() -> Self {
-        Self { velocity: [[0.0; D]; 2], plastic_strain: 0.0, width: 0.0, plastic_rate: 0.0 }
+        Self { velocity: [[0.0; D]; 2], plastic_strain: 0.0, width: 0.0, stretch: 0.0, plastic_rate: 0.0 }
     }
 }
 
@@ -50,7 +52,8 @@ impl Watch {
             return Self { rate, ..Self::default() };
         }
         let strain = has(|kind| matches!(kind, Kind::PlasticStrain));
-        Self { velocity: true, strain, width: adaptivity.split_stretch.is_some(), rate }
+        let width = adaptivity.split_stretch.is_some() || has(|kind| matches!(kind, Kind::Stretch));
+        Self { velocity: true, strain, width, rate }
     }
 
     /// To be called before the leaf's particles advance.
@@ -80,13 +83,19 @@ impl Watch {
             survey.plastic_strain = greatest(chunk.column(Layout::<D>::HISTORY));
         }
         if self.width {
-            survey.width = widest(chunk);
+            survey.stretch = greatest_stretch(chunk);
+            survey.width = survey.stretch * greatest(chunk.column(Layout::<D>::HALF));
         }
     }
 }
 
 /// A bound on the half widths of a chunk's boxes, m.
 pub(super) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    greatest_stretch(chunk) * greatest(chunk.column(Layout::<D>::HALF))
+}
+
+/// A bound on the widths of a chunk's boxes over their undeformed widths.
+fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
     let first = Layout::<D>::LEFT_CAUCHY_GREEN;
     // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
     // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
@@ -94,7 +103,7 @@ pub(super) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
     let elastic = (first..first + 3).map(|column| greatest(chunk.column(column))).fold(0.0, f64::max);
     let plastic = greatest(chunk.column(Layout::<D>::HISTORY + 1));
     let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
-    greatest(chunk.column(Layout::<D>::HALF)) * elastic.sqrt().max(isotropic)
+    elastic.sqrt().max(isotropic)
 }
 
 /// Least and greatest of the values, 0 among them.

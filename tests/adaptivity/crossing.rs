@@ -2,7 +2,7 @@
 use agimp::job::{AnyProblem, Problem};
 use partition::comm::Comm;
 
-use crate::state::{advance, count, extents, greatest_stress, on_ranks, solver};
+use crate::state::{advance, count, extents, greatest_stress, on_ranks, one_body, solver};
 
 const YOUNG: f64 = 1e3;
 /// Greatest stress over the modulus.
@@ -10,33 +10,9 @@ const TOLERANCE: f64 = 1e-10;
 
 fn job(dimension: usize, body: &str, region: &str) -> String {
     let domain = &["2.5", "1", "1"][..dimension].join(", ");
-    format!(
-        r#"
-version = 1
-dimension = {dimension}
-[domain]
-size = [{domain}]
-root_edge = 0.25
-[adaptivity]
-every_steps = 4
-[[adaptivity.criteria]]
-kind = "region"
-level = 2
-shape = {region}
-[[materials]]
-name = "rubber"
-density = 1000
-model = "hencky"
-young = {YOUNG}
-poisson = 0.3
-[[bodies]]
-name = "body"
-material = "rubber"
-{body}
-[time]
-end = 1e3
-"#
-    )
+    let criterion =
+        format!("every_steps = 4\n[[adaptivity.criteria]]\nkind = 'region'\nlevel = 2\nshape = {region}");
+    one_body(dimension, domain, &criterion, &format!("model = 'hencky'\nyoung = {YOUNG}"), body)
 }
 
 fn crosses<const D: usize>(comm: &Comm, job: &str, distance: f64)

@@ -18,6 +18,32 @@ pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
     }
 }
 
+/// A job with one body of an elastic material in a domain of leaves of 0.25 m on level 0; its last table is `time`.
+pub fn one_body(dimension: usize, size: &str, adaptivity: &str, model: &str, body: &str) -> String {
+    format!(
+        r#"
+version = 1
+dimension = {dimension}
+[domain]
+size = [{size}]
+root_edge = 0.25
+[adaptivity]
+{adaptivity}
+[[materials]]
+name = "rubber"
+density = 1000
+poisson = 0.3
+{model}
+[[bodies]]
+name = "body"
+material = "rubber"
+{body}
+[time]
+end = 1e3
+"#
+    )
+}
+
 /// The job with its first tree and particles.
 pub fn solver<const D: usize>(comm: &Comm, text: &str) -> Solver<D>
 where

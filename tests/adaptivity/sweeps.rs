@@ -5,7 +5,7 @@ use agimp::job::{AnyProblem, Problem};
 use agimp::solver::Solver;
 use partition::comm::Comm;
 
-use crate::state::{advance, count, on_ranks, solver};
+use crate::state::{advance, count, on_ranks, one_body, solver};
 
 /// Length of all time steps, s.
 const STEP: f64 = 3e-4;
@@ -24,35 +24,12 @@ fn job(dimension: usize, body: &str, sweeps: usize) -> String {
     }
     let domain = ["2"; 3][..dimension].join(", ");
     let (lower, upper) = (["-9"; 2][..dimension - 1].join(", "), ["9"; 2][..dimension - 1].join(", "));
-    format!(
-        r#"
-version = 1
-dimension = {dimension}
-[domain]
-size = [{domain}]
-root_edge = 0.25
-[adaptivity]
-every_steps = 1
-[[adaptivity.criteria]]
-kind = "region"
-level = 1
-shape = {{ kind = "box", min = [-0.4, {lower}], max = [-0.2, {upper}] }}
-motion = [{rows}]
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e6
-poisson = 0.3
-[[bodies]]
-name = "ball"
-material = "rubber"
-{body}
-[time]
-end = 1e3
-dt_max = {STEP}
-"#
-    )
+    let criterion = format!(
+        "every_steps = 1\n[[adaptivity.criteria]]\nkind = 'region'\nlevel = 1\n\
+         shape = {{ kind = 'box', min = [-0.4, {lower}], max = [-0.2, {upper}] }}\nmotion = [{rows}]"
+    );
+    let job = one_body(dimension, &domain, &criterion, "model = 'neo_hookean'\nyoung = 1e6", body);
+    format!("{job}dt_max = {STEP}\n")
 }
 
 /// Mass, momentum and angular momentum.

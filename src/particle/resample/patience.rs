@@ -14,8 +14,8 @@ const SHIFT: u32 = 40;
 const BITS: u64 = 7 << SHIFT;
 /// Greatest count of a particle that limits keep from merging: tried at one regrid of 64.
 const REFUSED: u64 = 6;
-/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of 16.
-const WAITING: u64 = 4;
+/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of four.
+const WAITING: u64 = 2;
 /// Bits of the root that neighbours differ in: about as many particles as a leaf has.
 const NEIGHBOURS: u32 = 9;
 
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn ever_more_rarely() {
         assert_eq!(turns(7, true), [0, 2, 4, 8, 16, 32, 64, 128, 192, 256, 320, 384]);
-        assert_eq!(turns(7, false)[..7], [0, 2, 4, 8, 16, 32, 48]);
+        assert_eq!(turns(7, false)[..6], [0, 2, 4, 8, 12, 16]);
         // Other roots, other times.
         assert_eq!(turns(5 << NEIGHBOURS, true)[5..8], [59, 123, 187]);
     }

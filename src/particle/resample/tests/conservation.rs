@@ -1,0 +1,135 @@
+//! What splits and merges keep.
+use super::*;
+
+fn splitting_conserves<const D: usize>(seed: u64) {
+    let materials = materials();
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut chunk = particles::<D>(seed, 1, 1, None);
+    let original = chunk.clone();
+    let before = totals(&chunk);
+    let energy = split_all(&mut chunk, &setting(&scheme, 2));
+    let after = totals(&chunk);
+    assert_conserved(&before, &after, 1e-14, 0);
+    assert!((after.kinetic - before.kinetic - energy).abs() <= 1e-14 * after.kinetic);
+    for p in 0..original.len() {
+        // Mass and centre of each family are those of the parent to the last bit.
+        let family = p << D..(p + 1) << D;
+        let mass = original.column(Layout::<D>::MASS)[p];
+        let is_share = |part: &f64| part * f64::from(1 << D) == mass;
+        assert!(chunk.column(Layout::<D>::MASS)[family.clone()].iter().all(is_share));
+        for axis in 0..D {
+            let x = &chunk.column(Layout::<D>::POSITION + axis)[family.clone()];
+            let opposite = 0.5 * x[0] + 0.5 * x[(1 << D) - 1];
+            assert_eq!(opposite, original.position(p)[axis]);
+        }
+    }
+}
+
+fn merging_undoes_splitting<const D: usize>(seed: u64, transfer: Transfer) {
+    let materials = materials();
+    let scheme = scheme(&materials, transfer);
+    let mut chunk = particles::<D>(seed, 1, 1, None);
+    if transfer.has_increments() {
+        (0..chunk.len()).for_each(|p| write_matrix(&mut chunk, p, &[[0.0; D]; D]));
+    }
+    let original = chunk.clone();
+    let added = split_all(&mut chunk, &setting(&scheme, 2));
+    let limits = Limits { velocity: 0.1, strain: 1e-9, volume: 1e-9, history: 1e-9, stretch: 1.2 };
+    let (report, removed) = merge_all(&mut chunk, &setting(&scheme, 1), &limits);
+    let number = original.len() as u64;
+    assert_eq!((report.merged, report.families, &report.unnamed), (number, number, &vec![]));
+    assert!((added - removed).abs() <= 1e-13 * added, "{added} {removed}");
+    // TPIC's gradient comes from differences of velocities over the small distance of children.
+    assert_same(&original, &chunk, if transfer == Transfer::Tpic { 1e-12 } else { 1e-13 });
+}
+
+fn three_generations_return<const D: usize>(seed: u64) {
+    let materials = materials();
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut chunk = particles::<D>(seed, 0, 1, None);
+    let original = chunk.clone();
+    for level in 1..=3 {
+        split_all(&mut chunk, &setting(&scheme, level));
+    }
+    let mut ids = chunk.ids().to_vec();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), original.len() << (3 * D));
+    let (report, _) = merge_all(&mut chunk, &setting(&scheme, 0), &OPEN);
+    assert_eq!(report.merged, report.families);
+    assert_same(&original, &chunk, 1e-12);
+}
+
+/// Particles of one size in lattice cells of twice that size, with different states.
+fn merging_strangers_conserves<const D: usize>(seed: u64) {
+    let materials = materials();
+    let scheme = scheme(&materials, Transfer::Apic);
+    for kind in 0..KINDS {
+        let mut chunk = particles::<D>(seed, 1, 2, Some(kind));
+        // As large as on level 2, which they are made for.
+        (0..chunk.len()).for_each(|p| {
+            let tag = Tag::unpack(chunk.tags()[p]);
+            chunk.tags_mut()[p] = Tag { level: 2, ..tag }.pack();
+        });
+        let before = totals(&chunk);
+        let ids = chunk.ids().to_vec();
+        let (report, energy) = merge_all(&mut chunk, &setting(&scheme, 1), &OPEN);
+        assert!(report.merged >= 4 && report.families == 0);
+        assert_eq!(report.unnamed.len() as u64, report.merged);
+        assert!(chunk.ids().iter().all(|id| ids.contains(id)));
+        let after = totals(&chunk);
+        // Where the material flows on return, that work comes on top.
+        assert_conserved(&before, &after, 2e-14, 1);
+        let work = before.sums.len() - 1;
+        assert!(after.sums[work].0 >= before.sums[work].0 * (1.0 - 1e-13));
+        if kind == 0 {
+            assert_conserved(&before, &after, 2e-14, 0);
+        }
+        assert!((before.kinetic - after.kinetic - energy).abs() <= 1e-13 * before.kinetic);
+        for p in 0..chunk.len() {
+            assert_admissible(&chunk, p);
+        }
+    }
+}
+
+/// An update without increment changes nothing but by round-off, and the stored stress is that of the state.
+fn assert_admissible<const D: usize>(chunk: &Chunk<D>, p: usize) {
+    let mut again = chunk.clone();
+    set_matter(&mut again, p, elastic(chunk, p), read(chunk, Layout::<D>::HISTORY, p));
+    for column in Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::MASS {
+        let scale = if column < Layout::<D>::STRESS { 1.0 } else { 1e6 };
+        let (a, b) = (chunk.column(column)[p], again.column(column)[p]);
+        assert!((a - b).abs() <= 1e-13 * scale, "column {column}: {a} is returned to {b}");
+    }
+    assert!(material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0] > 0.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn splitting_conserves_in_both_dimensions(seed in any::<u64>()) {
+        splitting_conserves::<2>(seed);
+        splitting_conserves::<3>(seed);
+    }
+
+    #[test]
+    fn merging_undoes_splitting_in_both_dimensions(seed in any::<u64>()) {
+        for transfer in [Transfer::Apic, Transfer::Tpic, Transfer::Flip { blend: 0.9 }] {
+            merging_undoes_splitting::<2>(seed, transfer);
+            merging_undoes_splitting::<3>(seed, transfer);
+        }
+    }
+
+    #[test]
+    fn merging_strangers_conserves_in_both_dimensions(seed in any::<u64>()) {
+        merging_strangers_conserves::<2>(seed);
+        merging_strangers_conserves::<3>(seed);
+    }
+}
+
+#[test]
+fn three_generations_and_back() {
+    three_generations_return::<2>(1);
+    three_generations_return::<3>(2);
+}
