@@ -1,7 +1,7 @@
 //! Symmetric 3×3 matrices over lanes: products of small matrices and eigen decomposition.
 //!
 //! Components in the order `xx, yy, zz, xy, xz, yz`.
-use crate::kernel::simd::{Lanes, Mask};
+use crate::kernel::simd::{Lanes, Mask, each};
 
 /// A symmetric matrix for each lane.
 pub type Symmetric = [Lanes; 6];
@@ -114,7 +114,7 @@ impl Eigen {
                 |i: usize, j: usize| (value[0] * v[0][i]).mul_add(v[0][j], value[1] * v[1][i] * v[1][j]);
             return [entry(0, 0), entry(1, 1), value[2], entry(0, 1), zero, zero];
         }
-        let scaled: [[Lanes; 3]; 3] = std::array::from_fn(|k| v[k].map(|component| value[k] * component));
+        let scaled: [[Lanes; 3]; 3] = std::array::from_fn(|k| each(v[k], |component| value[k] * component));
         let entry = |i: usize, j: usize| {
             scaled[0][i].mul_add(v[0][j], scaled[1][i].mul_add(v[1][j], scaled[2][i] * v[2][j]))
         };

@@ -2,7 +2,7 @@
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::eigen::{decompose, greatest_bound};
 use super::{Lame, Material, State, Symmetric};
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, each};
 
 /// Fixed corotated solid.
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +24,10 @@ impl Material for FixedCorotated {
         let Lame { lambda, mu } = self.lame;
         let one = Lanes::splat(1.0);
         let eigen = decompose(&state.elastic, plane);
-        let stretch = eigen.value.map(Lanes::sqrt);
+        let stretch = each(eigen.value, Lanes::sqrt);
         let volume = stretch[0] * stretch[1] * stretch[2];
         let pressure = (volume - one) * volume * lambda;
-        let principal = stretch.map(|s| (s * (s - one)).mul_add(Lanes::splat(2.0 * mu), pressure));
+        let principal = each(stretch, |s| (s * (s - one)).mul_add(Lanes::splat(2.0 * mu), pressure));
         state.stress = eigen.compose(&principal, plane);
         let modulus = greatest_bound(&state.elastic) * (2.0 * mu) + volume * volume * lambda;
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();

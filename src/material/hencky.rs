@@ -3,7 +3,7 @@
 use super::eigen::greatest_bound;
 use super::spectral::principal_strains;
 use super::{Lame, Material, State, Symmetric};
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, each};
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]
@@ -29,14 +29,14 @@ impl Hencky {
     #[inline(always)]
     pub(super) fn principal_stresses(&self, strain: &[Lanes; 3]) -> [Lanes; 3] {
         let pressure = (strain[0] + strain[1] + strain[2]) * self.lame.lambda;
-        strain.map(|e| e.mul_add(Lanes::splat(2.0 * self.lame.mu), pressure))
+        each(*strain, |e| e.mul_add(Lanes::splat(2.0 * self.lame.mu), pressure))
     }
 
     /// Bound of the wave speeds: along a principal direction `ρ₀ c² = s² ∂P/∂F = λ + 2μ - τ`, greatest
     /// where the stress is most compressive.
     #[inline(always)]
     pub(super) fn wave_speed_under(&self, stress: &Symmetric) -> Lanes {
-        let compression = greatest_bound(&stress.map(|s| -s)).max(Lanes::splat(0.0));
+        let compression = greatest_bound(&each(*stress, |s| -s)).max(Lanes::splat(0.0));
         ((compression + Lanes::splat(self.lame.pressure_wave())) * (1.0 / self.density)).sqrt()
     }
 }

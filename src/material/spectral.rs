@@ -6,13 +6,13 @@ use super::eigen::{Eigen, decompose};
 use super::hencky::Hencky;
 use super::{State, Symmetric};
 use crate::kernel::math::{exp, ln};
-use crate::kernel::simd::{Lanes, Mask};
+use crate::kernel::simd::{Lanes, Mask, each};
 
 /// Principal logarithmic strains of `b`, with its decomposition.
 #[inline(always)]
 pub(super) fn principal_strains(b: &Symmetric, plane: bool) -> (Eigen, [Lanes; 3]) {
     let eigen = decompose(b, plane);
-    (eigen, eigen.value.map(|value| ln(value) * 0.5))
+    (eigen, each(eigen.value, |value| ln(value) * 0.5))
 }
 
 /// A trial state in its principal directions.
@@ -34,7 +34,7 @@ impl Trial {
     pub fn of(b: &Symmetric, plane: bool) -> Self {
         let (eigen, strain) = principal_strains(b, plane);
         let trace = strain[0] + strain[1] + strain[2];
-        let deviator = strain.map(|e| e - trace * (1.0 / 3.0));
+        let deviator = each(strain, |e| e - trace * (1.0 / 3.0));
         let [x, y, z] = deviator;
         let norm = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
         Self { eigen, strain, trace, deviator, norm }
@@ -53,7 +53,7 @@ impl Trial {
         plane: bool,
     ) {
         if changed.any() {
-            let elastic = self.eigen.compose(&strain.map(|e| exp(e + e)), plane);
+            let elastic = self.eigen.compose(&each(*strain, |e| exp(e + e)), plane);
             for c in 0..6 {
                 let unit = Lanes::splat(if c < 3 { 1.0 } else { 0.0 });
                 let returned = unstrained.select(unit, elastic[c]);

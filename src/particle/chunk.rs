@@ -283,12 +283,12 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
-    /// Gives back room once an eighth of what is needed stands empty, as in leaves that the material leaves.
+    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the material has left.
     fn give_back(&mut self) {
         if self.len == 0 {
             *self = Self::new();
-        } else if self.capacity > self.len + self.len / 8 + 4 * CAPACITY_STEP {
-            let mut smaller = Self::with_capacity(self.len + self.len / 32);
+        } else if self.capacity > self.len + self.len / 4 + 4 * CAPACITY_STEP {
+            let mut smaller = Self::with_capacity(self.len + self.len / 16);
             smaller.len = self.len;
             for column in 0..Layout::<D>::REALS {
                 smaller.column_mut(column).copy_from_slice(self.column(column));

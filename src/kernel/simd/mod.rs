@@ -160,17 +160,28 @@ impl Lanes {
     /// Four numbers for each particle become one row of four per particle.
     #[inline(always)]
     pub fn rows(columns: [Self; 4]) -> [F64x4; LANES] {
-        let [a, b, c, d] = F64x4::transpose(columns.map(|column| column.0[0]));
-        let [e, f, g, h] = F64x4::transpose(columns.map(|column| column.0[1]));
+        let [x, y, z, w] = columns;
+        let [a, b, c, d] = F64x4::transpose([x.0[0], y.0[0], z.0[0], w.0[0]]);
+        let [e, f, g, h] = F64x4::transpose([x.0[1], y.0[1], z.0[1], w.0[1]]);
         [a, b, c, d, e, f, g, h]
     }
     /// Inverse of [`Lanes::rows`].
     #[inline(always)]
     pub fn columns(rows: [F64x4; LANES]) -> [Self; 4] {
         let [a, b, c, d, e, f, g, h] = rows;
-        let (low, high) = (F64x4::transpose([a, b, c, d]), F64x4::transpose([e, f, g, h]));
-        std::array::from_fn(|i| Self([low[i], high[i]]))
+        let [x0, y0, z0, w0] = F64x4::transpose([a, b, c, d]);
+        let [x1, y1, z1, w1] = F64x4::transpose([e, f, g, h]);
+        [Self([x0, x1]), Self([y0, y1]), Self([z0, z1]), Self([w0, w1])]
     }
+}
+
+/// `map` of an array, which the compiler may not move out of line as it does with that of the standard library.
+#[inline(always)]
+pub fn each<const N: usize>(mut values: [Lanes; N], f: impl Fn(Lanes) -> Lanes) -> [Lanes; N] {
+    for value in &mut values {
+        *value = f(*value);
+    }
+    values
 }
 
 impl Mask {
