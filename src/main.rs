@@ -3,7 +3,7 @@ use agimp::cli::{Arguments, Failure, execute};
 use agimp::job::{FaultList, JobError};
 use clap::Parser as _;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -21,8 +21,13 @@ fn explain(failure: &Failure) {
     match failure {
         Failure::Job(JobError::Invalid(list)) => explain_faults(list),
         Failure::Elsewhere(_) => {}
-        other => eprintln!("agimp: {other}"),
+        other => tell(&format!("agimp: {other}")),
     }
+}
+
+/// Writes a message in one piece: `mpirun` may put its own words between pieces. If nobody listens, nobody is told.
+fn tell(text: &str) {
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// Each fault on a line of its own that editors and scripts understand, then its place in the file.
@@ -41,11 +46,11 @@ fn explain_faults(list: &FaultList) {
         let mut text = String::new();
         match handler.render_report(&mut text, report.as_ref()) {
             // Without colours the line begins with the file, as editors and scripts like it.
-            Ok(()) => eprintln!("{}", text.strip_prefix("  x ").unwrap_or(&text)),
-            Err(_) => eprintln!("{}", list.headline(fault)),
+            Ok(()) => tell(text.strip_prefix("  x ").unwrap_or(&text)),
+            Err(_) => tell(&list.headline(fault)),
         }
     }
     if list.faults.len() > 1 {
-        eprintln!("agimp: {} faults in {}", list.faults.len(), list.path.display());
+        tell(&format!("agimp: {} faults in {}", list.faults.len(), list.path.display()));
     }
 }

@@ -200,7 +200,9 @@ fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
         NO_STEP => String::new(),
         step => format!(", step {step}"),
     };
-    eprintln!("agimp: rank {rank}{step}: {message}{place}");
+    // In one piece, or `mpirun` may put its own words between pieces; if nobody listens, nobody is told.
+    let text = format!("agimp: rank {rank}{step}: {message}{place}\n");
+    let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
     if size > 1 && running {
         // Possibly not the main thread. The process ends either way, and waiting for the main
         // thread to notice could take forever if that one waits for a message.

@@ -69,7 +69,7 @@ pub struct Wanted {
     pub refused: u64,
 }
 
-/// Particles that [`split`] should treat: those made for a level coarser than that of the leaf, and, where boxes follow
+/// Particles that [`split()`] should treat: those made for a level coarser than that of the leaf, and, where boxes follow
 /// the stretch ([`BoxPolicy::Volume`]), those whose box is wider along some axis than `stretch` times that of an
 /// undeformed particle of the leaf's level. The latter are measured against the leaf and not against themselves, so
 /// that their children do not split again before they have stretched as much once more.
