@@ -47,6 +47,8 @@ pub(super) struct BlockSum<'a, const D: usize> {
     rows: [&'a [Row]; 32],
     /// Nodes that the arena at a position touches, where these are not all.
     touched: [u64; 32],
+    /// Keys of the bins at the positions, where something else than whole arenas reaches the block.
+    keys: [u64; 32],
     /// Positions with arenas.
     occupied: u32,
     /// Those whose particles do not touch all nodes.
@@ -70,6 +72,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             order: regions.order(plan.blocks[block].coord),
             rows: [&ZEROS; 32],
             touched: [0; 32],
+            keys: [0; 32],
             occupied: 0,
             partial: 0,
             mixed: 0,
@@ -119,6 +122,12 @@ impl<'a, const D: usize> BlockSum<'a, D> {
                 if received.touched(part.piece) & regions.nodes[part.region as usize] != 0 {
                     sum.mixed |= 1 << part.region;
                 }
+            }
+        }
+        if sum.mixed != 0 {
+            let bins = plan.feeders.inner::<D>(block);
+            for position in bits(u64::from(sum.occupied)).map(|position| position as usize) {
+                sum.keys[position] = plan.bins[bins[position] as usize].block.key();
             }
         }
         sum
@@ -224,15 +233,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         self.list_terms(region);
         let nodes = self.regions.nodes[region];
         let mut stack = std::mem::take(&mut self.scratch.rows);
-        let load = |term: &Term| {
-            let mut rows = [ZERO; MOST_BINS];
-            for (row, bit) in rows.iter_mut().zip(bits(nodes)) {
-                if term.touched >> bit & 1 == 1 {
-                    *row = self.row(term, bit);
-                }
-            }
-            rows
-        };
+        let load = |term: &Term| self.rows_of(term, nodes);
         let add = |to: &mut [Row; MOST_BINS], from: &[Row; MOST_BINS]| {
             to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
         };
@@ -320,7 +321,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
                 continue;
             }
             let bin = bins[position];
-            let key = if is_mixed { self.plan.bins[bin as usize].block.key() } else { 0 };
+            let key = self.keys[position];
             let origin = Origin::Bin { bin, position: slot.position };
             let touched = self.touched_at(position);
             self.scratch.terms.push(Term { key, tie: key, separation, touched, origin });
@@ -332,7 +333,10 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         let Scratch { outer, terms, .. } = &mut *self.scratch;
         terms.extend(outer.iter().filter(|term| term.touched & nodes != 0));
         if let Some(received) = self.received {
-            for part in self.plan.parts(self.block).iter().filter(|part| part.region as usize == region) {
+            // Parts are listed region by region.
+            let parts = self.plan.parts(self.block);
+            let first = parts.partition_point(|part| (part.region as usize) < region);
+            for part in parts[first..].iter().take_while(|part| part.region as usize == region) {
                 let touched = received.touched(part.piece);
                 if touched & nodes != 0 {
                     let origin = Origin::Piece(part.piece);
@@ -343,16 +347,22 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         arrange(terms);
     }
 
-    /// What a term adds to a node that it touches.
-    fn row(&self, term: &Term, bit: u32) -> Row {
+    /// What a term adds to the nodes of a region, in the order of their bits.
+    #[inline(always)]
+    fn rows_of(&self, term: &Term, nodes: u64) -> [Row; MOST_BINS] {
+        let mut rows = [ZERO; MOST_BINS];
+        let touched = bits(nodes).enumerate().filter(|(_, bit)| term.touched >> bit & 1 == 1);
         match (term.origin, self.received) {
             (Origin::Bin { bin, position }, _) => {
-                let node = arena_node::<D>(position as usize, bit);
-                self.arenas.rows(bin).map_or(ZERO, |rows| rows[node])
+                let from = self.arenas.rows(bin).unwrap_or(&ZEROS);
+                touched.for_each(|(i, bit)| rows[i] = from[arena_node::<D>(position as usize, bit)]);
             }
-            (Origin::Piece(piece), Some(received)) => received.row(piece, bit),
-            (Origin::Piece(_), None) => ZERO,
+            (Origin::Piece(piece), Some(received)) => {
+                touched.for_each(|(i, bit)| rows[i] = received.row(piece, bit));
+            }
+            (Origin::Piece(_), None) => {}
         }
+        rows
     }
 
     /// First moments that a term adds to a node.
