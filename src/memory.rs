@@ -6,7 +6,7 @@
 /// Blocks of at least this many bytes go back to the system as soon as they are freed: far above what steps allocate, and
 /// below the columns that a file is written from.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-const RETURNED: core::ffi::c_int = 4 << 20;
+const RETURNED: libc::c_int = 4 << 20;
 
 /// Has large blocks returned to the system when they are freed. Left to itself, the allocator of GNU systems raises its
 /// bound for such blocks up to 32 MiB as they come and go, and then keeps their pages between the particles' columns: 25
@@ -14,12 +14,8 @@ const RETURNED: core::ffi::c_int = 4 << 20;
 pub fn return_large_blocks() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
-        const M_MMAP_THRESHOLD: core::ffi::c_int = -3;
-        unsafe extern "C" {
-            fn mallopt(parameter: core::ffi::c_int, value: core::ffi::c_int) -> core::ffi::c_int;
-        }
-        // SAFETY: the signature is that of malloc.h; no other thread allocates yet. Where the setting is refused, memory
+        // SAFETY: no other thread allocates yet. Where the setting is refused, memory
         // is used as before.
-        unsafe { mallopt(M_MMAP_THRESHOLD, RETURNED) };
+        unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, RETURNED) };
     }
 }

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use bytemuck::Pod;
-
 use crate::forest::owner;
 use crate::weight::{self, CutAt, Cuts};
 use crate::{Comm, Forest, Octant};
@@ -118,15 +116,6 @@ impl Shipment {
     /// Not collective. The leaves that stayed, as indices `(before, after)`.
     pub fn kept(&self) -> (Range<usize>, Range<usize>) {
         self.kept.clone()
-    }
-
-    /// Collective. Moves one list per old leaf and returns one list per new leaf; see [`Shipment::move_items`].
-    ///
-    /// # Panics
-    /// If there is not one list per old leaf.
-    pub fn move_payload<T: Pod>(&self, comm: &Comm, per_leaf: Vec<Vec<T>>) -> Vec<Vec<T>> {
-        let append = |list: &Vec<T>, bytes: &mut Vec<u8>| bytes.extend_from_slice(bytemuck::cast_slice(list));
-        self.move_items(comm, per_leaf, append, bytemuck::allocation::pod_collect_to_vec)
     }
 
     /// Collective. Moves one item per old leaf and returns one item per new leaf. Items of leaves that stay are not

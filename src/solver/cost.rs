@@ -7,8 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Solver;
-use super::phases::Phase;
-use super::rebalance::thread_time;
+use super::phases::{Phase, thread_time};
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 

@@ -1,7 +1,11 @@
 //! Wall time by phase of the step.
 use std::time::{Duration, Instant};
 
-use super::rebalance::thread_time;
+/// Processor time of this thread: what other programs take of the machine does not count.
+pub(super) fn thread_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
+}
 
 /// Phases of a run whose wall time is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

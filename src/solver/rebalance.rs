@@ -9,7 +9,7 @@ use partition::{CutAt, Cuts};
 
 use super::Solver;
 pub use super::cost::{leaf_cost, leaf_weight};
-use super::phases::Phase;
+use super::phases::{Phase, thread_time};
 use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
 
@@ -45,12 +45,6 @@ impl Prospect {
         let helps = self.then - 1.0 <= 0.5 * (self.now - 1.0);
         self.then < self.now && (self.lost > self.price || self.now > CEILING && helps)
     }
-}
-
-/// Processor time of this thread: what other programs take of the machine does not count.
-pub(super) fn thread_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
 }
 
 /// What the current partition has cost, in seconds of processor time.

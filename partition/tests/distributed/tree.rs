@@ -156,9 +156,15 @@ fn share_out_at<const D: usize>(
         assert_eq!(imbalance, load[0] as f64 * comm.size() as f64 / load[1] as f64);
     }
 
-    let moved = shipment.move_payload(comm, old.iter().map(payload).collect());
+    let moved = shipment.move_items(
+        comm,
+        old.iter().map(payload).collect(),
+        |items: &Vec<_>, bytes| bytes.extend_from_slice(bytemuck::cast_slice(items)),
+        bytemuck::allocation::pod_collect_to_vec,
+    );
     assert!(moved.iter().eq(forest.leaves().iter().map(payload).collect::<Vec<_>>().iter()));
-    let tags = shipment.move_payload(comm, old.iter().map(|_| vec![comm.rank() as u8]).collect());
+    let tags = old.iter().map(|_| vec![comm.rank() as u8]).collect();
+    let tags = shipment.move_items(comm, tags, |tag, bytes| bytes.extend_from_slice(tag), <[u8]>::to_vec);
     for (source, range) in shipment.receives() {
         assert!(tags[range.clone()].iter().all(|tag| tag[..] == [*source as u8]));
     }
