@@ -150,6 +150,9 @@ impl<const D: usize> ArenaExchange<D> {
             let mut extents = 0u64;
             let mut values = Vec::new();
             for (i, piece) in pieces.iter().enumerate() {
+                if let Some(next) = pieces.get(i + 1) {
+                    own.read_ahead(next.block as usize);
+                }
                 extents |= (packing.pack(piece, own, &mut values) as u64) << (2 * i);
             }
             (extents, values)

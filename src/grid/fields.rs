@@ -6,12 +6,13 @@ use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
 use super::exchange::ReceivedSums;
-use super::links::Links;
+use super::links::{Links, NO_MOMENTS, weight_of};
 use super::mask::{block_nodes, offset, offset_count};
 use super::mixed::Mixed;
 use super::plan::{Block, GridPlan, NO_BLOCK};
 use super::sums::{BlockSum, Sources};
 use super::window::{Shared, Window};
+use crate::kernel::simd::F64x4;
 use crate::kernel::{Row, arena_nodes};
 
 const ZERO: Row = Row([0.0; 4]);
@@ -66,13 +67,6 @@ struct BlockMut<'a, const D: usize> {
     moments: Option<&'a mut [Moments<D>]>,
 }
 
-/// One block of the fields.
-#[derive(Clone, Copy)]
-struct BlockRef<'a, const D: usize> {
-    rows: &'a [Row],
-    moments: Option<&'a [Moments<D>]>,
-}
-
 impl<const D: usize> NodeFields<D> {
     /// Fields for the blocks of a plan.
     pub fn new(plan: &GridPlan<D>) -> Self {
@@ -111,6 +105,13 @@ impl<const D: usize> NodeFields<D> {
                     continue;
                 }
                 *active = false;
+                let next = index + 1;
+                if next < plan.blocks.len()
+                    && arenas.reach(next)
+                    && plan.is_seam(next) == (part == Part::Seam)
+                {
+                    sources.read_ahead(next);
+                }
                 if block.sum != 0 && (arenas.reach(index) || part == Part::Seam) {
                     let mut sum = BlockSum::find(sources, scratch, index, None);
                     *active = !sum.is_empty();
@@ -144,28 +145,36 @@ impl<const D: usize> NodeFields<D> {
                     self.dirty[linked.block as usize] = true;
                 }
             }
-            let cell = plan.cell(level as u8 + 1);
+            let steps = Step::<D>::of_all(plan.cell(level as u8 + 1));
             let (coarse, fine) =
                 split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
             for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
+                let constrained = plan.blocks[first / block_nodes(D)].constrained;
                 for i in nodes {
                     let at = links.nodes[i] as usize - first;
-                    let mut row = to.rows[at].0;
-                    let mut own = to.moments.as_ref().map_or([ZERO; D], |moments| moments[at]);
-                    for link in links.of(i) {
-                        let (child, moments) = fine.node(plan, link.node);
-                        let delta = offset::<D>(link.offset as usize).map(|o| f64::from(o) * cell);
-                        for lane in 0..4 {
-                            let mut a = child.0[lane];
-                            for axis in 0..D {
-                                let moment = moments[axis].0[lane];
-                                a = moment.mul_add(delta[axis], a);
-                                own[axis].0[lane] = link.weight.mul_add(moment, own[axis].0[lane]);
+                    let links = links.of(i);
+                    let mut row = F64x4::new(to.rows[at].0);
+                    for link in links {
+                        let steps = &steps[link.offset as usize];
+                        let mut sum = F64x4::new(fine.row(link.node).0);
+                        for (moment, delta) in fine.moments(link.moments).iter().zip(steps.delta) {
+                            sum = F64x4::new(moment.0).mul_add(delta, sum);
+                        }
+                        row = steps.weight.mul_add(sum, row);
+                    }
+                    to.rows[at] = Row(row.to_array());
+                    // Real nodes need no moments.
+                    if constrained >> at & 1 == 1
+                        && let Some(own) = &mut to.moments
+                    {
+                        for link in links {
+                            let weight = steps[link.offset as usize].weight;
+                            for (own, moment) in own[at].iter_mut().zip(fine.moments(link.moments)) {
+                                *own =
+                                    Row(weight.mul_add(F64x4::new(moment.0), F64x4::new(own.0)).to_array());
                             }
-                            row[lane] = link.weight.mul_add(a, row[lane]);
                         }
                     }
-                    to.set(at, Row(row), own);
                 }
             });
         }
@@ -177,27 +186,29 @@ impl<const D: usize> NodeFields<D> {
         self.mark_needed(plan, arenas);
         for level in 1..plan.levels() {
             let links = &plan.prolongation[level];
-            let cell = plan.cell(level as u8);
+            let steps = Step::<D>::of_all(plan.cell(level as u8));
             let (coarse, fine) =
                 split(&mut self.rows, &mut self.moments, plan, level, self.moment_start[level]);
             for_each_linked(fine, plan, links, &self.needed, |mut to, first, nodes| {
                 for i in nodes {
-                    let mut row = [0.0; 4];
-                    let mut sums = [ZERO; D];
+                    let mut row = F64x4::splat(0.0);
+                    let mut sums = [row; D];
                     for link in links.of(i) {
-                        let (parent, moments) = coarse.prolonged_node(plan, link.node);
-                        let delta = offset::<D>(link.offset as usize).map(|o| f64::from(o) * cell);
-                        for lane in 0..3 {
-                            let value = parent.0[lane];
-                            row[lane] = link.weight.mul_add(value, row[lane]);
-                            for axis in 0..D {
-                                let moment = value.mul_add(delta[axis], moments[axis].0[lane]);
-                                let sum = &mut sums[axis].0[lane];
-                                *sum = link.weight.mul_add(moment, *sum);
-                            }
+                        let steps = &steps[link.offset as usize];
+                        let [x, y, z, _] = coarse.row(link.node).0;
+                        let value = F64x4::new([x, y, z, 0.0]);
+                        row = steps.weight.mul_add(value, row);
+                        let moments = coarse.moments(link.moments);
+                        for axis in 0..D {
+                            let moment = value.mul_add(steps.delta[axis], F64x4::new(moments[axis].0));
+                            sums[axis] = steps.weight.mul_add(moment, sums[axis]);
                         }
                     }
-                    to.set(links.nodes[i] as usize - first, Row(row), sums);
+                    let at = links.nodes[i] as usize - first;
+                    to.rows[at] = Row(row.to_array());
+                    if let Some(moments) = &mut to.moments {
+                        moments[at] = sums.map(|sum| Row(sum.to_array()));
+                    }
                 }
             });
             for linked in &links.blocks {
@@ -301,29 +312,39 @@ struct Half<'a, const D: usize> {
 }
 
 impl<const D: usize> Half<'_, D> {
-    fn block(&self, plan: &GridPlan<D>, block: usize) -> BlockRef<'_, D> {
-        let nodes = block_nodes(D);
-        let slot = plan.blocks[block].moments;
-        BlockRef {
-            rows: &self.rows[(block - self.first_block) * nodes..][..nodes],
-            moments: slot.map(|slot| &self.moments[(slot as usize - self.first_slot) * nodes..][..nodes]),
+    /// Row of a node.
+    #[inline(always)]
+    fn row(&self, node: u32) -> &Row {
+        &self.rows[node as usize - self.first_block * block_nodes(D)]
+    }
+
+    /// First moments at a place; zeros for [`NO_MOMENTS`].
+    #[inline(always)]
+    fn moments(&self, place: u32) -> &Moments<D> {
+        if place == NO_MOMENTS {
+            return &[ZERO; D];
         }
+        &self.moments[place as usize - self.first_slot * block_nodes(D)]
     }
+}
 
-    /// Row and first moments of a node.
-    fn node(&self, plan: &GridPlan<D>, node: u32) -> (Row, Moments<D>) {
-        let nodes = block_nodes(D);
-        let block = self.block(plan, node as usize / nodes);
-        let at = node as usize % nodes;
-        (block.rows[at], block.moments.map_or([ZERO; D], |moments| moments[at]))
-    }
+/// Weight and distance of the parent at an offset from a constrained node.
+#[derive(Clone, Copy)]
+struct Step<const D: usize> {
+    weight: F64x4,
+    /// Parent minus constrained node, m, one number in all lanes.
+    delta: [F64x4; D],
+}
 
-    /// As [`Half::node`], with zero moments on real nodes, whose slots still hold sums.
-    fn prolonged_node(&self, plan: &GridPlan<D>, node: u32) -> (Row, Moments<D>) {
-        let nodes = block_nodes(D);
-        let (row, moments) = self.node(plan, node);
-        let constrained = plan.blocks[node as usize / nodes].constrained >> (node as usize % nodes) & 1 == 1;
-        (row, if constrained { moments } else { [ZERO; D] })
+impl<const D: usize> Step<D> {
+    /// By offset number, for constrained nodes of a level with this edge of cells.
+    fn of_all(cell: f64) -> [Self; 27] {
+        let step = |index: usize| {
+            let offset = offset::<D>(index);
+            let delta = std::array::from_fn(|axis| F64x4::splat(f64::from(offset[axis]) * cell));
+            Self { weight: F64x4::splat(weight_of(offset)), delta }
+        };
+        std::array::from_fn(step)
     }
 }
 
@@ -356,15 +377,6 @@ fn for_each_linked<const D: usize>(
     tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
         work(block, linked.block as usize * nodes, linked.nodes.start as usize..linked.nodes.end as usize);
     });
-}
-
-impl<const D: usize> BlockMut<'_, D> {
-    fn set(&mut self, at: usize, row: Row, moments: Moments<D>) {
-        self.rows[at] = row;
-        if let Some(slots) = &mut self.moments {
-            slots[at] = moments;
-        }
-    }
 }
 
 /// Velocities around one bin, for the gather.

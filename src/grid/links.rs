@@ -12,10 +12,19 @@ use crate::kernel::Row;
 pub struct Link {
     /// Node at the other end (block number × nodes per block + bit).
     pub node: u32,
-    /// Offset number of parent minus constrained node, in cells of the finer level.
+    /// Place of that node's first moments, of a constrained one; [`NO_MOMENTS`] for real ones.
+    pub moments: u32,
+    /// Offset number of parent minus constrained node, in cells of the finer level. The weight follows from it, see
+    /// [`weight_of`].
     pub offset: u8,
-    /// Weight.
-    pub weight: f64,
+}
+
+/// No first moments.
+pub const NO_MOMENTS: u32 = u32::MAX;
+
+/// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
+pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
+    offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
 }
 
 /// The nodes of one block that gather over links.
@@ -103,16 +112,21 @@ impl<const D: usize> GridPlan<D> {
                     let Some(&coarse_block) = number.get(&(block.level - 1, coord)) else { continue };
                     let coarse = coarse_block * nodes + parent_bit;
                     let offset = offset_index(parent.offset) as u8;
+                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
                     if block.sum >> bit & 1 == 1
                         && self.blocks[coarse_block as usize].sum >> parent_bit & 1 == 1
                     {
                         // A parent meets its children in lexicographic order of their position.
                         let order = u32::from(opposite(D, offset as usize) as u8);
-                        let link = Link { node: fine, offset, weight: parent.weight };
+                        let moments = self.moment_node(fine).map_or(NO_MOMENTS, |place| place as u32);
+                        let link = Link { node: fine, moments, offset };
                         restriction[level - 1].push((coarse, order, link));
                     }
                     if block.value >> bit & 1 == 1 {
-                        let link = Link { node: coarse, offset, weight: parent.weight };
+                        let is_real = self.blocks[coarse_block as usize].constrained >> parent_bit & 1 == 0;
+                        let place = self.moment_node(coarse).filter(|_| !is_real);
+                        let moments = place.map_or(NO_MOMENTS, |place| place as u32);
+                        let link = Link { node: coarse, moments, offset };
                         prolongation[level].push((fine, order as u32, link));
                     }
                 }
@@ -134,9 +148,10 @@ impl<const D: usize> GridPlan<D> {
                 for link in links.of(i) {
                     let parent = self.moment_node(link.node).map_or([0.0; 4], |slot| spread[slot].0);
                     let delta = offset::<D>(link.offset as usize);
+                    let weight = weight_of(delta);
                     for axis in 0..D {
                         let squared = f64::from(delta[axis] * delta[axis]) * cell_squared;
-                        sum[axis] += link.weight * (parent[axis] + squared);
+                        sum[axis] += weight * (parent[axis] + squared);
                     }
                 }
                 if let Some(slot) = self.moment_node(node) {

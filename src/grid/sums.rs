@@ -10,6 +10,7 @@ use super::order::Origin;
 use super::plan::GridPlan;
 use super::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
 use super::window::Window;
+use crate::kernel::simd::prefetch;
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 
 pub(super) const ZERO: Row = Row([0.0; 4]);
@@ -139,38 +140,56 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     /// Writes the sums of momentum and mass at all nodes of the regions in `wanted`.
     pub fn sum_rows(&mut self, wanted: u32, to: &mut [Row]) {
         let to = &mut to[..block_nodes(D)];
-        let left = if D == 3 {
-            self.plane::<0>(wanted, to) | self.plane::<1>(wanted, to) | self.plane::<2>(wanted, to)
-        } else {
-            self.plane::<1>(wanted, to)
-        };
+        self.all_planes::<false>(wanted & !self.mixed, to);
+        let left = if self.mixed == 0 { 0 } else { self.all_planes::<true>(wanted & self.mixed, to) };
         for region in bits(u64::from(left)) {
             self.fold_rows(region as usize, to);
         }
     }
 
-    /// Sums the regions that have parts `Y`, `Z` along the second and third axis; returns those left out because what
-    /// reaches them does not fit the pattern. In 2D there is no third axis.
+    /// Sums the regions in `wanted` along the fixed pattern; returns those left out because what reaches them does not
+    /// fit it. `MIXED` if more than whole arenas reaches these regions.
+    #[inline(never)]
+    fn all_planes<const MIXED: bool>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
+        if D == 3 {
+            self.plane::<MIXED, 0>(wanted, to)
+                | self.plane::<MIXED, 1>(wanted, to)
+                | self.plane::<MIXED, 2>(wanted, to)
+        } else {
+            self.plane::<MIXED, 1>(wanted, to)
+        }
+    }
+
+    /// Those that have part `Z` along the third axis. In 2D there is none.
     #[inline(always)]
-    fn plane<const Z: usize>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
-        self.line::<0, Z>(wanted, to) | self.line::<1, Z>(wanted, to) | self.line::<2, Z>(wanted, to)
+    fn plane<const MIXED: bool, const Z: usize>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
+        self.line::<MIXED, 0, Z>(wanted, to)
+            | self.line::<MIXED, 1, Z>(wanted, to)
+            | self.line::<MIXED, 2, Z>(wanted, to)
     }
 
     #[inline(always)]
-    fn line<const Y: usize, const Z: usize>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
-        self.region::<0, Y, Z>(wanted, to)
-            | self.region::<1, Y, Z>(wanted, to)
-            | self.region::<2, Y, Z>(wanted, to)
+    fn line<const MIXED: bool, const Y: usize, const Z: usize>(
+        &mut self,
+        wanted: u32,
+        to: &mut [Row],
+    ) -> u32 {
+        self.region::<MIXED, 0, Y, Z>(wanted, to)
+            | self.region::<MIXED, 1, Y, Z>(wanted, to)
+            | self.region::<MIXED, 2, Y, Z>(wanted, to)
     }
 
     #[inline(always)]
-    fn region<const X: usize, const Y: usize, const Z: usize>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
+    fn region<const MIXED: bool, const X: usize, const Y: usize, const Z: usize>(
+        &mut self,
+        wanted: u32,
+        to: &mut [Row],
+    ) -> u32 {
         let region = X + 3 * Y + if D == 3 { 9 * Z } else { 0 };
         if wanted >> region & 1 == 0 {
             return 0;
         }
-        let is_mixed = self.mixed >> region & 1 == 1;
-        if is_mixed && !self.place(region) {
+        if MIXED && !self.place(region) {
             return 1 << region;
         }
         let slots = &self.order[region];
@@ -191,7 +210,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             }
             *from = &self.rows[position][slot.start as usize..][..span];
         }
-        if is_mixed {
+        if MIXED {
             self.copy_pieces(region);
             for placed in &self.scratch.placed {
                 from[placed.slot] = match placed.origin {
@@ -289,6 +308,32 @@ impl<'a, const D: usize> BlockSum<'a, D> {
                     _ => pair(0).plus(&pair(2)).plus(&pair(4).plus(&pair(6))),
                 };
                 sum.plus(&ZERO)
+            });
+        }
+    }
+}
+
+impl<const D: usize> Sources<'_, D> {
+    /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the processor to
+    /// foresee them.
+    pub fn read_ahead(&self, block: usize) {
+        for (position, &bin) in self.plan.feeders.inner::<D>(block).iter().enumerate() {
+            if bin == NO_BIN {
+                continue;
+            }
+            let (Some(rows), Some(shared)) =
+                (self.arenas.rows(bin), Window::<D>::FULL.shared(opposite(D, position)))
+            else {
+                continue;
+            };
+            let first = rows.as_ptr().addr();
+            shared.for_each_run(|run| {
+                let (from, to) = (first + size_of::<Row>() * run.arena, size_of::<Row>() * (run.len - 1));
+                prefetch(from);
+                if run.len > 2 {
+                    prefetch(from + 64);
+                }
+                prefetch(from + to);
             });
         }
     }
