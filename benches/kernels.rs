@@ -116,6 +116,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
 fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
     let mut setting = Setting::<D>::new(model, distinct);
     let mut chunks = std::mem::take(&mut setting.chunks);
+    let mut leavers = g2p::Leavers::default();
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
@@ -128,6 +129,7 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
                 &scheme,
                 DT,
                 &fields,
+                &mut leavers,
                 Place::default(),
             ))
         })
@@ -180,6 +182,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
 fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
+    let mut leavers = g2p::Leavers::default();
     let (nodes, first) = (constrained(), vec![[Row::default(); 3]; arena_nodes(3)]);
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
@@ -194,6 +197,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
                 &scheme,
                 DT,
                 &fields,
+                &mut leavers,
                 Place::default(),
             ))
         })

@@ -155,6 +155,12 @@ impl Batch {
         })
     }
 
+    /// Which of some lanes, a bit each, are members.
+    #[inline(always)]
+    pub fn members_among(&self, lanes: u32) -> u32 {
+        self.lanes & lanes
+    }
+
     /// `values` of members, 0 elsewhere.
     #[inline(always)]
     pub fn of_members(&self, values: Lanes) -> Lanes {

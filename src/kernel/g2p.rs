@@ -9,7 +9,7 @@
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches};
 use super::constrained::ConstrainedNodes;
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{F64x4, LANES, Lanes, Mask};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
@@ -76,9 +76,60 @@ impl<const D: usize> Gathered<D> {
     }
 }
 
+/// Finds particles that are no longer in a box once they have moved.
+#[derive(Clone, Debug)]
+pub struct Leavers<const D: usize> {
+    lower: [f64; D],
+    upper: [f64; D],
+    /// Their indices, in the order in which they moved.
+    pub found: Vec<u32>,
+}
+
+impl<const D: usize> Default for Leavers<D> {
+    /// With a box that holds every position.
+    fn default() -> Self {
+        Self { lower: [f64::NEG_INFINITY; D], upper: [f64::INFINITY; D], found: Vec::new() }
+    }
+}
+
+impl<const D: usize> Leavers<D> {
+    /// Forgets what was found; from now on particles belong into the box `lower <= x < upper`.
+    pub fn begin(&mut self, (lower, upper): &([f64; D], [f64; D])) {
+        (self.lower, self.upper) = (*lower, *upper);
+        self.found.clear();
+    }
+
+    /// Lanes of positions in the box; one that is not a number is not.
+    #[inline(always)]
+    pub fn inside(&self, position: &[Lanes; D]) -> Mask {
+        let mut inside = !Mask::from_bits(0);
+        for axis in 0..D {
+            let (lower, upper) = (Lanes::splat(self.lower[axis]), Lanes::splat(self.upper[axis]));
+            inside = inside & lower.le(position[axis]) & position[axis].lt(upper);
+        }
+        inside
+    }
+
+    /// Notes the members of a batch that moved out.
+    #[inline(always)]
+    fn look(&mut self, batch: &Batch, moved: &[Lanes; D]) {
+        let left = batch.members_among(!self.inside(moved).bits());
+        // Nearly all particles stay.
+        if left != 0 {
+            self.note(batch, left);
+        }
+    }
+
+    #[inline(never)]
+    fn note(&mut self, batch: &Batch, left: u32) {
+        let lanes = (0..LANES).filter(|lane| left >> lane & 1 == 1);
+        self.found.extend(lanes.map(|lane| batch.particle(lane) as u32));
+    }
+}
+
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `next` is the place of the chunk
-/// that will be read after this one.
+/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `leavers` notes those that leave its
+/// box; `next` is the place of the chunk that will be read after this one.
 pub fn gather<const D: usize>(
     chunk: &mut Chunk<D>,
     select: Select,
@@ -86,6 +137,7 @@ pub fn gather<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     fields: &Fields<D>,
+    leavers: &mut Leavers<D>,
     next: Place,
 ) -> f64 {
     let batches = Batches::new(select, chunk, next);
@@ -100,7 +152,7 @@ pub fn gather<const D: usize>(
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
         sums.gather(&mut weights, &batch, fields);
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
     }
     largest(greatest)
 }
@@ -136,6 +188,7 @@ pub fn advance_gathered<const D: usize>(
     gathered: &[Gathered<D>],
     scheme: &Scheme,
     dt: f64,
+    leavers: &mut Leavers<D>,
 ) -> f64 {
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
     let mut sums = Sums::new();
@@ -146,7 +199,7 @@ pub fn advance_gathered<const D: usize>(
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
     }
     largest(greatest)
 }
@@ -309,6 +362,7 @@ fn advance<const D: usize>(
     sums: &Sums<D>,
     scheme: &Scheme,
     dt: f64,
+    leavers: &mut Leavers<D>,
 ) -> Lanes {
     let zero = Lanes::splat(0.0);
     let step = Lanes::splat(dt);
@@ -322,9 +376,10 @@ fn advance<const D: usize>(
         }
     }
     let increment = if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
+    let mut moved = *position;
     for i in 0..D {
-        let moved = velocity[i].mul_add(step, position[i]);
-        batch.store(reals, stride, Layout::<D>::POSITION + i, moved);
+        moved[i] = velocity[i].mul_add(step, position[i]);
+        batch.store(reals, stride, Layout::<D>::POSITION + i, moved[i]);
         let new = match scheme.transfer {
             Transfer::Apic | Transfer::Tpic => velocity[i],
             Transfer::Flip { blend } => {
@@ -336,6 +391,7 @@ fn advance<const D: usize>(
         batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
         square = new.mul_add(new, square);
     }
+    leavers.look(batch, &moved);
     for k in 0..D {
         let affine = Lanes::columns(sums.affine[k]);
         for i in 0..D {

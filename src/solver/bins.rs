@@ -342,7 +342,7 @@ impl<const D: usize> LeafBins<D> {
 }
 
 /// Positions of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
-fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
+pub(super) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
     let (reals, stride) = chunk.reals();
     std::array::from_fn(|axis| {
         let column = &reals[(Layout::<D>::POSITION + axis) * stride + first..];
@@ -361,13 +361,4 @@ fn narrow_lanes<const D: usize>(half: &[Lanes; D], cell: f64) -> u32 {
 /// than a few units of the last place.
 fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
     half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 8.0 * f64::EPSILON))
-}
-
-/// Greatest half width without deformation in a chunk, m.
-pub fn greatest_half<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    let batches = chunk.column(Layout::<D>::HALF).chunks_exact(LANES);
-    let rest = batches.remainder().iter().copied().fold(0.0, f64::max);
-    let lanes = batches.filter_map(<[f64]>::first_chunk);
-    let lanes = lanes.fold(Lanes::splat(rest), |most, batch| Lanes::load(batch).max(most));
-    lanes.to_array().into_iter().fold(0.0, f64::max)
 }

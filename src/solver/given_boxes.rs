@@ -5,7 +5,7 @@
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
-use super::bins::{BinMissing, BoxWidths, greatest_half};
+use super::bins::{BinMissing, BoxWidths};
 use super::migrate::position_key;
 use super::time_step::StepControl;
 use super::transfer::{extent, sort_with};
@@ -70,7 +70,7 @@ impl<const D: usize> BoxWidths<D> for Halves<D> {
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
-        greatest_half(chunk)
+        chunk.greatest_half()
     }
 
     fn are_known_to_kernels(&self) -> bool {

@@ -222,8 +222,8 @@ impl<const D: usize> Solver<D> {
         let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
-        self.gather(dt);
-        let moved = self.migrate();
+        let departed = self.gather(dt);
+        let moved = self.arrive(departed);
         let reach = self.local_reach();
 
         self.clock.step += 1;

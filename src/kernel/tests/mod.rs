@@ -1,6 +1,6 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::constrained::ConstrainedNodes;
-use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
+use super::g2p::{Fields, Gathered, Leavers, Moments, advance_gathered, gather_sub_boxes};
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
 use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
@@ -8,6 +8,19 @@ use crate::material::{Material, Parameters, build};
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 mod parts;
+
+/// As [`super::g2p::gather`], for particles that may go anywhere.
+fn gather<const D: usize>(
+    chunk: &mut Chunk<D>,
+    select: Select,
+    frame: &Frame<D>,
+    scheme: &Scheme,
+    dt: f64,
+    fields: &Fields<D>,
+    next: Place,
+) -> f64 {
+    g2p::gather(chunk, select, frame, scheme, dt, fields, &mut Leavers::default(), next)
+}
 
 /// A small deterministic generator of numbers in [0, 1).
 struct Numbers(u64);
