@@ -102,7 +102,7 @@ fn run<const D: usize>(
 ) -> Result<Option<Figures>, RunError> {
     let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
     let options = Options { restart: None, speaks: false, threads: rayon::current_num_threads() };
-    let mut recorder = Recorder::open(comm, problem, &options, &solver)?;
+    let mut recorder = Recorder::open(comm, problem, &options, &mut solver)?;
     let warm_up = job.warm_up.next_multiple_of(extent.steps);
     let (mut busy, mut start) = (busy_seconds(), std::time::Instant::now());
     for step in 0..warm_up + extent.repeats * extent.steps {
