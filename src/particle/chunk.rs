@@ -323,12 +323,12 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
-    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the material has left.
+    /// Gives back room once more than an eighth of what is needed stands empty, as in leaves that the material leaves.
     fn give_back(&mut self) {
         if self.len == 0 {
             *self = Self::new();
-        } else if self.capacity > self.len + self.len / 4 + 4 * CAPACITY_STEP {
-            let mut smaller = Self::with_capacity(self.len + self.len / 16);
+        } else if self.capacity > self.len + self.len / 8 + 2 * CAPACITY_STEP {
+            let mut smaller = Self::with_capacity(self.len + self.len / 32 + CAPACITY_STEP);
             (smaller.len, smaller.widest) = (self.len, self.widest);
             for column in 0..Layout::<D>::REALS {
                 smaller.values_mut(column).copy_from_slice(self.column(column));

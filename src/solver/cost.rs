@@ -46,6 +46,8 @@ pub struct Costs {
     nanoseconds: Vec<AtomicU64>,
     /// Steps since the last agreement, the one under way included.
     steps: Range<u64>,
+    /// Whether particles are transferred for a step, not for a row of the history.
+    is_step: bool,
     /// Steps and seconds of node work up to the last agreement.
     agreed_step: u64,
     agreed_seconds: f64,
@@ -74,6 +76,12 @@ impl Costs {
         }
         let first = if self.steps.is_empty() { step } else { self.steps.start };
         self.steps = first..step + 1;
+        self.is_step = true;
+    }
+
+    /// Not collective. Particles have been transferred.
+    pub(super) fn end_step(&mut self) {
+        self.is_step = false;
     }
 
     /// Not collective. Forgets times that belong to other leaves.
@@ -84,7 +92,7 @@ impl Costs {
 
     /// Runs work on the particles of a leaf, on any thread.
     pub(super) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
-        if !is_measured(leaf, self.steps.end) {
+        if !self.is_step || !is_measured(leaf, self.steps.end) {
             return work();
         }
         let start = thread_time();

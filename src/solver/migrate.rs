@@ -12,7 +12,7 @@ use super::records::{append_all, push_record, record_words};
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
-use crate::kernel::g2p;
+use crate::kernel::leavers;
 use crate::kernel::simd::LANES;
 use crate::particle::chunk::{Chunk, Layout};
 
@@ -353,7 +353,7 @@ impl Rule {
 
 /// Particles that are not in a box, in order; one whose position is not a number is in none.
 fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64; D])) -> Vec<u32> {
-    let mut leavers = g2p::Leavers::default();
+    let mut leavers = leavers::Leavers::default();
     leavers.begin(bounds);
     let mut found = Vec::new();
     for first in (0..chunk.len()).step_by(LANES) {

@@ -229,6 +229,7 @@ impl<const D: usize> Solver<D> {
         self.form_increments();
         self.prolong();
         let departed = self.gather(dt);
+        self.costs.end_step();
         let moved = self.arrive(departed);
         let reach = self.local_reach();
 

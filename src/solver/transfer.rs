@@ -1,7 +1,7 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinLists, BinMissing, BoxWidths};
+use super::bins::{BinLists, BinMissing, BoxWidths, values};
 use super::contact::SUMS;
 use super::grid::Grid;
 use super::migrate::Departed;
@@ -17,7 +17,8 @@ use crate::grid::arena::ArenaMut;
 use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
 use crate::kernel::constrained::ConstrainedNodes;
-use crate::kernel::g2p::{Fields, Gathered, Leavers, Moments};
+use crate::kernel::g2p::{Fields, Gathered, Moments};
+use crate::kernel::leavers::Leavers;
 use crate::kernel::p2g::MomentSums;
 use crate::kernel::simd::{Lanes, prefetch};
 use crate::kernel::{
@@ -88,8 +89,20 @@ struct Widths<'a, const D: usize> {
 }
 
 impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
-    fn of_batch(&self, chunk: &Chunk<D>, first: usize, cell: f64) -> [Lanes; D] {
-        domain::full_half_widths_from(chunk, first, cell, &self.extent, &self.scheme)
+    fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D] {
+        domain::full_half_widths_of(chunk, particles, cell, &self.extent, &self.scheme)
+    }
+
+    fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes {
+        let half = || values(chunk, Layout::<D>::HALF, first);
+        match self.scheme.boxes {
+            BoxPolicy::Fixed => half(),
+            BoxPolicy::Volume { max_stretch, .. } => half() * max_stretch,
+            BoxPolicy::Cell => Lanes::new(std::array::from_fn(|lane| {
+                let level = chunk.tags().get(first + lane).map_or(0, |&tag| Tag::unpack(tag).level);
+                0.5 * self.scheme.root_cell / f64::from(1u32 << level)
+            })),
+        }
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
