@@ -101,12 +101,6 @@ pub struct Place {
 /// Capacities are multiples of this, so that a batch of lanes never reads past a column.
 const CAPACITY_STEP: usize = 8;
 
-/// The capacity of a chunk that has room for so many particles: an odd multiple of the step, since with powers of two
-/// all columns would share a few sets of the cache.
-fn rounded(capacity: usize) -> usize {
-    (capacity.div_ceil(CAPACITY_STEP) | 1) * CAPACITY_STEP
-}
-
 impl<const D: usize> Chunk<D> {
     /// An empty chunk.
     pub fn new() -> Self {
@@ -329,13 +323,12 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
-    /// Gives back room once a sixteenth of what is needed stands empty, as in leaves that the material leaves.
+    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the material has left.
     fn give_back(&mut self) {
-        let wanted = rounded(self.len + CAPACITY_STEP);
         if self.len == 0 {
             *self = Self::new();
-        } else if self.capacity > wanted + self.len / 16 {
-            let mut smaller = Self::with_capacity(wanted);
+        } else if self.capacity > self.len + self.len / 4 + 4 * CAPACITY_STEP {
+            let mut smaller = Self::with_capacity(self.len + self.len / 16);
             (smaller.len, smaller.widest) = (self.len, self.widest);
             for column in 0..Layout::<D>::REALS {
                 smaller.values_mut(column).copy_from_slice(self.column(column));
@@ -364,7 +357,8 @@ impl<const D: usize> Chunk<D> {
         if capacity <= self.capacity {
             return;
         }
-        let capacity = rounded(capacity);
+        // An odd multiple: with powers of two all columns would share a few sets of the cache.
+        let capacity = (capacity.div_ceil(CAPACITY_STEP) | 1) * CAPACITY_STEP;
         let mut lines = vec![Line::zeroed(); capacity / CAPACITY_STEP * Layout::<D>::REALS];
         let reals: &mut [f64] = cast_slice_mut(&mut lines);
         for column in 0..Layout::<D>::REALS {
@@ -382,7 +376,7 @@ impl<const D: usize> Chunk<D> {
     fn grow_for(&mut self, extra: usize) {
         let needed = self.len + extra;
         if needed > self.capacity {
-            self.reserve_exact(needed.max(self.capacity + CAPACITY_STEP));
+            self.reserve_exact(needed.max(self.capacity + self.capacity / 32 + CAPACITY_STEP));
         }
     }
 }
