@@ -1,6 +1,6 @@
 //! Settings of the system's allocator.
 //!
-//! The only calls outside of HDF5, MPI and SIMD that need `unsafe`.
+//! The only call outside of HDF5, MPI and SIMD that needs `unsafe`.
 #![allow(unsafe_code)]
 
 /// Blocks of at least this many bytes go back to the system as soon as they are freed: far above what steps allocate, and
@@ -17,15 +17,5 @@ pub fn return_large_blocks() {
         // SAFETY: no other thread allocates yet. Where the setting is refused, memory
         // is used as before.
         unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, RETURNED) };
-    }
-}
-
-/// Returns what is free inside the heap to the system. Takes milliseconds; to be called after work that has allocated much
-/// for a short time, as files do.
-pub fn return_free_pages() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    {
-        // SAFETY: the allocator takes its own locks; nothing that is in use moves.
-        unsafe { libc::malloc_trim(0) };
     }
 }

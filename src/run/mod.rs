@@ -21,7 +21,6 @@ use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
-use crate::memory::return_free_pages;
 use crate::solver::phases::Phase;
 use crate::solver::{Clock, Requests, Solver};
 
@@ -325,7 +324,6 @@ impl<'a, const D: usize> Run<'a, D> {
         let view = View { leaf_fields: &fields, ..view };
         self.outputs.write(self.comm, &view)?;
         self.output_step = step;
-        return_free_pages();
         self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(())
     }
@@ -347,7 +345,6 @@ impl<'a, const D: usize> Run<'a, D> {
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
         self.schedule.checkpoint_written(self.solver.clock.time);
-        return_free_pages();
         self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(path)
     }

@@ -9,7 +9,6 @@ use crate::io::history::{Column, History};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
-use crate::memory::return_free_pages;
 use crate::solver::Solver;
 use crate::solver::phases::Phase;
 use crate::solver::totals::{GridTotals, ParticleTotals};
@@ -204,8 +203,6 @@ impl Recorder {
             },
         );
         solver.phases.clear();
-        // Chunks that grow leave holes between the others.
-        return_free_pages();
         (self.since, self.since_step, self.since_traffic) = (Instant::now(), solver.clock.step, traffic);
         record
     }
