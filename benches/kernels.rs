@@ -4,6 +4,7 @@
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of their leaf's
 //! particles, whose stencils touch constrained nodes.
 use agimp::kernel::constrained::ConstrainedNodes;
+use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
 use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use agimp::material::{Material, Parameters, build};
@@ -116,6 +117,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
 fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
     let mut setting = Setting::<D>::new(model, distinct);
     let mut chunks = std::mem::take(&mut setting.chunks);
+    let mut leavers = Leavers::default();
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
@@ -128,6 +130,7 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
                 &scheme,
                 DT,
                 &fields,
+                &mut leavers,
                 Place::default(),
             ))
         })
@@ -180,6 +183,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
 fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
+    let mut leavers = Leavers::default();
     let (nodes, first) = (constrained(), vec![[Row::default(); 3]; arena_nodes(3)]);
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
@@ -194,6 +198,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
                 &scheme,
                 DT,
                 &fields,
+                &mut leavers,
                 Place::default(),
             ))
         })

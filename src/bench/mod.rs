@@ -56,14 +56,14 @@ pub struct Figures {
     pub core_share: f64,
 }
 
-/// Columns that a step reads and writes, each counted once per pass over the particles; P2G, G2P, the search for
-/// particles outside their leaf, and two bounds on half widths.
+/// Columns that a step reads and writes, each counted once per pass over the particles, of which there are two: P2G and
+/// G2P.
 fn bytes_per_step(dimension: usize, plastic: bool) -> f64 {
     let columns = match (dimension, plastic) {
-        (2, false) => 15 + 7 + 16 + 2 + 2,
-        (2, true) => 18 + 10 + 19 + 2 + 2,
-        (_, false) => 26 + 10 + 27 + 3 + 2,
-        (_, true) => 30 + 13 + 30 + 3 + 2,
+        (2, false) => 15 + 7 + 16,
+        (2, true) => 18 + 10 + 19,
+        (_, false) => 26 + 10 + 27,
+        (_, true) => 30 + 13 + 30,
     };
     // And the tags, twice.
     f64::from(8 * (columns + 2))
@@ -102,7 +102,7 @@ fn run<const D: usize>(
 ) -> Result<Option<Figures>, RunError> {
     let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
     let options = Options { restart: None, speaks: false, threads: rayon::current_num_threads() };
-    let mut recorder = Recorder::open(comm, problem, &options, &solver)?;
+    let mut recorder = Recorder::open(comm, problem, &options, &mut solver)?;
     let warm_up = job.warm_up.next_multiple_of(extent.steps);
     let (mut busy, mut start) = (busy_seconds(), std::time::Instant::now());
     for step in 0..warm_up + extent.repeats * extent.steps {

@@ -142,7 +142,8 @@ pub struct Record {
     pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
     pub memory: Spread,
-    /// Relative difference between the mass on the real nodes and that of the particles.
+    /// Relative difference between the mass on the real nodes and that of the particles in the last step, or in the
+    /// state itself before the first and at the end.
     pub mass_error: f64,
     /// Dynamic refinement, in jobs that have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]

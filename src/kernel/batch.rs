@@ -94,11 +94,15 @@ impl Iterator for Batches<'_> {
 }
 
 impl Batch {
-    /// Particles of a chunk from `first` on, as many as there are.
+    /// Up to [`LANES`] particles, at least one, lane by lane.
     #[inline(always)]
-    pub fn from_chunk<const D: usize>(chunk: &Chunk<D>, first: usize) -> Self {
-        let batches = Batches { taken: first, ..Batches::new(Select::All, chunk, Place::default()) };
-        batches.whole()
+    pub fn of_particles(list: &[u32]) -> Self {
+        match list.first_chunk() {
+            Some(next) if next[LANES - 1] == next[0] + LANES as u32 - 1 => {
+                Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() }
+            }
+            _ => Self::from_indices(list, |&p| p),
+        }
     }
 
     /// The first particles of a list, and their number. Where at least half of the next [`LANES`] particles of the chunk
@@ -153,6 +157,12 @@ impl Batch {
             left &= left.wrapping_sub(1);
             (lane < LANES).then_some(lane)
         })
+    }
+
+    /// Which of some lanes, a bit each, are members.
+    #[inline(always)]
+    pub fn members_among(&self, lanes: u32) -> u32 {
+        self.lanes & lanes
     }
 
     /// `values` of members, 0 elsewhere.

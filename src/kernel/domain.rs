@@ -40,16 +40,16 @@ pub fn full_half_widths<const D: usize>(
     collect(chunk, select, cell, f64::INFINITY, extent, scheme, out);
 }
 
-/// [`full_half_widths`] of [`LANES`] particles from `first` on; lanes behind the last particle hold anything.
-pub fn full_half_widths_from<const D: usize>(
+/// [`full_half_widths`] of up to [`LANES`] particles, at least one; lanes behind the last hold anything.
+pub fn full_half_widths_of<const D: usize>(
     chunk: &Chunk<D>,
-    first: usize,
+    particles: &[u32],
     cell: f64,
     extent: &[f64; D],
     scheme: &Scheme,
 ) -> [Lanes; D] {
     let (reals, stride) = chunk.reals();
-    let batch = Batch::from_chunk(chunk, first);
+    let batch = Batch::of_particles(particles);
     let position = batch.positions(reals, stride);
     of_batch(reals, stride, chunk.tags(), &batch, &position, cell, f64::INFINITY, extent, scheme)
 }

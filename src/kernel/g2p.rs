@@ -9,6 +9,7 @@
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches};
 use super::constrained::ConstrainedNodes;
+use super::leavers::Leavers;
 use super::simd::{F64x4, LANES, Lanes};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
@@ -77,8 +78,8 @@ impl<const D: usize> Gathered<D> {
 }
 
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `next` is the place of the chunk
-/// that will be read after this one.
+/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `leavers` notes those that leave its
+/// box; `next` is the place of the chunk that will be read after this one.
 pub fn gather<const D: usize>(
     chunk: &mut Chunk<D>,
     select: Select,
@@ -86,6 +87,7 @@ pub fn gather<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     fields: &Fields<D>,
+    leavers: &mut Leavers<D>,
     next: Place,
 ) -> f64 {
     let batches = Batches::new(select, chunk, next);
@@ -100,7 +102,7 @@ pub fn gather<const D: usize>(
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
         sums.gather(&mut weights, &batch, fields);
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
     }
     largest(greatest)
 }
@@ -136,6 +138,7 @@ pub fn advance_gathered<const D: usize>(
     gathered: &[Gathered<D>],
     scheme: &Scheme,
     dt: f64,
+    leavers: &mut Leavers<D>,
 ) -> f64 {
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
     let mut sums = Sums::new();
@@ -146,7 +149,7 @@ pub fn advance_gathered<const D: usize>(
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
     }
     largest(greatest)
 }
@@ -309,6 +312,7 @@ fn advance<const D: usize>(
     sums: &Sums<D>,
     scheme: &Scheme,
     dt: f64,
+    leavers: &mut Leavers<D>,
 ) -> Lanes {
     let zero = Lanes::splat(0.0);
     let step = Lanes::splat(dt);
@@ -322,9 +326,10 @@ fn advance<const D: usize>(
         }
     }
     let increment = if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
+    let mut moved = *position;
     for i in 0..D {
-        let moved = velocity[i].mul_add(step, position[i]);
-        batch.store(reals, stride, Layout::<D>::POSITION + i, moved);
+        moved[i] = velocity[i].mul_add(step, position[i]);
+        batch.store(reals, stride, Layout::<D>::POSITION + i, moved[i]);
         let new = match scheme.transfer {
             Transfer::Apic | Transfer::Tpic => velocity[i],
             Transfer::Flip { blend } => {
@@ -336,6 +341,7 @@ fn advance<const D: usize>(
         batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
         square = new.mul_add(new, square);
     }
+    leavers.look(batch, &moved);
     for k in 0..D {
         let affine = Lanes::columns(sums.affine[k]);
         for i in 0..D {

@@ -12,6 +12,7 @@ mod batch;
 pub mod constrained;
 pub mod domain;
 pub mod g2p;
+pub mod leavers;
 pub mod math;
 pub mod p2g;
 pub mod simd;

@@ -8,6 +8,8 @@
 //! no digits.
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
+use super::widest::{Widest, greatest};
+
 /// Column numbers of the real-valued components of a particle in `D` dimensions.
 ///
 /// In plane strain (`D == 2`) symmetric tensors keep their out-of-plane `zz` component, so they
@@ -81,6 +83,7 @@ pub struct Chunk<const D: usize> {
     lines: Vec<Line>,
     ids: Vec<u64>,
     tags: Vec<u64>,
+    widest: Widest,
 }
 
 /// Where the columns of a chunk lie in memory: from the chunk that comes next, kernels fetch the first lines while they
@@ -101,7 +104,7 @@ const CAPACITY_STEP: usize = 8;
 impl<const D: usize> Chunk<D> {
     /// An empty chunk.
     pub fn new() -> Self {
-        Self { len: 0, capacity: 0, lines: Vec::new(), ids: Vec::new(), tags: Vec::new() }
+        Self::default()
     }
 
     /// An empty chunk with room for `capacity` particles.
@@ -138,6 +141,13 @@ impl<const D: usize> Chunk<D> {
 
     /// Column `column`, mutable.
     pub fn column_mut(&mut self, column: usize) -> &mut [f64] {
+        if column == Layout::<D>::HALF {
+            self.widest = Widest::UNKNOWN;
+        }
+        self.values_mut(column)
+    }
+
+    fn values_mut(&mut self, column: usize) -> &mut [f64] {
         let start = column * self.capacity;
         &mut cast_slice_mut(&mut self.lines)[start..][..self.len]
     }
@@ -149,11 +159,12 @@ impl<const D: usize> Chunk<D> {
 
     /// All columns at once, mutable.
     pub fn reals_mut(&mut self) -> (&mut [f64], usize) {
+        self.widest = Widest::UNKNOWN;
         (cast_slice_mut(&mut self.lines), self.capacity)
     }
 
-    /// Real columns (with their stride) and tags at once, for kernels that write the former and read
-    /// the latter.
+    /// Real columns (with their stride) and tags at once, for kernels that write the former, undeformed half widths
+    /// excepted, and read the latter.
     pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
         (cast_slice_mut(&mut self.lines), self.capacity, &self.tags[..self.len])
     }
@@ -187,6 +198,18 @@ impl<const D: usize> Chunk<D> {
         &mut self.tags[..self.len]
     }
 
+    /// Greatest undeformed half width, m; 0 without particles.
+    pub fn greatest_half(&self) -> f64 {
+        self.widest.known().unwrap_or_else(|| greatest(self.column(Layout::<D>::HALF)))
+    }
+
+    /// Finds the greatest half width if something may have changed it, for [`Chunk::greatest_half`] to have it at hand.
+    pub fn note_greatest_half(&mut self) {
+        if self.widest.known().is_none() {
+            self.widest = Widest::of(self.column(Layout::<D>::HALF));
+        }
+    }
+
     /// Position of particle `p` relative to the domain's lower corner, m.
     pub fn position(&self, p: usize) -> [f64; D] {
         let (reals, stride) = self.reals();
@@ -203,6 +226,19 @@ impl<const D: usize> Chunk<D> {
         self.ids[p] = id;
         self.tags[p] = tag.pack();
         p
+    }
+
+    /// Appends a particle given by the words of its columns, with its identifier and packed tag.
+    pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64) {
+        self.grow_for(1);
+        let (p, stride) = (self.len, self.capacity);
+        self.len += 1;
+        let reals: &mut [f64] = cast_slice_mut(&mut self.lines);
+        for (column, &word) in columns[..Layout::<D>::REALS].iter().enumerate() {
+            reals[column * stride + p] = f64::from_bits(word);
+        }
+        (self.ids[p], self.tags[p]) = (id, tag);
+        self.widest.add(f64::from_bits(columns[Layout::<D>::HALF]));
     }
 
     /// Appends particle `p` of `source`.
@@ -271,8 +307,12 @@ impl<const D: usize> Chunk<D> {
         let fillers = (len as u32..self.len as u32).filter(|&p| leaving.next_if_eq(&p).is_none());
         let moves: Vec<(usize, usize)> =
             gaps.zip(fillers).map(|(to, from)| (to as usize, from as usize)).collect();
+        let mut widest = self.widest;
+        let halves = self.column(Layout::<D>::HALF);
+        gone.iter().for_each(|&p| widest.remove(halves[p as usize]));
+        self.widest = widest;
         for column in 0..Layout::<D>::REALS {
-            let values = self.column_mut(column);
+            let values = self.values_mut(column);
             moves.iter().for_each(|&(to, from)| values[to] = values[from]);
         }
         for (to, from) in moves {
@@ -289,9 +329,9 @@ impl<const D: usize> Chunk<D> {
             *self = Self::new();
         } else if self.capacity > self.len + self.len / 4 + 4 * CAPACITY_STEP {
             let mut smaller = Self::with_capacity(self.len + self.len / 16);
-            smaller.len = self.len;
+            (smaller.len, smaller.widest) = (self.len, self.widest);
             for column in 0..Layout::<D>::REALS {
-                smaller.column_mut(column).copy_from_slice(self.column(column));
+                smaller.values_mut(column).copy_from_slice(self.column(column));
             }
             smaller.ids_mut().copy_from_slice(self.ids());
             smaller.tags_mut().copy_from_slice(self.tags());

@@ -2,5 +2,6 @@
 pub mod chunk;
 pub mod resample;
 pub mod seed;
+mod widest;
 
 pub use chunk::{Chunk, Layout};

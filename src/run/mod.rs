@@ -191,11 +191,11 @@ impl<'a, const D: usize> Run<'a, D> {
         comm: &'a Comm,
         problem: &'a Problem<D>,
         options: &Options,
-        solver: Solver<D>,
+        mut solver: Solver<D>,
         outputs: Outputs,
         output_step: Option<u64>,
     ) -> Result<Self, RunError> {
-        let mut recorder = Recorder::open(comm, problem, options, &solver)?;
+        let mut recorder = Recorder::open(comm, problem, options, &mut solver)?;
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
         recorder.message(&format!(
             "{}: {} ranks x {} threads on {cores} cores, {} leaves",

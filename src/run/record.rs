@@ -4,13 +4,14 @@ use std::time::Instant;
 use partition::comm::{Comm, Traffic};
 
 use super::{Options, RunError, history};
+use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, History};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::solver::Solver;
 use crate::solver::phases::Phase;
-use crate::solver::resample::BooksTotal;
+use crate::solver::totals::{GridTotals, ParticleTotals};
 
 /// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {
@@ -32,7 +33,7 @@ impl Recorder {
         comm: &Comm,
         problem: &Problem<D>,
         options: &Options,
-        solver: &Solver<D>,
+        solver: &mut Solver<D>,
     ) -> Result<Self, RunError> {
         let step = solver.clock.step;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
@@ -48,7 +49,7 @@ impl Recorder {
         };
         let (history, telemetry) = comm.agree(files)?.unzip();
         let time = solver.clock.time;
-        Ok(Self {
+        let recorder = Self {
             history,
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
@@ -58,7 +59,16 @@ impl Recorder {
             since: Instant::now(),
             since_step: step,
             since_traffic: solver.traffic(),
-        })
+        };
+        recorder.prepare(solver);
+        Ok(recorder)
+    }
+
+    /// Not collective. Has the next step note what its record needs.
+    fn prepare<const D: usize>(&self, solver: &mut Solver<D>) {
+        if (solver.clock.step + 1).is_multiple_of(self.telemetry_every) {
+            solver.weigh_next_step();
+        }
     }
 
     /// Collective. After a step: what is due by step number.
@@ -73,6 +83,7 @@ impl Recorder {
         if row || record {
             self.write(comm, solver, row, record)?;
         }
+        self.prepare(solver);
         self.progress.step(step, solver.clock.time, solver.clock.dt);
         Ok(())
     }
@@ -85,39 +96,23 @@ impl Recorder {
         row: bool,
         record: bool,
     ) -> Result<(), RunError> {
-        let clock = solver.clock;
         // What this takes counts as output, not as steps.
         let start = Instant::now();
-        let (phases, before) = (solver.phases, solver.traffic());
-        let grid = solver.grid_totals();
-        solver.phases = phases;
-        let after = solver.traffic();
-        self.since_traffic.messages += after.messages - before.messages;
-        self.since_traffic.bytes += after.bytes - before.bytes;
-        let grid = comm.agree(grid)?;
-        let particles = solver.particle_totals();
-        let reactions = solver.reactions();
-        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
-        solver.phases.book(Phase::Output, start.elapsed());
+        let mut mass_error = solver.weighed_mass_error();
         let mut written = Ok(());
-        if row && let Some(history) = &mut self.history {
-            let mut values = history::row(clock.time, clock.dt, &particles, &grid);
-            if let Some(books) = &books {
-                values.extend(history::book_values(books));
+        if row || mass_error.is_none() {
+            let phases = solver.phases;
+            let totals = self.totals(comm, solver);
+            solver.phases = phases;
+            let (grid, particles) = totals?;
+            mass_error.get_or_insert((grid.mass - particles.mass) / particles.mass);
+            if row {
+                written = self.row(comm, solver, &particles, &grid);
             }
-            let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
-            for ((collider, state), reaction) in all {
-                values.extend(history::collider_values(collider, state, reaction, &self.origin));
-            }
-            written = history.row(clock.step, &values);
         }
-        if row {
-            // Where the row of this step has been written already, there is nothing to forget.
-            solver.forget_reactions();
-        }
+        solver.phases.book(Phase::Output, start.elapsed());
         if record {
-            let mass_error = (grid.mass - particles.mass) / particles.mass;
-            let record = self.record(comm, solver, mass_error, books);
+            let record = self.record(comm, solver, mass_error.unwrap_or_default());
             self.progress.record(&record);
             if let Some(telemetry) = &mut self.telemetry {
                 written = written.and_then(|()| telemetry.write(&record));
@@ -127,14 +122,52 @@ impl Recorder {
         Ok(())
     }
 
-    /// Collective. Speed, traffic and memory since the last record.
-    fn record<const D: usize>(
+    /// Collective. Sums over nodes and particles of the current state.
+    fn totals<const D: usize>(
         &mut self,
         comm: &Comm,
         solver: &mut Solver<D>,
-        mass_error: f64,
-        books: Option<BooksTotal>,
-    ) -> Record {
+    ) -> Result<(GridTotals, ParticleTotals), RunError> {
+        let before = solver.traffic();
+        let grid = solver.grid_totals();
+        let after = solver.traffic();
+        self.since_traffic.messages += after.messages - before.messages;
+        self.since_traffic.bytes += after.bytes - before.bytes;
+        let grid = comm.agree(grid)?;
+        Ok((grid, solver.particle_totals()))
+    }
+
+    /// Collective. Writes a row of the history.
+    fn row<const D: usize>(
+        &mut self,
+        comm: &Comm,
+        solver: &mut Solver<D>,
+        particles: &ParticleTotals,
+        grid: &GridTotals,
+    ) -> Result<(), FileError> {
+        let clock = solver.clock;
+        let reactions = solver.reactions();
+        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
+        let mut written = Ok(());
+        if let Some(history) = &mut self.history {
+            let mut values = history::row(clock.time, clock.dt, particles, grid);
+            if let Some(books) = &books {
+                values.extend(history::book_values(books));
+            }
+            let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
+            for ((collider, state), reaction) in all {
+                values.extend(history::collider_values(collider, state, reaction, &self.origin));
+            }
+            written = history.row(clock.step, &values);
+        }
+        // Where the row of this step has been written already, there is nothing to forget.
+        solver.forget_reactions();
+        written
+    }
+
+    /// Collective. Speed, traffic and memory since the last record.
+    fn record<const D: usize>(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
+        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
         let phases: Vec<(&'static str, f64)> =
             Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
         let traffic = solver.traffic();

@@ -2,7 +2,8 @@
 //!
 //! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
 //! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
-//! beside finer leaves, or where boxes are wider than a cell, each box is held against the leaves around.
+//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are held against the finer
+//! leaves around.
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
 use rayon::prelude::*;
@@ -30,7 +31,9 @@ pub struct LeafBins<const D: usize> {
     pub members: Vec<Members<D>>,
     /// Particles whose box is cut, in order; a part's slot points here.
     pub cut: Vec<u32>,
-    near: Vec<NearLeaf<D>>,
+    /// Finer leaves around.
+    finer: Vec<NearLeaf<D>>,
+    /// Beside finer leaves.
     sides: Option<Sides<D>>,
 }
 
@@ -40,6 +43,37 @@ pub struct BinLists<const D: usize> {
     leaves: Vec<LeafBins<D>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
+}
+
+/// In place of a bin: the box is in none as a whole.
+const CUT: u32 = u32::MAX;
+
+/// Memory that a thread reuses from leaf to leaf.
+#[derive(Debug, Default)]
+struct Scratch {
+    /// Per particle, its bin.
+    bins: Vec<u32>,
+    /// Particles whose bin may be another than the leaf's own.
+    undecided: Vec<u32>,
+}
+
+impl Scratch {
+    /// Puts all particles of a chunk into the leaf's own bin; `undecided` gives the lanes that may belong elsewhere, of the
+    /// batch from some particle on.
+    #[inline(always)]
+    fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, undecided: impl Fn(usize) -> u32) {
+        self.bins.clear();
+        self.bins.resize(chunk.len(), 0);
+        self.undecided.clear();
+        for first in (0..chunk.len()).step_by(LANES) {
+            let lanes = LANES.min(chunk.len() - first);
+            let mut left = undecided(first) & ((1 << lanes) - 1);
+            while left != 0 {
+                self.undecided.push(first as u32 + left.trailing_zeros());
+                left &= left - 1;
+            }
+        }
+    }
 }
 
 /// A part of a box falls outside the bins of its leaf.
@@ -52,9 +86,11 @@ pub struct BinMissing {
 
 /// Half widths of the boxes of a chunk, and their bound.
 pub trait BoxWidths<const D: usize>: Sync {
-    /// Half widths of the boxes of [`LANES`] particles from `first` on in a leaf with cells of edge `cell`, m; lanes behind
-    /// the last particle are of no use.
-    fn of_batch(&self, chunk: &Chunk<D>, first: usize, cell: f64) -> [Lanes; D];
+    /// Half widths of the boxes of up to [`LANES`] particles in a leaf with cells of edge `cell`, m; lanes behind the last
+    /// are of no use.
+    fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D];
+    /// Bounds on the half widths of [`LANES`] particles from `first` on, m; lanes behind the last particle are of no use.
+    fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes;
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
     /// Whether the kernels find the same half widths from the particles' state. If not, every box is
@@ -87,13 +123,14 @@ impl<const D: usize> BinLists<D> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
         let given = !widths.are_known_to_kernels();
         // All leaves, also after a failure: the others must not keep the lists of the step before.
-        let sorted = leaves.with_min_len(8).map(|(leaf, ((bins, sorted), own))| {
-            let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
-            let bound = widths.bound(chunk);
-            // An empty leaf has nothing to list.
-            *sorted = !chunk.is_empty() && (given || bins.sides.is_some() || bound > 0.5 * cell);
-            if *sorted { bins.sort(plan, leaf, own, chunk, widths, bound) } else { Ok(()) }
-        });
+        let sorted =
+            leaves.with_min_len(8).map_init(Scratch::default, |scratch, (leaf, ((bins, sorted), own))| {
+                let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
+                let bound = widths.bound(chunk);
+                // An empty leaf has nothing to list.
+                *sorted = !chunk.is_empty() && (given || bins.sides.is_some() || bound > 0.5 * cell);
+                if *sorted { bins.sort(plan, leaf, own, chunk, widths, scratch) } else { Ok(()) }
+            });
         sorted.reduce(|| Ok(()), Result::and)
     }
 
@@ -135,11 +172,9 @@ impl<const D: usize> BinLists<D> {
 
     /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
     pub fn is_finer_within(&self, leaf: usize, x: &[f64; D], distance: f64) -> bool {
-        let own = self.bounds[leaf].level;
         self.leaves[leaf]
-            .near
+            .finer
             .iter()
-            .filter(|near| near.level > own)
             .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
     }
 
@@ -158,21 +193,15 @@ impl<const D: usize> LeafBins<D> {
     fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
-        let around = leaves_around(tree, known);
-        let members = vec![Members::default(); bins];
-        let mut leaf = Self { members, cut: Vec::new(), near: Vec::new(), sides: None };
-        // All others need it only if boxes get wider than a cell.
-        if around.iter().any(|&leaf| tree.leaves()[leaf].level > here.level) {
-            leaf.find_near(plan, around);
+        let around =
+            leaves_around(tree, known).into_iter().filter(|&leaf| tree.leaves()[leaf].level > here.level);
+        let finer: Vec<NearLeaf<D>> = around.map(|leaf| near_leaf(tree, leaf, plan.root_edge)).collect();
+        let sides = (!finer.is_empty()).then(|| {
             let bins = &plan.bins[plan.leaf_bins(known - tree.first_own())];
             let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
-            leaf.sides = Some(Sides::new(own, here, cell, &leaf.near, bins));
-        }
-        leaf
-    }
-
-    fn find_near(&mut self, plan: &GridPlan<D>, around: Vec<usize>) {
-        self.near = around.into_iter().map(|leaf| near_leaf(&plan.tree, leaf, plan.root_edge)).collect();
+            Sides::new(own, here, cell, &finer, bins)
+        });
+        Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, sides }
     }
 
     fn sort(
@@ -182,58 +211,50 @@ impl<const D: usize> LeafBins<D> {
         own: &NearLeaf<D>,
         chunk: &Chunk<D>,
         widths: &impl BoxWidths<D>,
-        bound: f64,
+        scratch: &mut Scratch,
     ) -> Result<(), BinMissing> {
-        if self.near.is_empty() {
-            self.find_near(plan, leaves_around(&plan.tree, plan.tree.first_own() + leaf));
-        }
         self.cut.clear();
         self.members.iter_mut().for_each(Members::clear);
         let crowded = chunk.len() >= crowded(D);
-        let cells = [plan.cell(own.level), plan.cell(own.level + 1)];
+        let own_cell = plan.cell(own.level);
         let given = !widths.are_known_to_kernels();
-        let sides = self.sides.clone().filter(|_| !given);
-        // Of most batches it is known without their half widths that they stay inside.
-        let bound_is_narrow = is_narrow([bound], cells[0]);
-        let bound = [Lanes::splat(bound); D];
-        for first in (0..chunk.len()).step_by(LANES) {
-            let lanes = LANES.min(chunk.len() - first);
-            let position = positions(chunk, first);
-            let all = first as u32..(first + lanes) as u32;
-            if let Some(sides) = &sides
-                && crowded
-                && bound_is_narrow
-                && sides.side(sides.crossings(&position, &bound).of_any()) == Side::Own
-            {
-                self.members[0].whole.extend(all);
-                continue;
+        let sides = if given { None } else { self.sides.take() };
+        // Of most boxes it is known without their half widths that they are whole and stay inside.
+        let limit = Lanes::splat(narrow_limit(own_cell));
+        scratch.begin(chunk, |first| {
+            if given || !crowded {
+                return !0;
             }
-            let half = widths.of_batch(chunk, first, cells[0]);
-            let crossings = sides.as_ref().map(|sides| sides.crossings(&position, &half));
-            let narrow = cells.map(|cell| narrow_lanes(&half, cell));
-            let (position, half) = (position.map(Lanes::to_array), half.map(Lanes::to_array));
-            for (lane, p) in all.enumerate() {
-                let centre = std::array::from_fn(|axis| position[axis][lane]);
-                let half = std::array::from_fn(|axis| half[axis][lane]);
-                let side = sides.as_ref().zip(crossings).map(|(sides, crossings)| {
-                    let bin = match sides.side(crossings.of_lane(lane)) {
-                        Side::Own if narrow[0] >> lane & 1 == 1 => Some(0),
-                        Side::Finer if narrow[1] >> lane & 1 == 1 => sides.child_bin(&centre),
-                        Side::Own | Side::Finer | Side::Other => None,
-                    };
-                    bin.zip(Some(cells[usize::from(bin != Some(0))]))
-                });
-                if let Some(Some((bin, cell))) = side {
-                    let members = &mut self.members[bin];
-                    members.whole.push(p);
-                    if bin != 0 || !crowded {
-                        members.include(cell, centre, half);
+            let half = widths.bounds(chunk, first);
+            let elsewhere = sides.as_ref().map_or(0, |sides| {
+                sides.undecided(half, |axis| values(chunk, Layout::<D>::POSITION + axis, first))
+            });
+            elsewhere | (!half.le(limit)).bits()
+        });
+        let mut sorted = Ok(());
+        for particles in scratch.undecided.chunks(LANES) {
+            let half = widths.of_batch(chunk, particles, own_cell).map(Lanes::to_array);
+            for (lane, &p) in particles.iter().enumerate() {
+                let (centre, half) = (chunk.position(p as usize), half.map(|half| half[lane]));
+                let bin = self.sort_one(plan, leaf, own, sides.as_ref(), p, centre, half, given);
+                match bin {
+                    // The window of a crowded leaf's own bin is known.
+                    Ok(bin) if bin == CUT || bin == 0 && crowded => scratch.bins[p as usize] = bin,
+                    Ok(bin) => {
+                        scratch.bins[p as usize] = bin;
+                        let cell = plan.cell(plan.bins[plan.leaf_bins(leaf)][bin as usize].block.level);
+                        self.members[bin as usize].include(cell, centre, half);
                     }
-                } else {
-                    let sorted = self.sort_one(plan, leaf, own, p, centre, half, given);
-                    sorted.map_err(|()| BinMissing { id: chunk.ids()[p as usize] })?;
+                    Err(()) => {
+                        scratch.bins[p as usize] = CUT;
+                        sorted = sorted.and(Err(BinMissing { id: chunk.ids()[p as usize] }));
+                    }
                 }
             }
+        }
+        self.list(&scratch.bins);
+        if sides.is_some() {
+            self.sides = sides;
         }
         for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
             members.close(plan, bin);
@@ -241,34 +262,53 @@ impl<const D: usize> LeafBins<D> {
         if crowded {
             self.members[0].window = Window::FULL;
         }
-        Ok(())
+        sorted
     }
 
-    /// Sorts one box, held against all leaves around.
+    /// Makes the lists of whole boxes from the bin of each particle.
+    fn list(&mut self, bins: &[u32]) {
+        for (batch, bins) in bins.chunks(LANES).enumerate() {
+            let first = (batch * LANES) as u32;
+            if bins.iter().all(|&bin| bin == 0) {
+                self.members[0].whole.extend(first..first + bins.len() as u32);
+                continue;
+            }
+            for (p, &bin) in (first..).zip(bins).filter(|(_, bin)| **bin != CUT) {
+                self.members[bin as usize].whole.push(p);
+            }
+        }
+    }
+
+    /// Finds the bin of one box, or cuts it.
     fn sort_one(
         &mut self,
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
+        sides: Option<&Sides<D>>,
         particle: u32,
         centre: [f64; D],
         half: [f64; D],
         given: bool,
-    ) -> Result<(), ()> {
-        let level = self.finest_level(own, centre, half);
-        let cell = plan.cell(level);
-        if !given && is_narrow(half, cell) {
+    ) -> Result<u32, ()> {
+        // What lies across the faces is known as far as boxes up to a cell wide can reach.
+        let sides = sides.filter(|_| is_narrow(half, plan.cell(own.level)));
+        let level = self.finest_level(own, sides, centre, half);
+        if !given && is_narrow(half, plan.cell(level)) {
+            let child = || sides.filter(|_| level == own.level + 1)?.child_bin(&centre);
             // The first bin of a leaf is its own block's.
-            let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
-            let members = &mut self.members[bin.ok_or(())?];
-            members.whole.push(particle);
-            members.include(cell, centre, half);
-            return Ok(());
+            let bin = if level == own.level {
+                Some(0)
+            } else {
+                child().or_else(|| self.bin(plan, leaf, level, centre))
+            };
+            return bin.map(|bin| bin as u32).ok_or(());
         }
         let slot = self.cut.len() as u32;
         self.cut.push(particle);
         let (fraction, spread) = (1.0, [0.0; D]);
-        self.cut_box(plan, leaf, own, SubBox { particle, slot, centre, half, fraction, spread })
+        self.cut_box(plan, leaf, own, sides, SubBox { particle, slot, centre, half, fraction, spread })?;
+        Ok(CUT)
     }
 
     /// Halves a box along the axes on which it is too wide, until each part fits the level it overlaps.
@@ -277,9 +317,10 @@ impl<const D: usize> LeafBins<D> {
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
+        sides: Option<&Sides<D>>,
         part: SubBox<D>,
     ) -> Result<(), ()> {
-        let level = self.finest_level(own, part.centre, part.half);
+        let level = self.finest_level(own, sides, part.centre, part.half);
         let cell = plan.cell(level);
         let wide: [bool; D] = std::array::from_fn(|axis| !is_narrow([part.half[axis]], cell));
         let count = wide.iter().filter(|&&wide| wide).count();
@@ -297,21 +338,33 @@ impl<const D: usize> LeafBins<D> {
                 (true, _) => part.centre[axis] + half[axis],
             });
             let fraction = part.fraction / f64::from(1u32 << count);
-            self.cut_box(plan, leaf, own, SubBox { centre, half, fraction, ..part })?;
+            self.cut_box(plan, leaf, own, sides, SubBox { centre, half, fraction, ..part })?;
         }
         Ok(())
     }
 
     /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
-    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
-    fn finest_level(&self, own: &NearLeaf<D>, centre: [f64; D], half: [f64; D]) -> u8 {
+    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves. `sides` are those
+    /// of the leaf, for boxes at most a cell wide.
+    fn finest_level(
+        &self,
+        own: &NearLeaf<D>,
+        sides: Option<&Sides<D>>,
+        centre: [f64; D],
+        half: [f64; D],
+    ) -> u8 {
+        match sides.map(|sides| sides.side(sides.faces(&centre, &half))) {
+            Some(Side::Own) => return own.level,
+            Some(Side::Finer) => return own.level + 1,
+            Some(Side::Other) | None => {}
+        }
         let slack = own.slack();
         let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis] - slack[axis]);
         let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis] + slack[axis]);
         if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
             return own.level;
         }
-        self.near
+        self.finer
             .iter()
             .filter(|leaf| (0..D).all(|axis| lo[axis] < leaf.upper[axis] && hi[axis] > leaf.lower[axis]))
             .map(|leaf| leaf.level)
@@ -341,33 +394,26 @@ impl<const D: usize> LeafBins<D> {
     }
 }
 
-/// Positions of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
-fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
+/// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
+#[inline(always)]
+pub(super) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
     let (reals, stride) = chunk.reals();
-    std::array::from_fn(|axis| {
-        let column = &reals[(Layout::<D>::POSITION + axis) * stride + first..];
-        column.first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load)
-    })
+    reals[column * stride + first..].first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load)
 }
 
-/// Lanes of which [`is_narrow`] holds.
-fn narrow_lanes<const D: usize>(half: &[Lanes; D], cell: f64) -> u32 {
-    let limit = Lanes::splat(0.5 * cell * (1.0 + 8.0 * f64::EPSILON));
-    half.iter().fold(!0, |lanes, half| lanes & half.le(limit).bits())
+/// Positions, as [`values`] gives them.
+pub(super) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
+    std::array::from_fn(|axis| values(chunk, Layout::<D>::POSITION + axis, first))
 }
 
 /// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not
 /// cut a box that is exactly one cell wide; the kernel takes such a box as one cell wide, which is no more
 /// than a few units of the last place.
 fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
-    half.iter().all(|&half| half <= 0.5 * cell * (1.0 + 8.0 * f64::EPSILON))
+    half.iter().all(|&half| half <= narrow_limit(cell))
 }
 
-/// Greatest half width without deformation in a chunk, m.
-pub fn greatest_half<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    let batches = chunk.column(Layout::<D>::HALF).chunks_exact(LANES);
-    let rest = batches.remainder().iter().copied().fold(0.0, f64::max);
-    let lanes = batches.filter_map(<[f64]>::first_chunk);
-    let lanes = lanes.fold(Lanes::splat(rest), |most, batch| Lanes::load(batch).max(most));
-    lanes.to_array().into_iter().fold(0.0, f64::max)
+/// Half width of the widest boxes that fit into the stencil of cells of edge `cell`, see [`is_narrow`].
+fn narrow_limit(cell: f64) -> f64 {
+    0.5 * cell * (1.0 + 8.0 * f64::EPSILON)
 }

@@ -1,9 +1,10 @@
 //! What leaves cost: integers from measured time, the same on all ranks.
 //!
-//! In some steps the time of scatter and gather is taken leaf by leaf. It is shared out to classes: the material of the
+//! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the material of the
 //! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class. Steps
 //! in which nodes are summed and updated give the cost of a leaf. Costs steer the partition, which changes no bit
 //! of the state.
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Solver;
@@ -11,8 +12,9 @@ use super::phases::{Phase, thread_time};
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 
-/// Time is taken in one of so many steps.
-const MEASURE_EVERY: u64 = 4;
+/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
+/// processor time takes as long as several particles.
+const MEASURE_EVERY: u64 = 32;
 /// Cost of a leaf with particles before anything is measured, in particles.
 const LEAF_COST: u64 = 8;
 /// Unit of measured costs, s.
@@ -42,8 +44,10 @@ pub struct Costs {
     leaf: u64,
     /// Measured nanoseconds per own leaf.
     nanoseconds: Vec<AtomicU64>,
-    measuring: bool,
-    measured_steps: u64,
+    /// Steps since the last agreement, the one under way included.
+    steps: Range<u64>,
+    /// Whether particles are transferred for a step, not for a row of the history.
+    is_step: bool,
     /// Steps and seconds of node work up to the last agreement.
     agreed_step: u64,
     agreed_seconds: f64,
@@ -70,19 +74,25 @@ impl Costs {
         if self.nanoseconds.len() != leaves {
             self.forget(leaves);
         }
-        self.measuring = step % MEASURE_EVERY == MEASURE_EVERY - 1;
-        self.measured_steps += u64::from(self.measuring);
+        let first = if self.steps.is_empty() { step } else { self.steps.start };
+        self.steps = first..step + 1;
+        self.is_step = true;
+    }
+
+    /// Not collective. Particles have been transferred.
+    pub(super) fn end_step(&mut self) {
+        self.is_step = false;
     }
 
     /// Not collective. Forgets times that belong to other leaves.
     pub(super) fn forget(&mut self, leaves: usize) {
         self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
-        self.measured_steps = 0;
+        self.steps = 0..0;
     }
 
     /// Runs work on the particles of a leaf, on any thread.
     pub(super) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
-        if !self.measuring {
+        if !self.is_step || !is_measured(leaf, self.steps.end) {
             return work();
         }
         let start = thread_time();
@@ -103,6 +113,17 @@ impl Costs {
         let cost = particles.iter().zip(&self.particle).map(|(count, cost)| count * cost[kind as usize]);
         self.leaf + cost.sum::<u64>()
     }
+}
+
+/// Whether time is taken of a leaf in the step before `end`.
+fn is_measured(leaf: usize, end: u64) -> bool {
+    (leaf as u64 + end).is_multiple_of(MEASURE_EVERY)
+}
+
+/// In how many of some steps time was taken of a leaf.
+fn measurements(leaf: usize, steps: &Range<u64>) -> u64 {
+    let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
+    before(steps.end) - before(steps.start)
 }
 
 /// Particles of a chunk by material.
@@ -164,7 +185,7 @@ impl<const D: usize> Solver<D> {
             for (material, count) in counts(chunk, materials).into_iter().enumerate() {
                 let share = time as f64 * count as f64 / len as f64;
                 times[KINDS * material + kind] += units(share * 1e-9);
-                particles[KINDS * material + kind] += count * self.costs.measured_steps;
+                particles[KINDS * material + kind] += count * measurements(leaf, &self.costs.steps);
             }
         }
         let threads = rayon::current_num_threads() as f64;
@@ -197,6 +218,16 @@ impl Costs {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn measurements_are_counted() {
+        for leaf in 0..70 {
+            for steps in [0..1, 5..5, 3..40, 31..200, 64..64 + MEASURE_EVERY] {
+                let each = steps.clone().filter(|step| is_measured(leaf, step + 1));
+                assert_eq!(measurements(leaf, &steps), each.count() as u64);
+            }
+        }
+    }
 
     #[test]
     fn costs_follow_what_is_measured() {

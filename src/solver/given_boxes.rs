@@ -5,7 +5,7 @@
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
-use super::bins::{BinMissing, BoxWidths, greatest_half};
+use super::bins::{BinMissing, BoxWidths, values};
 use super::migrate::position_key;
 use super::time_step::StepControl;
 use super::transfer::{extent, sort_with};
@@ -61,16 +61,20 @@ struct Halves<const D: usize> {
 }
 
 impl<const D: usize> BoxWidths<D> for Halves<D> {
-    fn of_batch(&self, chunk: &Chunk<D>, first: usize, _cell: f64) -> [Lanes; D] {
-        let last = chunk.len() - 1;
+    fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], _cell: f64) -> [Lanes; D] {
+        let last = particles.len() - 1;
         std::array::from_fn(|axis| {
-            let half = |lane| self.halves[chunk.ids()[last.min(first + lane)] as usize][axis];
+            let half = |lane| self.halves[chunk.ids()[particles[last.min(lane)] as usize] as usize][axis];
             Lanes::new(std::array::from_fn(half))
         })
     }
 
+    fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes {
+        values(chunk, Layout::<D>::HALF, first)
+    }
+
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
-        greatest_half(chunk)
+        chunk.greatest_half()
     }
 
     fn are_known_to_kernels(&self) -> bool {

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::bins::BinLists;
 use super::increment::Increments;
-use super::migrate::{MigrateError, Migration, Moved};
+use super::migrate::{Departed, MigrateError, Migration, Moved};
 use super::phases::Phase;
-use super::resample::Resampling;
+use super::resample::{Resampling, Splits};
 use super::transfer::{extent, width_bound};
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
@@ -153,7 +153,7 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));
     }
 
-    /// Moves particles to the leaves that contain them.
+    /// Collective over neighbours. Moves particles to the leaves that contain them.
     pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
@@ -162,7 +162,25 @@ impl<const D: usize> Solver<D> {
         let moved = self.phases.time(Phase::Migrate, || {
             grid.migration.migrate(&grid.plan.tree, chunks, resampling.as_ref(), &mut splits)
         });
-        self.book_entries(&splits);
+        self.book_migration(moved, &splits)
+    }
+
+    /// Collective over neighbours. The second half of [`Solver::migrate`], after G2P, which has the first.
+    pub(super) fn arrive(&mut self, departed: Vec<Departed>) -> Result<Moved, MigrateError> {
+        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let mut splits = Vec::new();
+        let moved = self
+            .phases
+            .time(Phase::Migrate, || grid.migration.arrive(&grid.plan.tree, chunks, departed, &mut splits));
+        self.book_migration(moved, &splits)
+    }
+
+    fn book_migration(
+        &mut self,
+        moved: Result<Moved, MigrateError>,
+        splits: &[Splits],
+    ) -> Result<Moved, MigrateError> {
+        self.book_entries(splits);
         self.deleted += moved.as_ref().map_or(0, |moved| moved.deleted);
         moved
     }

@@ -7,11 +7,13 @@ use partition::comm::{Comm, NeighbourExchange, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use super::bins::positions;
 use super::records::{append_all, push_record, record_words};
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
-use crate::kernel::simd::{LANES, Lanes, Mask};
+use crate::kernel::leavers;
+use crate::kernel::simd::LANES;
 use crate::particle::chunk::{Chunk, Layout};
 
 const TAG: u16 = 12;
@@ -50,6 +52,11 @@ enum Destination {
 /// Moves particles to the leaves that contain them.
 pub struct Migration<const D: usize> {
     exchange: NeighbourExchange,
+    pub(super) borders: Borders<D>,
+}
+
+/// The boxes of the own leaves, and what happens to particles outside them.
+pub struct Borders<const D: usize> {
     boxes: Vec<([f64; D], [f64; D])>,
     rule: Rule,
 }
@@ -72,13 +79,79 @@ pub struct Moved {
     pub deleted: u64,
 }
 
+/// What has been taken out of one leaf.
+#[derive(Debug, Default)]
+pub(super) struct Departed {
+    /// Records of the particles that go to other leaves, in their order.
+    records: Vec<u64>,
+    /// Number of particles out of the domain.
+    deleted: u64,
+    /// Why nothing was taken out.
+    error: Option<MigrateError>,
+    /// Splits of those that enter finer leaves.
+    splits: Option<Splits>,
+}
+
+impl Departed {
+    /// Takes particles, ascending, out of a chunk.
+    fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
+        let mut departed = Self::default();
+        if leavers.is_empty() {
+            return departed;
+        }
+        departed.records.reserve_exact(leavers.len() * record_words::<D>());
+        for (p, destination) in leavers {
+            match *destination {
+                Destination::Leaf(to) => {
+                    push_record(&mut departed.records, u64::from(to), chunk, *p as usize);
+                }
+                Destination::Gone => departed.deleted += 1,
+                Destination::Stay => {}
+            }
+        }
+        let gone: Vec<u32> = leavers.iter().map(|&(p, _)| p).collect();
+        chunk.remove(&gone);
+        departed
+    }
+}
+
+impl<const D: usize> Borders<D> {
+    /// Lower and upper corner of an own leaf, m.
+    pub(super) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
+        &self.boxes[leaf]
+    }
+
+    /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to another or to
+    /// none. With `resampling`, particles that enter a leaf finer than they were made for become their children before.
+    pub(super) fn depart(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        outside: &[u32],
+        resampling: Option<&Resampling<'_, D>>,
+    ) -> Departed {
+        if outside.is_empty() {
+            return Departed::default();
+        }
+        let known = tree.first_own() + leaf;
+        let bounds = self.of_leaf(leaf);
+        let (leavers, splits) = self.rule.leavers_resampled(tree, known, chunk, bounds, outside, resampling);
+        let departed = match leavers {
+            Ok(leavers) => Departed::take(chunk, &leavers),
+            Err(error) => Departed { error: Some(error), ..Departed::default() },
+        };
+        Departed { splits: resampling.map(|_| splits), ..departed }
+    }
+}
+
 impl<const D: usize> Migration<D> {
     /// Not collective. `neighbours` must be those of the plan's arena exchange.
     pub fn new(comm: &Comm, plan: &GridPlan<D>, neighbours: Vec<usize>, leaving: Leaving) -> Self {
         let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
         let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
         let exchange = NeighbourExchange::new(comm, neighbours, TAG);
-        Self { exchange, boxes, rule: Rule { leaving, root_edge: plan.root_edge } }
+        Self { exchange, borders: Borders { boxes, rule: Rule { leaving, root_edge: plan.root_edge } } }
     }
 
     /// Messages and bytes so far.
@@ -86,13 +159,11 @@ impl<const D: usize> Migration<D> {
         self.exchange.traffic()
     }
 
-    /// Collective over neighbours. Moves every particle into the leaf that contains it. With `resampling`, particles that
-    /// enter a leaf finer than they were made for become their children on the way; what that did is appended to
-    /// `splits`.
+    /// Collective over neighbours. Moves every particle into the leaf that contains it; see [`Borders::depart`] and
+    /// [`Migration::arrive`].
     ///
     /// # Errors
-    /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
-    /// in any case.
+    /// As those of [`Migration::arrive`].
     pub(super) fn migrate(
         &mut self,
         tree: &KnownTree<D>,
@@ -100,24 +171,14 @@ impl<const D: usize> Migration<D> {
         resampling: Option<&Resampling<'_, D>>,
         splits: &mut Vec<Splits>,
     ) -> Result<Moved, MigrateError> {
-        let (first, rule) = (tree.first_own(), self.rule);
-        let found: Vec<(Leavers, Splits)> = chunks
-            .par_iter_mut()
-            .zip(&self.boxes)
-            .enumerate()
-            .with_min_len(4)
-            .map(|(leaf, (chunk, bounds))| {
-                rule.leavers_resampled(tree, first + leaf, chunk, bounds, resampling)
-            })
-            .collect();
-        let mut all = Vec::with_capacity(found.len());
-        for (leavers, split) in found {
-            if resampling.is_some() {
-                splits.push(split);
-            }
-            all.push(leavers);
-        }
-        self.carry(tree, chunks, all)
+        let borders = &self.borders;
+        let leaves = chunks.par_iter_mut().enumerate().with_min_len(4);
+        let departed = leaves.map(|(leaf, chunk)| {
+            let outside = outside(chunk, borders.of_leaf(leaf));
+            borders.depart(tree, leaf, chunk, &outside, resampling)
+        });
+        let departed = departed.collect();
+        self.arrive(tree, chunks, departed, splits)
     }
 
     /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the places given
@@ -128,56 +189,44 @@ impl<const D: usize> Migration<D> {
         chunks: &mut [Chunk<D>],
         wanted: &[Vec<(u32, [f64; D])>],
     ) -> Result<Moved, MigrateError> {
-        let roots = tree.brick().roots;
+        let (roots, root_edge) = (tree.brick().roots, self.borders.rule.root_edge);
         let destination = |leaf: usize, place: [f64; D]| {
-            let to = tree.locate(position_key(place, roots, self.rule.root_edge));
+            let to = tree.locate(position_key(place, roots, root_edge));
             to.filter(|&to| to != tree.first_own() + leaf).map(|to| Destination::Leaf(to as u32))
         };
-        let each = wanted.iter().enumerate().map(|(leaf, wanted)| {
+        let leaves = chunks.par_iter_mut().zip(wanted).enumerate().with_min_len(32);
+        let departed = leaves.map(|(leaf, (chunk, wanted))| {
             let known = wanted.iter().filter_map(|&(p, place)| Some((p, destination(leaf, place)?)));
-            Ok(known.collect())
+            Departed::take(chunk, &known.collect::<Vec<_>>())
         });
-        let each = each.collect();
-        self.carry(tree, chunks, each)
+        let departed = departed.collect();
+        self.arrive(tree, chunks, departed, &mut Vec::new())
     }
 
-    /// Collective over neighbours. Moves what was found to leave each own leaf.
-    fn carry(
+    /// Collective over neighbours. Appends what has departed from each own leaf, here and on other ranks, to where it
+    /// goes. Appends what splits on the way did to `splits`.
+    ///
+    /// # Errors
+    /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
+    /// in any case.
+    pub(super) fn arrive(
         &mut self,
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],
-        found: Vec<Leavers>,
+        mut departed: Vec<Departed>,
+        splits: &mut Vec<Splits>,
     ) -> Result<Moved, MigrateError> {
         let mut error = None;
         let mut moved = Moved::default();
-        let mut leaving: Vec<(usize, Vec<(u32, Destination)>)> = Vec::new();
-        for (leaf, found) in found.into_iter().enumerate() {
-            match found {
-                Ok(found) if found.is_empty() => {}
-                Ok(found) => leaving.push((leaf, found)),
-                Err(found) => {
-                    error.get_or_insert(found);
-                }
-            }
+        for departed in &mut departed {
+            moved.deleted += departed.deleted;
+            splits.extend(departed.splits.take());
+            error = error.or(departed.error.take());
         }
-        let records: Vec<Vec<u64>> = leaving
-            .par_iter()
-            .with_min_len(16)
-            .map(|(leaf, found)| {
-                let mut records = Vec::with_capacity(found.len() * record_words::<D>());
-                for (p, destination) in found {
-                    if let Destination::Leaf(to) = *destination {
-                        push_record(&mut records, u64::from(to), &chunks[*leaf], *p as usize);
-                    }
-                }
-                records
-            })
-            .collect();
-
         let neighbours = self.exchange.neighbours();
         let mut outgoing: Vec<Vec<u8>> = neighbours.iter().map(|_| Vec::new()).collect();
         let mut own: Vec<(u32, &[u64])> = Vec::new();
-        for record in records.iter().flat_map(|records| records.chunks_exact(record_words::<D>())) {
+        for record in departed.iter().flat_map(|leaf| leaf.records.chunks_exact(record_words::<D>())) {
             let to = record[0] as usize;
             if let Some(local) = tree.local(to) {
                 own.push((local as u32, record));
@@ -193,14 +242,6 @@ impl<const D: usize> Migration<D> {
             }
         }
         let pending = self.exchange.begin(outgoing);
-        let mut gone = vec![Vec::new(); chunks.len()];
-        for (leaf, found) in leaving {
-            moved.deleted += found.iter().filter(|(_, to)| matches!(to, Destination::Gone)).count() as u64;
-            gone[leaf] = found.into_iter().map(|(p, _)| p).collect();
-        }
-        let some = chunks.par_iter_mut().zip(&gone).with_min_len(32).filter(|(_, gone)| !gone.is_empty());
-        some.for_each(|(chunk, gone)| chunk.remove(gone));
-
         let rank = chunks.first().map_or(0, |_| tree.owner(tree.first_own()));
         let messages: Vec<Vec<u64>> =
             pending.finish().iter().map(|bytes| bytemuck::allocation::pod_collect_to_vec(bytes)).collect();
@@ -237,11 +278,12 @@ impl Rule {
         leaf: usize,
         chunk: &mut Chunk<D>,
         bounds: &([f64; D], [f64; D]),
+        outside: &[u32],
         resampling: Option<&Resampling<'_, D>>,
     ) -> (Leavers, Splits) {
         let mut splits = Splits::default();
+        let mut leavers = self.leavers(tree, leaf, chunk, outside);
         loop {
-            let leavers = self.leavers(tree, leaf, chunk, bounds);
             let (Some(resampling), Ok(found)) = (resampling, &leavers) else { return (leavers, splits) };
             let entries = found.iter().filter_map(|(p, destination)| match destination {
                 Destination::Leaf(to) => Some((*p, tree.leaves()[*to as usize].level)),
@@ -251,19 +293,20 @@ impl Rule {
             if found.is_empty() || !resampling.enter(chunk, level, entries, &mut splits) {
                 return (leavers, splits);
             }
+            leavers = self.leavers(tree, leaf, chunk, &self::outside(chunk, bounds));
         }
     }
 
-    /// Particles of one leaf that are outside it, with their destinations, in order.
+    /// Those among the particles `outside` the box of a leaf that are not in the leaf, with their destinations, in order.
     fn leavers<const D: usize>(
         self,
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
-        (lower, upper): &([f64; D], [f64; D]),
+        outside: &[u32],
     ) -> Leavers {
-        let mut leavers = Vec::new();
-        for p in outside(chunk, lower, upper) {
+        let mut leavers = Vec::with_capacity(outside.len());
+        for &p in outside {
             match self.destination(tree, leaf, chunk, p as usize)? {
                 Destination::Stay => {}
                 destination => leavers.push((p, destination)),
@@ -309,17 +352,12 @@ impl Rule {
 }
 
 /// Particles that are not in a box, in order; one whose position is not a number is in none.
-fn outside<const D: usize>(chunk: &Chunk<D>, lower: &[f64; D], upper: &[f64; D]) -> Vec<u32> {
-    let (reals, stride) = chunk.reals();
+fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64; D])) -> Vec<u32> {
+    let mut leavers = leavers::Leavers::default();
+    leavers.begin(bounds);
     let mut found = Vec::new();
     for first in (0..chunk.len()).step_by(LANES) {
-        let mut inside = !Mask::from_bits(0);
-        for axis in 0..D {
-            // Columns hold whole batches; what lies behind the last particle is passed over below.
-            let column = &reals[(Layout::<D>::POSITION + axis) * stride + first..];
-            let x = column.first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load);
-            inside = inside & Lanes::splat(lower[axis]).le(x) & x.lt(Lanes::splat(upper[axis]));
-        }
+        let inside = leavers.inside(&positions(chunk, first));
         // Nearly all particles stay.
         if !inside.all() {
             let lanes = 0..LANES.min(chunk.len() - first);

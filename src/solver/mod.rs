@@ -37,6 +37,7 @@ use self::regrid::Recall;
 use self::resample::Books;
 use self::survey::Survey;
 use self::time_step::StepControl;
+use self::totals::Weighed;
 use self::transfer::Reach;
 use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
@@ -155,6 +156,8 @@ pub struct Solver<const D: usize> {
     partitioned: LastPartition,
     /// New partitions since the start of this process.
     pub partitions: u64,
+    is_to_weigh: bool,
+    weighed: Option<Weighed>,
 }
 
 impl<const D: usize> Solver<D> {
@@ -190,6 +193,8 @@ impl<const D: usize> Solver<D> {
             costs: Costs::new(clock.step),
             partitioned,
             partitions: 0,
+            is_to_weigh: false,
+            weighed: None,
         };
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
@@ -219,11 +224,13 @@ impl<const D: usize> Solver<D> {
         let sorted = self.sort_into_bins();
         self.note_velocities();
         self.nodes_from_particles(dt);
+        self.weigh();
         let impulses = self.update_nodes(dt, &rates);
         self.form_increments();
         self.prolong();
-        self.gather(dt);
-        let moved = self.migrate();
+        let departed = self.gather(dt);
+        self.costs.end_step();
+        let moved = self.arrive(departed);
         let reach = self.local_reach();
 
         self.clock.step += 1;

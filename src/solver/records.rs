@@ -1,7 +1,7 @@
 //! Particles on their way between leaves: one record of 64-bit words each.
 use rayon::prelude::*;
 
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Layout};
 
 /// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
 pub const fn record_words<const D: usize>() -> usize {
@@ -16,18 +16,8 @@ pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chu
     records.extend([chunk.ids()[p], chunk.tags()[p]]);
 }
 
-/// Appends the particle of a record to a chunk.
-fn push_particle<const D: usize>(chunk: &mut Chunk<D>, record: &[u64]) {
-    let [_, columns @ .., id, tag] = record else { return };
-    let p = chunk.push_zeroed(*id, Tag::unpack(*tag));
-    let (reals, stride) = chunk.reals_mut();
-    for (column, word) in columns.iter().enumerate() {
-        reals[column * stride + p] = f64::from_bits(*word);
-    }
-    chunk.tags_mut()[p] = *tag;
-}
-
-/// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given.
+/// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given. Chunks know
+/// their greatest half width afterwards.
 pub fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
     // Sorted by counting, so that chunks can take theirs at the same time.
     let mut start = vec![0u32; chunks.len() + 1];
@@ -44,17 +34,20 @@ pub fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u
         next[chunk as usize] += 1;
     }
     let ranges = start.par_windows(2);
-    let some = chunks.par_iter_mut().zip(ranges).with_min_len(32).filter(|(_, range)| range[0] < range[1]);
-    some.for_each(|(chunk, range)| {
+    chunks.par_iter_mut().zip(ranges).with_min_len(32).for_each(|(chunk, range)| {
         for &number in &order[range[0] as usize..range[1] as usize] {
-            push_particle(chunk, arrivals[number as usize].1);
+            if let [_, columns @ .., id, tag] = arrivals[number as usize].1 {
+                chunk.push_words(columns, *id, *tag);
+            }
         }
+        chunk.note_greatest_half();
     });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::particle::chunk::Tag;
 
     #[test]
     fn records_come_back_in_order() {

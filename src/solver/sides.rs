@@ -49,8 +49,10 @@ pub(super) enum Side {
 /// The leaves across the faces of one leaf.
 #[derive(Clone, Debug)]
 pub(super) struct Sides<const D: usize> {
-    /// By the faces that a box crosses, see [`Crossings`].
+    /// By the faces that a box crosses, see [`Sides::faces`].
     sides: [Side; 64],
+    /// Faces, a bit each, that some box must cross for its side to be what it is.
+    decisive: u32,
     lower: [f64; D],
     upper: [f64; D],
     slack: [f64; D],
@@ -59,30 +61,9 @@ pub(super) struct Sides<const D: usize> {
     children: [Option<u32>; 8],
 }
 
-/// Which faces of the leaf the boxes of a batch cross: per axis, bits of the lanes for lower and upper face.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Crossings<const D: usize>([[u32; 2]; D]);
-
-impl<const D: usize> Crossings<D> {
-    fn index(self, crosses: impl Fn(u32) -> bool) -> usize {
-        let faces = self.0.as_flattened().iter().enumerate();
-        faces.fold(0, |index, (face, &lanes)| index | usize::from(crosses(lanes)) << face)
-    }
-
-    /// Faces that the box of one lane crosses, bit `2 axis` for the lower and `2 axis + 1` for the upper one.
-    pub fn of_lane(self, lane: usize) -> usize {
-        self.index(|lanes| lanes >> lane & 1 == 1)
-    }
-
-    /// Faces that any box crosses.
-    pub fn of_any(self) -> usize {
-        self.index(|lanes| lanes != 0)
-    }
-}
-
 impl<const D: usize> Sides<D> {
     /// The sides of `leaf`, which is the octant `here` with cells of edge `cell` and has the given bins; `near` are the
-    /// leaves around.
+    /// finer leaves around.
     pub fn new(leaf: NearLeaf<D>, here: Octant<D>, cell: f64, near: &[NearLeaf<D>], bins: &[Bin<D>]) -> Self {
         // Finest level in each direction, among the leaves that touch this one. A box at most a cell wide reaches
         // half a cell beyond, less than the depth of a leaf one level finer.
@@ -118,18 +99,40 @@ impl<const D: usize> Sides<D> {
             bins.iter().position(|bin| bin.block == child).map(|bin| bin as u32)
         });
         let middle = std::array::from_fn(|axis| f64::from(2 * here.coord[axis] + 1) * 2.0 * cell);
-        Self { sides, lower: leaf.lower, upper: leaf.upper, slack: leaf.slack(), middle, children }
+        let faces = (0..2 * D as u32)
+            .filter(|face| (0..1 << (2 * D)).any(|set: usize| sides[set] != sides[set & !(1 << face)]));
+        let decisive = faces.fold(0, |bits, face| bits | 1 << face);
+        Self { sides, decisive, lower: leaf.lower, upper: leaf.upper, slack: leaf.slack(), middle, children }
     }
 
-    /// Which faces boxes cross, or touch up to round-off.
-    pub fn crossings(&self, centre: &[Lanes; D], half: &[Lanes; D]) -> Crossings<D> {
-        Crossings(std::array::from_fn(|axis| {
-            let slack = Lanes::splat(self.slack[axis]);
-            let (lower, upper) = (Lanes::splat(self.lower[axis]), Lanes::splat(self.upper[axis]));
-            let lo = centre[axis] - half[axis] - slack;
-            let hi = centre[axis] + half[axis] + slack;
-            [(!lower.le(lo)).bits(), (!hi.le(upper)).bits()]
-        }))
+    /// Lanes whose boxes may scatter elsewhere than on the leaf's own level, given bounds on their half widths.
+    /// `position` gives coordinates along an axis.
+    #[inline(always)]
+    pub fn undecided(&self, half: Lanes, position: impl Fn(usize) -> Lanes) -> u32 {
+        let mut lanes = 0;
+        for axis in 0..D {
+            let faces = self.decisive >> (2 * axis) & 0b11;
+            if faces == 0 {
+                continue;
+            }
+            let (centre, slack) = (position(axis), Lanes::splat(self.slack[axis]));
+            if faces & 1 == 1 {
+                lanes |= (!Lanes::splat(self.lower[axis]).le(centre - half - slack)).bits();
+            }
+            if faces & 2 == 2 {
+                lanes |= (!(centre + half + slack).le(Lanes::splat(self.upper[axis]))).bits();
+            }
+        }
+        lanes
+    }
+
+    /// Faces that a box crosses, or touches up to round-off: bit `2 axis` for the lower and `2 axis + 1` for the upper one.
+    pub fn faces(&self, centre: &[f64; D], half: &[f64; D]) -> usize {
+        (0..D).fold(0, |faces, axis| {
+            let above_lower = self.lower[axis] <= centre[axis] - half[axis] - self.slack[axis];
+            let below_upper = centre[axis] + half[axis] + self.slack[axis] <= self.upper[axis];
+            faces | (usize::from(!above_lower) | usize::from(!below_upper) << 1) << (2 * axis)
+        })
     }
 
     /// Where a box scatters that crosses some faces.

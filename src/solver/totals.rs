@@ -5,6 +5,7 @@
 use partition::comm::Comm;
 use rayon::prelude::*;
 
+use super::phases::Phase;
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
@@ -25,6 +26,10 @@ pub struct GridTotals {
     /// kg m²/s; in plane strain only the last component.
     pub angular_momentum: [f64; 3],
 }
+
+/// Mass on the real nodes and of the particles in one step, on one rank.
+#[derive(Clone, Debug)]
+pub(super) struct Weighed([ExactSum; 2]);
 
 /// Sums over all particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,6 +86,51 @@ impl<const D: usize> Solver<D> {
             momentum: [of(1), of(2), of(3)],
             angular_momentum: [of(4), of(5), of(6)],
         })
+    }
+
+    /// Not collective. Has the next step add up the mass on nodes and of particles once nodes have their sums; on all ranks
+    /// or none. That is much cheaper than [`Solver::grid_totals`], which scatters once more.
+    pub fn weigh_next_step(&mut self) {
+        self.is_to_weigh = true;
+    }
+
+    /// Not collective. Adds up masses, if that is asked for, in a step whose nodes have their sums.
+    pub(super) fn weigh(&mut self) {
+        if !std::mem::take(&mut self.is_to_weigh) {
+            return;
+        }
+        let (plan, fields, chunks) = (&self.grid.plan, &self.grid.fields, &self.chunks);
+        self.weighed = self.phases.time(Phase::Output, || {
+            let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
+            let on_nodes = blocks.filter(|(index, _)| fields.active[*index]);
+            let on_nodes = on_nodes.fold(ExactSum::new, |mut sum, (index, block)| {
+                let rows = &fields.rows[index * block_nodes(D)..];
+                bits(block.owned).for_each(|bit| sum.add(rows[bit as usize].0[3]));
+                sum
+            });
+            let of_leaves = chunks.par_iter().with_min_len(64).fold(ExactSum::new, |mut sum, chunk| {
+                leaf_mass(chunk).enter(&mut sum);
+                sum
+            });
+            // Exact sums do not depend on how they are put together.
+            let together = |mut sum: ExactSum, other: ExactSum| {
+                sum.merge(&other);
+                sum
+            };
+            Some(Weighed([
+                on_nodes.reduce(ExactSum::new, together),
+                of_leaves.reduce(ExactSum::new, together),
+            ]))
+        });
+    }
+
+    /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the latter, when a
+    /// step weighed them last; `None` if none has since the last call.
+    pub fn weighed_mass_error(&mut self) -> Option<f64> {
+        let Weighed(mut sums) = self.weighed.take()?;
+        ExactSum::sum_over_ranks(&self.comm, &mut sums);
+        let [nodes, particles] = sums.map(|sum| sum.to_f64());
+        Some((nodes - particles) / particles)
     }
 
     /// Collective. Sums over all particles.
@@ -191,6 +241,16 @@ impl DoubledLanes {
             total
         })
     }
+}
+
+/// Mass of the particles of one leaf, added up as by [`leaf_totals`].
+fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> Doubled {
+    let (batches, rest) = chunk.column(Layout::<D>::MASS).as_chunks::<LANES>();
+    let mut sum = DoubledLanes::new();
+    batches.iter().for_each(|batch| sum.add(Lanes::load(batch)));
+    let rest = std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0));
+    sum.add(Lanes::new(rest));
+    sum.total()
 }
 
 /// Sums over the particles of one leaf, in their order.

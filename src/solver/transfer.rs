@@ -1,10 +1,12 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinLists, BinMissing, BoxWidths, greatest_half};
+use super::bins::{BinLists, BinMissing, BoxWidths, values};
 use super::contact::SUMS;
 use super::grid::Grid;
+use super::migrate::Departed;
 use super::phases::{Phase, Phases};
+use super::resample::Resampling;
 use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
 use super::{Physics, Solver};
@@ -16,6 +18,7 @@ use crate::grid::fields::{Part, VelocityArena, load_rows};
 use crate::grid::plan::Bin;
 use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
+use crate::kernel::leavers::Leavers;
 use crate::kernel::p2g::MomentSums;
 use crate::kernel::simd::{Lanes, prefetch};
 use crate::kernel::{
@@ -53,12 +56,18 @@ struct Scratch<const D: usize> {
     arena: VelocityArena<D>,
     increments: Vec<Row>,
     gathered: Vec<Gathered<D>>,
+    leavers: Leavers<D>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         let increments = vec![Row([0.0; 4]); arena_nodes(D)];
-        Self { arena: VelocityArena::default(), increments, gathered: Vec::new() }
+        Self {
+            arena: VelocityArena::default(),
+            increments,
+            gathered: Vec::new(),
+            leavers: Leavers::default(),
+        }
     }
 }
 
@@ -80,8 +89,20 @@ struct Widths<'a, const D: usize> {
 }
 
 impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
-    fn of_batch(&self, chunk: &Chunk<D>, first: usize, cell: f64) -> [Lanes; D] {
-        domain::full_half_widths_from(chunk, first, cell, &self.extent, &self.scheme)
+    fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D] {
+        domain::full_half_widths_of(chunk, particles, cell, &self.extent, &self.scheme)
+    }
+
+    fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes {
+        let half = || values(chunk, Layout::<D>::HALF, first);
+        match self.scheme.boxes {
+            BoxPolicy::Fixed => half(),
+            BoxPolicy::Volume { max_stretch, .. } => half() * max_stretch,
+            BoxPolicy::Cell => Lanes::new(std::array::from_fn(|lane| {
+                let level = chunk.tags().get(first + lane).map_or(0, |&tag| Tag::unpack(tag).level);
+                0.5 * self.scheme.root_cell / f64::from(1u32 << level)
+            })),
+        }
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
@@ -92,8 +113,8 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
 /// A bound on the half widths of all boxes that the particles of a chunk can have, m.
 pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>) -> f64 {
     match scheme.boxes {
-        BoxPolicy::Fixed => greatest_half(chunk),
-        BoxPolicy::Volume { max_stretch, .. } => max_stretch * greatest_half(chunk),
+        BoxPolicy::Fixed => chunk.greatest_half(),
+        BoxPolicy::Volume { max_stretch, .. } => max_stretch * chunk.greatest_half(),
         BoxPolicy::Cell => {
             let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
             coarsest.map_or(0.0, |level| 0.5 * scheme.root_cell / f64::from(1u32 << level))
@@ -281,9 +302,13 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
     }
 
-    /// G2P: velocity, affine matrix, deformation, stress and position of all particles.
-    pub(super) fn gather(&mut self, dt: f64) {
+    /// G2P: velocity, affine matrix, deformation, stress and position of all particles. Returns what has departed from
+    /// each leaf, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
+    pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
+        let resampling = resampling.as_ref();
+        let borders = &self.grid.migration.borders;
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
@@ -293,10 +318,12 @@ impl<const D: usize> Solver<D> {
         self.surveys.resize(chunks.len(), Survey::default());
         let surveys = &mut self.surveys;
         let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
+        let mut departed = Vec::new();
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(surveys).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
-                let Scratch { arena, increments, gathered } = scratch;
+                let Scratch { arena, increments, gathered, leavers } = scratch;
+                leavers.begin(borders.of_leaf(leaf));
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
@@ -320,10 +347,14 @@ impl<const D: usize> Solver<D> {
                     let nodes = Fields { velocity: &arena.rows, increment, moments };
                     g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
-                        signal = signal.max(g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes, next));
+                        let fastest = g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes, leavers, next);
+                        signal = signal.max(fastest);
                     }
                 }
-                signal.max(g2p::advance_gathered(chunk, cut, gathered, &scheme, dt))
+                let fastest = g2p::advance_gathered(chunk, cut, gathered, &scheme, dt, leavers);
+                // Bins take them in turn.
+                leavers.found.sort_unstable();
+                signal.max(fastest)
             };
             let speeds =
                 leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
@@ -331,11 +362,13 @@ impl<const D: usize> Solver<D> {
                         watch.before(chunk, survey);
                         let signal = gather_leaf(scratch, leaf, chunk);
                         watch.after(chunk, dt, survey);
-                        signal
+                        let outside = &scratch.leavers.found;
+                        (signal, borders.depart(&plan.tree, leaf, chunk, outside, resampling))
                     })
                 });
-            speeds.collect_into_vec(signal);
+            speeds.unzip_into_vecs(signal, &mut departed);
         });
+        departed
     }
 
     /// S: velocities of the nodes at all particles, leaf by leaf.

@@ -1,6 +1,7 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::constrained::ConstrainedNodes;
-use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather, gather_sub_boxes};
+use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather_sub_boxes};
+use super::leavers::Leavers;
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
 use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
@@ -8,6 +9,19 @@ use crate::material::{Material, Parameters, build};
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 mod parts;
+
+/// As [`super::g2p::gather`], for particles that may go anywhere.
+fn gather<const D: usize>(
+    chunk: &mut Chunk<D>,
+    select: Select,
+    frame: &Frame<D>,
+    scheme: &Scheme,
+    dt: f64,
+    fields: &Fields<D>,
+    next: Place,
+) -> f64 {
+    g2p::gather(chunk, select, frame, scheme, dt, fields, &mut Leavers::default(), next)
+}
 
 /// A small deterministic generator of numbers in [0, 1).
 struct Numbers(u64);
@@ -23,6 +37,37 @@ impl Numbers {
 
 const CELL: f64 = 0.05;
 const DT: f64 = 1e-4;
+
+/// Those that have left a box are found, whatever the batches.
+fn leavers_are_found<const D: usize>() {
+    let (materials, frame) = (materials(), frame::<D>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let start = particles::<D>(53, 33, 5);
+    let velocity = vec![Row([300.0, -200.0, if D == 3 { 100.0 } else { 0.0 }, 0.0]); arena_nodes(D)];
+    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let bounds = ([4.5 * CELL; D], [7.5 * CELL; D]);
+    let odd: Vec<u32> = (1..53).step_by(2).collect();
+    for select in [Select::All, Select::List(&odd), Select::List(&[7, 20]), Select::List(&[])] {
+        let (mut chunk, mut leavers) = (start.clone(), Leavers::default());
+        leavers.begin(&bounds);
+        g2p::gather(&mut chunk, select, &frame, &scheme, DT, &fields, &mut leavers, Place::default());
+        let moved: Vec<u32> = match select {
+            Select::All => (0..53).collect(),
+            Select::List(list) => list.to_vec(),
+        };
+        let is_inside =
+            |p: u32| chunk.position(p as usize).iter().all(|x| (bounds.0[0]..bounds.1[0]).contains(x));
+        let expected: Vec<u32> = moved.iter().copied().filter(|&p| !is_inside(p)).collect();
+        assert_eq!(leavers.found, expected);
+        assert!(moved.len() < 50 || (5..45).contains(&expected.len()), "{}", expected.len());
+    }
+}
+
+#[test]
+fn particles_that_leave_are_found() {
+    leavers_are_found::<2>();
+    leavers_are_found::<3>();
+}
 
 fn materials() -> Vec<Box<dyn Material>> {
     let elastic = Elastic { young: 1e5, poisson: 0.3 };

@@ -56,7 +56,7 @@ fn parts_equal_the_whole<const D: usize>() {
     let mut gathered = vec![Gathered::default(); parted.len()];
     gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
-    advance_gathered(&mut parted, &list, &gathered, &scheme, DT);
+    advance_gathered(&mut parted, &list, &gathered, &scheme, DT, &mut Leavers::default());
     for column in 0..Layout::<D>::REALS {
         for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
             assert!((a - b).abs() <= 1e-11 * a.abs().max(1.0), "column {column}: {a} {b}");

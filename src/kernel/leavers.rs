@@ -1,0 +1,54 @@
+//! Particles that leave the box of their leaf, found by G2P while their new positions are in registers.
+use super::batch::Batch;
+use super::simd::{LANES, Lanes, Mask};
+
+/// Finds particles that are no longer in a box once they have moved.
+#[derive(Clone, Debug)]
+pub struct Leavers<const D: usize> {
+    lower: [f64; D],
+    upper: [f64; D],
+    /// Their indices, in the order in which they moved.
+    pub found: Vec<u32>,
+}
+
+impl<const D: usize> Default for Leavers<D> {
+    /// With a box that holds every position.
+    fn default() -> Self {
+        Self { lower: [f64::NEG_INFINITY; D], upper: [f64::INFINITY; D], found: Vec::new() }
+    }
+}
+
+impl<const D: usize> Leavers<D> {
+    /// Forgets what was found; from now on particles belong into the box `lower <= x < upper`.
+    pub fn begin(&mut self, (lower, upper): &([f64; D], [f64; D])) {
+        (self.lower, self.upper) = (*lower, *upper);
+        self.found.clear();
+    }
+
+    /// Lanes of positions in the box; one that is not a number is not.
+    #[inline(always)]
+    pub fn inside(&self, position: &[Lanes; D]) -> Mask {
+        let mut inside = !Mask::from_bits(0);
+        for axis in 0..D {
+            let (lower, upper) = (Lanes::splat(self.lower[axis]), Lanes::splat(self.upper[axis]));
+            inside = inside & lower.le(position[axis]) & position[axis].lt(upper);
+        }
+        inside
+    }
+
+    /// Notes the members of a batch that moved out.
+    #[inline(always)]
+    pub(super) fn look(&mut self, batch: &Batch, moved: &[Lanes; D]) {
+        let left = batch.members_among(!self.inside(moved).bits());
+        // Nearly all particles stay.
+        if left != 0 {
+            self.note(batch, left);
+        }
+    }
+
+    #[inline(never)]
+    fn note(&mut self, batch: &Batch, left: u32) {
+        let lanes = (0..LANES).filter(|lane| left >> lane & 1 == 1);
+        self.found.extend(lanes.map(|lane| batch.particle(lane) as u32));
+    }
+}
