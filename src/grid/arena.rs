@@ -2,7 +2,7 @@
 use std::sync::Arc;
 
 use super::constrained::{ArenaConstraints, ArenaMoments};
-use super::plan::GridPlan;
+use super::plan::{GridPlan, NO_BLOCK};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
@@ -27,6 +27,17 @@ pub struct Arenas<const D: usize> {
     constraints: Arc<Vec<ArenaConstraints>>,
     /// Per bin, the nodes that its particles touch.
     windows: Vec<Window<D>>,
+    /// Per block, what reaches it.
+    reached: Vec<Reached>,
+}
+
+/// Which occupied bins reach a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Reached {
+    /// Some bin whose block lies in its leaf.
+    inner: bool,
+    /// Some other bin; in most steps there are few: boxes must be wide, or lie across a change of level.
+    outer: bool,
 }
 
 /// The arena of one bin.
@@ -67,6 +78,8 @@ impl<const D: usize> Arenas<D> {
         self.touched.resize(plan.bins.len(), None);
         self.windows.resize(plan.bins.len(), Window::EMPTY);
         self.moment_start.clear();
+        self.reached.clear();
+        self.reached.resize(plan.blocks.len(), Reached::default());
         for (number, bin) in plan.bins.iter().enumerate() {
             let window = window(number);
             let occupied = window.is_some();
@@ -74,6 +87,13 @@ impl<const D: usize> Arenas<D> {
             self.slot[number] = if occupied { slots } else { NONE };
             self.touched[number] = bin.touched.filter(|_| occupied);
             self.moment_start.push(moments);
+            if occupied {
+                for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
+                    let reached = &mut self.reached[block as usize];
+                    reached.inner |= bin.is_inner;
+                    reached.outer |= !bin.is_inner;
+                }
+            }
             slots += u32::from(occupied);
             moments +=
                 self.touched[number].map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
@@ -104,6 +124,16 @@ impl<const D: usize> Arenas<D> {
     /// The nodes that the particles of a bin touch.
     pub fn window(&self, bin: usize) -> Window<D> {
         self.windows[bin]
+    }
+
+    /// Whether an occupied bin reaches a block.
+    pub fn reach(&self, block: usize) -> bool {
+        self.reached[block].inner || self.reached[block].outer
+    }
+
+    /// Whether one does whose block lies outside its leaf.
+    pub fn outer_reach(&self, block: usize) -> bool {
+        self.reached[block].outer
     }
 
     /// Whether a bin is occupied.

@@ -3,8 +3,9 @@ use rustc_hash::FxHashMap;
 
 use super::arena::Arenas;
 use super::exchange::ArenaExchange;
+use super::mixed::Mixed;
 use super::plan::GridPlan;
-use super::sums::{Scratch, Sources};
+use super::sums::Sources;
 
 /// Counts of one rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,9 +40,8 @@ pub fn surface_bytes<const D: usize>(
     plan: &GridPlan<D>,
     arenas: &Arenas<D>,
 ) -> u64 {
-    let strays = &plan.feeders.strays(plan, arenas);
-    let own = Sources { plan, arenas, strays, received: None };
-    let mut scratch = Scratch::default();
+    let own = Sources { plan, arenas, received: None };
+    let mut scratch = Mixed::default();
     let mut total = 0;
     for pieces in exchange.sent() {
         let mut needed: FxHashMap<u32, Needed> = FxHashMap::default();

@@ -10,10 +10,11 @@ use rayon::prelude::*;
 use super::arena::{Arenas, Moments};
 use super::feeders::NO_BIN;
 use super::mask::{bits, block_nodes};
+use super::mixed::Mixed;
 use super::plan::GridPlan;
 use super::region::Regions;
 use super::sources::Piece;
-use super::sums::{BlockSum, Scratch, Sources};
+use super::sums::{BlockSum, Sources};
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -143,8 +144,7 @@ impl<const D: usize> ArenaExchange<D> {
 
     /// Not collective. Adds up what neighbours need of the own arenas: a message for each.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>) -> Vec<Vec<u8>> {
-        let strays = &plan.feeders.strays(plan, arenas);
-        let own = Sources { plan, arenas, strays, received: None };
+        let own = Sources { plan, arenas, received: None };
         let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
         let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
             let mut extents = 0u64;
@@ -186,7 +186,7 @@ impl SentPiece {
     pub fn find<'a, const D: usize>(
         &self,
         own: Sources<'a, D>,
-        scratch: &'a mut Scratch<D>,
+        scratch: &'a mut Mixed<D>,
     ) -> BlockSum<'a, D> {
         let keys = self.keys.map(|(first, last)| first..=last);
         BlockSum::find(own, scratch, self.block as usize, keys)
@@ -195,7 +195,7 @@ impl SentPiece {
 
 /// Memory that a thread reuses from piece to piece.
 struct Packing<const D: usize> {
-    scratch: Scratch<D>,
+    scratch: Mixed<D>,
     rows: Vec<Row>,
     moments: Vec<Moments<D>>,
 }
@@ -203,7 +203,7 @@ struct Packing<const D: usize> {
 impl<const D: usize> Default for Packing<D> {
     fn default() -> Self {
         let nodes = block_nodes(D);
-        Self { scratch: Scratch::default(), rows: vec![ZERO; nodes], moments: vec![[ZERO; D]; nodes] }
+        Self { scratch: Mixed::default(), rows: vec![ZERO; nodes], moments: vec![[ZERO; D]; nodes] }
     }
 }
 
@@ -221,9 +221,12 @@ impl<const D: usize> Packing<D> {
         }
         sum.sum_rows(Regions::of::<D>().meeting::<D>(nodes), &mut self.rows);
         for bit in bits(nodes) {
-            let Row(row) = self.rows[bit as usize];
-            values.extend_from_slice(&row[..D]);
-            values.push(row[3]);
+            let Row([x, y, z, mass]) = self.rows[bit as usize];
+            if D == 3 {
+                values.extend_from_slice(&[x, y, z, mass]);
+            } else {
+                values.extend_from_slice(&[x, y, mass]);
+            }
         }
         sum.sum_moments(nodes & piece.constrained, &mut self.moments);
         for bit in bits(nodes & piece.constrained) {
@@ -256,43 +259,68 @@ impl<const D: usize> ReceivedSums<D> {
         self.touched[piece as usize]
     }
 
-    /// Momentum and mass of a touched node.
+    /// Momentum and mass that a piece adds to a node.
     pub(super) fn row(&self, piece: u32, bit: u32) -> Row {
-        let before = self.touched[piece as usize] & ((1 << bit) - 1);
+        let touched = self.touched[piece as usize];
+        if touched >> bit & 1 == 0 {
+            return ZERO;
+        }
+        let before = touched & ((1 << bit) - 1);
         self.rows[self.pieces[piece as usize].first_row + before.count_ones() as usize]
     }
 
-    /// First moments of a touched constrained node.
+    /// First moments that it adds to a constrained node.
     pub(super) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
-        let place = &self.pieces[piece as usize];
-        let before = self.touched[piece as usize] & place.constrained & ((1 << bit) - 1);
+        let (place, touched) = (&self.pieces[piece as usize], self.touched[piece as usize]);
+        if touched & place.constrained & 1 << bit == 0 {
+            return [ZERO; D];
+        }
+        let before = touched & place.constrained & ((1 << bit) - 1);
         self.moments[place.first_moment + before.count_ones() as usize]
     }
 
     fn unpack(&mut self, message: &[u8], pieces: std::ops::Range<usize>) {
         let (extents, values) = message.split_at(pieces.len().div_ceil(TASK) * 2 * TASK / 8);
-        let mut values = values.chunks_exact(8).map(|b| f64::from_ne_bytes(std::array::from_fn(|i| b[i])));
-        let mut next = || values.next().unwrap_or(f64::NAN);
+        let mut values = Values(values);
         for (number, piece) in pieces.enumerate() {
             let place = &self.pieces[piece];
             let extent = extents[number / 4] >> (2 * (number % 4)) & 3;
             let touched = match extent {
                 extent if extent == Extent::None as u8 => 0,
                 extent if extent == Extent::All as u8 => place.nodes,
-                _ => next().to_bits() & place.nodes,
+                _ => values.take::<1>()[0].to_bits() & place.nodes,
             };
             self.touched[piece] = touched;
             for row in &mut self.rows[place.first_row..][..touched.count_ones() as usize] {
-                for lane in 0..D {
-                    row.0[lane] = next();
-                }
-                row.0[3] = next();
+                *row = if D == 3 {
+                    Row(values.take())
+                } else {
+                    let [x, y, mass] = values.take();
+                    Row([x, y, 0.0, mass])
+                };
             }
             let moments = (place.constrained & touched).count_ones() as usize;
             for moments in &mut self.moments[place.first_moment..][..moments] {
-                moments.iter_mut().for_each(|row| (0..D).for_each(|lane| row.0[lane] = next()));
+                for row in moments {
+                    row.0[..D].copy_from_slice(&values.take::<D>());
+                }
             }
         }
+    }
+}
+
+/// What is left of the numbers of a message.
+struct Values<'a>(&'a [u8]);
+
+impl Values<'_> {
+    /// The next `N` numbers; NaN behind the end.
+    #[inline(always)]
+    fn take<const N: usize>(&mut self) -> [f64; N] {
+        let Some((next, rest)) = self.0.split_at_checked(8 * N) else { return [f64::NAN; N] };
+        self.0 = rest;
+        let mut values = [0.0; N];
+        bytemuck::cast_slice_mut(&mut values).copy_from_slice(next);
+        values
     }
 }
 

@@ -8,8 +8,9 @@ use super::arena::{Arenas, Moments};
 use super::exchange::ReceivedSums;
 use super::links::Links;
 use super::mask::{block_nodes, offset, offset_count};
+use super::mixed::Mixed;
 use super::plan::{Block, GridPlan, NO_BLOCK};
-use super::sums::{BlockSum, Scratch, Sources};
+use super::sums::{BlockSum, Sources};
 use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
 
@@ -94,14 +95,13 @@ impl<const D: usize> NodeFields<D> {
 
     /// Not collective. Adds up the arenas that reach each block of `part`.
     pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>, part: Part) {
-        let strays = &plan.feeders.strays(plan, arenas);
-        let sources = Sources { plan, arenas, strays, received: (part == Part::Seam).then_some(received) };
+        let sources = Sources { plan, arenas, received: (part == Part::Seam).then_some(received) };
         let nodes = block_nodes(D);
         let rows = self.rows.par_chunks_mut(TASK * nodes);
         let flags = self.active.par_chunks_mut(TASK).zip(self.dirty.par_chunks_mut(TASK));
         let moments = moment_tasks(plan, &mut self.moments);
         let tasks = rows.zip(flags).zip(moments).enumerate();
-        tasks.for_each_init(Scratch::default, |scratch, (task, ((rows, (active, dirty)), moments))| {
+        tasks.for_each_init(Mixed::default, |scratch, (task, ((rows, (active, dirty)), moments))| {
             let mut moments = moments.chunks_mut(nodes);
             let flags = active.iter_mut().zip(dirty);
             for (index, (rows, (active, dirty))) in (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags)) {
@@ -111,7 +111,7 @@ impl<const D: usize> NodeFields<D> {
                     continue;
                 }
                 *active = false;
-                if block.sum != 0 {
+                if block.sum != 0 && (arenas.reach(index) || part == Part::Seam) {
                     let mut sum = BlockSum::find(sources, scratch, index, None);
                     *active = !sum.is_empty();
                     if *active {
@@ -208,10 +208,8 @@ impl<const D: usize> NodeFields<D> {
 
     /// Marks the blocks that occupied bins touch, and the blocks of their constraint parents.
     fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
-        let strays = &plan.feeders.strays(plan, arenas);
-        let own = Sources { plan, arenas, strays, received: None };
-        let needed = self.needed.par_iter_mut().enumerate().with_min_len(64);
-        needed.for_each(|(block, needed)| *needed = own.reach(block));
+        let needed = self.needed.par_iter_mut().enumerate().with_min_len(1024);
+        needed.for_each(|(block, needed)| *needed = arenas.reach(block));
         for links in plan.prolongation.iter().rev() {
             for linked in &links.blocks {
                 if self.needed[linked.block as usize] {

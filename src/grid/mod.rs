@@ -15,6 +15,7 @@ pub mod fields;
 pub mod known;
 pub mod links;
 pub mod mask;
+mod mixed;
 pub mod order;
 pub mod plan;
 pub mod reach;

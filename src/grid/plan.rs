@@ -46,6 +46,8 @@ pub struct Bin<const D: usize> {
     pub leaf: u32,
     /// Level and block coordinate of the arena.
     pub block: Octant<D>,
+    /// Whether the block lies in the leaf.
+    pub is_inner: bool,
     /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
     pub around: [u32; 27],
     /// Its constrained nodes among [`GridPlan::constraints`], if it has any.
@@ -124,7 +126,7 @@ impl<const D: usize> GridPlan<D> {
         let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.list_bins(&number, &bins);
-        plan.feeders = Feeders::new(&plan.tree, &plan.bins, plan.blocks.len());
+        plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.link_levels(&number);
         plan.find_face_nodes();
@@ -237,9 +239,10 @@ impl<const D: usize> GridPlan<D> {
         for (leaf, blocks) in bins.iter().enumerate() {
             self.leaf_start.push(self.bins.len() as u32);
             for &block in blocks {
+                let is_inner = self.tree.leaves()[self.tree.first_own() + leaf].contains(&block);
                 if let Some(&same) = of_block.get(&block) {
                     let same = self.bins[same as usize].clone();
-                    self.bins.push(Bin { leaf: leaf as u32, ..same });
+                    self.bins.push(Bin { leaf: leaf as u32, is_inner, ..same });
                     continue;
                 }
                 of_block.insert(block, self.bins.len() as u32);
@@ -253,7 +256,7 @@ impl<const D: usize> GridPlan<D> {
                 }
                 let touched = has_constrained(&self.blocks, &around).then_some(constrained);
                 constrained += u32::from(touched.is_some());
-                self.bins.push(Bin { leaf: leaf as u32, block, around, touched });
+                self.bins.push(Bin { leaf: leaf as u32, block, is_inner, around, touched });
             }
         }
         self.leaf_start.push(self.bins.len() as u32);

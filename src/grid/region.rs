@@ -42,6 +42,8 @@ pub const fn part_bins(part: usize) -> usize {
 
 /// Most bins of a region.
 pub const MOST_BINS: usize = 8;
+/// Most arena nodes from the first to the last of a region.
+pub const SPAN: usize = 2 + ARENA_EDGE * (1 + ARENA_EDGE);
 /// Most regions of a block.
 pub const MOST_REGIONS: usize = 27;
 

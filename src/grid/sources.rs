@@ -2,7 +2,7 @@
 //!
 //! For every region of every block whose sums it needs, a rank knows all bins that may contribute, own and others. In the tree
 //! of their keys it looks for the largest subtrees of one owner: these are the pieces that it asks for.
-use partition::Octant;
+use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
 use super::feeders::NO_BIN;
@@ -39,7 +39,12 @@ pub struct Part {
     pub piece: u32,
     /// A key of the subtree that it is in this region.
     pub key: u64,
+    /// Position of one of the bins in the subtree that lie in their leaves; [`NO_HOME`] if it has none.
+    pub home: u8,
 }
+
+/// No position.
+pub const NO_HOME: u8 = u8::MAX;
 
 /// A bin that may contribute to a block.
 struct Candidate {
@@ -47,6 +52,8 @@ struct Candidate {
     tie: u64,
     rank: usize,
     position: u8,
+    /// Whether the bin's block lies in its leaf.
+    is_inner: bool,
 }
 
 impl<const D: usize> GridPlan<D> {
@@ -54,6 +61,22 @@ impl<const D: usize> GridPlan<D> {
     pub fn source_key(&self, bin: u32) -> (u64, u64) {
         let bin = &self.bins[bin as usize];
         source_key(&self.tree.leaves()[self.tree.first_own() + bin.leaf as usize], &bin.block)
+    }
+
+    /// Positions around a block that the leaf of an own bin covers or lies in, as bits.
+    pub fn homes(&self, bin: u32, block: usize) -> u32 {
+        let (bin, block) = (&self.bins[bin as usize], &self.blocks[block]);
+        let leaf = &self.tree.leaves()[self.tree.first_own() + bin.leaf as usize];
+        (0..D).fold((1 << offset_count(D)) - 1, |homes, axis| {
+            let at = |coord: u32, level: u8| i64::from(coord) << (MAX_LEVEL - level);
+            let (from, to) = (at(leaf.coord[axis], leaf.level), at(leaf.coord[axis] + 1, leaf.level));
+            let along = (0..3).filter(|&towards| {
+                let beside = i64::from(block.coord[axis]) + towards - 1;
+                let edge = 1i64 << (MAX_LEVEL - block.level);
+                beside * edge < to && from < (beside + 1) * edge
+            });
+            homes & along.fold(0, |set, towards| set | positions_at::<D>(axis, towards as usize))
+        })
     }
 
     /// Lists the pieces that this rank needs of others, by rank, and where they enter.
@@ -105,7 +128,7 @@ impl<const D: usize> GridPlan<D> {
         let outer = self.feeders.outer(block).iter().map(|outer| (outer.bin, outer.position));
         candidates.extend(inner.chain(outer).map(|(bin, position)| {
             let (key, tie) = self.source_key(bin);
-            Candidate { key, tie, rank, position }
+            Candidate { key, tie, rank, position, is_inner: self.bins[bin as usize].is_inner }
         }));
     }
 
@@ -121,7 +144,7 @@ impl<const D: usize> GridPlan<D> {
         let regions = Regions::of::<D>();
         let Block { sum, constrained, .. } = self.blocks[block];
         let known = pieces.len();
-        let mut found: Vec<(usize, u64, u64)> = Vec::new();
+        let mut found: Vec<(usize, u64, u64, u8)> = Vec::new();
         for region in 0..offset_count(D) {
             let nodes = regions.nodes[region] & sum;
             if nodes == 0 {
@@ -134,10 +157,12 @@ impl<const D: usize> GridPlan<D> {
                 if let [first, ..] = subtree
                     && first.rank != rank
                 {
-                    found.push((first.rank, first.key, subtree[subtree.len() - 1].key));
+                    let home = subtree.iter().find(|candidate| candidate.is_inner);
+                    let home = home.map_or(NO_HOME, |candidate| candidate.position);
+                    found.push((first.rank, first.key, subtree[subtree.len() - 1].key, home));
                 }
             });
-            for &(owner, first, last) in &found {
+            for &(owner, first, last, home) in &found {
                 let is_all = found.iter().filter(|(other, ..)| *other == owner).count() == 1;
                 let (from, to) = if is_all { (0, u64::MAX) } else { (first, last) };
                 let is_same = |piece: &Piece| (piece.rank, piece.first, piece.last) == (owner, from, to);
@@ -155,10 +180,19 @@ impl<const D: usize> GridPlan<D> {
                 }
                 pieces[piece].nodes |= nodes;
                 pieces[piece].constrained |= nodes & constrained;
-                parts.push((block as u32, Part { region: region as u8, piece: piece as u32, key: first }));
+                parts.push((
+                    block as u32,
+                    Part { region: region as u8, piece: piece as u32, key: first, home },
+                ));
             }
         }
     }
+}
+
+/// Positions with offset `towards - 1` along `axis`, as bits.
+fn positions_at<const D: usize>(axis: usize, towards: usize) -> u32 {
+    let here = |position: &usize| position / 3usize.pow(axis as u32) % 3 == towards;
+    (0..offset_count(D)).filter(here).fold(0, |set, position| set | 1 << position)
 }
 
 /// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies, or, if
@@ -197,7 +231,8 @@ impl<const D: usize> RemoteBins<D> {
             });
             candidates.extend(leaves.iter().map(|&leaf| {
                 let (key, tie) = source_key(&tree.leaves()[leaf], &bin);
-                Candidate { key, tie, rank: tree.owner(leaf), position: position as u8 }
+                let is_inner = tree.leaves()[leaf].contains(&bin);
+                Candidate { key, tie, rank: tree.owner(leaf), position: position as u8, is_inner }
             }));
         }
     }

@@ -37,10 +37,9 @@ impl<const D: usize> Window<D> {
         // Wider than rounding can move the kernel's own choice of the lowest node.
         const SLACK: f64 = 1e-9;
         for axis in 0..D {
-            let first = (lowest[axis] - SLACK).floor().clamp(-1.0, 3.0) as i32 + 1;
-            let last = (lowest[axis] + SLACK).floor().clamp(-1.0, 3.0) as i32 + 4;
-            self.lower[axis] = self.lower[axis].min(first as u8);
-            self.upper[axis] = self.upper[axis].max(last as u8);
+            let lowest_node = |x: f64| (x.floor().clamp(-1.0, 3.0) + 1.0) as usize;
+            self.lower[axis] = self.lower[axis].min(FIRST[lowest_node(lowest[axis] - SLACK)]);
+            self.upper[axis] = self.upper[axis].max(END[lowest_node(lowest[axis] + SLACK)]);
         }
     }
 
@@ -91,6 +90,11 @@ impl<const D: usize> Window<D> {
         Some(shared)
     }
 }
+
+/// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing of what the
+/// arena shares with a region of a block (see [`super::region`]), so that sums never meet part of a region.
+const FIRST: [u8; 5] = [0, 1, 1, 3, 4];
+const END: [u8; 5] = [3, 4, 5, 7, 7];
 
 /// First arena node, the one after the last, and the first block node that the arena of a bin shares along one axis
 /// with the blocks below, at and above it.

@@ -1,0 +1,219 @@
+//! Sums at nodes that more than whole arenas reach: bins outside their leaves, and sums of other ranks.
+//!
+//! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another rank are the
+//! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
+//! does not fit is listed and added up along the tree of keys.
+use super::arena::Moments;
+use super::mask::bits;
+use super::order::{Origin, Term, arrange, fold};
+use super::region::{MOST_BINS, SPAN, arena_node};
+use super::sources::{NO_HOME, Part};
+use super::sums::{BlockSum, ZERO, ZEROS};
+use crate::kernel::{ARENA_EDGE, Row};
+
+/// A bin outside its leaf that reaches a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Other {
+    pub key: u64,
+    pub tie: u64,
+    /// Nodes of the block that it touches.
+    pub touched: u64,
+    /// Positions that its leaf covers or lies in.
+    pub homes: u32,
+    pub origin: Origin,
+}
+
+/// What takes the place of an arena in the pattern of a region.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    /// The place.
+    pub slot: usize,
+    pub origin: Origin,
+}
+
+/// What else than whole arenas reaches a block; memory that a thread reuses from block to block.
+#[derive(Debug)]
+pub(super) struct Mixed<const D: usize> {
+    /// Bins outside their leaves.
+    pub outer: Vec<Other>,
+    /// What takes the place of arenas in the present region.
+    pub placed: Vec<Placed>,
+    /// Rows of other ranks in the present region, by place, at the distances that they have in an arena.
+    pub pieces: Vec<Row>,
+    terms: Vec<Term>,
+    rows: Vec<(u32, [Row; MOST_BINS])>,
+    moments: Vec<(u32, Moments<D>)>,
+}
+
+impl<const D: usize> Default for Mixed<D> {
+    fn default() -> Self {
+        Self {
+            outer: Vec::new(),
+            placed: Vec::new(),
+            pieces: vec![ZERO; MOST_BINS * SPAN],
+            terms: Vec::new(),
+            rows: Vec::new(),
+            moments: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> BlockSum<'_, D> {
+    /// Parts of received pieces that enter a region in this step, with the nodes that they touch.
+    fn parts(&self, region: usize) -> impl Iterator<Item = (&Part, u64)> {
+        // Parts are listed region by region.
+        let parts = if self.received.is_some() { self.plan.parts(self.block) } else { &[] };
+        let first = parts.partition_point(|part| (part.region as usize) < region);
+        let here = parts[first..].iter().take_while(move |part| part.region as usize == region);
+        here.filter_map(move |part| {
+            let touched = self.received?.touched(part.piece) & self.regions.nodes[region];
+            (touched != 0).then_some((part, touched))
+        })
+    }
+
+    /// Finds the places of all that reaches a region beside whole arenas; false if it does not fit the pattern.
+    #[inline(never)]
+    pub fn place(&mut self, region: usize) -> bool {
+        let (here, nodes) = (self.regions.positions[region], self.regions.nodes[region]);
+        let mut placed = std::mem::take(&mut self.scratch.placed);
+        placed.clear();
+        // A subtree's other places must stay empty, so that all of it is one summand.
+        let mut free = here & !self.occupied;
+        let mut fits = |homes: u32, origin: Origin| {
+            let homes = homes & here;
+            if homes == 0 || homes & !free != 0 {
+                return false;
+            }
+            free &= !homes;
+            let position = homes.trailing_zeros() as u8;
+            let slot = self.order[region].iter().position(|slot| slot.position == position);
+            placed.extend(slot.map(|slot| Placed { slot, origin }));
+            true
+        };
+        let mut outer = self.scratch.outer.iter().filter(|other| other.touched & nodes != 0);
+        let is_home = |part: &Part| if part.home == NO_HOME { 0 } else { 1 << part.home };
+        let all_fit = outer.all(|other| fits(other.homes, other.origin))
+            && self.parts(region).all(|(part, _)| fits(is_home(part), Origin::Piece(part.piece)));
+        self.scratch.placed = placed;
+        all_fit
+    }
+
+    /// Copies rows of other ranks to their places.
+    pub fn copy_pieces(&mut self, region: usize) {
+        let nodes = self.regions.nodes[region];
+        let Some(received) = self.received else { return };
+        let Mixed { placed, pieces, .. } = &mut *self.scratch;
+        let first = node_in_arena::<D>(nodes.trailing_zeros());
+        for placed in placed {
+            if let Origin::Piece(piece) = placed.origin {
+                let to = &mut pieces[placed.slot * SPAN..][..SPAN];
+                for bit in bits(nodes) {
+                    to[node_in_arena::<D>(bit) - first] = received.row(piece, bit);
+                }
+            }
+        }
+    }
+
+    /// The sums of a region, along a list of all that reaches it.
+    pub fn fold_rows(&mut self, region: usize, to: &mut [Row]) {
+        self.list_terms(region);
+        let nodes = self.regions.nodes[region];
+        let mut stack = std::mem::take(&mut self.scratch.rows);
+        let load = |term: &Term| self.rows_of(term, nodes);
+        let add = |to: &mut [Row; MOST_BINS], from: &[Row; MOST_BINS]| {
+            to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
+        };
+        let sum = fold(&self.scratch.terms, &mut stack, load, add).unwrap_or_default();
+        for (bit, row) in bits(nodes).zip(&sum) {
+            to[bit as usize] = row.plus(&ZERO);
+        }
+        self.scratch.rows = stack;
+    }
+
+    /// The moments at nodes of a region, along a list of all that reaches it.
+    pub fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Moments<D>]) {
+        self.list_terms(region);
+        let mut stack = std::mem::take(&mut self.scratch.moments);
+        for bit in bits(nodes) {
+            let load = |term: &Term| {
+                let touched = term.touched >> bit & 1 == 1;
+                let found = if touched { self.moments(term.origin, bit) } else { None };
+                found.unwrap_or([ZERO; D])
+            };
+            let sum = fold(&self.scratch.terms, &mut stack, load, add_moments);
+            to[bit as usize] = sum.unwrap_or([ZERO; D]).map(|row| row.plus(&ZERO));
+        }
+        self.scratch.moments = stack;
+    }
+
+    /// Lists what reaches a region, in order.
+    fn list_terms(&mut self, region: usize) {
+        let mut terms = std::mem::take(&mut self.scratch.terms);
+        terms.clear();
+        let nodes = self.regions.nodes[region];
+        let bins = self.plan.feeders.inner::<D>(self.block);
+        for position in bits(u64::from(self.occupied & self.regions.positions[region])) {
+            let bin = bins[position as usize];
+            let key = self.plan.bins[bin as usize].block.key();
+            let touched = self.touched_at(position as usize);
+            let origin = Origin::Bin { bin, position: position as u8 };
+            terms.push(Term { key, tie: key, separation: 0, touched, origin });
+        }
+        let outer = self.scratch.outer.iter().filter(|other| other.touched & nodes != 0);
+        terms.extend(outer.map(|&Other { key, tie, touched, origin, .. }| Term {
+            key,
+            tie,
+            separation: 0,
+            touched,
+            origin,
+        }));
+        terms.extend(self.parts(region).map(|(part, touched)| Term {
+            key: part.key,
+            tie: part.key,
+            separation: 0,
+            touched,
+            origin: Origin::Piece(part.piece),
+        }));
+        arrange(&mut terms);
+        self.scratch.terms = terms;
+    }
+
+    /// What a term adds to the nodes of a region, in the order of their bits.
+    #[inline(always)]
+    fn rows_of(&self, term: &Term, nodes: u64) -> [Row; MOST_BINS] {
+        let mut rows = [ZERO; MOST_BINS];
+        let touched = bits(nodes).enumerate().filter(|(_, bit)| term.touched >> bit & 1 == 1);
+        match (term.origin, self.received) {
+            (Origin::Bin { bin, position }, _) => {
+                let from = self.arenas.rows(bin).unwrap_or(&ZEROS);
+                touched.for_each(|(i, bit)| rows[i] = from[arena_node::<D>(position as usize, bit)]);
+            }
+            (Origin::Piece(piece), Some(received)) => {
+                touched.for_each(|(i, bit)| rows[i] = received.row(piece, bit));
+            }
+            (Origin::Piece(_), None) => {}
+        }
+        rows
+    }
+
+    /// First moments that something adds to a node.
+    pub fn moments(&self, origin: Origin, bit: u32) -> Option<Moments<D>> {
+        match origin {
+            Origin::Bin { bin, position } => {
+                let node = arena_node::<D>(position as usize, bit);
+                self.arenas.get(bin).and_then(|arena| arena.moments).map(|moments| moments.at(node))
+            }
+            Origin::Piece(piece) => self.received.map(|received| received.moments(piece, bit)),
+        }
+    }
+}
+
+/// Where node `bit` of a block lies in an arena, from the block's first node on.
+fn node_in_arena<const D: usize>(bit: u32) -> usize {
+    (0..D).map(|axis| (bit as usize >> (2 * axis) & 3) * ARENA_EDGE.pow(axis as u32)).sum()
+}
+
+/// Adds one node's moments.
+fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
+    to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
+}
