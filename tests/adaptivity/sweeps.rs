@@ -78,7 +78,8 @@ where
     assert!(most > 2 * number && total.refused == 0 && solver.regrids >= changes);
     assert!(booked > 0.0 && total.merges >= 9 * number, "{total:?}");
     assert!(solver.forest.leaves().iter().all(|leaf| leaf.level == 0));
-    assert_eq!(count(&solver), number, "families find together again");
+    // Siblings that do not come are given up after a while.
+    assert!((number..=number + number / 50).contains(&count(&solver)), "families find together again");
     // Splits make affine velocities visible, merges hide them; the rest is what the method loses anyway.
     let explained = energy_before + total.split_energy - total.merge_energy;
     assert!((energy_after - explained).abs() <= loss * energy_before, "{energy_after} {explained}");
@@ -110,5 +111,5 @@ fn over_a_ball() {
 #[ignore = "the long form of over_a_ball"]
 fn over_a_ball_a_thousand_times() {
     let body = ball([0.2, 0.1, -0.15]);
-    on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, &body, 170, 1000, 4e-2));
+    on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, &body, 170, 1000, 5e-2));
 }
