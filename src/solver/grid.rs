@@ -92,7 +92,11 @@ impl<const D: usize> Grid<D> {
 /// Not collective. Half width of the widest box that the particles of a leaf can have, in cells of that leaf rounded
 /// up; 0 if all are at most a cell wide.
 pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
-    let cells = width_bound(chunk, scheme) / cell;
+    reach_of_width(width_bound(chunk, scheme) / cell)
+}
+
+/// Reach that boxes of a half width need, which is given in cells.
+pub(super) fn reach_of_width(cells: f64) -> u32 {
     // Rounding must not make a box that is exactly one cell wide a wide one.
     if cells <= 0.5 * (1.0 + 4.0 * f64::EPSILON) { 0 } else { cells.ceil() as u32 }
 }
@@ -156,7 +160,7 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. Moves particles to the leaves that contain them.
     pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {

@@ -10,11 +10,13 @@ mod increment;
 mod indicators;
 mod members;
 pub mod migrate;
+pub mod parts;
 pub mod phases;
 pub mod rebalance;
 mod records;
 pub mod regrid;
 pub mod resample;
+mod reunion;
 mod sides;
 mod surroundings;
 mod survey;
@@ -31,6 +33,7 @@ use self::contact::Contacts;
 use self::cost::Costs;
 use self::grid::Grid;
 use self::migrate::{MigrateError, Moved};
+use self::parts::Parts;
 use self::phases::{Phase, Phases, thread_time};
 use self::rebalance::LastPartition;
 use self::regrid::Recall;
@@ -144,6 +147,8 @@ pub struct Solver<const D: usize> {
     pub books: Books,
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
+    /// Where the time of regrids went since the start of this process.
+    pub parts: Parts,
     /// What was noted of each own leaf in the last step.
     surveys: Vec<Survey<D>>,
     /// What regrids remember; nothing that a bit depends on.
@@ -186,6 +191,7 @@ impl<const D: usize> Solver<D> {
             deleted: 0,
             books: Books::default(),
             regrids: 0,
+            parts: Parts::default(),
             surveys: Vec::new(),
             recall: Recall::default(),
             sent_before: Traffic::default(),
@@ -263,9 +269,9 @@ impl<const D: usize> Solver<D> {
         self.grid.arenas = arenas;
     }
 
-    /// Collective. Reach that the boxes of all ranks need.
+    /// Collective. Reach that the boxes of all ranks need, also once particles that are due to merge have done so.
     fn agreed_reach(&self) -> u32 {
-        let mut reach = [u64::from(self.local_reach())];
+        let mut reach = [u64::from(self.local_reach().max(self.reach_of_merges()))];
         self.comm.max_u64(&mut reach);
         reach[0] as u32
     }

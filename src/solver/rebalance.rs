@@ -9,6 +9,7 @@ use partition::{CutAt, Cuts};
 
 use super::Solver;
 pub use super::cost::{leaf_cost, leaf_weight};
+use super::parts::Part;
 use super::phases::{Phase, thread_time};
 use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
@@ -116,17 +117,20 @@ impl<const D: usize> Solver<D> {
 
     fn move_leaves(&mut self, cuts: Cuts) -> bool {
         let (wall, start) = (Instant::now(), thread_time());
+        self.parts.begin();
         let shipment = self.forest.partition_at(&self.comm, cuts);
         if shipment.changed() {
             let chunks = std::mem::take(&mut self.chunks);
             self.chunks = shipment.move_items(&self.comm, chunks, Chunk::append_to, Chunk::from_bytes);
         }
+        self.parts.end(Part::Partition);
         // The tree may have changed before, even if no leaf moves now.
         if self.grid.plan.revision != self.forest.revision() {
             self.signal = vec![0.0; self.chunks.len()];
             self.costs.forget(self.chunks.len());
             self.rebuild_grid(self.agreed_reach());
         }
+        self.parts.end(Part::Grid);
         self.partitioned = LastPartition::since(start);
         self.partitions += u64::from(shipment.changed());
         self.phases.book(Phase::Regrid, wall.elapsed());

@@ -6,6 +6,7 @@ use partition::{Forest, MAX_LEVEL, Mark, Octant, Region, correspondence};
 use rayon::prelude::*;
 
 use super::migrate::{MigrateError, Moved, leaf_box, position_key};
+use super::parts::Part;
 use super::phases::Phase;
 use super::surroundings::Surroundings;
 use super::survey::Survey;
@@ -86,6 +87,7 @@ impl<const D: usize> Solver<D> {
             _ => return Ok(false),
         }
         let (start, phases) = (Instant::now(), self.phases);
+        self.parts.begin();
         if self.surveys.len() != self.chunks.len() {
             self.survey_now();
         }
@@ -93,6 +95,7 @@ impl<const D: usize> Solver<D> {
         let is_new = levels_before.is_some();
         let mut looks = self.look_at_levels();
         let split = self.split_particles(&looks, levels_before.as_deref());
+        self.parts.end(Part::Split);
         if is_new {
             self.rebalance();
             self.surveys.clear();
@@ -102,29 +105,39 @@ impl<const D: usize> Solver<D> {
         }
         let is_due = self.physics.adaptivity.as_ref().is_some_and(|adaptivity| adaptivity.merge.is_some())
             && looks.iter().any(|look| look.due || look.stale);
-        let is_due = self.comm.any(is_due);
-        let merged = is_due && self.merge_particles(&looks);
-        let mut changed = self.comm.any(is_new || split || merged);
-        if changed {
-            // Boxes of children may reach over the faces of their leaf, and with them their centres.
-            let moved = self.migrate();
-            let moved: Result<Moved, StepError> = moved.map_err(|error: MigrateError| error.into());
+        let mut flags = [u64::from(is_new || split), u64::from(is_due)];
+        self.comm.max_u64(&mut flags);
+        let [is_other, is_due] = flags.map(|flag| flag > 0);
+        let reports = if is_due { self.merge_particles(&looks) } else { Vec::new() };
+        let mut merged = is_due && self.comm.any(reports.iter().any(|report| report.merged > 0));
+        self.parts.end(Part::Merge);
+        if is_other || merged {
+            // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of merged ones
+            // do not, but for rounding.
+            let moved: Result<Moved, StepError> = match is_other {
+                true => self.migrate().map_err(|error: MigrateError| error.into()),
+                false => self.send_home(|leaf| reports[leaf].merged > 0),
+            };
             self.comm.agree(moved)?;
         }
+        self.parts.end(Part::Migrate);
         if is_due {
-            changed |= self.reunite_families(&looks)?;
-            self.count_tries(&looks);
+            merged |= self.reunite_families(&looks)?;
+            self.count_tries(&looks, &reports);
+            self.parts.end(Part::Merge);
         }
-        if changed {
+        if is_other {
+            // Merged particles are no faster than the fastest of those that they stand for.
             self.signal = self.chunks.iter().map(|chunk| self.signal_at_rest(chunk)).collect();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
         }
+        self.parts.end(Part::Migrate);
         // One phase for all of it.
         self.phases = phases;
         self.phases.book(Phase::Regrid, start.elapsed());
-        Ok(changed)
+        Ok(is_other || merged)
     }
 
     /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether the
@@ -153,9 +166,11 @@ impl<const D: usize> Solver<D> {
     /// any leaf of any rank changed: the level of the leaf that each own leaf's particles come from.
     fn change_tree(&mut self) -> Option<Vec<u8>> {
         let wishes = self.wishes();
+        self.parts.end(Part::Criteria);
         let revision = self.forest.revision();
         let settled = self.recall.settled.as_ref().filter(|settled| settled.revision == revision);
         if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
+            self.parts.end(Part::Tree);
             return None;
         }
         let adaptivity = self.physics.adaptivity.as_ref()?;
@@ -168,9 +183,11 @@ impl<const D: usize> Solver<D> {
         let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
         let Some(followed) = followed else {
             self.recall.settled = Some(Settled { revision, wishes, marks });
+            self.parts.end(Part::Tree);
             return None;
         };
         let old = std::mem::replace(&mut self.forest, followed);
+        self.parts.end(Part::Tree);
         Some(self.move_to_leaves(old.leaves()))
     }
 

@@ -1,17 +1,17 @@
 //! Splitting and merging of particles in a run, and the books about it.
 use partition::Octant;
-use partition::comm::{Comm, Disagreement};
+use partition::comm::Comm;
 use rayon::prelude::*;
 
+use super::grid::reach_of_width;
 use super::migrate::leaf_box;
 use super::survey::widest;
-use super::{Physics, Solver, StepError};
+use super::{Physics, Solver};
 use crate::exact_sum::ExactSum;
-use crate::kernel::Scheme;
+use crate::kernel::{BoxPolicy, Scheme};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
-use crate::particle::resample::family::separated;
-use crate::particle::resample::patience::{self, Look};
+use crate::particle::resample::patience::{self, Look, Turn};
 use crate::particle::resample::{Merged, Setting, ids, merge, needs_split, split};
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
@@ -89,19 +89,24 @@ pub(super) struct Resampling<'a, const D: usize> {
     extent: [f64; D],
     nominal: &'a [f64],
     stretch: Option<f64>,
-    turn: u64,
 }
 
 impl<'a, const D: usize> Resampling<'a, D> {
     /// For a domain with its upper corner at `extent` (m); `None` if the job wants particles left alone.
-    pub fn new(physics: &'a Physics<D>, scheme: &'a Scheme<'a>, extent: [f64; D], step: u64) -> Option<Self> {
+    pub fn new(physics: &'a Physics<D>, scheme: &'a Scheme<'a>, extent: [f64; D]) -> Option<Self> {
         let adaptivity = physics.adaptivity.as_ref()?;
         let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
-        Some(Self { scheme, extent, nominal, stretch, turn: step / adaptivity.every })
+        Some(Self { scheme, extent, nominal, stretch })
     }
 
     fn setting(&self, level: u8) -> Setting<'a, D> {
-        Setting { scheme: self.scheme, extent: self.extent, level, nominal: self.nominal, turn: self.turn }
+        let (scheme, extent, nominal) = (self.scheme, self.extent, self.nominal);
+        Setting { scheme, extent, level, nominal, turn: Turn::ALL }
+    }
+
+    /// For merges in a leaf of a level.
+    pub(super) fn setting_at(&self, level: u8, turn: Turn) -> Setting<'a, D> {
+        Setting { turn, ..self.setting(level) }
     }
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
@@ -183,10 +188,36 @@ fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
 impl<const D: usize> Solver<D> {
     /// Not collective. How the particles of each own leaf fit it.
     pub(super) fn look_at_levels(&self) -> Vec<Look> {
-        let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
-        let turn = self.clock.step / adaptivity.every;
-        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(64);
-        leaves.map(|(chunk, leaf)| patience::look(chunk, leaf.level, turn)).collect()
+        if self.physics.adaptivity.is_none() {
+            return Vec::new();
+        }
+        let turns = self.turns();
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&turns).enumerate();
+        let surveys = Some(&self.surveys).filter(|surveys| surveys.len() == self.chunks.len());
+        let each = leaves.with_min_len(64).map(|(number, ((chunk, leaf), &turn))| {
+            // Who came in this very step can wait for the next time.
+            let known = surveys.and_then(|surveys| surveys[number].levels?.look(leaf.level, turn));
+            known.unwrap_or_else(|| patience::look(chunk, leaf.level, turn))
+        });
+        each.collect()
+    }
+
+    /// Not collective. Who is to be tried in each own leaf. While the grid is not that of the tree, leaves count as not
+    /// beside finer ones.
+    pub(super) fn turns(&self) -> Vec<Turn> {
+        let every = self.physics.adaptivity.as_ref().map_or(1, |adaptivity| adaptivity.every);
+        let regrid = self.clock.step / every;
+        let (lists, root_edge) = (&self.grid.lists, self.physics.root_edge);
+        let is_of_tree = self.grid.plan.revision == self.forest.revision();
+        let leaves = self.forest.leaves().iter().enumerate();
+        let each = leaves.map(|(number, leaf)| {
+            let (lower, upper) = leaf_box(leaf, root_edge);
+            let centre = std::array::from_fn(|a| 0.5 * (lower[a] + upper[a]));
+            let beside_finer =
+                is_of_tree && lists.is_finer_within(number, &centre, 0.75 * (upper[0] - lower[0]));
+            Turn::new(regrid, leaf.key(), beside_finer)
+        });
+        each.collect()
     }
 
     /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the cells that
@@ -194,7 +225,7 @@ impl<const D: usize> Solver<D> {
     pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> bool {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent, self.clock.step) else {
+        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
             return false;
         };
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.surveys).enumerate();
@@ -214,18 +245,18 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
     /// finer leaf, in the wanted leaves; strangers only on demand. Returns per leaf those that are to be named.
-    fn merge_in_leaves(
+    pub(super) fn merge_in_leaves(
         &mut self,
         among_strangers: bool,
         is_wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<Merged> {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
-        let resampling = Resampling::new(&self.physics, &scheme, extent, self.clock.step);
+        let resampling = Resampling::new(&self.physics, &scheme, extent);
         let limits = self.physics.adaptivity.as_ref().and_then(|a| a.merge);
         let Some((resampling, limits)) = resampling.zip(limits) else { return Vec::new() };
+        let (turns, root_edge) = (self.turns(), self.physics.root_edge);
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
-        let root_edge = self.physics.root_edge;
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).enumerate().with_min_len(8);
         let done: Vec<(Merged, Vec<f64>)> = leaves
             .map(|(number, (chunk, leaf)): (usize, (&mut Chunk<D>, &Octant<D>))| {
@@ -234,11 +265,10 @@ impl<const D: usize> Solver<D> {
                 if is_wanted(number) {
                     let cell = plan.cell(leaf.level);
                     let is_far = |x: [f64; D]| !lists.is_finer_within(number, &x, cell);
-                    let setting = resampling.setting(leaf.level);
+                    let setting = resampling.setting_at(leaf.level, turns[number]);
                     let bounds = leaf_box(leaf, root_edge);
                     let bounds = among_strangers.then_some(&bounds);
                     merged = merge(chunk, &setting, &limits, bounds, is_far, &mut |e| energies.push(e));
-                    patience::count_refused(chunk, &merged.refused);
                 }
                 (merged, energies)
             })
@@ -253,51 +283,8 @@ impl<const D: usize> Solver<D> {
         reports
     }
 
-    /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go
-    /// back. Faces across one combination of axes are tried at a time, in turn from call to call. All particles must be
-    /// in their leaves. Returns whether any rank merged any.
-    ///
-    /// # Errors
-    /// On all ranks when a particle could not be moved.
-    pub(super) fn reunite_families(&mut self, looks: &[Look]) -> Result<bool, Disagreement> {
-        let Some(adaptivity) = &self.physics.adaptivity else { return Ok(false) };
-        let Some(limits) = adaptivity.merge else { return Ok(false) };
-        let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
-        let scheme = self.physics.scheme();
-        let extent = super::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent, self.clock.step) else {
-            return Ok(false);
-        };
-        let root_edge = self.physics.root_edge;
-        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(looks).with_min_len(8);
-        let apart: Vec<Vec<(u32, [f64; D])>> = leaves
-            .map(|((chunk, leaf), look)| match look.due {
-                true => {
-                    let bounds = leaf_box(leaf, root_edge);
-                    separated(chunk, &resampling.setting(leaf.level), &limits, &bounds, axes)
-                }
-                false => Vec::new(),
-            })
-            .collect();
-        if !self.comm.any(apart.iter().any(|apart| !apart.is_empty())) {
-            return Ok(false);
-        }
-        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
-        let before: Vec<usize> = chunks.iter().map(Chunk::len).collect();
-        let gathered = grid.migration.gather(&grid.plan.tree, chunks, &apart);
-        let gathered = gathered.map_err(StepError::from);
-        // Where somebody came; numbers tell unless as many went.
-        let came: Vec<bool> = (self.chunks.iter().zip(&before).zip(&apart))
-            .map(|((chunk, &before), apart)| chunk.len() != before || !apart.is_empty())
-            .collect();
-        let merged = self.merge_in_leaves(false, |leaf| came[leaf]).iter().any(|report| report.merged > 0);
-        let returned = self.migrate().map_err(StepError::from);
-        self.comm.agree(gathered.and(returned))?;
-        Ok(self.comm.any(merged))
-    }
-
-    /// Collective. Merges particles in leaves that are coarser than they are. Returns whether this rank merged any.
-    pub(super) fn merge_particles(&mut self, looks: &[Look]) -> bool {
+    /// Collective. Merges particles in leaves that are coarser than they are. Returns what was done in each own leaf.
+    pub(super) fn merge_particles(&mut self, looks: &[Look]) -> Vec<Merged> {
         let reports = self.merge_in_leaves(true, |leaf| looks[leaf].due);
         // Groups that are no family get roots of their own, counted along the curve.
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
@@ -313,17 +300,38 @@ impl<const D: usize> Solver<D> {
             }
             self.books.next_root += total[0];
         }
-        reports.iter().any(|report| report.merged > 0)
+        reports
     }
 
     /// Not collective. After all merges of a regrid: counts those that were tried in vain.
-    pub(super) fn count_tries(&mut self, looks: &[Look]) {
-        let Some(adaptivity) = &self.physics.adaptivity else { return };
-        let turn = self.clock.step / adaptivity.every;
-        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).with_min_len(64);
-        leaves.filter(|(_, look)| look.due || look.stale).for_each(|((chunk, leaf), _)| {
-            patience::count(chunk, leaf.level, turn);
+    pub(super) fn count_tries(&mut self, looks: &[Look], reports: &[Merged]) {
+        let turns = self.turns();
+        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).enumerate();
+        let tried = leaves.with_min_len(64).filter(|(_, (_, look))| look.due || look.stale);
+        tried.for_each(|(number, ((chunk, leaf), _))| {
+            let refused = reports.get(number).map_or(&[][..], |report| &report.refused);
+            patience::count(chunk, leaf.level, turns[number], refused);
         });
+    }
+
+    /// Not collective. Reach that merges of this rank's particles may need (see [`super::grid::needed_reach`]): with that the grid needs
+    /// not be made anew for them.
+    pub(super) fn reach_of_merges(&self) -> u32 {
+        let Some(adaptivity) = self.physics.adaptivity.as_ref().filter(|a| a.merge.is_some()) else {
+            return 0;
+        };
+        let stretch = match self.physics.boxes {
+            BoxPolicy::Fixed => 1.0,
+            BoxPolicy::Volume { max_stretch, .. } => max_stretch,
+            BoxPolicy::Cell => return 0,
+        };
+        // Half widths and cells are those of level 0 over the same power of two.
+        let nominal = adaptivity.nominal.iter().copied().fold(0.0, f64::max);
+        let reach = reach_of_width(stretch * nominal / (0.25 * self.physics.root_edge));
+        let has_finer = |(chunk, leaf): (&Chunk<D>, &Octant<D>)| {
+            chunk.tags().iter().any(|&tag| Tag::unpack(tag).level > leaf.level)
+        };
+        if reach > 0 && self.chunks.iter().zip(self.forest.leaves()).any(has_finer) { reach } else { 0 }
     }
 
     /// Collective. The root after the highest that any living particle's identifier has.

@@ -5,6 +5,7 @@ use super::Solver;
 use crate::adaptivity::{Adaptivity, Kind};
 use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::resample::patience::Levels;
 
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.
@@ -21,18 +22,27 @@ pub(super) struct Survey<const D: usize> {
     pub stretch: f64,
     /// Mean rate of the plastic strain in the last step, 1/s.
     pub plastic_rate: f64,
+    /// What their tags say; `None` if nothing is known.
+    pub levels: Option<Levels>,
 }
 
 impl<const D: usize> Default for Survey<D> {
     fn default() -> Self {
-        Self { velocity: [[0.0; D]; 2], plastic_strain: 0.0, width: 0.0, stretch: 0.0, plastic_rate: 0.0 }
+        Self {
+            velocity: [[0.0; D]; 2],
+            plastic_strain: 0.0,
+            width: 0.0,
+            stretch: 0.0,
+            plastic_rate: 0.0,
+            levels: None,
+        }
     }
 }
 
 /// What to note.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Watch {
-    /// Velocities.
+    /// Velocities and tags.
     velocity: bool,
     /// Greatest plastic strain.
     strain: bool,
@@ -78,6 +88,7 @@ impl Watch {
             let ranges: [[f64; 2]; D] =
                 std::array::from_fn(|axis| range(chunk.column(Layout::<D>::VELOCITY + axis)));
             survey.velocity = std::array::from_fn(|side| ranges.map(|range| range[side]));
+            survey.levels = Some(Levels::of(chunk.tags()));
         }
         if self.strain {
             survey.plastic_strain = greatest(chunk.column(Layout::<D>::HISTORY));

@@ -39,8 +39,9 @@ fn conserved<const D: usize>(solver: &mut Solver<D>) -> Vec<[f64; 3]> {
     vec![[particles.mass, 0.0, 0.0], particles.momentum, grid.angular_momentum]
 }
 
-/// Sweeps so often, looking after each; the tree must change `changes` times or more.
-fn sweeps<const D: usize>(comm: &Comm, body: &str, sweeps: usize, changes: u64)
+/// Sweeps so often, looking after each; the tree must change `changes` times or more, and not more than the share `loss` of
+/// the energy may be lost without an entry in the books.
+fn sweeps<const D: usize>(comm: &Comm, body: &str, sweeps: usize, changes: u64, loss: f64)
 where
     Problem<D>: TryFrom<AnyProblem>,
 {
@@ -80,27 +81,34 @@ where
     assert_eq!(count(&solver), number, "families find together again");
     // Splits make affine velocities visible, merges hide them; the rest is what the method loses anyway.
     let explained = energy_before + total.split_energy - total.merge_energy;
-    assert!((energy_after - explained).abs() <= 5e-3 * energy_before, "{energy_after} {explained}");
+    assert!((energy_after - explained).abs() <= loss * energy_before, "{energy_after} {explained}");
 }
 
 #[test]
 fn over_a_disc() {
     let body = "shape = { kind = 'circle', centre = [0.9, 0.95], radius = 0.4 }\n\
                 velocity = [0.2, 0.1]\nangular_velocity = 6";
-    on_ranks("sweeps::over_a_disc", &[1], |comm| sweeps::<2>(comm, body, 130, 1000));
+    on_ranks("sweeps::over_a_disc", &[1], |comm| sweeps::<2>(comm, body, 130, 1000, 5e-3));
 }
 
-const BALL: &str = "particles_per_cell = 1\nshape = { kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }\n\
-                    velocity = [0.5, 0.2, -0.3]\nangular_velocity = [2, -3, 5]";
+/// A spinning ball that drifts with this velocity.
+fn ball(velocity: [f64; 3]) -> String {
+    format!(
+        "particles_per_cell = 1\nshape = {{ kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }}\n\
+         velocity = {velocity:?}\nangular_velocity = [2, -3, 5]"
+    )
+}
 
 #[test]
 fn over_a_ball() {
-    on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, BALL, 40, 250));
+    let body = ball([0.5, 0.2, -0.3]);
+    on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, &body, 40, 250, 5e-3));
 }
 
-/// As [`over_a_ball`]; takes minutes.
+/// As [`over_a_ball`]; takes minutes. The ball is slower, so that it does not reach a wall.
 #[test]
 #[ignore = "the long form of over_a_ball"]
 fn over_a_ball_a_thousand_times() {
-    on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, BALL, 170, 1000));
+    let body = ball([0.2, 0.1, -0.15]);
+    on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, &body, 170, 1000, 5e-2));
 }

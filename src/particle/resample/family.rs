@@ -2,7 +2,7 @@
 //!
 //! The particles of a family that was split from one particle are the only group whose merge gives that particle back.
 //! So siblings wait for each other as long as they may be near: while all of them are in the leaf and not torn apart;
-//! while a sibling in the leaf is itself split; and while the others may be just beyond a face of the leaf. They count
+//! while a sibling in the leaf is itself split; and for a while if the others may be just beyond a face of the leaf. They count
 //! as torn apart when the centres of those in the leaf are further from each other along an axis than those of
 //! undeformed siblings whose boxes just fit the widest box that a merge may make.
 //!
@@ -11,6 +11,7 @@
 //! the caller tries the combinations of axes in turn.
 use super::super::chunk::Chunk;
 use super::merge::{Limits, of_level};
+use super::sieve::Sieve;
 use super::{Setting, ids, patience};
 use crate::particle::chunk::Tag;
 
@@ -41,9 +42,11 @@ pub(super) fn parents<const D: usize>(chunk: &Chunk<D>, of: impl Iterator<Item =
 
 /// Particles of a level that have one of the parents (ascending), by parent and number.
 pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8, parents: &[u64]) -> Vec<Sibling> {
+    let sieve = Sieve::of(parents.iter().copied());
     let with_parent = |(p, tag): (u32, u64)| {
         let (parent, number) = ids::parent::<D>(chunk.ids()[p as usize])?;
-        parents.binary_search(&parent).is_ok().then_some(Sibling { parent, tag, number, p })
+        let is_one = sieve.may_hold(parent) && parents.binary_search(&parent).is_ok();
+        is_one.then_some(Sibling { parent, tag, number, p })
     };
     let mut siblings: Vec<Sibling> = of_level(chunk, level).filter_map(with_parent).collect();
     siblings.sort_unstable();
@@ -115,8 +118,11 @@ pub(super) fn waiting<const D: usize>(
                     || upper[a] < setting.extent[a] && x[a] >= upper[a] - distance
             })
         };
-        if all || family.iter().all(|sibling| beside_leaf(chunk.position(sibling.p as usize))) {
+        if all {
             waiting.extend(family.iter().map(|sibling| sibling.p));
+        } else if family.iter().all(|sibling| beside_leaf(chunk.position(sibling.p as usize))) {
+            let patient = family.iter().map(|sibling| sibling.p);
+            waiting.extend(patient.filter(|&p| !patience::has_given_up(chunk.tags()[p as usize])));
         }
     }
     waiting.sort_unstable();
@@ -135,7 +141,11 @@ pub fn separated<const D: usize>(
     let finest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).max().unwrap_or(0);
     let mut separated = Vec::new();
     for level in setting.level + 1..=finest {
-        let due = parents(chunk, patience::due(chunk, level, setting.turn));
+        let due = patience::due(chunk, level, setting.turn).into_iter();
+        let due = parents(chunk, due.filter(|&p| !patience::has_given_up(chunk.tags()[p as usize])));
+        if due.is_empty() {
+            continue;
+        }
         let siblings = siblings(chunk, level, &due);
         for family in siblings.chunk_by(same_parent).filter(|family| family.len() < 1 << D) {
             let distance = greatest_distance(setting, limits, family[0].tag, level);

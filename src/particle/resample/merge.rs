@@ -2,6 +2,7 @@
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
+use super::sieve::Sieve;
 use super::{Setting, patience, volume};
 
 /// How different particles may be that become one.
@@ -44,7 +45,7 @@ pub struct Merged {
     /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
     /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
-    /// Identifiers, ascending, of particles that the limits keep apart.
+    /// Identifiers, ascending, of particles that the limits keep apart, or that are alone.
     pub refused: Vec<u64>,
 }
 
@@ -74,11 +75,12 @@ pub fn merge<const D: usize>(
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
         for among_strangers in [false, true] {
-            let due: Vec<u32> = patience::due(chunk, level, setting.turn).collect();
+            let due = patience::due(chunk, level, setting.turn);
+            let refused = &mut report.refused;
             let mut groups = match bounds {
                 _ if due.is_empty() => continue,
                 _ if !among_strangers => families(chunk, level, &due),
-                Some(bounds) => strangers(chunk, setting, limits, bounds, level, &due),
+                Some(bounds) => strangers(chunk, setting, limits, bounds, level, &due, refused),
                 None => continue,
             };
             groups.retain(|group| may_merge(centre(chunk, group)));
@@ -157,7 +159,8 @@ fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Gr
 }
 
 /// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
-/// body and cell; in cells where one of the given ones is.
+/// body and cell; in cells where one of the given ones is. Identifiers of those among the given ones that are alone are
+/// appended to `refused`.
 fn strangers<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
@@ -165,48 +168,63 @@ fn strangers<const D: usize>(
     bounds: &Bounds<D>,
     level: u8,
     with: &[u32],
+    refused: &mut Vec<u64>,
 ) -> Vec<Group> {
+    let per_spacing = |body| 0.5 / setting.nominal(Tag { material: 0, body, level }, level - 1);
+    let per_spacing: Vec<f64> = (0..setting.nominal.len() as u16).map(per_spacing).collect();
     let cell_of = |p: u32, tag: u64| {
-        let per_spacing = 0.5 / setting.nominal(Tag::unpack(tag), level - 1);
+        let per_spacing = per_spacing[usize::from(Tag::unpack(tag).body)];
         (tag, chunk.position(p as usize).map(|x| (x * per_spacing).floor() as i64))
     };
     let mut cells: Vec<(u64, [i64; D])> =
         with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize]))).collect();
     cells.sort_unstable();
     cells.dedup();
+    let key =
+        |(tag, cell): &(u64, [i64; D])| cell.iter().fold(*tag, |key, &c| key.rotate_left(21) ^ c as u64);
+    let sieve = Sieve::of(cells.iter().map(key));
     let in_cells = of_level(chunk, level).map(|(p, tag)| (cell_of(p, tag), p));
     let mut members: Vec<((u64, [i64; D]), u32)> =
-        in_cells.filter(|(cell, _)| cells.binary_search(cell).is_ok()).collect();
+        in_cells.filter(|(cell, _)| sieve.may_hold(key(cell)) && cells.binary_search(cell).is_ok()).collect();
     let parents = family::parents(chunk, members.iter().map(|(_, p)| *p));
     let waiting = family::waiting(chunk, setting, limits, bounds, level, &parents);
     members.retain(|(_, p)| waiting.binary_search(p).is_err());
     members.sort_unstable();
-    let mut groups = Vec::new();
+    let (mut groups, mut alone) = (Vec::new(), Vec::new());
     for cell in members.chunk_by(|a, b| a.0 == b.0) {
         let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0.0), level - 1);
-        // A lattice of equal parts fills the volume to round-off.
-        let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 1e-9);
+        // A lattice of equal parts fills the volume to round-off. More must not come in: boxes wider than a cell by more
+        // than that would need another grid.
+        let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 8.0 * f64::EPSILON);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
         for &(_, p) in cell {
             let part = volume(chunk, p as usize);
             if filled + part > room {
-                close(chunk, &mut group, &mut groups);
+                close(chunk, &mut group, &mut groups, &mut alone);
                 filled = 0.0;
             }
             group.push(p);
             filled += part;
         }
-        close(chunk, &mut group, &mut groups);
+        close(chunk, &mut group, &mut groups, &mut alone);
     }
+    let alone = alone.iter().filter(|p| with.binary_search(p).is_ok());
+    refused.extend(alone.map(|&p| chunk.ids()[p as usize]));
     groups.retain(|group| group.members.iter().any(|p| with.binary_search(p).is_ok()));
     groups
 }
 
 /// Ends a group, which counts if it has two members or more.
-fn close<const D: usize>(chunk: &Chunk<D>, group: &mut Vec<u32>, groups: &mut Vec<Group>) {
+fn close<const D: usize>(
+    chunk: &Chunk<D>,
+    group: &mut Vec<u32>,
+    groups: &mut Vec<Group>,
+    alone: &mut Vec<u32>,
+) {
     let members = std::mem::take(group);
     if members.len() < 2 {
+        alone.extend(members);
         return;
     }
     let smallest = members.iter().map(|&p| chunk.ids()[p as usize]).min();

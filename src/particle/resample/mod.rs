@@ -12,6 +12,7 @@ pub mod ids;
 mod merge;
 mod mix;
 pub mod patience;
+mod sieve;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -31,8 +32,8 @@ pub struct Setting<'a, const D: usize> {
     /// Half width of an undeformed particle of level 0 by body, m: half a cell of level 0 over the particles per cell
     /// and direction. On level k it is this over 2^k.
     pub nominal: &'a [f64],
-    /// Number of the regrid, which says who is tried for a merge (see [`patience`]).
-    pub turn: u64,
+    /// Who is tried for a merge.
+    pub turn: patience::Turn,
 }
 
 impl<const D: usize> Setting<'_, D> {

@@ -2,102 +2,205 @@
 //!
 //! Particles that are finer than their leaf are tried at every regrid at first, then more and more rarely, since what
 //! keeps them apart does not go away soon as a rule, and looking is dear. How often a particle has been tried in vain is
-//! part of its state: three bits of its packed tag. Turns of particles with neighbouring roots, which lie together as
-//! long as nothing mixes them, come at the same time, and those of others at other times; so the work is spread.
-use super::ids;
+//! part of its state: eight bits of its packed tag. The time between two tries doubles with each, so that nobody waits
+//! longer than about twice what was needed. From every sixteenth regrid on leaves have their turns at different regrids, so
+//! that the work is spread.
+//!
+//! Particles whose siblings may still come are tried eight times, at every regrid, and eight times at every second, before
+//! they take their chance with strangers: siblings meet across faces of leaves only at the right turn (see [`super::family`]), which is one of
+//! three or seven, and the same for all leaves. Families that met and were too different go on. Those in leaves beside finer ones, which keep siblings apart as well, go on
+//! waiting instead, and begin anew when the finer leaves are gone.
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 
 /// Lowest bit of the count in a packed tag.
 const SHIFT: u32 = 40;
 /// All bits of the count.
-const BITS: u64 = 7 << SHIFT;
-/// Greatest count of a particle that limits keep from merging: tried at one regrid of 64.
-const REFUSED: u64 = 6;
-/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of four.
-const WAITING: u64 = 2;
-/// Bits of the root that neighbours differ in: about as many particles as a leaf has.
-const NEIGHBOURS: u32 = 9;
+const COUNT: u64 = 0x7f << SHIFT;
+/// Bit of particles whose whole family has been seen together, if not yet close enough.
+const MET: u64 = 1 << 47;
+/// All that is noted in a tag.
+const BITS: u64 = COUNT | MET;
+/// By how much the count grows from one interval to the next, which is twice as long.
+const DOUBLING: u64 = 8;
+/// Greatest count of a particle that limits keep from merging: tried at one regrid of 256.
+const REFUSED: u64 = 8 * DOUBLING;
+/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of 64.
+const WAITING: u64 = 6 * DOUBLING;
+/// Greatest count of one of a family that has been seen together: at one of eight, when all leaves have their turn.
+const TOGETHER: u64 = 4 * DOUBLING - 1;
+/// Count from which on nobody waits for siblings who have not come, and most likely have become one with others: after
+/// all turns of the axes.
+const GIVEN_UP: u64 = 2 * DOUBLING;
+/// Count of a particle that waits for siblings, or to get away from finer leaves, as long as its leaf is beside finer ones.
+const PARKED: u64 = 0x7f;
+/// Bits of the level in a packed tag.
+const LEVEL: u64 = 0xff << 32;
 
 /// The packed tag without its count.
 pub fn plain(tag: u64) -> u64 {
     tag & !BITS
 }
 
-/// Whether a particle is to be tried at the regrid of number `turn`.
-pub fn is_due<const D: usize>(tag: u64, id: u64, turn: u64) -> bool {
-    let phase = turn.wrapping_add(ids::root::<D>(id) >> NEIGHBOURS);
-    phase & ((1 << ((tag & BITS) >> SHIFT)) - 1) == 0
+/// Who in a leaf is tried at a regrid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// One bit for each interval between tries.
+    intervals: u32,
+    /// Whether finer leaves touch the leaf.
+    beside_finer: bool,
+}
+
+impl Turn {
+    /// Everybody, in a leaf that is not beside finer ones.
+    pub const ALL: Self = Self { intervals: u32::MAX, beside_finer: false };
+
+    /// At regrid `number` in the leaf that begins at a key of the curve.
+    pub fn new(number: u64, leaf: u64, beside_finer: bool) -> Self {
+        let own = number.wrapping_add(leaf.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48);
+        let is_due = |interval: u64| match interval {
+            _ if interval == PARKED / DOUBLING => !beside_finer || own & 63 == 0,
+            _ if interval <= TOGETHER / DOUBLING => number & ((1 << interval) - 1) == 0,
+            _ => own & ((1 << interval) - 1) == 0,
+        };
+        let due = (0..=PARKED / DOUBLING).filter(|&interval| is_due(interval));
+        Self { intervals: due.fold(0, |bits, interval| bits | 1 << interval), beside_finer }
+    }
+
+    /// Whether a particle that is finer than the leaf is tried.
+    pub fn has(self, tag: u64) -> bool {
+        self.intervals & interval(tag) != 0
+    }
+}
+
+/// How often a particle has been tried, more or less.
+fn count_of(tag: u64) -> u64 {
+    (tag & COUNT) >> SHIFT
+}
+
+/// The bit of a particle's interval between tries.
+fn interval(tag: u64) -> u32 {
+    1 << (count_of(tag) / DOUBLING)
+}
+
+/// Whether a particle has been tried so often that it waits no longer for siblings who are not there.
+pub fn has_given_up(tag: u64) -> bool {
+    tag & MET == 0 && (GIVEN_UP..PARKED).contains(&count_of(tag))
 }
 
 /// Particles of a chunk made for a level that are due.
-pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: u64) -> impl Iterator<Item = u32> {
-    let each = (0..).zip(chunk.tags().iter().zip(chunk.ids()));
-    let of_level = each.filter(move |(_, (tag, _))| Tag::unpack(**tag).level == level);
-    of_level.filter(move |(_, (tag, id))| is_due::<D>(**tag, **id, turn)).map(|(p, _)| p)
+pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Vec<u32> {
+    let level = u64::from(level) << 32;
+    let each = (0..).zip(chunk.tags());
+    each.filter(|(_, tag)| **tag & LEVEL == level && turn.has(**tag)).map(|(p, _)| p).collect()
 }
 
-/// Whether a chunk in a leaf of a level has particles made for finer ones, and whether any of those is due.
-pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: u64) -> Look {
-    const LEVEL: u64 = 0xff << 32;
-    let own = u64::from(level) << 32;
-    // Most leaves have particles of their own level only, without counts.
-    let differs = chunk.tags().iter().fold(0, |differs, tag| differs | (tag ^ own));
-    let mut look = Look { coarser: false, finer: false, due: false, stale: false };
-    if differs & (LEVEL | BITS) == 0 {
-        return look;
-    }
-    for (&tag, &id) in chunk.tags().iter().zip(chunk.ids()) {
-        match (tag & LEVEL).cmp(&own) {
-            std::cmp::Ordering::Less => look.coarser = true,
-            std::cmp::Ordering::Equal => look.stale |= tag & BITS != 0,
-            std::cmp::Ordering::Greater => {
-                look.finer = true;
-                look.due |= is_due::<D>(tag, id, turn);
+/// What the tags of a chunk say, without the level of its leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Levels {
+    /// Coarsest level that a particle was made for, as in a tag.
+    coarsest: u64,
+    /// Intervals of these particles.
+    of_coarsest: u32,
+    /// Intervals of all others.
+    of_finer: u32,
+    /// Whether one of the coarsest has been tried.
+    tried: bool,
+}
+
+impl Levels {
+    /// Of some tags.
+    pub fn of(tags: &[u64]) -> Self {
+        let coarsest = tags.iter().fold(LEVEL, |least, tag| least.min(tag & LEVEL));
+        let mut levels = Self { coarsest, of_coarsest: 0, of_finer: 0, tried: false };
+        let differs = tags.iter().fold(0, |differs, tag| differs | (tag ^ coarsest));
+        // Most leaves have particles of one level only, without counts.
+        if differs & (LEVEL | BITS) == 0 {
+            levels.of_coarsest = u32::from(!tags.is_empty());
+            return levels;
+        }
+        for &tag in tags {
+            if tag & LEVEL == coarsest {
+                levels.of_coarsest |= interval(tag);
+                levels.tried |= tag & BITS != 0;
+            } else {
+                levels.of_finer |= interval(tag);
             }
         }
+        levels
+    }
+
+    /// What this means in a leaf of a level; `None` if particles of the leaf's level cannot be told from others.
+    pub fn look(self, level: u8, turn: Turn) -> Option<Look> {
+        let (finer, stale) = match self.coarsest.cmp(&(u64::from(level) << 32)) {
+            _ if self.of_coarsest == 0 => (0, false),
+            std::cmp::Ordering::Less => return None,
+            std::cmp::Ordering::Equal => (self.of_finer, self.tried),
+            std::cmp::Ordering::Greater => (self.of_finer | self.of_coarsest, false),
+        };
+        Some(Look { coarser: false, due: turn.intervals & finer != 0, stale })
+    }
+}
+
+/// How the particles of a chunk fit a leaf of a level.
+pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Look {
+    let own = u64::from(level) << 32;
+    let mut look = Look::default();
+    for &tag in chunk.tags() {
+        let is_finer = tag & LEVEL > own;
+        look.coarser |= tag & LEVEL < own;
+        look.stale |= !is_finer & (tag & BITS != 0);
+        look.due |= is_finer & turn.has(tag);
     }
     look
 }
 
 /// What [`look`] sees.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Look {
     /// Particles made for coarser leaves.
     pub coarser: bool,
-    /// Particles made for finer leaves.
-    pub finer: bool,
-    /// Some of the finer ones are due.
+    /// Particles made for finer leaves, some of them due.
     pub due: bool,
     /// Particles that fit their leaf have been tried elsewhere.
     pub stale: bool,
 }
 
-/// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf.
-pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: u64) {
+/// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf. `refused`: identifiers,
+/// ascending, of those that the limits keep apart.
+pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: Turn, refused: &[u64]) {
     for p in 0..chunk.len() {
         let (tag, id) = (chunk.tags()[p], chunk.ids()[p]);
         if Tag::unpack(tag).level <= level {
             chunk.tags_mut()[p] = plain(tag);
-        } else if is_due::<D>(tag, id, turn) {
-            chunk.tags_mut()[p] = with_one_more(tag, WAITING);
+        } else if turn.has(tag) {
+            chunk.tags_mut()[p] = tried_again(tag, refused.binary_search(&id).is_ok(), turn.beside_finer);
         }
     }
 }
 
-/// Counts those that the limits keep apart, by identifier, ascending.
-pub fn count_refused<const D: usize>(chunk: &mut Chunk<D>, refused: &[u64]) {
-    for p in 0..chunk.len() {
-        if !refused.is_empty() && refused.binary_search(&chunk.ids()[p]).is_ok() {
-            chunk.tags_mut()[p] = with_one_more(chunk.tags()[p], REFUSED);
+/// Notes that the families of some particles (identifiers, ascending) have been seen together.
+pub fn met<const D: usize>(chunk: &mut Chunk<D>, together: &[u64]) {
+    for p in 0..if together.is_empty() { 0 } else { chunk.len() } {
+        if together.binary_search(&chunk.ids()[p]).is_ok() {
+            chunk.tags_mut()[p] |= MET;
         }
     }
 }
 
-/// The tag with a count one higher, but not above `most` if it was not before.
-fn with_one_more(tag: u64, most: u64) -> u64 {
-    let tried = (tag & BITS) >> SHIFT;
-    plain(tag) | (tried + 1).min(most.max(tried)) << SHIFT
+/// The tag after one more try in vain.
+fn tried_again(tag: u64, is_refused: bool, beside_finer: bool) -> u64 {
+    let tries = count_of(tag);
+    let tries = match (is_refused, tries) {
+        (true, PARKED) => GIVEN_UP + DOUBLING,
+        (true, _) => (tries + DOUBLING).min(REFUSED),
+        (false, PARKED) if beside_finer => PARKED,
+        (false, PARKED) => 0,
+        (false, _) if beside_finer && tries + 1 == GIVEN_UP => PARKED,
+        (false, _) if tag & MET != 0 => (tries + 1).min(TOGETHER.max(tries)),
+        (false, _) => (tries + 1).min(WAITING.max(tries)),
+    };
+    tag & !COUNT | tries << SHIFT
 }
 
 #[cfg(test)]
@@ -105,33 +208,66 @@ mod tests {
     use super::*;
 
     /// Regrids at which a particle is tried when nothing comes of it.
-    fn turns(id: u64, refused: bool) -> Vec<u64> {
+    fn turns(leaf: u64, refused: bool, beside_finer: impl Fn(u64) -> bool) -> Vec<u64> {
         let mut chunk = Chunk::<2>::new();
-        chunk.push_zeroed(id, Tag { material: 1, body: 2, level: 3 });
-        let mut tried = Vec::new();
-        for turn in 0..400 {
+        let (tag, id) = (Tag { material: 1, body: 2, level: 3 }, 7);
+        chunk.push_zeroed(id, tag);
+        let (ids, mut tried) = ([id], Vec::new());
+        for number in 0..1100 {
+            let turn = Turn::new(number, leaf, beside_finer(number));
             let look = look(&chunk, 2, turn);
-            assert!(look.finer && !look.coarser && !look.stale);
+            assert!(!look.coarser && !look.stale);
+            assert_eq!(Levels::of(chunk.tags()).look(2, turn), Some(look));
             if look.due {
-                tried.push(turn);
-                match refused {
-                    true => count_refused(&mut chunk, &[id]),
-                    false => count(&mut chunk, 2, turn),
-                }
-                assert_eq!(Tag::unpack(chunk.tags()[0]), Tag { material: 1, body: 2, level: 3 });
+                tried.push(number);
+                count(&mut chunk, 2, turn, if refused { &ids } else { &[] });
+                assert_eq!(Tag::unpack(chunk.tags()[0]), tag);
             }
         }
-        assert!(look(&chunk, 3, 0).stale);
-        count(&mut chunk, 3, 0);
-        assert_eq!(chunk.tags()[0], plain(chunk.tags()[0]));
+        let fits = Levels::of(chunk.tags());
+        assert!(look(&chunk, 3, Turn::ALL).stale && fits.look(3, Turn::ALL).is_some_and(|look| look.stale));
+        assert!(look(&chunk, 4, Turn::ALL).coarser && fits.look(4, Turn::ALL).is_none());
+        count(&mut chunk, 3, Turn::ALL, &[]);
+        assert_eq!(chunk.tags()[0], tag.pack());
+        assert_eq!(Levels::of(chunk.tags()).look(3, Turn::ALL), Some(Look::default()));
         tried
     }
 
     #[test]
     fn ever_more_rarely() {
-        assert_eq!(turns(7, true), [0, 2, 4, 8, 16, 32, 64, 128, 192, 256, 320, 384]);
-        assert_eq!(turns(7, false)[..6], [0, 2, 4, 8, 12, 16]);
-        // Other roots, other times.
-        assert_eq!(turns(5 << NEIGHBOURS, true)[5..8], [59, 123, 187]);
+        assert_eq!(turns(0, true, |_| false), [0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 768, 1024]);
+        let waiting = turns(0, false, |_| false);
+        // All turns of the axes come round before siblings are given up.
+        assert_eq!(waiting[..18], [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28]);
+        assert_eq!(waiting[waiting.len() - 2..], [1024, 1088]);
+        // Beside finer leaves nobody gives up; once these are gone, all turns of the axes come again.
+        let parked = turns(0, false, |number| number < 601);
+        assert_eq!(parked[14..18], [20, 22, 64, 128]);
+        let freed = parked.iter().position(|&number| number == 601).expect("tried at once");
+        assert_eq!(parked[freed..][..10], [601, 602, 603, 604, 605, 606, 607, 608, 609, 610]);
+        // Other leaves, other times.
+        let others = turns(5 << 40, true, |_| false);
+        assert_eq!(others[..2], [0, 2]);
+        assert!(
+            others[4..].windows(2).all(|pair| pair[1] - pair[0] <= 256) && !others.contains(&1024),
+            "{others:?}"
+        );
+    }
+
+    #[test]
+    fn levels_of_several() {
+        let mut chunk = Chunk::<3>::new();
+        assert_eq!(Levels::of(chunk.tags()).look(0, Turn::ALL), Some(Look::default()));
+        for (id, level) in [4, 2, 3, 2].into_iter().enumerate() {
+            chunk.push_zeroed(id as u64, Tag { material: 0, body: 0, level });
+        }
+        for number in 0..40 {
+            for level in 1..=2 {
+                let turn = Turn::new(number, 0, false);
+                let seen = look(&chunk, level, turn);
+                assert_eq!(Levels::of(chunk.tags()).look(level, turn), Some(seen));
+                count(&mut chunk, 2, turn, &[1, 2]);
+            }
+        }
     }
 }

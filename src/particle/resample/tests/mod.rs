@@ -38,7 +38,7 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
-    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: 0 }
+    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: patience::Turn::ALL }
 }
 
 /// The domain as one leaf.
