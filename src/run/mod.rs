@@ -278,7 +278,8 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Collective. Last row, last output, picture, evaluation.
     fn finish(&mut self) -> Result<Summary, RunError> {
         let step = self.solver.clock.step;
-        let row = self.recorder.row_step() != Some(step);
+        // Only rank 0 knows.
+        let row = !self.comm.any(self.recorder.row_step() == Some(step));
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
         // Unless it was due at this very step.
         if self.output_step != Some(step) {

@@ -138,6 +138,11 @@ impl<const D: usize> Solver<D> {
         pending
     }
 
+    /// Not collective. Notes what the surface between partitions needs, while the arenas are those of the present tree.
+    pub(super) fn note_surface(&mut self) {
+        self.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
+    }
+
     /// Collective. What this rank holds of the tree and sends in the exchange done last.
     pub fn census(&self) -> Census {
         let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
@@ -146,7 +151,7 @@ impl<const D: usize> Solver<D> {
             ghost_leaves: tree.ghost_len() as u64,
             neighbours: exchange.neighbours().len() as u64,
             arena_bytes: self.arena_bytes,
-            surface_bytes: surface_bytes(exchange, &self.grid.plan, &self.grid.arenas),
+            surface_bytes: self.surface_bytes,
             grid_bytes: self.grid.heap_bytes() as u64,
         }
     }

@@ -157,6 +157,8 @@ pub struct Solver<const D: usize> {
     sent_before: Traffic,
     /// Bytes of the last exchange of arenas.
     arena_bytes: u64,
+    /// Least bytes that these nodes need, as of the last step that was weighed.
+    surface_bytes: u64,
     costs: Costs,
     partitioned: LastPartition,
     /// New partitions since the start of this process.
@@ -196,6 +198,7 @@ impl<const D: usize> Solver<D> {
             recall: Recall::default(),
             sent_before: Traffic::default(),
             arena_bytes: 0,
+            surface_bytes: 0,
             costs: Costs::new(clock.step),
             partitioned,
             partitions: 0,

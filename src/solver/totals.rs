@@ -59,6 +59,7 @@ impl<const D: usize> Solver<D> {
     pub fn grid_totals(&mut self) -> Result<GridTotals, StepError> {
         let sorted = self.sort_into_bins();
         self.nodes_from_particles(0.0);
+        self.note_surface();
 
         let (plan, fields) = (&self.grid.plan, &self.grid.fields);
         let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
@@ -99,6 +100,7 @@ impl<const D: usize> Solver<D> {
         if !std::mem::take(&mut self.is_to_weigh) {
             return;
         }
+        self.note_surface();
         let (plan, fields, chunks) = (&self.grid.plan, &self.grid.fields, &self.chunks);
         self.weighed = self.phases.time(Phase::Output, || {
             let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);

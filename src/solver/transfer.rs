@@ -306,7 +306,7 @@ impl<const D: usize> Solver<D> {
     /// each leaf, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
     pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan), self.clock.step);
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let resampling = resampling.as_ref();
         let borders = &self.grid.migration.borders;
         let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
