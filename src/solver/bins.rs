@@ -33,6 +33,8 @@ pub struct LeafBins<const D: usize> {
     pub cut: Vec<u32>,
     /// Finer leaves around.
     finer: Vec<NearLeaf<D>>,
+    /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
+    around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
     sides: Option<Sides<D>>,
 }
@@ -193,15 +195,19 @@ impl<const D: usize> LeafBins<D> {
     fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
-        let around =
-            leaves_around(tree, known).into_iter().filter(|&leaf| tree.leaves()[leaf].level > here.level);
-        let finer: Vec<NearLeaf<D>> = around.map(|leaf| near_leaf(tree, leaf, plan.root_edge)).collect();
+        let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
+        let mut around = leaves_around(tree, known);
+        if around.iter().all(|&leaf| tree.leaves()[leaf].level <= here.level) {
+            around.clear();
+        }
+        let around: Vec<NearLeaf<D>> = around.into_iter().map(near).collect();
+        let finer: Vec<NearLeaf<D>> = around.iter().filter(|leaf| leaf.level > here.level).cloned().collect();
         let sides = (!finer.is_empty()).then(|| {
             let bins = &plan.bins[plan.leaf_bins(known - tree.first_own())];
             let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
             Sides::new(own, here, cell, &finer, bins)
         });
-        Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, sides }
+        Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, around, sides }
     }
 
     fn sort(
@@ -213,6 +219,11 @@ impl<const D: usize> LeafBins<D> {
         widths: &impl BoxWidths<D>,
         scratch: &mut Scratch,
     ) -> Result<(), BinMissing> {
+        if self.around.is_empty() {
+            let (tree, edge) = (&plan.tree, plan.root_edge);
+            let around = leaves_around(tree, tree.first_own() + leaf);
+            self.around = around.into_iter().map(|leaf| near_leaf(tree, leaf, edge)).collect();
+        }
         self.cut.clear();
         self.members.iter_mut().for_each(Members::clear);
         let crowded = chunk.len() >= crowded(D);
@@ -364,7 +375,7 @@ impl<const D: usize> LeafBins<D> {
         if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
             return own.level;
         }
-        self.finer
+        self.around
             .iter()
             .filter(|leaf| (0..D).all(|axis| lo[axis] < leaf.upper[axis] && hi[axis] > leaf.lower[axis]))
             .map(|leaf| leaf.level)
