@@ -155,12 +155,12 @@ impl<const D: usize> NodeFields<D> {
                     let links = links.of(i);
                     let mut row = F64x4::new(to.rows[at].0);
                     for link in links {
-                        let steps = &steps[link.offset as usize];
+                        let step = &steps[link.offset as usize];
                         let mut sum = F64x4::new(fine.row(link.node).0);
-                        for (moment, delta) in fine.moments(link.moments).iter().zip(steps.delta) {
+                        for (moment, delta) in fine.moments(link.moments).iter().zip(step.delta) {
                             sum = F64x4::new(moment.0).mul_add(delta, sum);
                         }
-                        row = steps.weight.mul_add(sum, row);
+                        row = step.weight.mul_add(sum, row);
                     }
                     to.rows[at] = Row(row.to_array());
                     // Real nodes need no moments.
@@ -194,14 +194,14 @@ impl<const D: usize> NodeFields<D> {
                     let mut row = F64x4::splat(0.0);
                     let mut sums = [row; D];
                     for link in links.of(i) {
-                        let steps = &steps[link.offset as usize];
+                        let step = &steps[link.offset as usize];
                         let [x, y, z, _] = coarse.row(link.node).0;
                         let value = F64x4::new([x, y, z, 0.0]);
-                        row = steps.weight.mul_add(value, row);
+                        row = step.weight.mul_add(value, row);
                         let moments = coarse.moments(link.moments);
                         for axis in 0..D {
-                            let moment = value.mul_add(steps.delta[axis], F64x4::new(moments[axis].0));
-                            sums[axis] = steps.weight.mul_add(moment, sums[axis]);
+                            let moment = value.mul_add(step.delta[axis], F64x4::new(moments[axis].0));
+                            sums[axis] = step.weight.mul_add(moment, sums[axis]);
                         }
                     }
                     let at = links.nodes[i] as usize - first;

@@ -4,12 +4,12 @@
 //! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
 //! does not fit is listed and added up along the tree of keys.
 use super::arena::Moments;
-use super::mask::bits;
+use super::mask::{bits, offset_count};
 use super::order::{Origin, Term, arrange, fold};
 use super::region::{MOST_BINS, SPAN, arena_node};
 use super::sources::{NO_HOME, Part};
 use super::sums::{BlockSum, ZERO, ZEROS};
-use crate::kernel::{ARENA_EDGE, Row};
+use crate::kernel::Row;
 
 /// A bin outside its leaf that reaches a block.
 #[derive(Clone, Copy, Debug)]
@@ -103,12 +103,14 @@ impl<const D: usize> BlockSum<'_, D> {
         let nodes = self.regions.nodes[region];
         let Some(received) = self.received else { return };
         let Mixed { placed, pieces, .. } = &mut *self.scratch;
-        let first = node_in_arena::<D>(nodes.trailing_zeros());
+        // Distances between nodes are the same in all arenas.
+        let node = |bit| arena_node::<D>(offset_count(D) / 2, bit);
+        let first = node(nodes.trailing_zeros());
         for placed in placed {
             if let Origin::Piece(piece) = placed.origin {
                 let to = &mut pieces[placed.slot * SPAN..][..SPAN];
                 for bit in bits(nodes) {
-                    to[node_in_arena::<D>(bit) - first] = received.row(piece, bit);
+                    to[node(bit) - first] = received.row(piece, bit);
                 }
             }
         }
@@ -206,11 +208,6 @@ impl<const D: usize> BlockSum<'_, D> {
             Origin::Piece(piece) => self.received.map(|received| received.moments(piece, bit)),
         }
     }
-}
-
-/// Where node `bit` of a block lies in an arena, from the block's first node on.
-fn node_in_arena<const D: usize>(bit: u32) -> usize {
-    (0..D).map(|axis| (bit as usize >> (2 * axis) & 3) * ARENA_EDGE.pow(axis as u32)).sum()
 }
 
 /// Adds one node's moments.

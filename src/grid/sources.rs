@@ -70,12 +70,12 @@ impl<const D: usize> GridPlan<D> {
         (0..D).fold((1 << offset_count(D)) - 1, |homes, axis| {
             let at = |coord: u32, level: u8| i64::from(coord) << (MAX_LEVEL - level);
             let (from, to) = (at(leaf.coord[axis], leaf.level), at(leaf.coord[axis] + 1, leaf.level));
+            let edge = 1i64 << (MAX_LEVEL - block.level);
             let along = (0..3).filter(|&towards| {
-                let beside = i64::from(block.coord[axis]) + towards - 1;
-                let edge = 1i64 << (MAX_LEVEL - block.level);
+                let beside = i64::from(block.coord[axis]) + towards as i64 - 1;
                 beside * edge < to && from < (beside + 1) * edge
             });
-            homes & along.fold(0, |set, towards| set | positions_at::<D>(axis, towards as usize))
+            homes & along.fold(0, |set, towards| set | POSITIONS[axis][towards])
         })
     }
 
@@ -189,11 +189,12 @@ impl<const D: usize> GridPlan<D> {
     }
 }
 
-/// Positions with offset `towards - 1` along `axis`, as bits.
-fn positions_at<const D: usize>(axis: usize, towards: usize) -> u32 {
-    let here = |position: &usize| position / 3usize.pow(axis as u32) % 3 == towards;
-    (0..offset_count(D)).filter(here).fold(0, |set, position| set | 1 << position)
-}
+/// By axis, positions with offset -1, 0 and 1 along it, as bits.
+const POSITIONS: [[u32; 3]; 3] = [
+    [0o111_111_111, 0o222_222_222, 0o444_444_444],
+    [0o007_007_007, 0o070_070_070, 0o700_700_700],
+    [0o777, 0o777 << 9, 0o777 << 18],
+];
 
 /// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies, or, if
 /// that is outside, where the leaf lies. So what a leaf contributes is together, and so is what a rank contributes.
