@@ -32,13 +32,13 @@ pub const JOBS: [BenchJob; 5] = [
     BenchJob {
         name: "neo_hookean",
         title: "spinning neo-Hookean block, 3D, uniform tree",
-        warm_up: 20,
+        warm_up: 40,
         kind: Kind::Block(NEO_HOOKEAN),
     },
     BenchJob {
         name: "von_mises",
         title: "spinning von Mises block, 3D, uniform tree",
-        warm_up: 20,
+        warm_up: 40,
         kind: Kind::Block(VON_MISES),
     },
     BenchJob {
@@ -56,7 +56,7 @@ pub const JOBS: [BenchJob; 5] = [
     BenchJob {
         name: "sheet",
         title: "spinning neo-Hookean sheet, 2D plane strain, uniform tree",
-        warm_up: 20,
+        warm_up: 40,
         kind: Kind::Sheet,
     },
 ];

@@ -113,6 +113,7 @@ fn run<const D: usize>(
         let done = solver.step(problem.time.end, Requests::default());
         done.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })?;
         recorder.after_step(comm, &mut solver)?;
+        solver.balance_if_due();
     }
     let core_share = busy.zip(busy_seconds()).map_or(1.0, |(before, after)| {
         (after - before) / (start.elapsed().as_secs_f64() * rayon::current_num_threads() as f64)

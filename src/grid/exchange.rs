@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::arena::{Arenas, Moments};
 use super::feeders::NO_BIN;
+use super::fields::NodeFields;
 use super::mask::{bits, block_nodes};
 use super::mixed::Mixed;
 use super::plan::GridPlan;
@@ -39,6 +40,8 @@ pub(super) struct SentPiece {
 pub struct ArenaExchange<const D: usize> {
     exchange: NeighbourExchange,
     sent: Vec<Vec<SentPiece>>,
+    /// Per block, whether neighbours need sums of all own bins that reach some nodes.
+    asked: Vec<bool>,
     received_from: Vec<std::ops::Range<usize>>,
 }
 
@@ -105,8 +108,12 @@ impl<const D: usize> ArenaExchange<D> {
                 start..plan.pieces.partition_point(|piece| piece.rank <= rank)
             })
             .collect();
+        let mut asked = vec![false; plan.blocks.len()];
+        for piece in sent.iter().flatten().filter(|piece| piece.keys.is_none()) {
+            asked[piece.block as usize] = true;
+        }
         let exchange = NeighbourExchange::new(comm, ranks, TAG);
-        (Self { exchange, sent, received_from }, ReceivedSums::new(plan))
+        (Self { exchange, sent, asked, received_from }, ReceivedSums::new(plan))
     }
 
     /// Ranks with which sums are exchanged.
@@ -114,7 +121,7 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.neighbours()
     }
 
-    /// Per bin, whether some neighbour needs it.
+    /// Per bin, whether it reaches a block of which some neighbour needs sums.
     pub fn sent_bins(&self, plan: &GridPlan<D>) -> Vec<bool> {
         let mut sent = vec![false; plan.bins.len()];
         let overlap = &Regions::of::<D>().overlap;
@@ -123,10 +130,12 @@ impl<const D: usize> ArenaExchange<D> {
             let outer = plan.feeders.outer(piece.block as usize).iter();
             let outer = outer.map(|outer| (outer.bin, outer.position));
             for (bin, position) in inner.filter(|(bin, _)| *bin != NO_BIN).chain(outer) {
-                let is_asked = |(first, last)| (first..=last).contains(&plan.source_key(bin).0);
-                if overlap[position as usize] & piece.nodes != 0 && piece.keys.is_none_or(is_asked) {
-                    sent[bin as usize] = true;
-                }
+                // Blocks are summed as a whole, pieces with keys by themselves.
+                let is_sent = piece.keys.is_none_or(|(first, last)| {
+                    let is_touched = overlap[position as usize] & piece.nodes != 0;
+                    is_touched && (first..=last).contains(&plan.source_key(bin).0)
+                });
+                sent[bin as usize] |= is_sent;
             }
         }
         sent
@@ -137,23 +146,30 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.traffic()
     }
 
+    /// Per block, whether neighbours need sums of all own bins that reach some nodes.
+    pub fn asked(&self) -> &[bool] {
+        &self.asked
+    }
+
     /// What each neighbour needs of the own bins.
     pub(super) fn sent(&self) -> &[Vec<SentPiece>] {
         &self.sent
     }
 
-    /// Not collective. Adds up what neighbours need of the own arenas: a message for each.
-    pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>) -> Vec<Vec<u8>> {
+    /// Not collective. What neighbours need of the own arenas: a message for each. Most of it `fields` have from
+    /// the blocks asked for; the rest is added up here.
+    pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>, fields: &NodeFields<D>) -> Vec<Vec<u8>> {
         let own = Sources { plan, arenas, received: None };
         let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
         let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
             let mut extents = 0u64;
             let mut values = Vec::new();
             for (i, piece) in pieces.iter().enumerate() {
-                if let Some(next) = pieces.get(i + 1) {
-                    own.read_ahead(next.block as usize);
-                }
-                extents |= (packing.pack(piece, own, &mut values) as u64) << (2 * i);
+                let extent = match piece.keys {
+                    None => pack(piece, plan, fields, &mut values),
+                    Some(_) => packing.pack(piece, own, &mut values),
+                };
+                extents |= (extent as u64) << (2 * i);
             }
             (extents, values)
         });
@@ -211,32 +227,57 @@ impl<const D: usize> Default for Packing<D> {
 }
 
 impl<const D: usize> Packing<D> {
-    /// Appends a piece to a message.
+    /// Adds up a piece and appends it to a message.
     fn pack(&mut self, piece: &SentPiece, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
         let mut sum = piece.find(own, &mut self.scratch);
         let nodes = sum.own_nodes() & piece.nodes;
-        if nodes == 0 {
-            return Extent::None;
-        }
-        let is_all = nodes == piece.nodes;
-        if !is_all {
-            values.push(f64::from_bits(nodes));
-        }
         sum.sum_rows(Regions::of::<D>().meeting::<D>(nodes), &mut self.rows);
-        for bit in bits(nodes) {
-            let Row([x, y, z, mass]) = self.rows[bit as usize];
-            if D == 3 {
-                values.extend_from_slice(&[x, y, z, mass]);
-            } else {
-                values.extend_from_slice(&[x, y, mass]);
-            }
-        }
         sum.sum_moments(nodes & piece.constrained, &mut self.moments);
-        for bit in bits(nodes & piece.constrained) {
-            self.moments[bit as usize].iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
-        }
-        if is_all { Extent::All } else { Extent::Some }
+        append(piece, nodes, &self.rows, |bit| &self.moments[bit as usize], values)
     }
+}
+
+/// Appends a piece to a message whose sums `fields` have.
+fn pack<const D: usize>(
+    piece: &SentPiece,
+    plan: &GridPlan<D>,
+    fields: &NodeFields<D>,
+    values: &mut Vec<f64>,
+) -> Extent {
+    let block = piece.block as usize;
+    let nodes = fields.touched(block) & piece.nodes;
+    let rows = &fields.rows[block * block_nodes(D)..][..block_nodes(D)];
+    let slot = plan.blocks[block].moments.unwrap_or(0);
+    append(piece, nodes, rows, |bit| fields.moments_at(slot, bit), values)
+}
+
+/// Appends the sums at `nodes` to a message.
+fn append<'a, const D: usize>(
+    piece: &SentPiece,
+    nodes: u64,
+    rows: &[Row],
+    moments: impl Fn(u32) -> &'a Moments<D>,
+    values: &mut Vec<f64>,
+) -> Extent {
+    if nodes == 0 {
+        return Extent::None;
+    }
+    let is_all = nodes == piece.nodes;
+    if !is_all {
+        values.push(f64::from_bits(nodes));
+    }
+    for bit in bits(nodes) {
+        let Row([x, y, z, mass]) = rows[bit as usize];
+        if D == 3 {
+            values.extend_from_slice(&[x, y, z, mass]);
+        } else {
+            values.extend_from_slice(&[x, y, mass]);
+        }
+    }
+    for bit in bits(nodes & piece.constrained) {
+        moments(bit).iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
+    }
+    if is_all { Extent::All } else { Extent::Some }
 }
 
 impl<const D: usize> ReceivedSums<D> {

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use super::arena::{Arenas, Moments};
 use super::exchange::ReceivedSums;
 use super::links::{Links, NO_MOMENTS, weight_of};
-use super::mask::{block_nodes, offset, offset_count};
-use super::mixed::Mixed;
+use super::mask::{bits, block_nodes, offset, offset_count};
+use super::mixed::{Mixed, add_moments};
 use super::plan::{Block, GridPlan, NO_BLOCK};
+use super::region::Regions;
 use super::sums::{BlockSum, Sources};
 use super::window::{Shared, Window};
 use crate::kernel::simd::F64x4;
@@ -26,6 +27,8 @@ pub struct NodeFields<const D: usize> {
     pub moments: Vec<Moments<D>>,
     /// Per block, whether something was summed in it in this step.
     pub active: Vec<bool>,
+    /// Nodes that own arenas touch in this step, of blocks whose sums other ranks ask for.
+    touched: Vec<u64>,
     /// Per block, whether the gather of this step reads it or a block that it is a parent of.
     needed: Vec<bool>,
     /// Per block, whether its rows may differ from zero.
@@ -55,10 +58,19 @@ fn moment_tasks<'a, const D: usize>(
 /// Which blocks to sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Blocks to which own bins contribute alone.
-    Interior,
-    /// Blocks that also need the sums of other ranks.
-    Seam,
+    /// Blocks of which other ranks ask for sums; first, so that they can be sent.
+    Asked,
+    /// All others.
+    Rest,
+}
+
+/// One block of the fields with what is noted of it, mutable.
+struct Slot<'a, const D: usize> {
+    rows: &'a mut [Row],
+    moments: Option<&'a mut [Moments<D>]>,
+    active: &'a mut bool,
+    dirty: &'a mut bool,
+    touched: &'a mut u64,
 }
 
 /// One block of the fields, mutable.
@@ -76,6 +88,7 @@ impl<const D: usize> NodeFields<D> {
             rows: vec![ZERO; plan.blocks.len() * nodes],
             moments: vec![[ZERO; D]; plan.moment_blocks * nodes],
             active: vec![false; plan.blocks.len()],
+            touched: vec![0; plan.blocks.len()],
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
             moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
@@ -87,51 +100,119 @@ impl<const D: usize> NodeFields<D> {
         self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Moments<D>>()
     }
 
-    /// Not collective. Adds up the arenas that reach each block of `part`.
-    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>, part: Part) {
-        let sources = Sources { plan, arenas, received: (part == Part::Seam).then_some(received) };
-        let nodes = block_nodes(D);
-        let rows = self.rows.par_chunks_mut(TASK * nodes);
-        let flags = self.active.par_chunks_mut(TASK).zip(self.dirty.par_chunks_mut(TASK));
-        let moments = moment_tasks(plan, &mut self.moments);
-        let tasks = rows.zip(flags).zip(moments).enumerate();
-        tasks.for_each_init(Mixed::default, |scratch, (task, ((rows, (active, dirty)), moments))| {
-            let mut moments = moments.chunks_mut(nodes);
-            let flags = active.iter_mut().zip(dirty);
-            for (index, (rows, (active, dirty))) in (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags)) {
-                let block = &plan.blocks[index];
-                let mut moments = block.moments.and_then(|_| moments.next());
-                if plan.is_seam(index) != (part == Part::Seam) {
-                    continue;
-                }
-                *active = false;
-                let next = index + 1;
-                if next < plan.blocks.len()
-                    && arenas.reach(next)
-                    && plan.is_seam(next) == (part == Part::Seam)
-                {
-                    sources.read_ahead(next);
-                }
-                if block.sum != 0 && (arenas.reach(index) || part == Part::Seam) {
-                    let mut sum = BlockSum::find(sources, scratch, index, None);
-                    *active = !sum.is_empty();
-                    if *active {
-                        sum.sum_rows(u32::MAX, rows);
-                        if let Some(moments) = &mut moments {
-                            moments.fill([ZERO; D]);
-                            sum.sum_moments(block.constrained & block.sum, moments);
-                        }
-                    }
-                }
-                if *dirty && !*active {
-                    rows.fill(ZERO);
+    /// Not collective. Adds up the own arenas that reach each block of `part`; `asked` says of each block whether other ranks
+    /// ask for its sums.
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, asked: &[bool], part: Part) {
+        let sources = Sources { plan, arenas, received: None };
+        let is_wanted = |index: usize| asked[index] == (part == Part::Asked);
+        self.for_each_block(plan, |scratch, index, slot| {
+            if !is_wanted(index) {
+                return;
+            }
+            let next = index + 1;
+            if next < plan.blocks.len() && arenas.reach(next) && is_wanted(next) {
+                sources.read_ahead(next);
+            }
+            let (block, mut moments) = (&plan.blocks[index], slot.moments);
+            let mut is_reached = false;
+            *slot.touched = 0;
+            if arenas.reach(index) && (asked[index] || block.sum != 0) {
+                let mut sum = BlockSum::find(sources, scratch, index, None);
+                is_reached = !sum.is_empty();
+                if is_reached {
+                    sum.sum_rows(u32::MAX, slot.rows);
                     if let Some(moments) = &mut moments {
                         moments.fill([ZERO; D]);
+                        sum.sum_moments(block.constrained, moments);
+                    }
+                    if part == Part::Asked {
+                        *slot.touched = sum.own_nodes();
                     }
                 }
-                *dirty = *active;
+            }
+            if *slot.dirty && !is_reached {
+                slot.rows.fill(ZERO);
+                if let Some(moments) = &mut moments {
+                    moments.fill([ZERO; D]);
+                }
+            }
+            *slot.active = is_reached && block.sum != 0;
+            *slot.dirty = is_reached;
+        });
+    }
+
+    /// Not collective. Adds what other ranks have sent. Where their share and the own one are one subtree each, that is all; other
+    /// regions are added up anew.
+    pub fn add_received(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>) {
+        if plan.pieces.is_empty() {
+            return;
+        }
+        let sources = Sources { plan, arenas, received: Some(received) };
+        let regions = Regions::of::<D>();
+        self.for_each_block(plan, |scratch, index, slot| {
+            let (mut rest, mut moments) = (0, slot.moments);
+            for part in plan.parts(index) {
+                let touched = received.touched(part.piece) & regions.nodes[part.region as usize];
+                if touched == 0 {
+                    continue;
+                }
+                (*slot.active, *slot.dirty) = (true, true);
+                if !part.is_only {
+                    rest |= 1 << part.region;
+                    continue;
+                }
+                for bit in bits(touched) {
+                    slot.rows[bit as usize].add(&received.row(part.piece, bit));
+                }
+                if let Some(moments) = &mut moments {
+                    for bit in bits(touched & plan.blocks[index].constrained) {
+                        add_moments(&mut moments[bit as usize], &received.moments(part.piece, bit));
+                    }
+                }
+            }
+            if rest != 0 {
+                let mut sum = BlockSum::find(sources, scratch, index, None);
+                sum.sum_rows(rest, slot.rows);
+                if let Some(moments) = moments {
+                    sum.sum_moments(plan.blocks[index].constrained & regions.nodes_in(rest), moments);
+                }
             }
         });
+    }
+
+    /// Calls `work` in parallel for all blocks.
+    fn for_each_block(
+        &mut self,
+        plan: &GridPlan<D>,
+        work: impl Fn(&mut Mixed<D>, usize, Slot<'_, D>) + Sync,
+    ) {
+        let nodes = block_nodes(D);
+        let rows = self.rows.par_chunks_mut(TASK * nodes);
+        let active = self.active.par_chunks_mut(TASK);
+        let flags = active.zip(self.dirty.par_chunks_mut(TASK)).zip(self.touched.par_chunks_mut(TASK));
+        let moments = moment_tasks(plan, &mut self.moments);
+        let tasks = rows.zip(flags).zip(moments).enumerate();
+        tasks.for_each_init(Mixed::default, |scratch, (task, ((rows, flags), moments))| {
+            let mut moments = moments.chunks_mut(nodes);
+            let ((active, dirty), touched) = flags;
+            let flags = active.iter_mut().zip(dirty).zip(touched);
+            for (index, (rows, ((active, dirty), touched))) in
+                (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags))
+            {
+                let moments = plan.blocks[index].moments.and_then(|_| moments.next());
+                work(scratch, index, Slot { rows, moments, active, dirty, touched });
+            }
+        });
+    }
+
+    /// Nodes that own arenas touch in this step, of a block whose sums other ranks ask for.
+    pub(super) fn touched(&self, block: usize) -> u64 {
+        self.touched[block]
+    }
+
+    /// First moments of a node, of a block that has any.
+    pub(super) fn moments_at(&self, slot: u32, bit: u32) -> &Moments<D> {
+        &self.moments[slot as usize * block_nodes(D) + bit as usize]
     }
 
     /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:

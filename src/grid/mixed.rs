@@ -211,6 +211,6 @@ impl<const D: usize> BlockSum<'_, D> {
 }
 
 /// Adds one node's moments.
-fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
+pub(super) fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
     to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
 }

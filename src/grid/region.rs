@@ -10,7 +10,7 @@
 //! on the block's coordinate alone, in so few ways that tables hold them all.
 use std::sync::LazyLock;
 
-use super::mask::{arena_overlap, node_of_bit};
+use super::mask::{arena_overlap, bits, node_of_bit};
 use super::mask::{offset, offset_count, offset_index, opposite, product};
 use crate::kernel::ARENA_EDGE;
 
@@ -95,6 +95,11 @@ impl Regions {
     pub fn meeting<const D: usize>(&self, nodes: u64) -> u32 {
         let meets = |region: &usize| self.nodes[*region] & nodes != 0;
         (0..offset_count(D)).filter(meets).fold(0, |all, region| all | 1 << region)
+    }
+
+    /// Nodes of some regions, given as bits.
+    pub fn nodes_in(&self, regions: u32) -> u64 {
+        bits(u64::from(regions)).fold(0, |nodes, region| nodes | self.nodes[region as usize])
     }
 
     fn new<const D: usize>() -> Self {
@@ -185,7 +190,7 @@ mod tests {
     use partition::Octant;
 
     use super::*;
-    use crate::grid::mask::{bits, shifted};
+    use crate::grid::mask::shifted;
     use crate::grid::order::separation;
 
     fn check<const D: usize>(coord: [u32; D]) {

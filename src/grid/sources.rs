@@ -41,6 +41,8 @@ pub struct Part {
     pub key: u64,
     /// Position of one of the bins in the subtree that lie in their leaves; [`NO_HOME`] if it has none.
     pub home: u8,
+    /// Whether own bins are one subtree as well, if any reach the region, so that the sum is theirs and this.
+    pub is_only: bool,
 }
 
 /// No position.
@@ -153,10 +155,12 @@ impl<const D: usize> GridPlan<D> {
             let reaches = |candidate: &&Candidate| regions.positions[region] >> candidate.position & 1 == 1;
             let here: Vec<&Candidate> = candidates.iter().filter(reaches).collect();
             found.clear();
+            let mut own = 0;
             each_subtree(&here, &|candidate| candidate.key, &|candidate| candidate.rank, &mut |subtree| {
-                if let [first, ..] = subtree
-                    && first.rank != rank
-                {
+                let [first, ..] = subtree else { return };
+                if first.rank == rank {
+                    own += 1;
+                } else {
                     let home = subtree.iter().find(|candidate| candidate.is_inner);
                     let home = home.map_or(NO_HOME, |candidate| candidate.position);
                     found.push((first.rank, first.key, subtree[subtree.len() - 1].key, home));
@@ -180,10 +184,9 @@ impl<const D: usize> GridPlan<D> {
                 }
                 pieces[piece].nodes |= nodes;
                 pieces[piece].constrained |= nodes & constrained;
-                parts.push((
-                    block as u32,
-                    Part { region: region as u8, piece: piece as u32, key: first, home },
-                ));
+                let is_only = found.len() == 1 && own <= 1;
+                let (block, region, piece) = (block as u32, region as u8, piece as u32);
+                parts.push((block, Part { region, piece, key: first, home, is_only }));
             }
         }
     }

@@ -110,9 +110,6 @@ impl RunError {
     }
 }
 
-/// Steps between looks at the imbalance.
-const BALANCE_EVERY: u64 = 10;
-
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///
 /// # Errors
@@ -236,7 +233,7 @@ impl<'a, const D: usize> Run<'a, D> {
                 return Ok(Outcome::Stopped { checkpoint });
             }
             if self.solver.clock.time < self.problem.time.end {
-                self.balance();
+                self.solver.balance_if_due();
             }
         }
         Ok(Outcome::Finished(Box::new(self.finish()?)))
@@ -266,13 +263,6 @@ impl<'a, const D: usize> Run<'a, D> {
             self.checkpoint()?;
         }
         Ok(())
-    }
-
-    /// Collective. Partitions anew if ranks have become unequal.
-    fn balance(&mut self) {
-        if self.comm.size() > 1 && self.solver.clock.step.is_multiple_of(BALANCE_EVERY) {
-            self.solver.balance();
-        }
     }
 
     /// Collective. Last row, last output, picture, evaluation.

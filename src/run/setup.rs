@@ -102,7 +102,7 @@ fn partition_by_seeds<const D: usize>(
     // Counted, not filled: leaves that go to other ranks shall take no memory here.
     let count = |leaf: &Octant<D>| {
         let mut counts = vec![0; problem.bodies.len()];
-        count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost(counts.iter().sum()))
+        count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost::<D>(counts.iter().sum()))
     };
     let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
     let even = || vec![1; forest.leaves().len()];

@@ -1,9 +1,9 @@
 //! What leaves cost: integers from measured time, the same on all ranks.
 //!
 //! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the material of the
-//! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class. Steps
-//! in which nodes are summed and updated give the cost of a leaf. Costs steer the partition, which changes no bit
-//! of the state.
+//! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class; the leaf's arena
+//! counts as some particles more. Steps in which nodes are summed and updated give the cost of a leaf beside them. Costs
+//! steer the partition, which changes no bit of the state.
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -15,8 +15,8 @@ use crate::particle::chunk::Tag;
 /// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
 /// processor time takes as long as several particles.
 const MEASURE_EVERY: u64 = 32;
-/// Cost of a leaf with particles before anything is measured, in particles.
-const LEAF_COST: u64 = 8;
+/// A leaf without particles costs one such part of what a leaf with particles costs beside them.
+const EMPTY: u64 = 8;
 /// Unit of measured costs, s.
 const UNIT: f64 = 1e-11;
 /// A class needs so many measured particles to have a cost of its own.
@@ -35,6 +35,17 @@ pub enum Kind {
 
 const KINDS: usize = 3;
 
+/// What the arena of a leaf costs in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter in sand that
+/// has a free surface; 24 in 2D.
+const fn arena_cost(d: usize) -> u64 {
+    if d == 2 { 24 } else { 64 }
+}
+
+/// What the nodes of a leaf with particles cost before anything is measured, in particles.
+const fn node_cost(d: usize) -> u64 {
+    if d == 2 { 6 } else { 40 }
+}
+
 /// Costs of leaves and what they are measured from.
 #[derive(Debug, Default)]
 pub struct Costs {
@@ -48,6 +59,8 @@ pub struct Costs {
     steps: Range<u64>,
     /// Whether particles are transferred for a step, not for a row of the history.
     is_step: bool,
+    /// Step at which this process began.
+    first_step: u64,
     /// Steps and seconds of node work up to the last agreement.
     agreed_step: u64,
     agreed_seconds: f64,
@@ -55,18 +68,23 @@ pub struct Costs {
 
 /// Cost of a leaf in particles, as long as no time is measured.
 pub fn leaf_weight<const D: usize>(chunk: &Chunk<D>) -> u64 {
-    leaf_cost(chunk.len() as u64)
+    leaf_cost::<D>(chunk.len() as u64)
 }
 
 /// As [`leaf_weight`], for a leaf with so many particles.
-pub fn leaf_cost(particles: u64) -> u64 {
-    if particles == 0 { 1 } else { LEAF_COST + particles }
+pub fn leaf_cost<const D: usize>(particles: u64) -> u64 {
+    if particles == 0 { node_cost(D) / EMPTY + 1 } else { node_cost(D) + arena_cost(D) + particles }
 }
 
 impl Costs {
     /// No costs yet, in a run that starts or goes on at a step.
     pub(super) fn new(step: u64) -> Self {
-        Self { agreed_step: step, ..Self::default() }
+        Self { first_step: step, agreed_step: step, ..Self::default() }
+    }
+
+    /// Whether time has been taken of all leaves.
+    pub(super) fn are_measured(&self) -> bool {
+        self.agreed_step - self.first_step >= MEASURE_EVERY
     }
 
     /// Not collective. Begins a step of `leaves` own leaves.
@@ -107,9 +125,9 @@ impl Costs {
             return leaf_weight(chunk);
         }
         if chunk.is_empty() {
-            return (self.leaf / LEAF_COST).max(1);
+            return (self.leaf / EMPTY).max(1);
         }
-        let particles = counts(chunk, self.particle.len());
+        let particles = loads(chunk, self.particle.len());
         let cost = particles.iter().zip(&self.particle).map(|(count, cost)| count * cost[kind as usize]);
         self.leaf + cost.sum::<u64>()
     }
@@ -134,6 +152,13 @@ fn counts<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
         _ => chunk.tags().iter().for_each(|&tag| counts[usize::from(Tag::unpack(tag).material)] += 1),
     }
     counts
+}
+
+/// As [`counts`], with the leaf's arena shared out to the materials. The chunk is not empty.
+fn loads<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
+    let mut loads = counts(chunk, materials);
+    loads.iter_mut().for_each(|count| *count += arena_cost(D) * *count / chunk.len() as u64);
+    loads
 }
 
 /// New cost of a class: `new` mixed with what was found before.
@@ -182,10 +207,10 @@ impl<const D: usize> Solver<D> {
             nodes[1] += steps;
             let (kind, len) = (self.kind(leaf) as usize, chunk.len() as u64);
             let time = self.costs.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
-            for (material, count) in counts(chunk, materials).into_iter().enumerate() {
-                let share = time as f64 * count as f64 / len as f64;
+            for (material, load) in loads(chunk, materials).into_iter().enumerate() {
+                let share = time as f64 * load as f64 / (len + arena_cost(D)) as f64;
                 times[KINDS * material + kind] += units(share * 1e-9);
-                particles[KINDS * material + kind] += count * measurements(leaf, &self.costs.steps);
+                particles[KINDS * material + kind] += load * measurements(leaf, &self.costs.steps);
             }
         }
         let threads = rayon::current_num_threads() as f64;

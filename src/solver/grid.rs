@@ -129,10 +129,11 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Starts sending the sums that neighbours need.
-    pub(super) fn send_arenas(&mut self) -> Pending {
+    pub(super) fn send_sums(&mut self) -> Pending {
         let grid = &mut self.grid;
         let before = grid.exchange.traffic().bytes;
-        let messages = self.phases.time(Phase::Sum, || grid.exchange.pack(&grid.plan, &grid.arenas));
+        let messages =
+            self.phases.time(Phase::Sum, || grid.exchange.pack(&grid.plan, &grid.arenas, &grid.fields));
         let pending = self.phases.time(Phase::Exchange, || grid.exchange.begin(messages));
         self.arena_bytes = grid.exchange.traffic().bytes - before;
         pending
@@ -156,10 +157,11 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Waits for the sums of neighbours.
-    pub(super) fn receive_arenas(&mut self, pending: Pending) {
+    /// Waits for the sums of neighbours and adds them.
+    pub(super) fn add_sums_of_neighbours(&mut self, pending: Pending) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));
+        self.phases.time(Phase::Sum, || grid.fields.add_received(&grid.plan, &grid.arenas, &grid.received));
     }
 
     /// Collective over neighbours. Moves particles to the leaves that contain them.

@@ -179,7 +179,7 @@ impl<const D: usize> Solver<D> {
     ) -> Self {
         let start = thread_time();
         let grid = Grid::build(comm, &forest, &physics, 0);
-        let partitioned = LastPartition::since(start);
+        let partitioned = LastPartition::at_start(start);
         let mut solver = Self {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
@@ -253,11 +253,11 @@ impl<const D: usize> Solver<D> {
     /// over `dt`, and mass, on real nodes.
     pub(super) fn nodes_from_particles(&mut self, dt: f64) {
         self.scatter(dt, Reach::Neighbours);
-        let pending = self.send_arenas();
+        self.sum_nodes(Part::Asked);
+        let pending = self.send_sums();
         self.scatter(dt, Reach::Own);
-        self.sum_nodes(Part::Interior);
-        self.receive_arenas(pending);
-        self.sum_nodes(Part::Seam);
+        self.sum_nodes(Part::Rest);
+        self.add_sums_of_neighbours(pending);
         self.restrict();
     }
 

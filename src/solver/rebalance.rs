@@ -2,7 +2,8 @@
 //!
 //! When to make a new one: like a debtor who settles when what is owed equals the fee, ranks take new cuts when the time
 //! that the present ones have lost since they were made reaches what a new partition takes. While imbalance grows
-//! evenly, that is the interval with the least sum of both.
+//! evenly, that is the interval with the least sum of both. The partition with which a run starts is a guess; it is
+//! replaced as soon as costs are measured, if that takes away half of the imbalance.
 use std::time::{Duration, Instant};
 
 use partition::{CutAt, Cuts};
@@ -14,6 +15,8 @@ use super::phases::{Phase, thread_time};
 use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
 
+/// Steps between looks at the imbalance.
+const LOOK_EVERY: u64 = 10;
 /// Imbalance below which nothing is done.
 const LIMIT: f64 = 1.01;
 /// Imbalance from which on the price does not matter, if new cuts take away half of it.
@@ -39,12 +42,15 @@ struct Prospect {
     lost: f64,
     /// Seconds that the last new partition took.
     price: f64,
+    /// Whether the partition was made before costs were measured.
+    is_guess: bool,
 }
 
 impl Prospect {
     fn pays(self) -> bool {
         let helps = self.then - 1.0 <= 0.5 * (self.now - 1.0);
-        self.then < self.now && (self.lost > self.price || self.now > CEILING && helps)
+        let at_any_price = self.is_guess || self.now > CEILING;
+        self.then < self.now && (self.lost > self.price || at_any_price && helps)
     }
 }
 
@@ -57,13 +63,20 @@ pub(super) struct LastPartition {
     lost: f64,
     /// Time of the last look.
     looked: Duration,
+    /// Whether it was made before costs were measured.
+    is_guess: bool,
 }
 
 impl LastPartition {
     /// The partition with which a run starts or goes on, made since `start`.
-    pub fn since(start: Duration) -> Self {
+    pub fn at_start(start: Duration) -> Self {
+        Self { is_guess: true, ..Self::since(start) }
+    }
+
+    /// One made since `start`.
+    fn since(start: Duration) -> Self {
         let now = thread_time();
-        Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now }
+        Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now, is_guess: false }
     }
 }
 
@@ -82,6 +95,13 @@ impl<const D: usize> Solver<D> {
         Imbalance(self.plan_partition().imbalance())
     }
 
+    /// Collective. [`Solver::balance`] in those steps in which several ranks look at it.
+    pub fn balance_if_due(&mut self) {
+        if self.comm.size() > 1 && self.clock.step.is_multiple_of(LOOK_EVERY) {
+            self.balance();
+        }
+    }
+
     /// Collective. Measures costs and partitions anew if that pays. Changes no bit of the state. Returns whether
     /// leaves have moved.
     pub fn balance(&mut self) -> bool {
@@ -90,6 +110,7 @@ impl<const D: usize> Solver<D> {
         let time = thread_time();
         let since = (time - self.partitioned.looked).as_secs_f64();
         self.partitioned.looked = time;
+        let is_guess = self.costs.are_measured() && std::mem::take(&mut self.partitioned.is_guess);
         if now <= LIMIT {
             return false;
         }
@@ -99,7 +120,7 @@ impl<const D: usize> Solver<D> {
         let cuts = self.plan_partition();
         let then = cuts.imbalance();
         self.partitioned.lost += since * (1.0 - then / now).max(0.0);
-        let pays = Prospect { now, then, lost: self.partitioned.lost, price }.pays();
+        let pays = Prospect { now, then, lost: self.partitioned.lost, price, is_guess }.pays();
         pays && self.move_leaves(cuts)
     }
 
@@ -144,10 +165,13 @@ mod tests {
 
     #[test]
     fn a_partition_that_brings_nothing_is_not_made() {
-        let prospect = Prospect { now: 1.03, then: 1.01, lost: 2.0, price: 1.0 };
+        let prospect = Prospect { now: 1.03, then: 1.01, lost: 2.0, price: 1.0, is_guess: false };
         assert!(prospect.pays());
         assert!(!Prospect { then: 1.03, ..prospect }.pays());
         assert!(!Prospect { lost: 0.5, ..prospect }.pays());
+        let guess = Prospect { lost: 0.0, is_guess: true, ..prospect };
+        assert!(guess.pays());
+        assert!(!Prospect { then: 1.02, ..guess }.pays());
         // Beyond the ceiling at any price, but only where it helps.
         let dear = Prospect { now: 1.06, price: 1e9, ..prospect };
         assert!(dear.pays());

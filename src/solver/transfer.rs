@@ -268,12 +268,11 @@ impl<const D: usize> Solver<D> {
         Ok(())
     }
 
-    /// Adds up arenas on the nodes of `part`.
+    /// Adds up own arenas on the nodes of `part`.
     pub(super) fn sum_nodes(&mut self, part: Part) {
         let grid = &mut self.grid;
-        self.phases.time(Phase::Sum, || {
-            grid.fields.sum(&grid.plan, &grid.arenas, &grid.received, part);
-        });
+        let asked = grid.exchange.asked();
+        self.phases.time(Phase::Sum, || grid.fields.sum(&grid.plan, &grid.arenas, asked, part));
     }
 
     /// Hands sums of constrained nodes to their parents.
