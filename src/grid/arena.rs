@@ -20,15 +20,23 @@ pub struct Arenas<const D: usize> {
     moments: Vec<Moments<D>>,
     /// Per bin, number of its arena.
     slot: Vec<u32>,
-    /// Per bin, its constrained nodes among `constraints`.
-    touched: Vec<Option<u32>>,
-    /// First of the moments of each bin, and their number at the end.
-    moment_start: Vec<u32>,
+    /// What is known of each arena.
+    occupied: Vec<Occupied<D>>,
     constraints: Arc<Vec<ArenaConstraints>>,
-    /// Per bin, the nodes that its particles touch.
-    windows: Vec<Window<D>>,
     /// Per block, what reaches it.
     reached: Vec<Reached>,
+}
+
+/// An occupied bin.
+#[derive(Clone, Copy, Debug)]
+struct Occupied<const D: usize> {
+    bin: u32,
+    /// Its constrained nodes among the plan's constraints.
+    touched: Option<u32>,
+    /// Its first moments.
+    moments: [u32; 2],
+    /// The nodes that its particles touch.
+    window: Window<D>,
 }
 
 /// Which occupied bins reach a block.
@@ -70,60 +78,54 @@ impl<const D: usize> ArenaMut<'_, D> {
 }
 
 impl<const D: usize> Arenas<D> {
-    /// Makes room for the bins that `window` gives nodes. Contents are left over from earlier steps.
-    pub fn occupy(&mut self, plan: &GridPlan<D>, window: impl Fn(usize) -> Option<Window<D>>) {
-        let (mut slots, mut moments) = (0, 0);
+    /// Makes room for the occupied bins, which come in order with the nodes that their particles touch. Contents are left
+    /// over from earlier steps.
+    pub fn occupy(&mut self, plan: &GridPlan<D>, occupied: impl Iterator<Item = (usize, Window<D>)>) {
         self.constraints = Arc::clone(&plan.constraints);
-        self.slot.resize(plan.bins.len(), NONE);
-        self.touched.resize(plan.bins.len(), None);
-        self.windows.resize(plan.bins.len(), Window::EMPTY);
-        self.moment_start.clear();
+        if self.slot.len() == plan.bins.len() {
+            // Most bins were not occupied and need no second look.
+            self.occupied.iter().for_each(|arena| self.slot[arena.bin as usize] = NONE);
+        } else {
+            self.slot.clear();
+            self.slot.resize(plan.bins.len(), NONE);
+        }
+        self.occupied.clear();
         self.reached.clear();
         self.reached.resize(plan.blocks.len(), Reached::default());
-        for (number, bin) in plan.bins.iter().enumerate() {
-            let window = window(number);
-            let occupied = window.is_some();
-            self.windows[number] = window.unwrap_or(Window::EMPTY);
-            self.slot[number] = if occupied { slots } else { NONE };
-            self.touched[number] = bin.touched.filter(|_| occupied);
-            self.moment_start.push(moments);
-            if occupied {
-                for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
-                    let reached = &mut self.reached[block as usize];
-                    reached.inner |= bin.is_inner;
-                    reached.outer |= !bin.is_inner;
-                }
+        let mut moments = 0;
+        for (number, window) in occupied {
+            let bin = &plan.bins[number];
+            for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
+                let reached = &mut self.reached[block as usize];
+                reached.inner |= bin.is_inner;
+                reached.outer |= !bin.is_inner;
             }
-            slots += u32::from(occupied);
-            moments +=
-                self.touched[number].map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
+            self.slot[number] = self.occupied.len() as u32;
+            let count = bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
+            let (bin, touched) = (number as u32, bin.touched);
+            self.occupied.push(Occupied { bin, touched, moments: [moments, moments + count], window });
+            moments += count;
         }
-        self.moment_start.push(moments);
-        grow(&mut self.rows, slots as usize * arena_nodes(D), Row([0.0; 4]));
+        grow(&mut self.rows, self.occupied.len() * arena_nodes(D), Row([0.0; 4]));
         grow(&mut self.moments, moments as usize, [Row([0.0; 4]); D]);
     }
 
     /// The arenas of all occupied bins, mutable and disjoint, in bin order.
     pub fn each_mut(&mut self) -> Vec<ArenaMut<'_, D>> {
-        let mut rows = self.rows.chunks_mut(arena_nodes(D));
         let mut rest = &mut self.moments[..];
-        let mut arenas = Vec::with_capacity(self.slot.len());
-        for (bin, slot) in self.slot.iter().enumerate() {
-            let count = self.moment_start[bin + 1] - self.moment_start[bin];
-            let (moments, others) = std::mem::take(&mut rest).split_at_mut(count as usize);
+        let each = self.occupied.iter().zip(self.rows.chunks_mut(arena_nodes(D)));
+        each.map(|(arena, rows)| {
+            let [first, end] = arena.moments;
+            let (moments, others) = std::mem::take(&mut rest).split_at_mut((end - first) as usize);
             rest = others;
-            if *slot != NONE
-                && let Some(rows) = rows.next()
-            {
-                arenas.push(ArenaMut { bin, rows, moments });
-            }
-        }
-        arenas
+            ArenaMut { bin: arena.bin as usize, rows, moments }
+        })
+        .collect()
     }
 
-    /// The nodes that the particles of a bin touch.
+    /// The nodes that the particles of an occupied bin touch.
     pub fn window(&self, bin: usize) -> Window<D> {
-        self.windows[bin]
+        self.occupied[self.slot[bin] as usize].window
     }
 
     /// Whether an occupied bin reaches a block.
@@ -150,17 +152,15 @@ impl<const D: usize> Arenas<D> {
 
     /// The arena of a bin, if it is occupied.
     pub fn get(&self, bin: u32) -> Option<Arena<'_, D>> {
-        let (slot, bin) = (self.slot[bin as usize], bin as usize);
-        let moments = self.touched[bin].map(|table| ArenaMoments {
-            values: &self.moments[self.moment_start[bin] as usize..self.moment_start[bin + 1] as usize],
+        let slot = self.slot[bin as usize];
+        let arena = self.occupied.get(slot as usize)?;
+        let [first, end] = arena.moments.map(|moment| moment as usize);
+        let moments = arena.touched.map(|table| ArenaMoments {
+            values: &self.moments[first..end],
             constraints: &self.constraints[table as usize],
         });
-        let nodes = arena_nodes(D);
-        (slot != NONE).then(|| Arena {
-            rows: &self.rows[slot as usize * nodes..][..nodes],
-            moments,
-            window: self.windows[bin],
-        })
+        let rows = &self.rows[slot as usize * arena_nodes(D)..][..arena_nodes(D)];
+        Some(Arena { rows, moments, window: arena.window })
     }
 
     /// Heap bytes held.

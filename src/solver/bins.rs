@@ -1,43 +1,13 @@
-//! Sorting the particles of a leaf into its bins.
-//!
-//! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
-//! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
-//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are held against the finer
-//! leaves around.
-//! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
-//! same way; its weights are the mean of theirs.
+//! Lists of the particles in each bin of one rank; `leaf_bins.rs` finds those of one leaf.
 use rayon::prelude::*;
 
-use super::members::Members;
-use super::sides::{NearLeaf, Side, Sides, near_leaf};
-use crate::grid::mask::{offset, offset_count};
+use super::leaf_bins::{LeafBins, Scratch};
+use super::sides::{NearLeaf, near_leaf};
 use crate::grid::plan::Bin;
-use crate::grid::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
-use crate::kernel::simd::{LANES, Lanes};
-use crate::particle::chunk::{Chunk, Layout};
-
-/// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
-/// more than it saves.
-const fn crowded(d: usize) -> usize {
-    if d == 2 { 32 } else { 128 }
-}
-
-/// Bins of one own leaf whose particles do not all share the leaf's own bin.
-#[derive(Clone, Debug, Default)]
-pub struct LeafBins<const D: usize> {
-    /// Members of each bin of the leaf.
-    pub members: Vec<Members<D>>,
-    /// Particles whose box is cut, in order; a part's slot points here.
-    pub cut: Vec<u32>,
-    /// Finer leaves around.
-    finer: Vec<NearLeaf<D>>,
-    /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
-    around: Vec<NearLeaf<D>>,
-    /// Beside finer leaves.
-    sides: Option<Sides<D>>,
-}
+use crate::kernel::simd::Lanes;
+use crate::particle::Chunk;
 
 /// Particle lists of the bins of one rank.
 #[derive(Clone, Debug, Default)]
@@ -45,37 +15,6 @@ pub struct BinLists<const D: usize> {
     leaves: Vec<LeafBins<D>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
-}
-
-/// In place of a bin: the box is in none as a whole.
-const CUT: u32 = u32::MAX;
-
-/// Memory that a thread reuses from leaf to leaf.
-#[derive(Debug, Default)]
-struct Scratch {
-    /// Per particle, its bin.
-    bins: Vec<u32>,
-    /// Particles whose bin may be another than the leaf's own.
-    undecided: Vec<u32>,
-}
-
-impl Scratch {
-    /// Puts all particles of a chunk into the leaf's own bin; `undecided` gives the lanes that may belong elsewhere, of the
-    /// batch from some particle on.
-    #[inline(always)]
-    fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, undecided: impl Fn(usize) -> u32) {
-        self.bins.clear();
-        self.bins.resize(chunk.len(), 0);
-        self.undecided.clear();
-        for first in (0..chunk.len()).step_by(LANES) {
-            let lanes = LANES.min(chunk.len() - first);
-            let mut left = undecided(first) & ((1 << lanes) - 1);
-            while left != 0 {
-                self.undecided.push(first as u32 + left.trailing_zeros());
-                left &= left - 1;
-            }
-        }
-    }
 }
 
 /// A part of a box falls outside the bins of its leaf.
@@ -88,10 +27,10 @@ pub struct BinMissing {
 
 /// Half widths of the boxes of a chunk, and their bound.
 pub trait BoxWidths<const D: usize>: Sync {
-    /// Half widths of the boxes of up to [`LANES`] particles in a leaf with cells of edge `cell`, m; lanes behind the last
+    /// Half widths of the boxes of up to `LANES` particles in a leaf with cells of edge `cell`, m; lanes behind the last
     /// are of no use.
     fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D];
-    /// Bounds on the half widths of [`LANES`] particles from `first` on, m; lanes behind the last particle are of no use.
+    /// Bounds on the half widths of `LANES` particles from `first` on, m; lanes behind the last particle are of no use.
     fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes;
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
@@ -163,13 +102,20 @@ impl<const D: usize> BinLists<D> {
         );
     }
 
-    /// Nodes that the members of a bin touch, or `None` if it has none.
-    pub fn window(&self, leaf: usize, bin: usize, chunk: &Chunk<D>) -> Option<Window<D>> {
-        let is_empty = match self.of_leaf(leaf) {
-            None => bin != 0 || chunk.is_empty(),
-            Some(bins) => bins.members[bin].whole.is_empty() && bins.members[bin].parts.is_empty(),
-        };
-        (!is_empty).then(|| self.window_of(leaf, bin))
+    /// The bins that have members, in order, with the nodes that these touch.
+    pub fn occupied(
+        &self,
+        plan: &GridPlan<D>,
+        chunks: &[Chunk<D>],
+    ) -> impl Iterator<Item = (usize, Window<D>)> {
+        let leaves = chunks.iter().enumerate().filter(|(_, chunk)| !chunk.is_empty());
+        leaves.flat_map(move |(leaf, _)| {
+            let first = plan.leaf_bins(leaf).start;
+            let bins = self.of_leaf(leaf);
+            let is_occupied = move |number: usize| bins.is_none_or(|bins| !bins.members[number].is_empty());
+            let numbers = (0..bins.map_or(1, |bins| bins.members.len())).filter(move |&n| is_occupied(n));
+            numbers.map(move |number| (first + number, self.window_of(leaf, number)))
+        })
     }
 
     /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
@@ -180,7 +126,7 @@ impl<const D: usize> BinLists<D> {
             .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
     }
 
-    /// As [`BinLists::window`], for a bin that has members.
+    /// The nodes that the members of a bin touch, of which it has some.
     pub fn window_of(&self, leaf: usize, bin: usize) -> Window<D> {
         self.of_leaf(leaf).map_or(Window::FULL, |bins| bins.members[bin].window)
     }
@@ -189,242 +135,4 @@ impl<const D: usize> BinLists<D> {
     pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
         self.sorted[leaf].then_some(&self.leaves[leaf])
     }
-}
-
-impl<const D: usize> LeafBins<D> {
-    fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
-        let tree = &plan.tree;
-        let here = tree.leaves()[known];
-        let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
-        let mut around = leaves_around(tree, known);
-        if around.iter().all(|&leaf| tree.leaves()[leaf].level <= here.level) {
-            around.clear();
-        }
-        let around: Vec<NearLeaf<D>> = around.into_iter().map(near).collect();
-        let finer: Vec<NearLeaf<D>> = around.iter().filter(|leaf| leaf.level > here.level).cloned().collect();
-        let sides = (!finer.is_empty()).then(|| {
-            let bins = &plan.bins[plan.leaf_bins(known - tree.first_own())];
-            let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
-            Sides::new(own, here, cell, &finer, bins)
-        });
-        Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, around, sides }
-    }
-
-    fn sort(
-        &mut self,
-        plan: &GridPlan<D>,
-        leaf: usize,
-        own: &NearLeaf<D>,
-        chunk: &Chunk<D>,
-        widths: &impl BoxWidths<D>,
-        scratch: &mut Scratch,
-    ) -> Result<(), BinMissing> {
-        if self.around.is_empty() {
-            let (tree, edge) = (&plan.tree, plan.root_edge);
-            let around = leaves_around(tree, tree.first_own() + leaf);
-            self.around = around.into_iter().map(|leaf| near_leaf(tree, leaf, edge)).collect();
-        }
-        self.cut.clear();
-        self.members.iter_mut().for_each(Members::clear);
-        let crowded = chunk.len() >= crowded(D);
-        let own_cell = plan.cell(own.level);
-        let given = !widths.are_known_to_kernels();
-        let sides = if given { None } else { self.sides.take() };
-        // Of most boxes it is known without their half widths that they are whole and stay inside.
-        let limit = Lanes::splat(narrow_limit(own_cell));
-        scratch.begin(chunk, |first| {
-            if given || !crowded {
-                return !0;
-            }
-            let half = widths.bounds(chunk, first);
-            let elsewhere = sides.as_ref().map_or(0, |sides| {
-                sides.undecided(half, |axis| values(chunk, Layout::<D>::POSITION + axis, first))
-            });
-            elsewhere | (!half.le(limit)).bits()
-        });
-        let mut sorted = Ok(());
-        for particles in scratch.undecided.chunks(LANES) {
-            let half = widths.of_batch(chunk, particles, own_cell).map(Lanes::to_array);
-            for (lane, &p) in particles.iter().enumerate() {
-                let (centre, half) = (chunk.position(p as usize), half.map(|half| half[lane]));
-                let bin = self.sort_one(plan, leaf, own, sides.as_ref(), p, centre, half, given);
-                match bin {
-                    // The window of a crowded leaf's own bin is known.
-                    Ok(bin) if bin == CUT || bin == 0 && crowded => scratch.bins[p as usize] = bin,
-                    Ok(bin) => {
-                        scratch.bins[p as usize] = bin;
-                        let cell = plan.cell(plan.bins[plan.leaf_bins(leaf)][bin as usize].block.level);
-                        self.members[bin as usize].include(cell, centre, half);
-                    }
-                    Err(()) => {
-                        scratch.bins[p as usize] = CUT;
-                        sorted = sorted.and(Err(BinMissing { id: chunk.ids()[p as usize] }));
-                    }
-                }
-            }
-        }
-        self.list(&scratch.bins);
-        if sides.is_some() {
-            self.sides = sides;
-        }
-        for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
-            members.close(plan, bin);
-        }
-        if crowded {
-            self.members[0].window = Window::FULL;
-        }
-        sorted
-    }
-
-    /// Makes the lists of whole boxes from the bin of each particle.
-    fn list(&mut self, bins: &[u32]) {
-        for (batch, bins) in bins.chunks(LANES).enumerate() {
-            let first = (batch * LANES) as u32;
-            if bins.iter().all(|&bin| bin == 0) {
-                self.members[0].whole.extend(first..first + bins.len() as u32);
-                continue;
-            }
-            for (p, &bin) in (first..).zip(bins).filter(|(_, bin)| **bin != CUT) {
-                self.members[bin as usize].whole.push(p);
-            }
-        }
-    }
-
-    /// Finds the bin of one box, or cuts it.
-    fn sort_one(
-        &mut self,
-        plan: &GridPlan<D>,
-        leaf: usize,
-        own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
-        particle: u32,
-        centre: [f64; D],
-        half: [f64; D],
-        given: bool,
-    ) -> Result<u32, ()> {
-        // What lies across the faces is known as far as boxes up to a cell wide can reach.
-        let sides = sides.filter(|_| is_narrow(half, plan.cell(own.level)));
-        let level = self.finest_level(own, sides, centre, half);
-        if !given && is_narrow(half, plan.cell(level)) {
-            let child = || sides.filter(|_| level == own.level + 1)?.child_bin(&centre);
-            // The first bin of a leaf is its own block's.
-            let bin = if level == own.level {
-                Some(0)
-            } else {
-                child().or_else(|| self.bin(plan, leaf, level, centre))
-            };
-            return bin.map(|bin| bin as u32).ok_or(());
-        }
-        let slot = self.cut.len() as u32;
-        self.cut.push(particle);
-        let (fraction, spread) = (1.0, [0.0; D]);
-        self.cut_box(plan, leaf, own, sides, SubBox { particle, slot, centre, half, fraction, spread })?;
-        Ok(CUT)
-    }
-
-    /// Halves a box along the axes on which it is too wide, until each part fits the level it overlaps.
-    fn cut_box(
-        &mut self,
-        plan: &GridPlan<D>,
-        leaf: usize,
-        own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
-        part: SubBox<D>,
-    ) -> Result<(), ()> {
-        let level = self.finest_level(own, sides, part.centre, part.half);
-        let cell = plan.cell(level);
-        let wide: [bool; D] = std::array::from_fn(|axis| !is_narrow([part.half[axis]], cell));
-        let count = wide.iter().filter(|&&wide| wide).count();
-        if count == 0 {
-            let bin = self.bin(plan, leaf, level, part.centre).ok_or(())?;
-            self.members[bin].parts.push(part);
-            self.members[bin].include(cell, part.centre, part.half);
-            return Ok(());
-        }
-        let half: [f64; D] = std::array::from_fn(|axis| part.half[axis] * if wide[axis] { 0.5 } else { 1.0 });
-        for corner in (0..1u32 << D).filter(|corner| (0..D).all(|a| wide[a] || corner >> a & 1 == 0)) {
-            let centre = std::array::from_fn(|axis| match (wide[axis], corner >> axis & 1) {
-                (false, _) => part.centre[axis],
-                (true, 0) => part.centre[axis] - half[axis],
-                (true, _) => part.centre[axis] + half[axis],
-            });
-            let fraction = part.fraction / f64::from(1u32 << count);
-            self.cut_box(plan, leaf, own, sides, SubBox { centre, half, fraction, ..part })?;
-        }
-        Ok(())
-    }
-
-    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
-    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves. `sides` are those
-    /// of the leaf, for boxes at most a cell wide.
-    fn finest_level(
-        &self,
-        own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
-        centre: [f64; D],
-        half: [f64; D],
-    ) -> u8 {
-        match sides.map(|sides| sides.side(sides.faces(&centre, &half))) {
-            Some(Side::Own) => return own.level,
-            Some(Side::Finer) => return own.level + 1,
-            Some(Side::Other) | None => {}
-        }
-        let slack = own.slack();
-        let lo: [f64; D] = std::array::from_fn(|axis| centre[axis] - half[axis] - slack[axis]);
-        let hi: [f64; D] = std::array::from_fn(|axis| centre[axis] + half[axis] + slack[axis]);
-        if (0..D).all(|axis| lo[axis] >= own.lower[axis] && hi[axis] <= own.upper[axis]) {
-            return own.level;
-        }
-        self.around
-            .iter()
-            .filter(|leaf| (0..D).all(|axis| lo[axis] < leaf.upper[axis] && hi[axis] > leaf.lower[axis]))
-            .map(|leaf| leaf.level)
-            .max()
-            .unwrap_or(own.level)
-    }
-
-    /// Bin, counted within the leaf, of the block of `level` that contains `centre`. A centre on the face of
-    /// two blocks may lie in either.
-    fn bin(&self, plan: &GridPlan<D>, leaf: usize, level: u8, centre: [f64; D]) -> Option<usize> {
-        let bins = &plan.bins[plan.leaf_bins(leaf)];
-        let edge = plan.cell(level) * 4.0;
-        let scaled: [f64; D] = centre.map(|x| x / edge);
-        let find = |coord: [u32; D]| {
-            bins.iter().position(|bin| bin.block.level == level && bin.block.coord == coord)
-        };
-        let roots = plan.tree.brick().roots;
-        let coord = std::array::from_fn(|axis| (scaled[axis] as u32).min((roots[axis] << level) - 1));
-        find(coord).or_else(|| {
-            // Rounding may have put a centre on a face into a block that cannot hold it.
-            let nudge = 1e-9;
-            (0..offset_count(D)).find_map(|index| {
-                let shift = offset::<D>(index);
-                find(std::array::from_fn(|axis| (scaled[axis] + f64::from(shift[axis]) * nudge) as u32))
-            })
-        })
-    }
-}
-
-/// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
-#[inline(always)]
-pub(super) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
-    let (reals, stride) = chunk.reals();
-    reals[column * stride + first..].first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load)
-}
-
-/// Positions, as [`values`] gives them.
-pub(super) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
-    std::array::from_fn(|axis| values(chunk, Layout::<D>::POSITION + axis, first))
-}
-
-/// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not
-/// cut a box that is exactly one cell wide; the kernel takes such a box as one cell wide, which is no more
-/// than a few units of the last place.
-fn is_narrow<const N: usize>(half: [f64; N], cell: f64) -> bool {
-    half.iter().all(|&half| half <= narrow_limit(cell))
-}
-
-/// Half width of the widest boxes that fit into the stencil of cells of edge `cell`, see [`is_narrow`].
-fn narrow_limit(cell: f64) -> f64 {
-    0.5 * cell * (1.0 + 8.0 * f64::EPSILON)
 }

@@ -5,7 +5,8 @@
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
-use super::bins::{BinMissing, BoxWidths, values};
+use super::bins::{BinMissing, BoxWidths};
+use super::leaf_bins::values;
 use super::migrate::position_key;
 use super::time_step::StepControl;
 use super::transfer::{extent, sort_with};

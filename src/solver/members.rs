@@ -25,6 +25,11 @@ impl<const D: usize> Default for Members<D> {
 impl<const D: usize> Members<D> {
     const NO_FACES: [[f64; D]; 2] = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
 
+    /// Whether there are no members.
+    pub(super) fn is_empty(&self) -> bool {
+        self.whole.is_empty() && self.parts.is_empty()
+    }
+
     /// Takes out all members.
     pub(super) fn clear(&mut self) {
         self.whole.clear();

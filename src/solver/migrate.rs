@@ -7,7 +7,7 @@ use partition::comm::{Comm, NeighbourExchange, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use super::bins::positions;
+use super::leaf_bins::positions;
 use super::records::{append_all, push_record, record_words};
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;

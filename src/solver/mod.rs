@@ -8,6 +8,7 @@ pub mod given_boxes;
 pub mod grid;
 mod increment;
 mod indicators;
+mod leaf_bins;
 mod members;
 pub mod migrate;
 pub mod parts;

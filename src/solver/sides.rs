@@ -8,7 +8,15 @@ use super::migrate::leaf_box;
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::Bin;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{LANES, Lanes, Mask};
+
+/// Lanes that are set, as the lowest bit of each byte.
+#[inline(always)]
+fn by_lane(lanes: Mask) -> u64 {
+    // Byte i gets bit i of eight, from where carries bring it to the highest bit of the byte.
+    let bits = u64::from(lanes.bits()).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
+    (bits.wrapping_add(0x0040_6070_787c_7e7f) >> 7) & 0x0101_0101_0101_0101
+}
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]
@@ -135,6 +143,47 @@ impl<const D: usize> Sides<D> {
         })
     }
 
+    /// Bins, counted within the leaf, of the boxes of a batch that are whole and on the leaf's own level or one finer: half widths
+    /// are held against these limits of both levels.
+    #[inline(always)]
+    pub fn bins(
+        &self,
+        centre: &[Lanes; D],
+        half: &[Lanes; D],
+        [limit, limit_of_finer]: [f64; 2],
+    ) -> [Option<u32>; LANES] {
+        let narrow =
+            |limit: f64| half.iter().fold(u32::MAX, |all, half| all & half.le(Lanes::splat(limit)).bits());
+        let (narrow, narrow_for_finer) = (narrow(limit), narrow(limit_of_finer));
+        let (faces, children) = (self.faces_of_batch(centre, half), self.children_of_batch(centre));
+        std::array::from_fn(|lane| match self.sides[usize::from(faces[lane])] {
+            // The first bin of a leaf is its own block's.
+            Side::Own if narrow >> lane & 1 == 1 => Some(0),
+            Side::Finer if narrow_for_finer >> lane & 1 == 1 => self.children[usize::from(children[lane])],
+            _ => None,
+        })
+    }
+
+    /// [`Sides::faces`] of the boxes of a batch.
+    #[inline(always)]
+    fn faces_of_batch(&self, centre: &[Lanes; D], half: &[Lanes; D]) -> [u8; LANES] {
+        let mut faces = 0;
+        for axis in 0..D {
+            let (slack, below) = (Lanes::splat(self.slack[axis]), centre[axis] - half[axis]);
+            let above_lower = Lanes::splat(self.lower[axis]).le(below - slack);
+            let below_upper = (centre[axis] + half[axis] + slack).le(Lanes::splat(self.upper[axis]));
+            faces |= by_lane(!above_lower) << (2 * axis) | by_lane(!below_upper) << (2 * axis + 1);
+        }
+        faces.to_le_bytes()
+    }
+
+    /// Children of the leaf that contain the points of a batch.
+    #[inline(always)]
+    fn children_of_batch(&self, centre: &[Lanes; D]) -> [u8; LANES] {
+        let upper = |axis: usize| by_lane(Lanes::splat(self.middle[axis]).le(centre[axis])) << axis;
+        (0..D).fold(0, |children, axis| children | upper(axis)).to_le_bytes()
+    }
+
     /// Where a box scatters that crosses some faces.
     pub fn side(&self, faces: usize) -> Side {
         self.sides[faces]
@@ -145,5 +194,18 @@ impl<const D: usize> Sides<D> {
         let child =
             (0..D).fold(0, |child, axis| child | usize::from(centre[axis] >= self.middle[axis]) << axis);
         self.children[child].map(|bin| bin as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_become_bytes() {
+        for bits in 0..1u32 << LANES {
+            let bytes = by_lane(Mask::from_bits(bits)).to_le_bytes();
+            assert_eq!(bytes, std::array::from_fn(|lane| (bits >> lane & 1) as u8));
+        }
     }
 }

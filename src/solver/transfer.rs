@@ -1,9 +1,10 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinLists, BinMissing, BoxWidths, values};
+use super::bins::{BinLists, BinMissing, BoxWidths};
 use super::contact::SUMS;
 use super::grid::Grid;
+use super::leaf_bins::values;
 use super::migrate::Departed;
 use super::phases::{Phase, Phases};
 use super::resample::Resampling;
@@ -172,12 +173,7 @@ pub(super) fn sort_with<const D: usize>(
         grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
             spread::of_parts(chunk, parts, &frame(plan, bin), constrained(plan, bin), each);
         });
-        let lists = &grid.lists;
-        grid.arenas.occupy(plan, |bin| {
-            let leaf = plan.bins[bin].leaf as usize;
-            let number = bin - plan.leaf_bins(leaf).start;
-            lists.window(leaf, number, &chunks[leaf])
-        });
+        grid.arenas.occupy(plan, grid.lists.occupied(plan, chunks));
         sorted
     })
 }
