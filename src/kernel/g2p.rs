@@ -10,7 +10,7 @@
 use super::batch::{Batch, Batches};
 use super::constrained::ConstrainedNodes;
 use super::leavers::Leavers;
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
@@ -90,21 +90,53 @@ pub fn gather<const D: usize>(
     leavers: &mut Leavers<D>,
     next: Place,
 ) -> f64 {
-    let batches = Batches::new(select, chunk, next);
-    let (reals, stride, tags) = chunk.reals_mut_and_tags();
-    let cell = frame.cell;
-    let mut weights = Weights::new();
-    let mut sums = Sums::new();
-    let mut greatest = Lanes::splat(0.0);
-    for batch in batches {
-        let position = batch.positions(reals, stride);
-        let half =
-            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
-        weights.fill(frame, &position, &position, &half);
-        sums.gather(&mut weights, &batch, fields);
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
+    widest(Gather { chunk, select, frame, scheme, dt, fields, leavers, next })
+}
+
+/// [`gather`] with its arguments.
+struct Gather<'a, const D: usize> {
+    chunk: &'a mut Chunk<D>,
+    select: Select<'a>,
+    frame: &'a Frame<D>,
+    scheme: &'a Scheme<'a>,
+    dt: f64,
+    fields: &'a Fields<'a, D>,
+    leavers: &'a mut Leavers<D>,
+    next: Place,
+}
+
+impl<const D: usize> Kernel for Gather<'_, D> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { chunk, select, frame, scheme, dt, fields, leavers, next } = self;
+        let batches = Batches::new(select, chunk, next);
+        let (reals, stride, tags) = chunk.reals_mut_and_tags();
+        let cell = frame.cell;
+        let mut weights = Weights::new();
+        let mut sums = Sums::new();
+        let mut greatest = Lanes::splat(0.0);
+        for batch in batches {
+            let position = batch.positions(reals, stride);
+            let half = domain::of_batch(
+                reals,
+                stride,
+                tags,
+                &batch,
+                &position,
+                cell,
+                0.5 * cell,
+                &frame.extent,
+                scheme,
+            );
+            weights.fill(frame, &position, &position, &half);
+            sums.gather(&mut weights, &batch, fields);
+            greatest =
+                advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
+        }
+        largest(greatest)
     }
-    largest(greatest)
 }
 
 /// Gathers for parts of boxes and adds each to `gathered[part.slot]`; [`advance_gathered`] follows

@@ -16,7 +16,7 @@
 //! ```
 use super::batch::{Batch, Batches};
 use super::constrained::ConstrainedNodes;
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
@@ -45,10 +45,32 @@ pub fn scatter<const D: usize>(
     moments: Option<MomentSums<D>>,
     next: Place,
 ) {
-    // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
-    match moments {
-        None => scatter_all(chunk, select, frame, scheme, dt, arena, None, next),
-        moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments, next),
+    widest(Scatter { chunk, select, frame, scheme, dt, arena, moments, next });
+}
+
+/// [`scatter`] with its arguments.
+struct Scatter<'a, const D: usize> {
+    chunk: &'a Chunk<D>,
+    select: Select<'a>,
+    frame: &'a Frame<D>,
+    scheme: &'a Scheme<'a>,
+    dt: f64,
+    arena: &'a mut [Row],
+    moments: Option<MomentSums<'a, D>>,
+    next: Place,
+}
+
+impl<const D: usize> Kernel for Scatter<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { chunk, select, frame, scheme, dt, arena, moments, next } = self;
+        // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
+        match moments {
+            None => scatter_all(chunk, select, frame, scheme, dt, arena, None, next),
+            moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments, next),
+        }
     }
 }
 

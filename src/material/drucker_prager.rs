@@ -12,8 +12,8 @@
 use super::hencky::Hencky;
 use super::parameters::FrictionMatch;
 use super::spectral::Trial;
-use super::{Lame, Material, State, Symmetric, parameters};
-use crate::kernel::simd::Lanes;
+use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
+use crate::kernel::simd::{Lanes, widest};
 
 /// Drucker-Prager granular material.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +40,9 @@ impl DruckerPrager {
     }
 }
 
-impl Material for DruckerPrager {
-    fn update(&self, state: &mut State, plane: bool) {
+impl Law for DruckerPrager {
+    #[inline(always)]
+    fn respond(&self, state: &mut State, plane: bool) {
         let zero = Lanes::splat(0.0);
         let one = Lanes::splat(1.0);
         let [shear, gain] = state.history;
@@ -77,6 +78,12 @@ impl Material for DruckerPrager {
             state.work = flows.select(retained * excess * (2.0 * self.solid.shear_modulus()), zero);
         }
         trial.finish(&self.solid, state, &strain, changed, apart, plane);
+    }
+}
+
+impl Material for DruckerPrager {
+    fn update(&self, state: &mut State, plane: bool) {
+        widest(Response(self, state, plane));
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {

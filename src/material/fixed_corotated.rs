@@ -1,8 +1,8 @@
 //! Fixed corotated elasticity: `W = μ Σ (s - 1)² + λ/2 (J - 1)²` with principal stretches s,
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::eigen::{decompose, greatest_bound};
-use super::{Lame, Material, State, Symmetric};
-use crate::kernel::simd::{Lanes, each};
+use super::{Lame, Law, Material, Response, State, Symmetric};
+use crate::kernel::simd::{Lanes, each, widest};
 
 /// Fixed corotated solid.
 #[derive(Clone, Copy, Debug)]
@@ -18,9 +18,10 @@ impl FixedCorotated {
     }
 }
 
-impl Material for FixedCorotated {
+impl Law for FixedCorotated {
     /// Along a principal direction, `ρ₀ c² = s² ∂P/∂F = 2μ s² + λ J²`.
-    fn update(&self, state: &mut State, plane: bool) {
+    #[inline(always)]
+    fn respond(&self, state: &mut State, plane: bool) {
         let Lame { lambda, mu } = self.lame;
         let one = Lanes::splat(1.0);
         let eigen = decompose(&state.elastic, plane);
@@ -32,6 +33,12 @@ impl Material for FixedCorotated {
         let modulus = greatest_bound(&state.elastic) * (2.0 * mu) + volume * volume * lambda;
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
         state.work = Lanes::splat(0.0);
+    }
+}
+
+impl Material for FixedCorotated {
+    fn update(&self, state: &mut State, plane: bool) {
+        widest(Response(self, state, plane));
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {

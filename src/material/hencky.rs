@@ -2,8 +2,8 @@
 //! `ε = ½ ln b`. Also the elastic part of the plastic models.
 use super::eigen::greatest_bound;
 use super::spectral::principal_strains;
-use super::{Lame, Material, State, Symmetric};
-use crate::kernel::simd::{Lanes, each};
+use super::{Lame, Law, Material, Response, State, Symmetric};
+use crate::kernel::simd::{Lanes, each, widest};
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]
@@ -41,12 +41,19 @@ impl Hencky {
     }
 }
 
-impl Material for Hencky {
-    fn update(&self, state: &mut State, plane: bool) {
+impl Law for Hencky {
+    #[inline(always)]
+    fn respond(&self, state: &mut State, plane: bool) {
         let (eigen, strain) = principal_strains(&state.elastic, plane);
         state.stress = eigen.compose(&self.principal_stresses(&strain), plane);
         state.wave_speed = self.wave_speed_under(&state.stress);
         state.work = Lanes::splat(0.0);
+    }
+}
+
+impl Material for Hencky {
+    fn update(&self, state: &mut State, plane: bool) {
+        widest(Response(self, state, plane));
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {

@@ -3,7 +3,7 @@
 //! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
 //! elastic state. Plastic models map a trial `b` back to their yield surface in principal Hencky
 //! strains.
-use crate::kernel::simd::{LANES, Lanes, Mask};
+use crate::kernel::simd::{Kernel, LANES, Lanes, Mask};
 
 pub mod driver;
 pub mod drucker_prager;
@@ -42,6 +42,24 @@ impl State {
     pub fn new(elastic: Symmetric) -> Self {
         let zero = Lanes::splat(0.0);
         Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+    }
+}
+
+/// What [`Material::update`] of a model does, to be compiled for several instruction sets.
+trait Law {
+    /// See there. To be marked `inline(always)`.
+    fn respond(&self, state: &mut State, plane: bool);
+}
+
+/// A [`Law`] with its arguments.
+struct Response<'a, L>(&'a L, &'a mut State, bool);
+
+impl<L: Law> Kernel for Response<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.respond(self.1, self.2);
     }
 }
 
@@ -145,5 +163,56 @@ pub fn update(materials: &[Box<dyn Material>], index: &[u16; LANES], state: &mut
         state.work = mask.select(part.work, state.work);
         state.wave_speed = mask.select(part.wave_speed, state.wave_speed);
         pending &= !bits;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::parameters::FrictionMatch;
+    use super::*;
+
+    /// The update with the processor's widest instructions against the one that this test is compiled for.
+    fn instructions_change_no_bit<M: Material + Law>(model: &M, trial: State) {
+        for plane in [false, true] {
+            let (mut wide, mut plain) = (trial, trial);
+            model.update(&mut wide, plane);
+            model.respond(&mut plain, plane);
+            for (wide, plain) in all(&wide).zip(all(&plain)) {
+                assert_eq!(wide.map(f64::to_bits), plain.map(f64::to_bits), "{model:?}");
+            }
+        }
+    }
+
+    fn all(state: &State) -> impl Iterator<Item = [f64; LANES]> {
+        let scalars = [state.work, state.wave_speed];
+        let lanes = state.elastic.into_iter().chain(state.stress).chain(state.history).chain(scalars);
+        lanes.map(Lanes::to_array)
+    }
+
+    proptest! {
+        #[test]
+        fn bits_do_not_depend_on_instructions(
+            normal in prop::array::uniform3(prop::array::uniform8(0.7_f64..1.4)),
+            shear in prop::array::uniform3(prop::array::uniform8(-0.2_f64..0.2)),
+            history in prop::array::uniform8(0.0_f64..0.1),
+        ) {
+            let [xy, xz, yz] = shear.map(Lanes::new);
+            let [xx, yy, zz] = normal.map(Lanes::new);
+            let mut trial = State::new([xx, yy, zz, xy, xz, yz]);
+            trial.history = [Lanes::new(history); HISTORIES];
+            let (young, poisson, density) = (1e6, 0.3, 1500.0);
+            let lame = Lame::new(young, poisson);
+            instructions_change_no_bit(&neo_hookean::NeoHookean::new(lame, density), trial);
+            instructions_change_no_bit(&fixed_corotated::FixedCorotated::new(lame, density), trial);
+            instructions_change_no_bit(&hencky::Hencky::new(lame, density), trial);
+            let metal = parameters::VonMises { young, poisson, yield_stress: 5e4, hardening: 1e5 };
+            instructions_change_no_bit(&von_mises::VonMises::new(&metal, density), trial);
+            let matching = FrictionMatch::default();
+            let sand =
+                parameters::DruckerPrager { young, poisson, friction_angle: 30.0, matching, volume_correction: true };
+            instructions_change_no_bit(&drucker_prager::DruckerPrager::new(&sand, density), trial);
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! Compressible neo-Hookean elasticity: `W = μ/2 (tr b - 3) - μ ln J + λ/2 ln² J`,
 //! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
 use super::eigen::{determinant, greatest_bound};
-use super::{Lame, Material, State, Symmetric};
+use super::{Lame, Law, Material, Response, State, Symmetric};
 use crate::kernel::math::ln;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, widest};
 
 /// Compressible neo-Hookean solid.
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +19,10 @@ impl NeoHookean {
     }
 }
 
-impl Material for NeoHookean {
+impl Law for NeoHookean {
     /// Along a principal direction of stretch s, `ρ₀ c² = s² ∂P/∂F = μ (s² + 1) + λ (1 - ln J)`.
-    fn update(&self, state: &mut State, _plane: bool) {
+    #[inline(always)]
+    fn respond(&self, state: &mut State, _plane: bool) {
         let Lame { lambda, mu } = self.lame;
         let one = Lanes::splat(1.0);
         let b = &state.elastic;
@@ -36,6 +37,12 @@ impl Material for NeoHookean {
         let modulus = (greatest_bound(b) + one) * mu + (one - volume_log).max(one) * lambda;
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
         state.work = Lanes::splat(0.0);
+    }
+}
+
+impl Material for NeoHookean {
+    fn update(&self, state: &mut State, plane: bool) {
+        widest(Response(self, state, plane));
     }
 
     fn energy(&self, b: &Symmetric, _plane: bool) -> Lanes {

@@ -4,8 +4,8 @@
 //! `f = |dev τ| - √(2/3) (σ_y + H κ)`, closed form: `Δγ = f / (2μ + 2H/3)`, `Δκ = √(2/3) Δγ`.
 use super::hencky::Hencky;
 use super::spectral::Trial;
-use super::{Lame, Material, State, Symmetric, parameters};
-use crate::kernel::simd::{Lanes, Mask};
+use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
+use crate::kernel::simd::{Lanes, Mask, widest};
 
 /// Von Mises solid.
 #[derive(Clone, Copy, Debug)]
@@ -23,8 +23,9 @@ impl VonMises {
     }
 }
 
-impl Material for VonMises {
-    fn update(&self, state: &mut State, plane: bool) {
+impl Law for VonMises {
+    #[inline(always)]
+    fn respond(&self, state: &mut State, plane: bool) {
         let zero = Lanes::splat(0.0);
         let one = Lanes::splat(1.0);
         let root = (2.0_f64 / 3.0).sqrt();
@@ -49,6 +50,12 @@ impl Material for VonMises {
             state.work = flows.select(radius(kappa) * flow, zero);
         }
         trial.finish(&self.solid, state, &strain, flows, Mask::from_bits(0), plane);
+    }
+}
+
+impl Material for VonMises {
+    fn update(&self, state: &mut State, plane: bool) {
+        widest(Response(self, state, plane));
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {

@@ -15,6 +15,8 @@ pub use avx::{F64x4, Mask4};
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma")))]
 pub use portable::{F64x4, Mask4};
 
+pub use dispatch::{Kernel, widest};
+
 /// 2^52 + 1023: adding it to a small integer leaves that integer, biased as an exponent, in the low bits.
 const EXPONENT_MAGIC: f64 = 4_503_599_627_370_496.0 + 1023.0;
 /// Bits of 2^52.
@@ -26,6 +28,7 @@ const ONE_BITS: u64 = 0x3ff0_0000_0000_0000;
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 mod avx;
+mod dispatch;
 #[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
 mod portable;
 
