@@ -69,11 +69,6 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// What other ranks have sent of their sums.
-    pub fn received(&self) -> &ReceivedSums<D> {
-        &self.received
-    }
-
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         self.plan.heap_bytes()
