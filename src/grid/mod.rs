@@ -13,6 +13,7 @@ pub mod exchange;
 pub mod feeders;
 pub mod fields;
 pub mod known;
+mod levels;
 pub mod links;
 pub mod mask;
 mod mixed;

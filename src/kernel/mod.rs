@@ -12,6 +12,7 @@ mod batch;
 pub mod constrained;
 pub mod domain;
 pub mod g2p;
+mod gathered;
 pub mod leavers;
 pub mod math;
 pub mod p2g;

@@ -1,0 +1,184 @@
+//! What particles gather from the nodes of their stencils; see [`super::g2p`].
+use super::batch::Batch;
+use super::constrained::ConstrainedNodes;
+use super::simd::{F64x4, LANES};
+use super::weights::Weights;
+use super::{ARENA_EDGE, Row};
+
+/// First moments of the constrained nodes of an arena.
+#[derive(Clone, Copy)]
+pub struct Moments<'a, const D: usize> {
+    /// The constrained nodes.
+    pub nodes: &'a ConstrainedNodes,
+    /// Per constrained node, row k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
+    pub first: &'a [[Row; D]],
+}
+
+/// What the nodes of an arena offer.
+#[derive(Clone, Copy)]
+pub struct Fields<'a, const D: usize> {
+    /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.
+    pub velocity: &'a [Row],
+    /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`] the velocities that
+    /// particles take on.
+    pub increment: Option<&'a [Row]>,
+    /// Moments, where the block touches constrained nodes.
+    pub moments: Option<Moments<'a, D>>,
+}
+
+/// Sums over the stencils of one particle. Additive: a box in parts is the sum of its parts.
+#[derive(Clone, Copy, Debug)]
+pub struct Gathered<const D: usize> {
+    /// `Σ w v_j`.
+    velocity: F64x4,
+    /// Column k is `Σ v_j ∂w/∂x_k`.
+    gradient: [F64x4; D],
+    /// Column k is `Σ w (v_j d_k + V_j,k)`.
+    affine: [F64x4; D],
+    /// `Σ w Δv_j`.
+    increment: F64x4,
+}
+
+impl<const D: usize> Default for Gathered<D> {
+    fn default() -> Self {
+        let zero = F64x4::splat(0.0);
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
+    }
+}
+
+impl<const D: usize> Gathered<D> {
+    /// Velocity, m/s.
+    pub fn velocity(&self) -> [f64; D] {
+        let row = self.velocity.to_array();
+        std::array::from_fn(|axis| row[axis])
+    }
+
+    /// Adds `share` times `other`.
+    pub(super) fn add(&mut self, other: &Self, share: f64) {
+        let share = F64x4::splat(share);
+        let add = |to: &mut F64x4, from: F64x4| *to = from.mul_add(share, *to);
+        add(&mut self.velocity, other.velocity);
+        add(&mut self.increment, other.increment);
+        for k in 0..D {
+            add(&mut self.gradient[k], other.gradient[k]);
+            add(&mut self.affine[k], other.affine[k]);
+        }
+    }
+}
+
+/// [`Gathered`] of a batch, one row per lane. Made once and filled for batch after batch; lanes that
+/// a batch does not fill keep what they had, which is valid.
+pub(super) struct Sums<const D: usize> {
+    pub velocity: [F64x4; LANES],
+    pub gradient: [[F64x4; LANES]; D],
+    pub affine: [[F64x4; LANES]; D],
+    pub increment: [F64x4; LANES],
+}
+
+impl<const D: usize> Sums<D> {
+    pub fn new() -> Self {
+        let zero = [F64x4::splat(0.0); LANES];
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
+    }
+
+    pub fn row(&self, lane: usize) -> Gathered<D> {
+        Gathered {
+            velocity: self.velocity[lane],
+            gradient: std::array::from_fn(|k| self.gradient[k][lane]),
+            affine: std::array::from_fn(|k| self.affine[k][lane]),
+            increment: self.increment[lane],
+        }
+    }
+
+    pub fn set(&mut self, lane: usize, row: &Gathered<D>) {
+        self.velocity[lane] = row.velocity;
+        self.increment[lane] = row.increment;
+        for k in 0..D {
+            self.gradient[k][lane] = row.gradient[k];
+            self.affine[k][lane] = row.affine[k];
+        }
+    }
+
+    /// The members of a batch, with all that the fields offer.
+    #[inline(always)]
+    pub fn gather(&mut self, weights: &mut Weights<D>, batch: &Batch, fields: &Fields<D>) {
+        let span = super::stencil_span(D);
+        for lane in batch.members() {
+            let first = weights.first(lane);
+            self.contract(weights, lane, &fields.velocity[first..first + span]);
+        }
+        if let Some(increment) = fields.increment {
+            for lane in batch.members() {
+                self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
+            }
+        }
+        if let Some(moments) = &fields.moments
+            && moments.nodes.prepare(weights, batch)
+        {
+            self.add_moments(weights, batch, moments);
+        }
+    }
+
+    #[inline(never)]
+    fn add_moments(&mut self, weights: &Weights<D>, batch: &Batch, moments: &Moments<D>) {
+        for lane in batch.members() {
+            let mut sum = [F64x4::splat(0.0); D];
+            moments.nodes.for_each(weights, lane, |node, weight| {
+                for k in 0..D {
+                    sum[k] = weight.mul_add(F64x4::new(moments.first[node][k].0), sum[k]);
+                }
+            });
+            for k in 0..D {
+                self.affine[k][lane] = self.affine[k][lane] + sum[k];
+            }
+        }
+    }
+
+    /// Velocity, gradient and affine sums.
+    ///
+    /// Each needs the nodes averaged over all axes but one: the pencil along x is
+    /// `X_a = Σ_bc wy_b wz_c v_abc`, and so on. All three come from one pass over the nodes.
+    #[inline(always)]
+    fn contract(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
+        let nodes = &nodes[..super::stencil_span(D)];
+        let zero = F64x4::splat(0.0);
+        let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
+        let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
+        let weight_x = [of(&x.weight[0]), of(&x.weight[1]), of(&x.weight[2])];
+        let mut pencil = [[zero; 3]; D];
+        for c in 0..if D == 3 { 3 } else { 1 } {
+            for b in 0..3 {
+                let product = of(if D == 3 { &weights.product[b][c] } else { &y.weight[b] });
+                let mut across = zero;
+                for a in 0..3 {
+                    let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
+                    pencil[0][a] = product.mul_add(row, pencil[0][a]);
+                    across = weight_x[a].mul_add(row, across);
+                }
+                if D == 3 {
+                    pencil[1][b] = of(&z.weight[c]).mul_add(across, pencil[1][b]);
+                    pencil[D - 1][c] = of(&y.weight[b]).mul_add(across, pencil[D - 1][c]);
+                } else {
+                    pencil[1][b] = across;
+                }
+            }
+        }
+        let dot = |factor: &[[f64; LANES]; 3], pencil: &[F64x4; 3]| {
+            let sum = of(&factor[1]).mul_add(pencil[1], of(&factor[0]) * pencil[0]);
+            of(&factor[2]).mul_add(pencil[2], sum)
+        };
+        self.velocity[lane] = dot(&x.weight, &pencil[0]);
+        for k in 0..D {
+            self.affine[k][lane] = dot(&weights.axis[k].arm, &pencil[k]);
+            self.gradient[k][lane] = dot(&weights.axis[k].slope, &pencil[k]);
+        }
+    }
+}
+
+/// `Σ w f_j` over the nodes from the first of the stencil on.
+pub(super) fn mean<const D: usize>(weights: &Weights<D>, lane: usize, nodes: &[Row]) -> F64x4 {
+    let nodes = &nodes[..super::stencil_span(D)];
+    let mut sum = F64x4::splat(0.0);
+    weights.for_each_node(lane, |node, weight| sum = weight.mul_add(F64x4::new(nodes[node].0), sum));
+    sum
+}
