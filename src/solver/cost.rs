@@ -35,10 +35,10 @@ pub enum Kind {
 
 const KINDS: usize = 3;
 
-/// What the arena of a leaf costs in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter in sand that
-/// has a free surface; 24 in 2D.
-const fn arena_cost(d: usize) -> u64 {
-    if d == 2 { 24 } else { 64 }
+/// What the arena of a leaf with so many particles costs in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter
+/// in sand that has a free surface, and 24 in 2D; less where few particles touch a part of it.
+fn arena_cost(d: usize, particles: u64) -> u64 {
+    particles.min(if d == 2 { 24 } else { 64 })
 }
 
 /// What the nodes of a leaf with particles cost before anything is measured, in particles.
@@ -73,7 +73,11 @@ pub fn leaf_weight<const D: usize>(chunk: &Chunk<D>) -> u64 {
 
 /// As [`leaf_weight`], for a leaf with so many particles.
 pub fn leaf_cost<const D: usize>(particles: u64) -> u64 {
-    if particles == 0 { node_cost(D) / EMPTY + 1 } else { node_cost(D) + arena_cost(D) + particles }
+    if particles == 0 {
+        node_cost(D) / EMPTY + 1
+    } else {
+        node_cost(D) + arena_cost(D, particles) + particles
+    }
 }
 
 impl Costs {
@@ -156,8 +160,8 @@ fn counts<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
 
 /// As [`counts`], with the leaf's arena shared out to the materials. The chunk is not empty.
 fn loads<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
-    let mut loads = counts(chunk, materials);
-    loads.iter_mut().for_each(|count| *count += arena_cost(D) * *count / chunk.len() as u64);
+    let (mut loads, len) = (counts(chunk, materials), chunk.len() as u64);
+    loads.iter_mut().for_each(|count| *count += arena_cost(D, len) * *count / len);
     loads
 }
 
@@ -208,7 +212,7 @@ impl<const D: usize> Solver<D> {
             let (kind, len) = (self.kind(leaf) as usize, chunk.len() as u64);
             let time = self.costs.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
             for (material, load) in loads(chunk, materials).into_iter().enumerate() {
-                let share = time as f64 * load as f64 / (len + arena_cost(D)) as f64;
+                let share = time as f64 * load as f64 / (len + arena_cost(D, len)) as f64;
                 times[KINDS * material + kind] += units(share * 1e-9);
                 particles[KINDS * material + kind] += load * measurements(leaf, &self.costs.steps);
             }
