@@ -174,7 +174,7 @@ impl<const D: usize> LeafBins<D> {
         }
     }
 
-    /// Finds the bin of one box, or cuts it.
+    /// Finds the bin of one box that [`Sides::bins`] does not tell, or cuts it.
     fn sort_one(
         &mut self,
         plan: &GridPlan<D>,
@@ -190,13 +190,8 @@ impl<const D: usize> LeafBins<D> {
         let sides = sides.filter(|_| is_narrow(half, plan.cell(own.level)));
         let level = self.finest_level(own, sides, centre, half);
         if !given && is_narrow(half, plan.cell(level)) {
-            let child = || sides.filter(|_| level == own.level + 1)?.child_bin(&centre);
             // The first bin of a leaf is its own block's.
-            let bin = if level == own.level {
-                Some(0)
-            } else {
-                child().or_else(|| self.bin(plan, leaf, level, centre))
-            };
+            let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
             return bin.map(|bin| bin as u32).ok_or(());
         }
         let slot = self.cut.len() as u32;

@@ -188,13 +188,6 @@ impl<const D: usize> Sides<D> {
     pub fn side(&self, faces: usize) -> Side {
         self.sides[faces]
     }
-
-    /// The bin one level finer, counted within the leaf, whose block contains a point of the leaf.
-    pub fn child_bin(&self, centre: &[f64; D]) -> Option<usize> {
-        let child =
-            (0..D).fold(0, |child, axis| child | usize::from(centre[axis] >= self.middle[axis]) << axis);
-        self.children[child].map(|bin| bin as usize)
-    }
 }
 
 #[cfg(test)]
