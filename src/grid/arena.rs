@@ -6,10 +6,6 @@ use super::plan::{GridPlan, NO_BLOCK};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
-/// First moments of one node: row `k` is column `k` of the matrix `A_j = Σ w m C` on the way from particles
-/// to nodes, or of `V_j` on the way back. Lane 3 is zero.
-pub type Moments<const D: usize> = [Row; D];
-
 /// No arena.
 const NONE: u32 = u32::MAX;
 
@@ -17,12 +13,13 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, Default)]
 pub struct Arenas<const D: usize> {
     rows: Vec<Row>,
-    moments: Vec<Moments<D>>,
+    /// First moments, bin by bin, by number of the column.
+    moments: Vec<Row>,
     /// Per bin, number of its arena.
     slot: Vec<u32>,
     /// What is known of each arena.
     occupied: Vec<Occupied<D>>,
-    constraints: Arc<Vec<ArenaConstraints>>,
+    constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Per block, what reaches it.
     reached: Vec<Reached>,
 }
@@ -31,7 +28,7 @@ pub struct Arenas<const D: usize> {
 #[derive(Clone, Copy, Debug)]
 struct Occupied<const D: usize> {
     bin: u32,
-    /// Its constrained nodes among the plan's constraints.
+    /// Its columns of first moments among the plan's constraints.
     touched: Option<u32>,
     /// Its first moments.
     moments: [u32; 2],
@@ -53,7 +50,7 @@ struct Reached {
 pub struct Arena<'a, const D: usize> {
     /// Momentum and mass; values outside the window are left over from earlier steps.
     pub rows: &'a [Row],
-    /// First moments, for bins that touch constrained nodes.
+    /// First moments, for bins that touch nodes with such.
     pub moments: Option<ArenaMoments<'a, D>>,
     /// The nodes that hold values.
     pub window: Window<D>,
@@ -65,15 +62,15 @@ pub struct ArenaMut<'a, const D: usize> {
     pub bin: usize,
     /// Momentum and mass.
     pub rows: &'a mut [Row],
-    /// First moments of the constrained nodes, in the order of [`ArenaConstraints`].
-    pub moments: &'a mut [Moments<D>],
+    /// First moments, in the order of [`ArenaConstraints`].
+    pub moments: &'a mut [Row],
 }
 
 impl<const D: usize> ArenaMut<'_, D> {
     /// Sets the nodes of a window and all moments to zero.
     pub fn clear(&mut self, window: &Window<D>) {
         window.for_each_run(|run| self.rows[run].fill(Row([0.0; 4])));
-        self.moments.fill([Row([0.0; 4]); D]);
+        self.moments.fill(Row([0.0; 4]));
     }
 }
 
@@ -107,7 +104,7 @@ impl<const D: usize> Arenas<D> {
             moments += count;
         }
         grow(&mut self.rows, self.occupied.len() * arena_nodes(D), Row([0.0; 4]));
-        grow(&mut self.moments, moments as usize, [Row([0.0; 4]); D]);
+        grow(&mut self.moments, moments as usize, Row([0.0; 4]));
     }
 
     /// The arenas of all occupied bins, mutable and disjoint, in bin order.
@@ -165,7 +162,7 @@ impl<const D: usize> Arenas<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Moments<D>>()
+        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Row>()
     }
 }
 

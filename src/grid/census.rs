@@ -2,6 +2,7 @@
 use rustc_hash::FxHashMap;
 
 use super::arena::Arenas;
+use super::columns::Columns;
 use super::exchange::ArenaExchange;
 use super::mixed::Mixed;
 use super::plan::GridPlan;
@@ -24,16 +25,15 @@ pub struct Census {
     pub grid_bytes: u64,
 }
 
-/// Nodes of a block that one receiver needs: all, and those with first moments.
-#[derive(Clone, Copy, Default)]
-struct Needed {
+/// What one receiver needs of a block: nodes, and their first moments.
+#[derive(Clone, Copy)]
+struct Needed<const D: usize> {
     rows: u64,
-    moments: u64,
+    moments: Columns<D>,
 }
 
 /// Not collective. Bytes that the surface between partitions needs: for every pair of ranks, the distinct nodes that the
-/// sender's particles touch and the receiver sums, each once, with momentum and mass, and with first moments where the
-/// node is constrained. An exchange that keeps the order of sums sends a node once for every subtree of one owner
+/// sender's particles touch and the receiver sums, each once, with momentum and mass, and with the first moments that it has. An exchange that keeps the order of sums sends a node once for every subtree of one owner
 /// in that order, so at least this.
 pub fn surface_bytes<const D: usize>(
     exchange: &ArenaExchange<D>,
@@ -44,16 +44,16 @@ pub fn surface_bytes<const D: usize>(
     let mut scratch = Mixed::default();
     let mut total = 0;
     for pieces in exchange.sent() {
-        let mut needed: FxHashMap<u32, Needed> = FxHashMap::default();
+        let mut needed: FxHashMap<u32, Needed<D>> = FxHashMap::default();
         for piece in pieces {
             let nodes = piece.find(own, &mut scratch).own_nodes() & piece.nodes;
-            let block = needed.entry(piece.block).or_default();
+            let block = needed.entry(piece.block).or_insert(Needed { rows: 0, moments: Columns::NONE });
             block.rows |= nodes;
-            block.moments |= nodes & piece.constrained;
+            block.moments = block.moments.union(&piece.columns.within(nodes));
         }
-        let (row, moments) = (8 * (D as u64 + 1), 8 * (D * D) as u64);
-        let bytes = |needed: &Needed| {
-            row * u64::from(needed.rows.count_ones()) + moments * u64::from(needed.moments.count_ones())
+        let (row, column) = (8 * (D as u64 + 1), 8 * D as u64);
+        let bytes = |needed: &Needed<D>| {
+            row * u64::from(needed.rows.count_ones()) + column * needed.moments.len() as u64
         };
         total += needed.values().map(bytes).sum::<u64>();
     }

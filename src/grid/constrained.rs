@@ -1,106 +1,107 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
 use rustc_hash::FxHashMap;
 
-use super::arena::Moments;
-use super::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
+use super::columns::{Columns, Moments};
+use super::mask::{arena_overlap, offset, offset_count};
 use super::plan::{Block, NO_BLOCK, arena_index};
 use crate::kernel::Row;
-use crate::kernel::constrained::ConstrainedNodes;
+use crate::kernel::constrained::{Column, ConstrainedNodes};
 
-/// Constrained nodes in the arena of a bin: numbered block by block around the bin, in the order of their bits.
+/// Columns of first moments in the arena of a bin: numbered block by block around the bin, each in the order of [`Columns`].
 #[derive(Clone, Debug)]
-pub struct ArenaConstraints {
+pub struct ArenaConstraints<const D: usize> {
     /// What the kernels need of them.
     pub nodes: ConstrainedNodes,
-    /// Per offset number of a block, its constrained nodes in the arena and the number of the first.
-    parts: Vec<(u64, u16)>,
+    /// Per offset number of a block, its columns in the arena and the number of the first.
+    parts: Vec<(Columns<D>, u16)>,
 }
 
-/// The constrained nodes that the blocks around a bin share with its arena, by offset number.
+/// The columns that the blocks around a bin share with its arena, by offset number.
 fn shared<const D: usize>(
     blocks: &[Block<D>],
     around: &[u32; 27],
-) -> impl Iterator<Item = (usize, u32, u64)> {
+) -> impl Iterator<Item = (usize, u32, Columns<D>)> {
     let around = around.iter().copied().enumerate().take(offset_count(D));
     around.filter(|(_, block)| *block != NO_BLOCK).map(|(index, block)| {
-        (index, block, blocks[block as usize].constrained & arena_overlap::<D>(offset(index)))
+        (index, block, blocks[block as usize].columns.within(arena_overlap::<D>(offset(index))))
     })
 }
 
-/// Whether the arena of a bin has constrained nodes.
-pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32; 27]) -> bool {
-    shared(blocks, around).any(|(_, _, nodes)| nodes != 0)
+/// Whether the arena of a bin has first moments.
+pub(super) fn has_columns<const D: usize>(blocks: &[Block<D>], around: &[u32; 27]) -> bool {
+    shared(blocks, around).any(|(_, _, columns)| !columns.is_empty())
 }
 
 /// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
 #[derive(Default)]
-pub(super) struct Tables {
+pub(super) struct Tables<const D: usize> {
     /// By what a table is made from.
     numbers: FxHashMap<Vec<u64>, u32>,
-    tables: Vec<ArenaConstraints>,
+    tables: Vec<ArenaConstraints<D>>,
 }
 
-impl Tables {
-    /// Number of the table for the constrained nodes around a bin; `second` holds the second moments of all blocks that
-    /// have moments.
-    pub fn number<const D: usize>(&mut self, blocks: &[Block<D>], around: &[u32; 27], second: &[Row]) -> u32 {
-        let mut parts = vec![(0, 0); offset_count(D)];
-        let mut nodes: Vec<(usize, Row)> = Vec::new();
-        for (index, block, constrained) in shared(blocks, around) {
-            parts[index] = (constrained, nodes.len() as u16);
-            let slot = blocks[block as usize].moments;
-            nodes.extend(bits(constrained).map(|bit| {
-                let moments = slot.map(|slot| second[slot as usize * block_nodes(D) + bit as usize]);
-                (arena_index::<D>(index, bit), moments.unwrap_or_default())
+impl<const D: usize> Tables<D> {
+    /// Number of the table for the columns around a bin; `second` holds the second moments of all columns.
+    pub fn number(&mut self, blocks: &[Block<D>], around: &[u32; 27], second: &[f64]) -> u32 {
+        let mut parts = vec![(Columns::NONE, 0); offset_count(D)];
+        let mut all: Vec<Column> = Vec::new();
+        for (index, block, columns) in shared(blocks, around) {
+            parts[index] = (columns, all.len() as u16);
+            let block = &blocks[block as usize];
+            let mut taken = (u32::MAX, 0);
+            all.extend(columns.iter().map(|(bit, axis)| {
+                // A node is in the arena with all its columns.
+                taken = if taken.0 == bit { (bit, taken.1 + 1) } else { (bit, block.columns.first_of(bit)) };
+                let second = second[block.moments as usize + taken.1];
+                Column { node: arena_index::<D>(index, bit), axis, second }
             }));
         }
-        let moments = nodes.iter().flat_map(|(_, row)| row.0.map(f64::to_bits));
-        let content: Vec<u64> = parts.iter().map(|(nodes, _)| *nodes).chain(moments).collect();
+        let sets = parts.iter().flat_map(|(columns, _)| columns.along());
+        let content: Vec<u64> = sets.chain(all.iter().map(|column| column.second.to_bits())).collect();
         *self.numbers.entry(content).or_insert_with(|| {
-            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(nodes), parts });
+            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts });
             self.tables.len() as u32 - 1
         })
     }
 
     /// The tables by number.
-    pub fn finish(self) -> Vec<ArenaConstraints> {
+    pub fn finish(self) -> Vec<ArenaConstraints<D>> {
         self.tables
     }
 }
 
-impl ArenaConstraints {
-    /// Those of the nodes `inside` of the block at offset number `index`, with their numbers.
-    pub fn of_block(&self, index: usize, inside: u64) -> impl Iterator<Item = (u32, usize)> {
-        let (nodes, first) = self.parts[index];
-        let numbered = bits(nodes).zip(usize::from(first)..);
-        numbered.filter(move |(bit, _)| inside >> bit & 1 == 1)
+impl<const D: usize> ArenaConstraints<D> {
+    /// Columns in the arena of the block at offset number `index`, and the number of the first.
+    #[inline(always)]
+    pub fn of_block(&self, index: usize) -> (Columns<D>, usize) {
+        let (columns, first) = self.parts[index];
+        (columns, usize::from(first))
     }
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.nodes.heap_bytes() + self.parts.capacity() * size_of::<(u64, u16)>()
+        self.nodes.heap_bytes() + self.parts.capacity() * size_of::<(Columns<D>, u16)>()
     }
 }
 
-/// First moments in the arena of a bin: of its constrained nodes alone.
+/// First moments in the arena of a bin.
 #[derive(Clone, Copy, Debug)]
 pub struct ArenaMoments<'a, const D: usize> {
-    /// Moments in the order of the nodes' numbers.
-    pub values: &'a [Moments<D>],
-    /// The nodes.
-    pub constraints: &'a ArenaConstraints,
+    /// By number of the column.
+    pub values: &'a [Row],
+    /// The columns.
+    pub constraints: &'a ArenaConstraints<D>,
 }
 
 impl<'a, const D: usize> ArenaMoments<'a, D> {
-    /// Moments of the arena's constrained nodes in the block at offset number `index`, in the order of their bits; those
-    /// of other blocks follow.
-    pub fn from_block(self, index: usize) -> &'a [Moments<D>] {
-        let (_, first) = self.constraints.parts[index];
-        &self.values[usize::from(first)..]
+    /// Those at nodes of the block at offset number `index`, in order.
+    pub fn from_block(self, index: usize) -> &'a [Row] {
+        &self.values[self.constraints.of_block(index).1..]
     }
 
-    /// Moments of a node of the arena; zero if it is not constrained.
-    pub fn at(self, node: usize) -> Moments<D> {
-        self.constraints.nodes.place(node).map_or([Row::default(); D], |number| self.values[number])
+    /// Those of a node of the block at offset number `index`.
+    pub fn at(self, index: usize, bit: u32) -> Moments<D> {
+        let (columns, first) = self.constraints.of_block(index);
+        columns.read(&self.values[first..], bit)
     }
 }

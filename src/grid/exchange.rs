@@ -7,7 +7,8 @@ use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use super::arena::{Arenas, Moments};
+use super::arena::Arenas;
+use super::columns::{Columns, Moments};
 use super::feeders::NO_BIN;
 use super::fields::NodeFields;
 use super::mask::{bits, block_nodes};
@@ -25,13 +26,13 @@ const TASK: usize = 16;
 
 /// A sum that one neighbour needs of own bins.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SentPiece {
+pub(super) struct SentPiece<const D: usize> {
     /// The block.
     pub block: u32,
     /// Nodes that the neighbour needs.
     pub nodes: u64,
-    /// Those that are constrained.
-    pub constrained: u64,
+    /// Their first moments.
+    pub columns: Columns<D>,
     /// Keys of the bins, if not all that reach the block.
     keys: Option<(u64, u64)>,
 }
@@ -39,7 +40,7 @@ pub(super) struct SentPiece {
 /// Exchange of partial sums for one plan.
 pub struct ArenaExchange<const D: usize> {
     exchange: NeighbourExchange,
-    sent: Vec<Vec<SentPiece>>,
+    sent: Vec<Vec<SentPiece<D>>>,
     /// Per block, whether neighbours need sums of all own bins that reach some nodes.
     asked: Vec<bool>,
     received_from: Vec<std::ops::Range<usize>>,
@@ -49,17 +50,17 @@ pub struct ArenaExchange<const D: usize> {
 #[derive(Debug, Default)]
 pub struct ReceivedSums<const D: usize> {
     rows: Vec<Row>,
-    moments: Vec<Moments<D>>,
-    pieces: Vec<Place>,
+    moments: Vec<Row>,
+    pieces: Vec<Place<D>>,
     /// Nodes of each piece that have values.
     touched: Vec<u64>,
 }
 
 /// Where a received piece is kept.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct Place<const D: usize> {
     nodes: u64,
-    constrained: u64,
+    columns: Columns<D>,
     first_row: usize,
     first_moment: usize,
 }
@@ -95,10 +96,11 @@ impl<const D: usize> ArenaExchange<D> {
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();
         ranks.dedup();
-        let mut sent: Vec<Vec<SentPiece>> = ranks.iter().map(|_| Vec::new()).collect();
+        let mut sent: Vec<Vec<SentPiece<D>>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
-                sent[neighbour] = words.chunks_exact(5 + D).map(|words| read_request(words, plan)).collect();
+                sent[neighbour] =
+                    words.chunks_exact(4 + 2 * D).map(|words| read_request(words, plan)).collect();
             }
         }
         let received_from = ranks
@@ -152,7 +154,7 @@ impl<const D: usize> ArenaExchange<D> {
     }
 
     /// What each neighbour needs of the own bins.
-    pub(super) fn sent(&self) -> &[Vec<SentPiece>] {
+    pub(super) fn sent(&self) -> &[Vec<SentPiece<D>>] {
         &self.sent
     }
 
@@ -160,7 +162,7 @@ impl<const D: usize> ArenaExchange<D> {
     /// the blocks asked for; the rest is added up here.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>, fields: &NodeFields<D>) -> Vec<Vec<u8>> {
         let own = Sources { plan, arenas, received: None };
-        let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
+        let tasks: Vec<&[SentPiece<D>]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
         let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
             let mut extents = 0u64;
             let mut values = Vec::new();
@@ -175,7 +177,7 @@ impl<const D: usize> ArenaExchange<D> {
         });
         let sums: Vec<(u64, Vec<f64>)> = sums.collect();
         let mut sums = &sums[..];
-        let message = |pieces: &Vec<SentPiece>| {
+        let message = |pieces: &Vec<SentPiece<D>>| {
             let (own, rest) = sums.split_at(pieces.len().div_ceil(TASK));
             sums = rest;
             let mut message: Vec<u8> = Vec::new();
@@ -200,13 +202,9 @@ impl<const D: usize> ArenaExchange<D> {
     }
 }
 
-impl SentPiece {
+impl<const D: usize> SentPiece<D> {
     /// What reaches the block of the piece from the bins that it asks for.
-    pub fn find<'a, const D: usize>(
-        &self,
-        own: Sources<'a, D>,
-        scratch: &'a mut Mixed<D>,
-    ) -> BlockSum<'a, D> {
+    pub fn find<'a>(&self, own: Sources<'a, D>, scratch: &'a mut Mixed<D>) -> BlockSum<'a, D> {
         let keys = self.keys.map(|(first, last)| first..=last);
         BlockSum::find(own, scratch, self.block as usize, keys)
     }
@@ -216,30 +214,32 @@ impl SentPiece {
 struct Packing<const D: usize> {
     scratch: Mixed<D>,
     rows: Vec<Row>,
-    moments: Vec<Moments<D>>,
+    /// First moments of the present block.
+    moments: Vec<Row>,
 }
 
 impl<const D: usize> Default for Packing<D> {
     fn default() -> Self {
         let nodes = block_nodes(D);
-        Self { scratch: Mixed::default(), rows: vec![ZERO; nodes], moments: vec![[ZERO; D]; nodes] }
+        Self { scratch: Mixed::default(), rows: vec![ZERO; nodes], moments: vec![ZERO; D * nodes] }
     }
 }
 
 impl<const D: usize> Packing<D> {
     /// Adds up a piece and appends it to a message.
-    fn pack(&mut self, piece: &SentPiece, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
+    fn pack(&mut self, piece: &SentPiece<D>, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
         let mut sum = piece.find(own, &mut self.scratch);
         let nodes = sum.own_nodes() & piece.nodes;
         sum.sum_rows(Regions::of::<D>().meeting::<D>(nodes), &mut self.rows);
-        sum.sum_moments(nodes & piece.constrained, &mut self.moments);
-        append(piece, nodes, &self.rows, |bit| &self.moments[bit as usize], values)
+        sum.sum_moments(nodes & piece.columns.nodes(), &mut self.moments);
+        let columns = own.plan.blocks[piece.block as usize].columns;
+        append(piece, nodes, &self.rows, (columns, &self.moments), values)
     }
 }
 
 /// Appends a piece to a message whose sums `fields` have.
 fn pack<const D: usize>(
-    piece: &SentPiece,
+    piece: &SentPiece<D>,
     plan: &GridPlan<D>,
     fields: &NodeFields<D>,
     values: &mut Vec<f64>,
@@ -247,16 +247,15 @@ fn pack<const D: usize>(
     let block = piece.block as usize;
     let nodes = fields.touched(block) & piece.nodes;
     let rows = &fields.rows[block * block_nodes(D)..][..block_nodes(D)];
-    let slot = plan.blocks[block].moments.unwrap_or(0);
-    append(piece, nodes, rows, |bit| fields.moments_at(slot, bit), values)
+    append(piece, nodes, rows, (plan.blocks[block].columns, fields.moments_of(plan, block)), values)
 }
 
-/// Appends the sums at `nodes` to a message.
-fn append<'a, const D: usize>(
-    piece: &SentPiece,
+/// Appends the sums at `nodes` to a message, from the rows and the first moments of the block.
+fn append<const D: usize>(
+    piece: &SentPiece<D>,
     nodes: u64,
     rows: &[Row],
-    moments: impl Fn(u32) -> &'a Moments<D>,
+    (columns, moments): (Columns<D>, &[Row]),
     values: &mut Vec<f64>,
 ) -> Extent {
     if nodes == 0 {
@@ -274,8 +273,12 @@ fn append<'a, const D: usize>(
             values.extend_from_slice(&[x, y, mass]);
         }
     }
-    for bit in bits(nodes & piece.constrained) {
-        moments(bit).iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
+    let mut node = (u32::MAX, [ZERO; D]);
+    for (bit, axis) in piece.columns.within(nodes).iter() {
+        if node.0 != bit {
+            node = (bit, columns.read(moments, bit));
+        }
+        values.extend_from_slice(&node.1[axis].0[..D]);
     }
     if is_all { Extent::All } else { Extent::Some }
 }
@@ -283,19 +286,14 @@ fn append<'a, const D: usize>(
 impl<const D: usize> ReceivedSums<D> {
     fn new(plan: &GridPlan<D>) -> Self {
         let (mut rows, mut moments) = (0, 0);
-        let place = |piece: &Piece| {
+        let place = |piece: &Piece<D>| {
             let (first_row, first_moment) = (rows, moments);
             rows += piece.nodes.count_ones() as usize;
-            moments += piece.constrained.count_ones() as usize;
-            Place { nodes: piece.nodes, constrained: piece.constrained, first_row, first_moment }
+            moments += piece.columns.len();
+            Place { nodes: piece.nodes, columns: piece.columns, first_row, first_moment }
         };
-        let pieces: Vec<Place> = plan.pieces.iter().map(place).collect();
-        Self {
-            rows: vec![ZERO; rows],
-            moments: vec![[ZERO; D]; moments],
-            touched: vec![0; pieces.len()],
-            pieces,
-        }
+        let pieces: Vec<Place<D>> = plan.pieces.iter().map(place).collect();
+        Self { rows: vec![ZERO; rows], moments: vec![ZERO; moments], touched: vec![0; pieces.len()], pieces }
     }
 
     /// Nodes of a piece that have values in this step.
@@ -313,14 +311,10 @@ impl<const D: usize> ReceivedSums<D> {
         self.rows[self.pieces[piece as usize].first_row + before.count_ones() as usize]
     }
 
-    /// First moments that it adds to a constrained node.
+    /// First moments that it adds to a node.
     pub(super) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
         let (place, touched) = (&self.pieces[piece as usize], self.touched[piece as usize]);
-        if touched & place.constrained & 1 << bit == 0 {
-            return [ZERO; D];
-        }
-        let before = touched & place.constrained & ((1 << bit) - 1);
-        self.moments[place.first_moment + before.count_ones() as usize]
+        place.columns.within(touched).read(&self.moments[place.first_moment..], bit)
     }
 
     fn unpack(&mut self, message: &[u8], pieces: std::ops::Range<usize>) {
@@ -343,11 +337,9 @@ impl<const D: usize> ReceivedSums<D> {
                     Row([x, y, 0.0, mass])
                 };
             }
-            let moments = (place.constrained & touched).count_ones() as usize;
-            for moments in &mut self.moments[place.first_moment..][..moments] {
-                for row in moments {
-                    row.0[..D].copy_from_slice(&values.take::<D>());
-                }
+            let moments = place.columns.within(touched).len();
+            for column in &mut self.moments[place.first_moment..][..moments] {
+                column.0[..D].copy_from_slice(&values.take::<D>());
             }
         }
     }
@@ -368,25 +360,28 @@ impl Values<'_> {
     }
 }
 
-fn push_request<const D: usize>(words: &mut Vec<u64>, piece: &Piece, plan: &GridPlan<D>) {
+fn push_request<const D: usize>(words: &mut Vec<u64>, piece: &Piece<D>, plan: &GridPlan<D>) {
     let block = &plan.blocks[piece.block as usize];
     words.push(u64::from(block.level));
     words.extend(block.coord.map(u64::from));
-    words.extend([piece.nodes, piece.constrained, piece.first, piece.last]);
+    words.push(piece.nodes);
+    words.extend(piece.columns.along());
+    words.extend([piece.first, piece.last]);
 }
 
 /// The piece that a neighbour asks for. Bins of this rank reach the nodes, so that it has their block.
-fn read_request<const D: usize>(words: &[u64], plan: &GridPlan<D>) -> SentPiece {
+fn read_request<const D: usize>(words: &[u64], plan: &GridPlan<D>) -> SentPiece<D> {
     let level = words[0].min(u64::from(MAX_LEVEL)) as u8;
     let coord = std::array::from_fn(|axis| words[1 + axis] as u32);
-    let [nodes, constrained, first, last] = std::array::from_fn(|i| words[1 + D + i]);
+    let (nodes, columns) = (words[1 + D], Columns::new(std::array::from_fn(|axis| words[2 + D + axis])));
+    let [first, last] = std::array::from_fn(|i| words[2 + 2 * D + i]);
     let place = |level: u8, coord: [u32; D]| (level, Octant { level, coord }.key(), coord);
     let found =
         plan.blocks.binary_search_by_key(&place(level, coord), |block| place(block.level, block.coord));
     debug_assert!(found.is_ok(), "a sum of nodes that no own bin reaches");
     let keys = (last != u64::MAX).then_some((first, last));
     match found {
-        Ok(block) => SentPiece { block: block as u32, nodes, constrained, keys },
-        Err(_) => SentPiece { block: 0, nodes: 0, constrained: 0, keys },
+        Ok(block) => SentPiece { block: block as u32, nodes, columns, keys },
+        Err(_) => SentPiece { block: 0, nodes: 0, columns: Columns::NONE, keys },
     }
 }

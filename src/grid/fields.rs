@@ -4,10 +4,11 @@
 //! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
 use rayon::prelude::*;
 
-use super::arena::{Arenas, Moments};
+use super::arena::Arenas;
+use super::columns::{Columns, axes_in};
 use super::exchange::ReceivedSums;
 use super::mask::{bits, block_nodes, offset_count};
-use super::mixed::{Mixed, add_moments};
+use super::mixed::Mixed;
 use super::plan::{Block, GridPlan, NO_BLOCK};
 use super::region::Regions;
 use super::sums::{BlockSum, Sources};
@@ -21,8 +22,8 @@ pub(super) const ZERO: Row = Row([0.0; 4]);
 pub struct NodeFields<const D: usize> {
     /// One row per node, block by block.
     pub rows: Vec<Row>,
-    /// First moments of nodes in blocks that hold constrained nodes.
-    pub moments: Vec<Moments<D>>,
+    /// First moments, block by block, by number of the column.
+    pub moments: Vec<Row>,
     /// Per block, whether something was summed in it in this step.
     pub active: Vec<bool>,
     /// Nodes that own arenas touch in this step, of blocks whose sums other ranks ask for.
@@ -31,22 +32,19 @@ pub struct NodeFields<const D: usize> {
     pub(super) needed: Vec<bool>,
     /// Per block, whether its rows may differ from zero.
     pub(super) dirty: Vec<bool>,
-    /// First moment slot of each level.
-    pub(super) moment_start: Vec<usize>,
+    /// First column of first moments of each level.
+    pub(super) first_column: Vec<usize>,
 }
 
 /// Blocks that one task adds up.
 const TASK: usize = 16;
 
 /// The first moments of the blocks of each task.
-fn moment_tasks<'a, const D: usize>(
-    plan: &GridPlan<D>,
-    moments: &'a mut [Moments<D>],
-) -> Vec<&'a mut [Moments<D>]> {
+fn moment_tasks<'a, const D: usize>(plan: &GridPlan<D>, moments: &'a mut [Row]) -> Vec<&'a mut [Row]> {
     let mut rest = moments;
-    let slots = |blocks: &[Block<D>]| blocks.iter().filter(|block| block.moments.is_some()).count();
+    let columns = |blocks: &[Block<D>]| blocks.iter().map(|block| block.columns.len()).sum();
     let task = |blocks: &[Block<D>]| {
-        let (own, others) = std::mem::take(&mut rest).split_at_mut(slots(blocks) * block_nodes(D));
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(columns(blocks));
         rest = others;
         own
     };
@@ -63,9 +61,9 @@ pub enum Part {
 }
 
 /// One block of the fields with what is noted of it, mutable.
-struct Slot<'a, const D: usize> {
+struct Slot<'a> {
     rows: &'a mut [Row],
-    moments: Option<&'a mut [Moments<D>]>,
+    moments: &'a mut [Row],
     active: &'a mut bool,
     dirty: &'a mut bool,
     touched: &'a mut u64,
@@ -75,21 +73,20 @@ impl<const D: usize> NodeFields<D> {
     /// Fields for the blocks of a plan.
     pub fn new(plan: &GridPlan<D>) -> Self {
         let nodes = block_nodes(D);
-        let with_moments = |end: usize| plan.blocks[..end].iter().filter(|b| b.moments.is_some()).count();
         Self {
             rows: vec![ZERO; plan.blocks.len() * nodes],
-            moments: vec![[ZERO; D]; plan.moment_blocks * nodes],
+            moments: vec![ZERO; plan.columns],
             active: vec![false; plan.blocks.len()],
             touched: vec![0; plan.blocks.len()],
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
-            moment_start: plan.level_start.iter().map(|&end| with_moments(end)).collect(),
+            first_column: plan.first_columns(),
         }
     }
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Moments<D>>()
+        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Row>()
     }
 
     /// Not collective. Adds up the own arenas that reach each block of `part`; `asked` says of each block whether other ranks
@@ -108,7 +105,7 @@ impl<const D: usize> NodeFields<D> {
             if next < plan.blocks.len() && arenas.reach(next) && is_wanted(next) {
                 sources.read_ahead(next);
             }
-            let (block, mut moments) = (&plan.blocks[index], slot.moments);
+            let block = &plan.blocks[index];
             let mut is_reached = false;
             *slot.touched = 0;
             if arenas.reach(index) && (asked[index] || block.sum != 0) {
@@ -116,10 +113,7 @@ impl<const D: usize> NodeFields<D> {
                 is_reached = !sum.is_empty();
                 if is_reached {
                     sum.sum_rows(u32::MAX, slot.rows);
-                    if let Some(moments) = &mut moments {
-                        moments.fill([ZERO; D]);
-                        sum.sum_moments(block.constrained, moments);
-                    }
+                    sum.sum_moments(u64::MAX, slot.moments);
                     if part == Part::Asked {
                         *slot.touched = sum.own_nodes();
                     }
@@ -127,9 +121,7 @@ impl<const D: usize> NodeFields<D> {
             }
             if *slot.dirty && !is_reached {
                 slot.rows.fill(ZERO);
-                if let Some(moments) = &mut moments {
-                    moments.fill([ZERO; D]);
-                }
+                slot.moments.fill(ZERO);
             }
             *slot.active = is_reached && block.sum != 0;
             *slot.dirty = is_reached;
@@ -145,7 +137,7 @@ impl<const D: usize> NodeFields<D> {
         let sources = Sources { plan, arenas, received: Some(received) };
         let regions = Regions::of::<D>();
         self.for_each_block(plan, |scratch, index, slot| {
-            let (mut rest, mut moments) = (0, slot.moments);
+            let (mut rest, columns) = (0, plan.blocks[index].columns);
             for part in plan.parts(index) {
                 let touched = received.touched(part.piece) & regions.nodes[part.region as usize];
                 if touched == 0 {
@@ -159,28 +151,22 @@ impl<const D: usize> NodeFields<D> {
                 for bit in bits(touched) {
                     slot.rows[bit as usize].add(&received.row(part.piece, bit));
                 }
-                if let Some(moments) = &mut moments {
-                    for bit in bits(touched & plan.blocks[index].constrained) {
-                        add_moments(&mut moments[bit as usize], &received.moments(part.piece, bit));
-                    }
+                for bit in bits(touched & columns.nodes()) {
+                    let more = received.moments(part.piece, bit);
+                    let own = slot.moments[columns.first_of(bit)..].iter_mut();
+                    own.zip(axes_in::<D>(columns.axes_of(bit))).for_each(|(own, axis)| own.add(&more[axis]));
                 }
             }
             if rest != 0 {
                 let mut sum = BlockSum::find(sources, scratch, index, None);
                 sum.sum_rows(rest, slot.rows);
-                if let Some(moments) = moments {
-                    sum.sum_moments(plan.blocks[index].constrained & regions.nodes_in(rest), moments);
-                }
+                sum.sum_moments(regions.nodes_in(rest), slot.moments);
             }
         });
     }
 
     /// Calls `work` in parallel for all blocks.
-    fn for_each_block(
-        &mut self,
-        plan: &GridPlan<D>,
-        work: impl Fn(&mut Mixed<D>, usize, Slot<'_, D>) + Sync,
-    ) {
+    fn for_each_block(&mut self, plan: &GridPlan<D>, work: impl Fn(&mut Mixed<D>, usize, Slot<'_>) + Sync) {
         let nodes = block_nodes(D);
         let rows = self.rows.par_chunks_mut(TASK * nodes);
         let active = self.active.par_chunks_mut(TASK);
@@ -188,13 +174,15 @@ impl<const D: usize> NodeFields<D> {
         let moments = moment_tasks(plan, &mut self.moments);
         let tasks = rows.zip(flags).zip(moments).enumerate();
         tasks.for_each_init(Mixed::default, |scratch, (task, ((rows, flags), moments))| {
-            let mut moments = moments.chunks_mut(nodes);
+            let mut rest = moments;
             let ((active, dirty), touched) = flags;
             let flags = active.iter_mut().zip(dirty).zip(touched);
             for (index, (rows, ((active, dirty), touched))) in
                 (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags))
             {
-                let moments = plan.blocks[index].moments.and_then(|_| moments.next());
+                let (moments, others) =
+                    std::mem::take(&mut rest).split_at_mut(plan.blocks[index].columns.len());
+                rest = others;
                 work(scratch, index, Slot { rows, moments, active, dirty, touched });
             }
         });
@@ -205,13 +193,13 @@ impl<const D: usize> NodeFields<D> {
         self.touched[block]
     }
 
-    /// First moments of a node, of a block that has any.
-    pub(super) fn moments_at(&self, slot: u32, bit: u32) -> &Moments<D> {
-        &self.moments[slot as usize * block_nodes(D) + bit as usize]
+    /// First moments of a block.
+    pub(super) fn moments_of(&self, plan: &GridPlan<D>, block: usize) -> &[Row] {
+        &self.moments[plan.moments_of(block)]
     }
 
     /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
-    /// touch constrained nodes their first moments.
+    /// touch nodes with first moments these.
     pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
         let bin = &plan.bins[bin];
         let constraints = bin.touched.map(|table| &plan.constraints[table as usize]);
@@ -225,14 +213,13 @@ impl<const D: usize> NodeFields<D> {
                 continue;
             }
             let rows = &self.rows[block as usize * nodes..][..nodes];
-            let block = &plan.blocks[block as usize];
             let Some(shared) = window.shared(index) else { continue };
             copy_rows(shared, rows, &mut arena.rows);
             if let Some(constraints) = constraints {
-                let moments = block.moments.map(|slot| &self.moments[slot as usize * nodes..][..nodes]);
-                for (bit, number) in constraints.of_block(index, u64::MAX) {
-                    arena.moments[number] = moments.map_or([ZERO; D], |moments| moments[bit as usize]);
-                }
+                let (here, first) = constraints.of_block(index);
+                let (all, moments) =
+                    (plan.blocks[block as usize].columns, self.moments_of(plan, block as usize));
+                copy_columns(&here, &all, moments, &mut arena.moments[first..]);
             }
         }
     }
@@ -256,6 +243,16 @@ pub fn load_rows<const D: usize>(
     }
 }
 
+/// Copies the columns `here` from the moments of a block, which has the columns `all`.
+#[inline(always)]
+fn copy_columns<const D: usize>(here: &Columns<D>, all: &Columns<D>, moments: &[Row], to: &mut [Row]) {
+    let mut to = to[..here.len()].iter_mut();
+    for bit in bits(here.nodes()) {
+        let own = &moments[all.first_of(bit)..][..here.axes_of(bit).count_ones() as usize];
+        own.iter().zip(&mut to).for_each(|(from, to)| *to = *from);
+    }
+}
+
 /// Copies the shared nodes from the rows of a block into those of an arena.
 #[inline(always)]
 fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]) {
@@ -271,12 +268,12 @@ fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j` of the constrained nodes, by their number in the arena.
-    pub moments: Vec<Moments<D>>,
+    /// First moments `V_j`, by number of the column in the arena.
+    pub moments: Vec<Row>,
 }
 
 impl<const D: usize> Default for VelocityArena<D> {
     fn default() -> Self {
-        Self { rows: vec![ZERO; arena_nodes(D)], moments: vec![[ZERO; D]; arena_nodes(D)] }
+        Self { rows: vec![ZERO; arena_nodes(D)], moments: vec![ZERO; D * arena_nodes(D)] }
     }
 }

@@ -1,18 +1,19 @@
 //! Node fields between levels: sums go from constrained nodes to their parents, velocities back.
 use rayon::prelude::*;
 
-use super::arena::{Arenas, Moments};
-use super::fields::{NodeFields, ZERO};
-use super::links::{Links, NO_MOMENTS, weight_of};
+use super::arena::Arenas;
+use super::columns::axes_in;
+use super::fields::NodeFields;
+use super::links::{Link, Links, weight_of};
 use super::mask::{block_nodes, offset};
 use super::plan::GridPlan;
 use crate::kernel::Row;
 use crate::kernel::simd::F64x4;
 
 /// One block of the fields, mutable.
-struct BlockMut<'a, const D: usize> {
+struct BlockMut<'a> {
     rows: &'a mut [Row],
-    moments: Option<&'a mut [Moments<D>]>,
+    moments: &'a mut [Row],
 }
 
 impl<const D: usize> NodeFields<D> {
@@ -29,9 +30,9 @@ impl<const D: usize> NodeFields<D> {
             }
             let steps = Step::<D>::of_all(plan.cell(level as u8 + 1));
             let (coarse, fine) =
-                split(&mut self.rows, &mut self.moments, plan, level + 1, self.moment_start[level + 1]);
-            for_each_linked(coarse, plan, links, &self.active, |mut to, first, nodes| {
-                let constrained = plan.blocks[first / block_nodes(D)].constrained;
+                split(&mut self.rows, &mut self.moments, plan, level + 1, self.first_column[level + 1]);
+            for_each_linked(coarse, plan, links, &self.active, |to, first, nodes| {
+                let columns = plan.blocks[first / block_nodes(D)].columns;
                 for i in nodes {
                     let at = links.nodes[i] as usize - first;
                     let links = links.of(i);
@@ -39,23 +40,23 @@ impl<const D: usize> NodeFields<D> {
                     for link in links {
                         let step = &steps[link.offset as usize];
                         let mut sum = F64x4::new(fine.row(link.node).0);
-                        for (moment, delta) in fine.moments(link.moments).iter().zip(step.delta) {
-                            sum = F64x4::new(moment.0).mul_add(delta, sum);
-                        }
+                        fine.each_column(link, |axis, moment| {
+                            sum = moment.mul_add(step.delta[axis], sum);
+                        });
                         row = step.weight.mul_add(sum, row);
                     }
                     to.rows[at] = Row(row.to_array());
-                    // Real nodes need no moments.
-                    if constrained >> at & 1 == 1
-                        && let Some(own) = &mut to.moments
-                    {
+                    // Real nodes have no moments.
+                    let axes = columns.axes_of(at as u32);
+                    if axes != 0 {
+                        let mut sums = columns.read(to.moments, at as u32).map(|row| F64x4::new(row.0));
                         for link in links {
                             let weight = steps[link.offset as usize].weight;
-                            for (own, moment) in own[at].iter_mut().zip(fine.moments(link.moments)) {
-                                *own =
-                                    Row(weight.mul_add(F64x4::new(moment.0), F64x4::new(own.0)).to_array());
-                            }
+                            fine.each_column(link, |axis, moment| {
+                                sums[axis] = weight.mul_add(moment, sums[axis]);
+                            });
                         }
+                        columns.write(to.moments, at as u32, &sums.map(|sum| Row(sum.to_array())));
                     }
                 }
             });
@@ -70,9 +71,12 @@ impl<const D: usize> NodeFields<D> {
             let links = &plan.prolongation[level];
             let steps = Step::<D>::of_all(plan.cell(level as u8));
             let (coarse, fine) =
-                split(&mut self.rows, &mut self.moments, plan, level, self.moment_start[level]);
-            for_each_linked(fine, plan, links, &self.needed, |mut to, first, nodes| {
+                split(&mut self.rows, &mut self.moments, plan, level, self.first_column[level]);
+            for_each_linked(fine, plan, links, &self.needed, |to, first, nodes| {
+                let columns = plan.blocks[first / block_nodes(D)].columns;
                 for i in nodes {
+                    let at = links.nodes[i] as usize - first;
+                    let axes = columns.axes_of(at as u32);
                     let mut row = F64x4::splat(0.0);
                     let mut sums = [row; D];
                     for link in links.of(i) {
@@ -80,17 +84,15 @@ impl<const D: usize> NodeFields<D> {
                         let [x, y, z, _] = coarse.row(link.node).0;
                         let value = F64x4::new([x, y, z, 0.0]);
                         row = step.weight.mul_add(value, row);
-                        let moments = coarse.moments(link.moments);
-                        for axis in 0..D {
-                            let moment = value.mul_add(step.delta[axis], F64x4::new(moments[axis].0));
-                            sums[axis] = step.weight.mul_add(moment, sums[axis]);
+                        for axis in axes_in::<D>(axes) {
+                            sums[axis] = step.weighted_delta[axis].mul_add(value, sums[axis]);
                         }
+                        coarse.each_column(link, |axis, moment| {
+                            sums[axis] = step.weight.mul_add(moment, sums[axis]);
+                        });
                     }
-                    let at = links.nodes[i] as usize - first;
                     to.rows[at] = Row(row.to_array());
-                    if let Some(moments) = &mut to.moments {
-                        moments[at] = sums.map(|sum| Row(sum.to_array()));
-                    }
+                    columns.write(to.moments, at as u32, &sums.map(|sum| Row(sum.to_array())));
                 }
             });
             for linked in &links.blocks {
@@ -113,29 +115,30 @@ impl<const D: usize> NodeFields<D> {
     }
 }
 
-/// The fields of the levels below `level`, whose first moment slot is `slot`, and those of `level` and deeper.
+/// The fields of the levels below `level`, whose first column of first moments is number `column`, and those of `level` and
+/// deeper.
 fn split<'a, const D: usize>(
     rows: &'a mut [Row],
-    moments: &'a mut [Moments<D>],
+    moments: &'a mut [Row],
     plan: &GridPlan<D>,
     level: usize,
-    slot: usize,
+    column: usize,
 ) -> (Half<'a, D>, Half<'a, D>) {
     let (nodes, block) = (block_nodes(D), plan.level_start[level]);
     let (coarse_rows, fine_rows) = rows.split_at_mut(block * nodes);
-    let (coarse_moments, fine_moments) = moments.split_at_mut(slot * nodes);
+    let (coarse_moments, fine_moments) = moments.split_at_mut(column);
     (
-        Half { rows: coarse_rows, moments: coarse_moments, first_block: 0, first_slot: 0 },
-        Half { rows: fine_rows, moments: fine_moments, first_block: block, first_slot: slot },
+        Half { rows: coarse_rows, moments: coarse_moments, first_block: 0, first_column: 0 },
+        Half { rows: fine_rows, moments: fine_moments, first_block: block, first_column: column },
     )
 }
 
 /// The fields of some levels.
 struct Half<'a, const D: usize> {
     rows: &'a mut [Row],
-    moments: &'a mut [Moments<D>],
+    moments: &'a mut [Row],
     first_block: usize,
-    first_slot: usize,
+    first_column: usize,
 }
 
 impl<const D: usize> Half<'_, D> {
@@ -145,13 +148,13 @@ impl<const D: usize> Half<'_, D> {
         &self.rows[node as usize - self.first_block * block_nodes(D)]
     }
 
-    /// First moments at a place; zeros for [`NO_MOMENTS`].
+    /// Calls `f` with axis and value of each column of first moments that the node of a link has.
     #[inline(always)]
-    fn moments(&self, place: u32) -> &Moments<D> {
-        if place == NO_MOMENTS {
-            return &[ZERO; D];
+    fn each_column(&self, link: &Link, mut f: impl FnMut(usize, F64x4)) {
+        if link.axes != 0 {
+            let columns = &self.moments[link.moments as usize - self.first_column..];
+            axes_in::<D>(link.axes).zip(columns).for_each(|(axis, column)| f(axis, F64x4::new(column.0)));
         }
-        &self.moments[place as usize - self.first_slot * block_nodes(D)]
     }
 }
 
@@ -161,6 +164,8 @@ struct Step<const D: usize> {
     weight: F64x4,
     /// Parent minus constrained node, m, one number in all lanes.
     delta: [F64x4; D],
+    /// The product of both.
+    weighted_delta: [F64x4; D],
 }
 
 impl<const D: usize> Step<D> {
@@ -168,8 +173,13 @@ impl<const D: usize> Step<D> {
     fn of_all(cell: f64) -> [Self; 27] {
         let step = |index: usize| {
             let offset = offset::<D>(index);
-            let delta = std::array::from_fn(|axis| F64x4::splat(f64::from(offset[axis]) * cell));
-            Self { weight: F64x4::splat(weight_of(offset)), delta }
+            // Weights are powers of two, so that products with them are exact.
+            let (weight, delta) = (weight_of(offset), offset.map(|along| f64::from(along) * cell));
+            Self {
+                weight: F64x4::splat(weight),
+                delta: delta.map(F64x4::splat),
+                weighted_delta: delta.map(|delta| F64x4::splat(weight * delta)),
+            }
         };
         std::array::from_fn(step)
     }
@@ -182,23 +192,21 @@ fn for_each_linked<const D: usize>(
     plan: &GridPlan<D>,
     links: &Links,
     flags: &[bool],
-    work: impl Fn(BlockMut<'_, D>, usize, std::ops::Range<usize>) + Sync,
+    work: impl Fn(BlockMut<'_>, usize, std::ops::Range<usize>) + Sync,
 ) {
     let nodes = block_nodes(D);
-    let Half { mut rows, mut moments, first_block, first_slot } = half;
-    let (mut next_block, mut next_slot) = (first_block, first_slot);
+    let Half { mut rows, mut moments, first_block, first_column } = half;
+    let (mut next_block, mut next_column) = (first_block, first_column);
     let mut tasks = Vec::new();
     for linked in links.blocks.iter().filter(|linked| flags[linked.block as usize]) {
         let block = linked.block as usize;
         let (_, rest) = std::mem::take(&mut rows).split_at_mut((block - next_block) * nodes);
         let (own, rest) = rest.split_at_mut(nodes);
         (rows, next_block) = (rest, block + 1);
-        let own_moments = plan.blocks[block].moments.map(|slot| {
-            let (_, rest) = std::mem::take(&mut moments).split_at_mut((slot as usize - next_slot) * nodes);
-            let (own, rest) = rest.split_at_mut(nodes);
-            (moments, next_slot) = (rest, slot as usize + 1);
-            own
-        });
+        let columns = plan.moments_of(block);
+        let (_, rest) = std::mem::take(&mut moments).split_at_mut(columns.start - next_column);
+        let (own_moments, rest) = rest.split_at_mut(columns.len());
+        (moments, next_column) = (rest, columns.end);
         tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
     }
     tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {

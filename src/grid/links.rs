@@ -2,25 +2,36 @@
 
 use rustc_hash::FxHashMap;
 
+use super::columns::{Columns, axes_in};
 use super::constraint::{block_and_bit, node_coord, parents_of};
 use super::mask::{bits, block_nodes, offset, offset_index, opposite};
-use super::plan::GridPlan;
-use crate::kernel::Row;
+use super::plan::{Block, GridPlan};
 
 /// A link between a constrained node and one of its parents.
 #[derive(Clone, Copy, Debug)]
 pub struct Link {
     /// Node at the other end (block number × nodes per block + bit).
     pub node: u32,
-    /// Place of that node's first moments, of a constrained one; [`NO_MOMENTS`] for real ones.
+    /// Place of that node's first column of first moments, if it has any.
     pub moments: u32,
+    /// Axes of these columns, a bit each.
+    pub axes: u8,
     /// Offset number of parent minus constrained node, in cells of the finer level. The weight follows from it, see
     /// [`weight_of`].
     pub offset: u8,
 }
 
-/// No first moments.
-pub const NO_MOMENTS: u32 = u32::MAX;
+impl Link {
+    /// To a node of a block, which has a number.
+    fn to<const D: usize>(block: &Block<D>, number: u32, bit: u32, offset: u8) -> Self {
+        Self {
+            node: number * block_nodes(D) as u32 + bit,
+            moments: block.moments + block.columns.first_of(bit) as u32,
+            axes: block.columns.axes_of(bit),
+            offset,
+        }
+    }
+}
 
 /// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
 pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
@@ -96,39 +107,42 @@ impl Links {
     }
 }
 
+/// A parent that a rank has of a constrained node.
+struct Found {
+    /// The constrained node in its block.
+    bit: u32,
+    /// Number among the node's parents.
+    order: u32,
+    /// The parent's block and its place there.
+    block: u32,
+    parent: u32,
+    /// Offset number of parent minus constrained node.
+    offset: u8,
+}
+
 impl<const D: usize> GridPlan<D> {
-    /// Lists the links of all levels; `number` numbers the blocks.
+    /// Lists the links of all levels and finds which first moments nodes have; `number` numbers the blocks.
     pub(super) fn link_levels(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
         let nodes = block_nodes(D) as u32;
         let levels = self.levels();
         let mut restriction: Vec<Vec<(u32, u32, Link)>> = vec![Vec::new(); levels];
         let mut prolongation = restriction.clone();
-        for (index, block) in self.blocks.iter().enumerate() {
+        let mut parents = Vec::new();
+        for index in 0..self.blocks.len() {
+            self.find_columns(index, number, &mut parents);
+            let block = &self.blocks[index];
             let level = block.level as usize;
-            for bit in bits((block.sum | block.value) & block.constrained) {
-                let fine = index as u32 * nodes + bit;
-                for (order, parent) in parents_of::<D>(node_coord(block.coord, bit)).enumerate() {
-                    let (coord, parent_bit) = block_and_bit(parent.node);
-                    let Some(&coarse_block) = number.get(&(block.level - 1, coord)) else { continue };
-                    let coarse = coarse_block * nodes + parent_bit;
-                    let offset = offset_index(parent.offset) as u8;
-                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
-                    if block.sum >> bit & 1 == 1
-                        && self.blocks[coarse_block as usize].sum >> parent_bit & 1 == 1
-                    {
-                        // A parent meets its children in lexicographic order of their position.
-                        let order = u32::from(opposite(D, offset as usize) as u8);
-                        let moments = self.moment_node(fine).map_or(NO_MOMENTS, |place| place as u32);
-                        let link = Link { node: fine, moments, offset };
-                        restriction[level - 1].push((coarse, order, link));
-                    }
-                    if block.value >> bit & 1 == 1 {
-                        let is_real = self.blocks[coarse_block as usize].constrained >> parent_bit & 1 == 0;
-                        let place = self.moment_node(coarse).filter(|_| !is_real);
-                        let moments = place.map_or(NO_MOMENTS, |place| place as u32);
-                        let link = Link { node: coarse, moments, offset };
-                        prolongation[level].push((fine, order as u32, link));
-                    }
+            for &Found { bit, order, block: coarse_block, parent, offset } in &parents {
+                let coarse = &self.blocks[coarse_block as usize];
+                if block.sum >> bit & 1 == 1 && coarse.sum >> parent & 1 == 1 {
+                    // A parent meets its children in lexicographic order of their position.
+                    let order = u32::from(opposite(D, offset as usize) as u8);
+                    let link = Link::to(block, index as u32, bit, offset);
+                    restriction[level - 1].push((coarse_block * nodes + parent, order, link));
+                }
+                if block.value >> bit & 1 == 1 {
+                    let link = Link::to(coarse, coarse_block, parent, offset);
+                    prolongation[level].push((index as u32 * nodes + bit, order, link));
                 }
             }
         }
@@ -136,29 +150,74 @@ impl<const D: usize> GridPlan<D> {
         self.prolongation = prolongation.into_iter().map(|entries| Links::group(entries, nodes)).collect();
     }
 
-    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes.
-    pub(super) fn constraint_spread(&self) -> Vec<Row> {
+    /// Finds the parents of the constrained nodes of a block, and of these nodes the columns of first moments: those along
+    /// which a parent lies beside the node, and those of its parents. Coarser blocks come before finer ones.
+    fn find_columns(
+        &mut self,
+        index: usize,
+        number: &FxHashMap<(u8, [u32; D]), u32>,
+        parents: &mut Vec<Found>,
+    ) {
+        parents.clear();
+        let mut columns = Columns::NONE;
+        let block = &self.blocks[index];
+        for bit in bits((block.sum | block.value) & block.constrained) {
+            for (order, parent) in parents_of::<D>(node_coord(block.coord, bit)).enumerate() {
+                let offset = offset_index(parent.offset);
+                debug_assert_eq!(parent.weight, weight_of(parent.offset));
+                columns.insert(bit, beside(parent.offset));
+                let (coord, bit_of_parent) = block_and_bit(parent.node);
+                let Some(&coarse) = number.get(&(block.level - 1, coord)) else { continue };
+                columns.insert(bit, self.blocks[coarse as usize].columns.axes_of(bit_of_parent));
+                parents.push(Found {
+                    bit,
+                    order: order as u32,
+                    block: coarse,
+                    parent: bit_of_parent,
+                    offset: offset as u8,
+                });
+            }
+        }
+        let moments = self.columns as u32;
+        self.columns += columns.len();
+        let block = &mut self.blocks[index];
+        (block.columns, block.moments) = (columns, moments);
+    }
+
+    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along the axis of each
+    /// column of first moments; along others they are zero.
+    pub(super) fn constraint_spread(&self) -> Vec<f64> {
         let nodes = block_nodes(D);
-        let mut spread = vec![Row([0.0; 4]); self.moment_blocks * nodes];
+        let mut spread = vec![0.0; self.columns];
         for level in 1..self.levels() {
             let cell_squared = self.cell(level as u8).powi(2);
             let links = &self.prolongation[level];
             for (i, &node) in links.nodes.iter().enumerate() {
-                let mut sum = [0.0; 4];
+                let block = &self.blocks[node as usize / nodes];
+                let bit = node % nodes as u32;
+                let mut sum = [0.0; D];
                 for link in links.of(i) {
-                    let parent = self.moment_node(link.node).map_or([0.0; 4], |slot| spread[slot].0);
                     let delta = offset::<D>(link.offset as usize);
                     let weight = weight_of(delta);
+                    let mut place = link.moments as usize;
                     for axis in 0..D {
-                        let squared = f64::from(delta[axis] * delta[axis]) * cell_squared;
-                        sum[axis] += weight * (parent[axis] + squared);
+                        sum[axis] += weight * f64::from(delta[axis] * delta[axis]) * cell_squared;
+                        if link.axes >> axis & 1 == 1 {
+                            sum[axis] += weight * spread[place];
+                            place += 1;
+                        }
                     }
                 }
-                if let Some(slot) = self.moment_node(node) {
-                    spread[slot] = Row(sum);
-                }
+                let first = block.moments as usize + block.columns.first_of(bit);
+                let axes = axes_in::<D>(block.columns.axes_of(bit));
+                axes.zip(first..).for_each(|(axis, place)| spread[place] = sum[axis]);
             }
         }
         spread
     }
+}
+
+/// Axes along which an offset leads elsewhere, a bit each.
+fn beside<const D: usize>(offset: [i32; D]) -> u8 {
+    (0..D).fold(0, |axes, axis| axes | u8::from(offset[axis] != 0) << axis)
 }

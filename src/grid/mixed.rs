@@ -3,8 +3,8 @@
 //! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another rank are the
 //! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
 //! does not fit is listed and added up along the tree of keys.
-use super::arena::Moments;
-use super::mask::{bits, offset_count};
+use super::columns::Moments;
+use super::mask::{bits, offset_count, opposite};
 use super::order::{Origin, Term, arrange, fold};
 use super::region::{MOST_BINS, SPAN, arena_node};
 use super::sources::{NO_HOME, Part};
@@ -132,8 +132,8 @@ impl<const D: usize> BlockSum<'_, D> {
         self.scratch.rows = stack;
     }
 
-    /// The moments at nodes of a region, along a list of all that reaches it.
-    pub fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Moments<D>]) {
+    /// The moments at nodes of a region, along a list of all that reaches it. `to` has all of the block.
+    pub fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Row]) {
         self.list_terms(region);
         let mut stack = std::mem::take(&mut self.scratch.moments);
         for bit in bits(nodes) {
@@ -143,7 +143,8 @@ impl<const D: usize> BlockSum<'_, D> {
                 found.unwrap_or([ZERO; D])
             };
             let sum = fold(&self.scratch.terms, &mut stack, load, add_moments);
-            to[bit as usize] = sum.unwrap_or([ZERO; D]).map(|row| row.plus(&ZERO));
+            let sum = sum.unwrap_or([ZERO; D]).map(|row| row.plus(&ZERO));
+            self.plan.blocks[self.block].columns.write(to, bit, &sum);
         }
         self.scratch.moments = stack;
     }
@@ -202,8 +203,8 @@ impl<const D: usize> BlockSum<'_, D> {
     pub fn moments(&self, origin: Origin, bit: u32) -> Option<Moments<D>> {
         match origin {
             Origin::Bin { bin, position } => {
-                let node = arena_node::<D>(position as usize, bit);
-                self.arenas.get(bin).and_then(|arena| arena.moments).map(|moments| moments.at(node))
+                let moments = self.arenas.get(bin)?.moments?;
+                Some(moments.at(opposite(D, position as usize), bit))
             }
             Origin::Piece(piece) => self.received.map(|received| received.moments(piece, bit)),
         }
@@ -211,6 +212,6 @@ impl<const D: usize> BlockSum<'_, D> {
 }
 
 /// Adds one node's moments.
-pub(super) fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
+fn add_moments<const D: usize>(to: &mut Moments<D>, from: &Moments<D>) {
     to.iter_mut().zip(from).for_each(|(to, from)| to.add(from));
 }

@@ -6,6 +6,7 @@
 pub mod arena;
 pub mod census;
 pub mod closure;
+pub mod columns;
 pub mod constrained;
 pub mod constraint;
 pub mod direct;

@@ -7,7 +7,8 @@ use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
-use super::constrained::{ArenaConstraints, Tables, has_constrained};
+use super::columns::Columns;
+use super::constrained::{ArenaConstraints, Tables, has_columns};
 use super::constraint::node_coord;
 use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
@@ -34,8 +35,10 @@ pub struct Block<const D: usize> {
     pub constrained: u64,
     /// Real nodes that this rank counts when it sums over the grid.
     pub owned: u64,
-    /// Place of its first moments, for blocks with needed constrained nodes.
-    pub moments: Option<u32>,
+    /// First moments of those needed.
+    pub columns: Columns<D>,
+    /// Place of these among those of all blocks.
+    pub moments: u32,
 }
 
 /// A bin: the particles of one leaf, or parts of their boxes, that scatter on one level into the arena of one
@@ -50,7 +53,7 @@ pub struct Bin<const D: usize> {
     pub is_inner: bool,
     /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
     pub around: [u32; 27],
-    /// Its constrained nodes among [`GridPlan::constraints`], if it has any.
+    /// Its columns of first moments among [`GridPlan::constraints`], if it has any.
     pub touched: Option<u32>,
 }
 
@@ -73,7 +76,7 @@ pub struct GridPlan<const D: usize> {
     /// Which own bins reach each block.
     pub feeders: Feeders,
     /// Sums that this rank needs of others, by rank.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<Piece<D>>,
     pub(super) parts: Vec<Part>,
     pub(super) part_start: Vec<u32>,
     /// Per level, restriction into its nodes from constrained nodes one level finer.
@@ -82,10 +85,10 @@ pub struct GridPlan<const D: usize> {
     pub prolongation: Vec<Links>,
     /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
     pub face_nodes: Vec<(u32, u8)>,
-    /// Number of blocks with first moments.
-    pub moment_blocks: usize,
+    /// Number of columns of first moments.
+    pub columns: usize,
     /// Constrained nodes of arenas, for [`Bin::touched`].
-    pub constraints: Arc<Vec<ArenaConstraints>>,
+    pub constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -117,7 +120,7 @@ impl<const D: usize> GridPlan<D> {
             restriction: Vec::new(),
             prolongation: Vec::new(),
             face_nodes: Vec::new(),
-            moment_blocks: 0,
+            columns: 0,
             constraints: Arc::default(),
             rounds,
             tree,
@@ -125,10 +128,10 @@ impl<const D: usize> GridPlan<D> {
         plan.list_blocks(&needed);
         let number: FxHashMap<(u8, [u32; D]), u32> =
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
+        plan.link_levels(&number);
         plan.list_bins(&number, &bins);
         plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
-        plan.link_levels(&number);
         plan.find_face_nodes();
         let spread = plan.constraint_spread();
         let (mut tables, mut number) = (Tables::default(), Vec::new());
@@ -179,7 +182,7 @@ impl<const D: usize> GridPlan<D> {
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
             + self.feeders.heap_bytes()
-            + self.pieces.capacity() * size_of::<Piece>()
+            + self.pieces.capacity() * size_of::<Piece<D>>()
             + self.parts.capacity() * size_of::<Part>()
             + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
@@ -194,16 +197,11 @@ impl<const D: usize> GridPlan<D> {
                 sum: sets.sum,
                 constrained: sets.constrained,
                 owned: self.owned_nodes(level, coord, sets.value & !sets.constrained),
-                moments: None,
+                columns: Columns::NONE,
+                moments: 0,
             })
             .collect();
         blocks.sort_unstable_by_key(|b| (b.level, Octant { level: b.level, coord: b.coord }.key(), b.coord));
-        for block in &mut blocks {
-            if block.constrained & (block.sum | block.value) != 0 {
-                block.moments = Some(self.moment_blocks as u32);
-                self.moment_blocks += 1;
-            }
-        }
         let deepest = blocks.last().map_or(0, |block| block.level as usize);
         self.level_start = (0..=deepest + 1)
             .map(|level| blocks.partition_point(|block| (block.level as usize) < level))
@@ -235,7 +233,7 @@ impl<const D: usize> GridPlan<D> {
     fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>, bins: &[Vec<Octant<D>>]) {
         // Bins of several leaves may have one block; what depends on the block is made once.
         let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
-        let mut constrained = 0;
+        let mut tables = 0;
         for (leaf, blocks) in bins.iter().enumerate() {
             self.leaf_start.push(self.bins.len() as u32);
             for &block in blocks {
@@ -254,8 +252,8 @@ impl<const D: usize> GridPlan<D> {
                         *slot = found;
                     }
                 }
-                let touched = has_constrained(&self.blocks, &around).then_some(constrained);
-                constrained += u32::from(touched.is_some());
+                let touched = has_columns(&self.blocks, &around).then_some(tables);
+                tables += u32::from(touched.is_some());
                 self.bins.push(Bin { leaf: leaf as u32, block, is_inner, around, touched });
             }
         }
@@ -281,11 +279,17 @@ impl<const D: usize> GridPlan<D> {
         }
     }
 
-    /// Place of a node's first moments, if its block has any.
-    pub fn moment_node(&self, node: u32) -> Option<usize> {
-        let nodes = block_nodes(D);
-        let slot = self.blocks[node as usize / nodes].moments?;
-        Some(slot as usize * nodes + node as usize % nodes)
+    /// The first moments of a block among those of all.
+    pub(super) fn moments_of(&self, block: usize) -> std::ops::Range<usize> {
+        let Block { columns, moments, .. } = &self.blocks[block];
+        *moments as usize..*moments as usize + columns.len()
+    }
+
+    /// Number of the first column of first moments of each level, and of all at the end.
+    pub(super) fn first_columns(&self) -> Vec<usize> {
+        let first =
+            |&start: &usize| self.blocks.get(start).map_or(self.columns, |block| block.moments as usize);
+        self.level_start.iter().map(first).collect()
     }
 }
 

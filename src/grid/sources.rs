@@ -5,6 +5,7 @@
 use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
+use super::columns::Columns;
 use super::feeders::NO_BIN;
 use super::mask::{box_offsets, offset, offset_count, shifted};
 use super::order::each_subtree;
@@ -14,15 +15,15 @@ use super::region::Regions;
 
 /// What another rank's bins in a subtree contribute to nodes of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Piece {
+pub struct Piece<const D: usize> {
     /// The other rank.
     pub rank: usize,
     /// The block.
     pub block: u32,
     /// Nodes that are needed.
     pub nodes: u64,
-    /// Those that are constrained.
-    pub constrained: u64,
+    /// Their first moments.
+    pub columns: Columns<D>,
     /// Least key in the subtree; 0 and the greatest possible key where the subtree holds all that the rank
     /// contributes.
     pub first: u64,
@@ -85,7 +86,7 @@ impl<const D: usize> GridPlan<D> {
     pub(super) fn list_pieces(&mut self, rank: usize) {
         let mut search = RemoteBins::default();
         // Pieces as they are found, and where they enter: block and part.
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut pieces: Vec<Piece<D>> = Vec::new();
         let mut parts: Vec<(u32, Part)> = Vec::new();
         let mut candidates = Vec::new();
         for block in 0..self.blocks.len() {
@@ -140,11 +141,11 @@ impl<const D: usize> GridPlan<D> {
         rank: usize,
         block: usize,
         candidates: &[Candidate],
-        pieces: &mut Vec<Piece>,
+        pieces: &mut Vec<Piece<D>>,
         parts: &mut Vec<(u32, Part)>,
     ) {
         let regions = Regions::of::<D>();
-        let Block { sum, constrained, .. } = self.blocks[block];
+        let Block { sum, columns, .. } = self.blocks[block];
         let known = pieces.len();
         let mut found: Vec<(usize, u64, u64, u8)> = Vec::new();
         for region in 0..offset_count(D) {
@@ -169,7 +170,7 @@ impl<const D: usize> GridPlan<D> {
             for &(owner, first, last, home) in &found {
                 let is_all = found.iter().filter(|(other, ..)| *other == owner).count() == 1;
                 let (from, to) = if is_all { (0, u64::MAX) } else { (first, last) };
-                let is_same = |piece: &Piece| (piece.rank, piece.first, piece.last) == (owner, from, to);
+                let is_same = |piece: &Piece<D>| (piece.rank, piece.first, piece.last) == (owner, from, to);
                 let piece = known + pieces[known..].iter().position(is_same).unwrap_or(pieces.len() - known);
                 if piece == pieces.len() {
                     let block = block as u32;
@@ -177,13 +178,13 @@ impl<const D: usize> GridPlan<D> {
                         rank: owner,
                         block,
                         nodes: 0,
-                        constrained: 0,
+                        columns: Columns::NONE,
                         first: from,
                         last: to,
                     });
                 }
                 pieces[piece].nodes |= nodes;
-                pieces[piece].constrained |= nodes & constrained;
+                pieces[piece].columns = pieces[piece].columns.union(&columns.within(nodes));
                 let is_only = found.len() == 1 && own <= 1;
                 let (block, region, piece) = (block as u32, region as u8, piece as u32);
                 parts.push((block, Part { region, piece, key: first, home, is_only }));

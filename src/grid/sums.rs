@@ -1,7 +1,8 @@
 //! The sum of one block.
 use std::ops::RangeInclusive;
 
-use super::arena::{Arenas, Moments};
+use super::arena::Arenas;
+use super::columns::axes_in;
 use super::exchange::ReceivedSums;
 use super::feeders::NO_BIN;
 use super::mask::{bits, block_nodes, opposite};
@@ -244,12 +245,13 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         0
     }
 
-    /// Writes the sums of first moments at `nodes`, all of them constrained.
-    pub fn sum_moments(&mut self, nodes: u64, to: &mut [Moments<D>]) {
+    /// Writes the sums of first moments at those of `nodes` that have any. `to` has all moments of the block.
+    pub fn sum_moments(&mut self, nodes: u64, to: &mut [Row]) {
+        let nodes = nodes & self.plan.blocks[self.block].columns.nodes();
         if nodes == 0 {
             return;
         }
-        let mut from: [&[Moments<D>]; 32] = [&[]; 32];
+        let mut from: [&[Row]; 32] = [&[]; 32];
         for position in bits(u64::from(self.occupied)) {
             let bin = self.plan.feeders.inner::<D>(self.block)[position as usize];
             if let Some(moments) = self.arenas.get(bin).and_then(|arena| arena.moments) {
@@ -268,47 +270,43 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     }
 
     /// The moments at nodes of a region in the fixed pattern; `from` has those of each position.
-    fn add_moments(
-        &self,
-        region: usize,
-        nodes: u64,
-        is_mixed: bool,
-        from: &[&[Moments<D>]; 32],
-        to: &mut [Moments<D>],
-    ) {
+    fn add_moments(&self, region: usize, nodes: u64, is_mixed: bool, from: &[&[Row]; 32], to: &mut [Row]) {
         let none = [ZERO; D];
-        let constrained = self.plan.blocks[self.block].constrained;
+        let columns = self.plan.blocks[self.block].columns;
         let count = self.regions.bins[region];
         for bit in bits(nodes) {
-            let below = constrained & ((1 << bit) - 1);
-            let mut at = [&none; MOST_BINS];
+            let (below, axes) = (columns.within((1 << bit) - 1), columns.axes_of(bit));
+            let here = axes.count_ones() as usize;
+            let mut at = [&none[..]; MOST_BINS];
             for (at, slot) in at.iter_mut().zip(&self.order[region]).take(count) {
                 let position = slot.position as usize % 32;
                 // The whole arena has moments; they are zero where particles touch nothing.
-                let number = (below & self.regions.overlap[position]).count_ones() as usize;
-                if let Some(found) = from[position].get(number) {
+                let first = below.within(self.regions.overlap[position]).len();
+                if let Some(found) = from[position].get(first..first + here) {
                     *at = found;
                 }
             }
             let mut others = [none; MOST_BINS];
             if is_mixed {
                 for placed in &self.scratch.placed {
-                    others[placed.slot] = self.moments(placed.origin, bit).unwrap_or(none);
+                    let all = self.moments(placed.origin, bit).unwrap_or(none);
+                    let those = axes_in::<D>(axes).map(|axis| all[axis]);
+                    others[placed.slot].iter_mut().zip(those).for_each(|(to, column)| *to = column);
                 }
                 for placed in &self.scratch.placed {
                     at[placed.slot] = &others[placed.slot];
                 }
             }
-            to[bit as usize] = std::array::from_fn(|axis| {
-                let pair = |slot: usize| at[slot][axis].plus(&at[slot + 1][axis]);
+            for (i, to) in to[below.len()..][..here].iter_mut().enumerate() {
+                let pair = |slot: usize| at[slot][i].plus(&at[slot + 1][i]);
                 let sum = match count {
-                    1 => at[0][axis],
+                    1 => at[0][i],
                     2 => pair(0),
                     4 => pair(0).plus(&pair(2)),
                     _ => pair(0).plus(&pair(2)).plus(&pair(4).plus(&pair(6))),
                 };
-                sum.plus(&ZERO)
-            });
+                *to = sum.plus(&ZERO);
+            }
         }
     }
 }

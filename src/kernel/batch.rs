@@ -1,5 +1,6 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
+use super::constrained::lanes_in;
 use super::simd::{LANES, Lanes, Mask, prefetch};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
@@ -151,12 +152,7 @@ impl Batch {
     /// Lanes that are members, in order.
     #[inline(always)]
     pub fn members(&self) -> impl Iterator<Item = usize> + use<> {
-        let mut left = self.lanes;
-        std::iter::from_fn(move || {
-            let lane = left.trailing_zeros() as usize;
-            left &= left.wrapping_sub(1);
-            (lane < LANES).then_some(lane)
-        })
+        lanes_in(self.lanes)
     }
 
     /// Which of some lanes, a bit each, are members.

@@ -1,124 +1,183 @@
 //! Constrained nodes of an arena, those that first and second moments belong to.
 //!
-//! In most arenas beside a level jump a few layers of nodes are constrained. Their moments are kept one after
-//! the other, and a stencil visits only those among its nodes that are constrained: elsewhere moments are zero.
+//! In most arenas beside a level jump a few layers of nodes are constrained, and of their moments most columns are zero
+//! (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its own nodes.
 use super::batch::Batch;
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{LANES, Lanes};
 use super::weights::Weights;
-use super::{ARENA_EDGE, Row, arena_nodes, stencil_bases};
+use super::{ARENA_EDGE, stencil_bases};
 
-/// Place of a node that is not constrained.
-const NONE: u16 = u16::MAX;
+/// Nodes of a stencil in 3D.
+const STENCIL: usize = 27;
 
-/// Nodes of a stencil, `a + 3 b (+ 9 c)`, in the arena from its first node on; padded, so that no index is out of bounds.
-const STENCIL: [u8; 32] = {
-    let mut nodes = [0; 32];
-    let mut node = 0;
-    while node < 27 {
-        nodes[node] = (node % 3 + ARENA_EDGE * (node / 3 % 3 + ARENA_EDGE * (node / 9))) as u8;
-        node += 1;
-    }
-    nodes
-};
+/// A column of first moments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Its node in the arena.
+    pub node: usize,
+    /// Its axis.
+    pub axis: usize,
+    /// The node's second moment S along this axis, m².
+    pub second: f64,
+}
 
-/// Which nodes of an arena are constrained, and their second moments.
+/// A column as a stencil finds it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Visit {
+    /// Node of the stencil, `a + 3 b (+ 9 c)`.
+    node: u8,
+    axis: u8,
+    /// Number of the column.
+    column: u16,
+}
+
+/// Which columns of moments the nodes of an arena have, and their second moments.
 #[derive(Clone, Debug)]
 pub struct ConstrainedNodes {
-    /// Per base of a stencil (see [`super::stencil_bases`]) its constrained nodes: bit `a + 3 b (+ 9 c)`.
-    stencils: Vec<u32>,
-    /// Per arena node, its number among the constrained ones.
-    place: Vec<u16>,
-    /// Second moments S: `(S_x, S_y, S_z, unused)`, m².
-    second: Vec<Row>,
+    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]) and axis.
+    visits: Vec<Visit>,
+    /// Start of each of these lists, and the end.
+    start: Vec<u16>,
+    /// Second moments, by column.
+    second: Vec<f64>,
 }
 
 impl ConstrainedNodes {
-    /// The given nodes, no node twice, with their second moments. They are numbered in the order given.
-    pub fn new<const D: usize>(nodes: impl IntoIterator<Item = (usize, Row)>) -> Self {
-        let (mut place, mut second) = (vec![NONE; arena_nodes(D)], Vec::new());
-        for (node, moments) in nodes {
-            place[node] = second.len() as u16;
-            second.push(moments);
+    /// The given columns, none twice. They are numbered in the order given.
+    pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>) -> Self {
+        let mut second = Vec::new();
+        let mut found: Vec<(u16, Visit)> = Vec::new();
+        for Column { node, axis, second: moment } in columns {
+            let column = second.len() as u16;
+            second.push(moment);
+            for visit in 0..3usize.pow(D as u32) {
+                // The stencil has the node at `visit` if its base is a valid one.
+                let base = (0..D).try_fold(0, |base, k| {
+                    let at = node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE;
+                    let first = at.checked_sub(visit / 3usize.pow(k as u32) % 3)?;
+                    (first < stencil_bases(1)).then(|| base + first * stencil_bases(k))
+                });
+                if let Some(base) = base {
+                    found.push((
+                        (D * base + axis) as u16,
+                        Visit { node: visit as u8, axis: axis as u8, column },
+                    ));
+                }
+            }
         }
-        let edge = stencil_bases(1);
-        let stencil = |base: usize| {
-            let lowest: usize =
-                (0..D).map(|k| base / edge.pow(k as u32) % edge * ARENA_EDGE.pow(k as u32)).sum();
-            let nodes = STENCIL.iter().take(3usize.pow(D as u32)).enumerate();
-            let constrained = nodes.filter(|(_, node)| place[lowest + usize::from(**node)] != NONE);
-            constrained.fold(0, |bits, (bit, _)| bits | 1 << bit)
-        };
-        Self { stencils: (0..stencil_bases(D)).map(stencil).collect(), place, second }
+        found.sort_unstable_by_key(|&(list, visit)| (list, visit.node));
+        let lists = (D * stencil_bases(D)) as u16;
+        let start = (0..=lists).map(|list| found.partition_point(|&(at, _)| at < list) as u16).collect();
+        Self { visits: found.into_iter().map(|(_, visit)| visit).collect(), start, second }
     }
 
-    /// Number of constrained nodes.
+    /// Number of columns.
     pub fn len(&self) -> usize {
         self.second.len()
     }
 
-    /// True if no node is constrained.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.second.is_empty()
     }
 
-    /// Number of an arena node among the constrained ones.
-    pub fn place(&self, node: usize) -> Option<usize> {
-        (self.place[node] != NONE).then_some(usize::from(self.place[node]))
-    }
-
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        4 * self.stencils.capacity() + 2 * self.place.capacity() + size_of::<Row>() * self.second.capacity()
+        size_of::<Visit>() * self.visits.capacity() + 2 * self.start.capacity() + 8 * self.second.capacity()
     }
 
-    /// Whether the stencil of any member of a batch has constrained nodes; if so, the weights of all nodes are made ready.
+    /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made ready.
     #[inline(always)]
-    pub(super) fn prepare<const D: usize>(&self, weights: &mut Weights<D>, batch: &Batch) -> bool {
-        let touched = batch.members().any(|lane| self.stencils[weights.base(lane)] != 0);
-        if touched {
+    pub(super) fn prepare<const D: usize>(&self, weights: &mut Weights<D>, batch: &Batch) -> u32 {
+        let has_any = |lane: usize| {
+            let base = weights.base(lane);
+            self.start[D * base] != self.start[D * base + D]
+        };
+        let touched = (0..LANES).fold(0, |lanes, lane| lanes | u32::from(has_any(lane)) << lane);
+        let touched = batch.members_among(touched);
+        if touched != 0 {
             weights.fill_nodes();
         }
         touched
     }
 
-    /// Calls `f` with number and weight of each constrained node in the stencil of a lane of a batch that
-    /// [`ConstrainedNodes::prepare`] has been called for.
+    /// What the stencil of a lane visits along the axes `first` to `last`.
+    #[inline(always)]
+    fn visits<const D: usize>(
+        &self,
+        weights: &Weights<D>,
+        lane: usize,
+        first: usize,
+        last: usize,
+    ) -> &[Visit] {
+        let list = D * weights.base(lane);
+        &self.visits[usize::from(self.start[list + first])..usize::from(self.start[list + last + 1])]
+    }
+
+    /// Calls `f` with number and axis of each column in the stencil of a lane of a batch that
+    /// [`ConstrainedNodes::prepare`] has been called for, and the weight of its node.
     #[inline(always)]
     pub(super) fn for_each<const D: usize>(
         &self,
         weights: &Weights<D>,
         lane: usize,
-        mut f: impl FnMut(usize, F64x4),
+        mut f: impl FnMut(usize, usize, f64),
     ) {
-        let mut left = self.stencils[weights.base(lane)];
-        let places = &self.place[weights.first(lane)..];
-        while left != 0 {
-            let node = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let place = places[usize::from(STENCIL[node])];
-            f(usize::from(place), F64x4::splat(weights.nodes[node][lane]));
+        for visit in self.visits(weights, lane, 0, D - 1) {
+            f(usize::from(visit.column), usize::from(visit.axis), visit.weight(weights, lane));
         }
     }
 
-    /// Adds `Σ w S` of the members of a batch that [`ConstrainedNodes::prepare`] has been called for.
+    /// [`ConstrainedNodes::for_each`] of the columns along one axis.
+    #[inline(always)]
+    pub(super) fn for_each_along<const D: usize>(
+        &self,
+        weights: &Weights<D>,
+        lane: usize,
+        axis: usize,
+        mut f: impl FnMut(usize, f64),
+    ) {
+        for visit in self.visits(weights, lane, axis, axis) {
+            f(usize::from(visit.column), visit.weight(weights, lane));
+        }
+    }
+
+    /// Adds `Σ w S` of the lanes that [`ConstrainedNodes::prepare`] gave.
     #[inline(never)]
     pub(super) fn add_spread<const D: usize>(
         &self,
         weights: &Weights<D>,
-        batch: &Batch,
+        touched: u32,
         spread: &mut [Lanes; D],
     ) {
         let mut values: [[f64; LANES]; D] = spread.map(Lanes::to_array);
-        for lane in batch.members() {
-            let mut sum = F64x4::splat(0.0);
-            self.for_each(weights, lane, |node, weight| {
-                sum = weight.mul_add(F64x4::new(self.second[node].0), sum);
-            });
-            let sum = sum.to_array();
+        for lane in lanes_in(touched) {
             for axis in 0..D {
-                values[axis][lane] += sum[axis];
+                let mut sum = 0.0;
+                self.for_each_along(weights, lane, axis, |column, weight| {
+                    sum = weight.mul_add(self.second[column], sum);
+                });
+                values[axis][lane] += sum;
             }
         }
         *spread = values.map(Lanes::new);
     }
+}
+
+impl Visit {
+    /// Weight of the node for the box of a lane.
+    #[inline(always)]
+    fn weight<const D: usize>(self, weights: &Weights<D>, lane: usize) -> f64 {
+        weights.nodes[usize::from(self.node) % STENCIL.next_power_of_two()][lane]
+    }
+}
+
+/// The lanes of a set that has a bit for each.
+#[inline(always)]
+pub(super) fn lanes_in(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = set.trailing_zeros() as usize;
+        set &= set.wrapping_sub(1);
+        (lane < LANES).then_some(lane)
+    })
 }

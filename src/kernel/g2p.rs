@@ -26,7 +26,7 @@ pub fn gather<const D: usize>(
     frame: &Frame<D>,
     scheme: &Scheme,
     dt: f64,
-    fields: &Fields<D>,
+    fields: &Fields,
     leavers: &mut Leavers<D>,
     next: Place,
 ) -> f64 {
@@ -40,7 +40,7 @@ struct Gather<'a, const D: usize> {
     frame: &'a Frame<D>,
     scheme: &'a Scheme<'a>,
     dt: f64,
-    fields: &'a Fields<'a, D>,
+    fields: &'a Fields<'a>,
     leavers: &'a mut Leavers<D>,
     next: Place,
 }
@@ -85,7 +85,7 @@ pub fn gather_sub_boxes<const D: usize>(
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
-    fields: &Fields<D>,
+    fields: &Fields,
     gathered: &mut [Gathered<D>],
 ) {
     let (reals, stride) = chunk.reals();

@@ -1,29 +1,29 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
 use super::batch::Batch;
-use super::constrained::ConstrainedNodes;
+use super::constrained::{ConstrainedNodes, lanes_in};
 use super::simd::{F64x4, LANES};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Row};
 
 /// First moments of the constrained nodes of an arena.
 #[derive(Clone, Copy)]
-pub struct Moments<'a, const D: usize> {
-    /// The constrained nodes.
+pub struct Moments<'a> {
+    /// The columns of the constrained nodes.
     pub nodes: &'a ConstrainedNodes,
-    /// Per constrained node, row k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
-    pub first: &'a [[Row; D]],
+    /// By column; that of axis k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
+    pub first: &'a [Row],
 }
 
 /// What the nodes of an arena offer.
 #[derive(Clone, Copy)]
-pub struct Fields<'a, const D: usize> {
+pub struct Fields<'a> {
     /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.
     pub velocity: &'a [Row],
     /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`] the velocities that
     /// particles take on.
     pub increment: Option<&'a [Row]>,
     /// Moments, where the block touches constrained nodes.
-    pub moments: Option<Moments<'a, D>>,
+    pub moments: Option<Moments<'a>>,
 }
 
 /// Sums over the stencils of one particle. Additive: a box in parts is the sum of its parts.
@@ -101,7 +101,7 @@ impl<const D: usize> Sums<D> {
 
     /// The members of a batch, with all that the fields offer.
     #[inline(always)]
-    pub fn gather(&mut self, weights: &mut Weights<D>, batch: &Batch, fields: &Fields<D>) {
+    pub fn gather(&mut self, weights: &mut Weights<D>, batch: &Batch, fields: &Fields) {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = weights.first(lane);
@@ -112,24 +112,23 @@ impl<const D: usize> Sums<D> {
                 self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
             }
         }
-        if let Some(moments) = &fields.moments
-            && moments.nodes.prepare(weights, batch)
-        {
-            self.add_moments(weights, batch, moments);
+        if let Some(moments) = &fields.moments {
+            let touched = moments.nodes.prepare(weights, batch);
+            if touched != 0 {
+                self.add_moments(weights, touched, moments);
+            }
         }
     }
 
     #[inline(never)]
-    fn add_moments(&mut self, weights: &Weights<D>, batch: &Batch, moments: &Moments<D>) {
-        for lane in batch.members() {
-            let mut sum = [F64x4::splat(0.0); D];
-            moments.nodes.for_each(weights, lane, |node, weight| {
-                for k in 0..D {
-                    sum[k] = weight.mul_add(F64x4::new(moments.first[node][k].0), sum[k]);
-                }
-            });
+    fn add_moments(&mut self, weights: &Weights<D>, touched: u32, moments: &Moments) {
+        for lane in lanes_in(touched) {
             for k in 0..D {
-                self.affine[k][lane] = self.affine[k][lane] + sum[k];
+                let mut sum = F64x4::splat(0.0);
+                moments.nodes.for_each_along(weights, lane, k, |column, weight| {
+                    sum = F64x4::splat(weight).mul_add(F64x4::new(moments.first[column].0), sum);
+                });
+                self.affine[k][lane] = self.affine[k][lane] + sum;
             }
         }
     }

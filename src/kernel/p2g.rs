@@ -15,18 +15,18 @@
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
 use super::batch::{Batch, Batches};
-use super::constrained::ConstrainedNodes;
+use super::constrained::{ConstrainedNodes, lanes_in};
 use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// First moments `A = Σ w m C` of the constrained nodes of an arena.
-pub struct MomentSums<'a, const D: usize> {
-    /// The constrained nodes, with their second moments.
+pub struct MomentSums<'a> {
+    /// The columns of the constrained nodes, with their second moments.
     pub nodes: &'a ConstrainedNodes,
-    /// Per constrained node, row k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
-    pub sums: &'a mut [[Row; D]],
+    /// By column; that of axis k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
+    pub sums: &'a mut [Row],
 }
 
 /// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also first
@@ -42,7 +42,7 @@ pub fn scatter<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
-    moments: Option<MomentSums<D>>,
+    moments: Option<MomentSums>,
     next: Place,
 ) {
     widest(Scatter { chunk, select, frame, scheme, dt, arena, moments, next });
@@ -56,7 +56,7 @@ struct Scatter<'a, const D: usize> {
     scheme: &'a Scheme<'a>,
     dt: f64,
     arena: &'a mut [Row],
-    moments: Option<MomentSums<'a, D>>,
+    moments: Option<MomentSums<'a>>,
     next: Place,
 }
 
@@ -82,7 +82,7 @@ pub fn scatter_sub_boxes<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
-    mut moments: Option<MomentSums<D>>,
+    mut moments: Option<MomentSums>,
 ) {
     let (reals, stride) = chunk.reals();
     let mut prepared = Prepared::new();
@@ -93,9 +93,11 @@ pub fn scatter_sub_boxes<const D: usize>(
         let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]));
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
-        let touching =
-            moments.as_mut().filter(|moments| moments.nodes.prepare(&mut prepared.weights, &batch));
-        prepared.add(&batch, arena, touching);
+        prepared.add(&batch, arena);
+        if let Some(moments) = &mut moments {
+            let touched = moments.nodes.prepare(&mut prepared.weights, &batch);
+            prepared.add_moments(touched, moments);
+        }
     }
 }
 
@@ -107,7 +109,7 @@ fn scatter_all<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     arena: &mut [Row],
-    mut moments: Option<MomentSums<D>>,
+    mut moments: Option<MomentSums>,
     next: Place,
 ) {
     let (reals, stride) = chunk.reals();
@@ -119,13 +121,18 @@ fn scatter_all<const D: usize>(
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
-        let touching =
-            moments.as_mut().filter(|moments| moments.nodes.prepare(&mut prepared.weights, &batch));
-        if let Some(moments) = &touching {
-            moments.nodes.add_spread(&prepared.weights, &batch, &mut spread);
+        let mut touched = 0;
+        if let Some(moments) = &moments {
+            touched = moments.nodes.prepare(&mut prepared.weights, &batch);
+            if touched != 0 {
+                moments.nodes.add_spread(&prepared.weights, touched, &mut spread);
+            }
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
-        prepared.add(&batch, arena, touching);
+        prepared.add(&batch, arena);
+        if let Some(moments) = &mut moments {
+            prepared.add_moments(touched, moments);
+        }
     }
 }
 
@@ -208,16 +215,13 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
-    /// Adds the members of a batch in order; with `moments` where any of their stencils has constrained nodes.
+    /// Adds the members of a batch in order.
     #[inline(always)]
-    fn add(&self, batch: &Batch, arena: &mut [Row], moments: Option<&mut MomentSums<D>>) {
+    fn add(&self, batch: &Batch, arena: &mut [Row]) {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = self.weights.first(lane);
             self.add_one(lane, &mut arena[first..first + span]);
-        }
-        if let Some(moments) = moments {
-            batch.members().for_each(|lane| self.add_moments(lane, moments));
         }
     }
 
@@ -260,13 +264,15 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
+    /// Adds first moments of the lanes in `touched`.
     #[inline(always)]
-    fn add_moments(&self, lane: usize, moments: &mut MomentSums<D>) {
-        moments.nodes.for_each(&self.weights, lane, |node, weight| {
-            let sums = &mut moments.sums[node];
-            for k in 0..D {
-                sums[k].0 = weight.mul_add(self.affine[k][lane], F64x4::new(sums[k].0)).to_array();
-            }
-        });
+    fn add_moments(&self, touched: u32, moments: &mut MomentSums) {
+        for lane in lanes_in(touched) {
+            moments.nodes.for_each(&self.weights, lane, |column, axis, weight| {
+                let sum = &mut moments.sums[column].0;
+                let affine = self.affine[axis.min(D - 1)][lane];
+                *sum = F64x4::splat(weight).mul_add(affine, F64x4::new(*sum)).to_array();
+            });
+        }
     }
 }

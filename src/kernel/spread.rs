@@ -62,10 +62,9 @@ fn complete<const D: usize>(
     constraints: Option<&ConstrainedNodes>,
 ) -> [[f64; LANES]; D] {
     let mut spread = weights.spread;
-    if let Some(constraints) = constraints
-        && constraints.prepare(weights, batch)
-    {
-        constraints.add_spread(weights, batch, &mut spread);
+    if let Some(constraints) = constraints {
+        let touched = constraints.prepare(weights, batch);
+        constraints.add_spread(weights, touched, &mut spread);
     }
     spread.map(Lanes::to_array)
 }

@@ -24,8 +24,9 @@ pub(super) struct Weights<const D: usize> {
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
     pub spread: [Lanes; D],
-    /// Weights node by node, `a + 3 b (+ 9 c)`; only after [`Weights::fill_nodes`].
-    pub nodes: [[f64; LANES]; 27],
+    /// Weights node by node, `a + 3 b (+ 9 c)`; only after [`Weights::fill_nodes`]. Padded, so that no index is out of
+    /// bounds.
+    pub nodes: [[f64; LANES]; 32],
 }
 
 /// 2^52: integers added to it stand in the low bits.
@@ -40,7 +41,7 @@ impl<const D: usize> Weights<D> {
             axis: [Factors { weight: none, arm: none, slope: none }; D],
             product: [none; 3],
             spread: [Lanes::splat(0.0); D],
-            nodes: [[0.0; LANES]; 27],
+            nodes: [[0.0; LANES]; 32],
         }
     }
 

@@ -1,5 +1,5 @@
 //! Scatter and gather together, against a plain scalar definition.
-use super::constrained::ConstrainedNodes;
+use super::constrained::{Column, ConstrainedNodes};
 use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather_sub_boxes};
 use super::leavers::Leavers;
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
@@ -17,7 +17,7 @@ fn gather<const D: usize>(
     frame: &Frame<D>,
     scheme: &Scheme,
     dt: f64,
-    fields: &Fields<D>,
+    fields: &Fields,
     next: Place,
 ) -> f64 {
     g2p::gather(chunk, select, frame, scheme, dt, fields, &mut Leavers::default(), next)
