@@ -4,7 +4,7 @@
 //! the block of a particle call the same code and get the same bits.
 use super::batch::{Batch, Batches};
 use super::math::{exp, ln};
-use super::simd::{LANES, Lanes, Mask};
+use super::simd::{LANES, Lanes, Mask, prefetch};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
@@ -52,6 +52,16 @@ pub fn full_half_widths_of<const D: usize>(
     let batch = Batch::of_particles(particles);
     let position = batch.positions(reals, stride);
     of_batch(reals, stride, chunk.tags(), &batch, &position, cell, f64::INFINITY, extent, scheme)
+}
+
+/// Asks for what [`full_half_widths_of`] will read of the batch of particles from `first` on.
+pub fn read_ahead<const D: usize>(place: Place, first: usize) {
+    let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
+    let state = elastic.chain([Layout::<D>::HISTORY + 1]);
+    for column in (Layout::<D>::POSITION..Layout::<D>::POSITION + D).chain(state) {
+        prefetch(place.columns + column * place.stride + first * size_of::<f64>());
+    }
+    prefetch(place.tags + first * size_of::<u64>());
 }
 
 fn collect<const D: usize>(

@@ -32,6 +32,8 @@ pub trait BoxWidths<const D: usize>: Sync {
     fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D];
     /// Bounds on the half widths of `LANES` particles from `first` on, m; lanes behind the last particle are of no use.
     fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes;
+    /// Asks for what [`BoxWidths::of_batch`] will read of the `LANES` particles from `first` on.
+    fn read_ahead(&self, _chunk: &Chunk<D>, _first: usize) {}
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
     /// Whether the kernels find the same half widths from the particles' state. If not, every box is

@@ -53,13 +53,21 @@ impl Scratch {
     /// Puts all particles of a chunk into the leaf's own bin; `undecided` gives the lanes that may belong elsewhere, of the
     /// batch from some particle on.
     #[inline(always)]
-    fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, undecided: impl Fn(usize) -> u32) {
+    fn begin<const D: usize>(
+        &mut self,
+        chunk: &Chunk<D>,
+        widths: &impl BoxWidths<D>,
+        undecided: impl Fn(usize) -> u32,
+    ) {
         self.bins.clear();
         self.bins.resize(chunk.len(), 0);
         self.undecided.clear();
         for first in (0..chunk.len()).step_by(LANES) {
             let lanes = LANES.min(chunk.len() - first);
             let mut left = undecided(first) & ((1 << lanes) - 1);
+            if left != 0 {
+                widths.read_ahead(chunk, first);
+            }
             while left != 0 {
                 self.undecided.push(first as u32 + left.trailing_zeros());
                 left &= left - 1;
@@ -109,7 +117,7 @@ impl<const D: usize> LeafBins<D> {
         let sides = if given { None } else { self.sides.take() };
         // Of most boxes it is known without their half widths that they are whole and stay inside.
         let limit = Lanes::splat(narrow_limit(own_cell));
-        scratch.begin(chunk, |first| {
+        scratch.begin(chunk, widths, |first| {
             if given || !crowded {
                 return !0;
             }

@@ -106,6 +106,10 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
         }
     }
 
+    fn read_ahead(&self, chunk: &Chunk<D>, first: usize) {
+        domain::read_ahead::<D>(chunk.place(), first);
+    }
+
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
         width_bound(chunk, &self.scheme)
     }
