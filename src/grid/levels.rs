@@ -4,9 +4,9 @@ use rayon::prelude::*;
 use super::arena::Arenas;
 use super::columns::axes_in;
 use super::fields::NodeFields;
-use super::links::{Link, Links, weight_of};
-use super::mask::{block_nodes, offset};
-use super::plan::GridPlan;
+use super::links::{ParentNode, ParentTable, parity, weight_of};
+use super::mask::{bits, block_nodes, offset};
+use super::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
 use crate::kernel::simd::F64x4;
 
@@ -18,45 +18,54 @@ struct BlockMut<'a> {
 
 impl<const D: usize> NodeFields<D> {
     /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:
-    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`.
+    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent meets its children block by block along the curve.
     pub fn restrict(&mut self, plan: &GridPlan<D>) {
-        for level in (0..plan.levels().saturating_sub(1)).rev() {
-            let links = &plan.restriction[level];
-            for linked in &links.blocks {
-                if links.others(linked).iter().any(|&other| self.active[other as usize]) {
-                    self.active[linked.block as usize] = true;
-                    self.dirty[linked.block as usize] = true;
+        let table = ParentTable::of::<D>();
+        for level in (1..plan.levels()).rev() {
+            let links = &plan.links[level];
+            for coarse in &links.coarse {
+                if links.of(coarse).iter().any(|child| self.active[child.block as usize]) {
+                    self.active[coarse.block as usize] = true;
+                    self.dirty[coarse.block as usize] = true;
                 }
             }
-            let steps = Step::<D>::of_all(plan.cell(level as u8 + 1));
-            let (coarse, fine) =
-                split(&mut self.rows, &mut self.moments, plan, level + 1, self.first_column[level + 1]);
-            for_each_linked(coarse, plan, links, &self.active, |to, first, nodes| {
-                let columns = plan.blocks[first / block_nodes(D)].columns;
-                for i in nodes {
-                    let at = links.nodes[i] as usize - first;
-                    let links = links.of(i);
-                    let mut row = F64x4::new(to.rows[at].0);
-                    for link in links {
-                        let step = &steps[link.offset as usize];
-                        let mut sum = F64x4::new(fine.row(link.node).0);
-                        fine.each_column(link, |axis, moment| {
-                            sum = moment.mul_add(step.delta[axis], sum);
-                        });
-                        row = step.weight.mul_add(sum, row);
-                    }
-                    to.rows[at] = Row(row.to_array());
-                    // Real nodes have no moments.
-                    let axes = columns.axes_of(at as u32);
-                    if axes != 0 {
-                        let mut sums = columns.read(to.moments, at as u32).map(|row| F64x4::new(row.0));
-                        for link in links {
-                            let weight = steps[link.offset as usize].weight;
-                            fine.each_column(link, |axis, moment| {
-                                sums[axis] = weight.mul_add(moment, sums[axis]);
+            let steps = Step::<D>::of_all(plan.cell(level as u8));
+            let (active, first) = (&self.active, self.first_column[level]);
+            let (to, from) = split(&mut self.rows, &mut self.moments, plan, level, first);
+            let coarse = links.coarse.iter().filter(|coarse| active[coarse.block as usize]);
+            let coarse = coarse.map(|coarse| (coarse.block, coarse));
+            for_each_linked(to, plan, coarse, |to, coarse| {
+                let Block { sum, columns, .. } = &plan.blocks[coarse.block as usize];
+                for child in links.of(coarse).iter().filter(|child| active[child.block as usize]) {
+                    let block = &plan.blocks[child.block as usize];
+                    let parity = parity(block.coord);
+                    let (rows, moments) = from.of_block(plan, child.block);
+                    for bit in bits(block.sum & block.constrained & table.having(parity, child.corner)) {
+                        let row = F64x4::new(rows[bit as usize].0);
+                        let own = &moments[block.columns.first_of(bit)..];
+                        let own = || axes_in::<D>(block.columns.axes_of(bit)).zip(own);
+                        let parents = table.of_node::<D>(parity, bit).iter();
+                        let here = |parent: &&ParentNode| {
+                            parent.corner == child.corner && sum >> parent.bit & 1 == 1
+                        };
+                        for parent in parents.filter(here) {
+                            let step = &steps[usize::from(parent.offset)];
+                            let value = own().fold(row, |value, (axis, column)| {
+                                F64x4::new(column.0).mul_add(step.delta[axis], value)
                             });
+                            let total = &mut to.rows[usize::from(parent.bit)].0;
+                            *total = step.weight.mul_add(value, F64x4::new(*total)).to_array();
+                            // Real nodes have no moments.
+                            if columns.nodes() >> parent.bit & 1 == 1 {
+                                let mut sums = columns.read(to.moments, parent.bit.into());
+                                for (axis, column) in own() {
+                                    let total = F64x4::new(sums[axis].0);
+                                    sums[axis] =
+                                        Row(step.weight.mul_add(F64x4::new(column.0), total).to_array());
+                                }
+                                columns.write(to.moments, parent.bit.into(), &sums);
+                            }
                         }
-                        columns.write(to.moments, at as u32, &sums.map(|sum| Row(sum.to_array())));
                     }
                 }
             });
@@ -67,36 +76,50 @@ impl<const D: usize> NodeFields<D> {
     /// level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real nodes.
     pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         self.mark_needed(plan, arenas);
+        let table = ParentTable::of::<D>();
         for level in 1..plan.levels() {
-            let links = &plan.prolongation[level];
+            let links = &plan.links[level];
             let steps = Step::<D>::of_all(plan.cell(level as u8));
-            let (coarse, fine) =
-                split(&mut self.rows, &mut self.moments, plan, level, self.first_column[level]);
-            for_each_linked(fine, plan, links, &self.needed, |to, first, nodes| {
-                let columns = plan.blocks[first / block_nodes(D)].columns;
-                for i in nodes {
-                    let at = links.nodes[i] as usize - first;
-                    let axes = columns.axes_of(at as u32);
+            let (needed, first) = (&self.needed, self.first_column[level]);
+            let (from, to) = split(&mut self.rows, &mut self.moments, plan, level, first);
+            let fine = links.fine.iter().filter(|fine| needed[fine.block as usize]);
+            for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |to, fine| {
+                let block = &plan.blocks[fine.block as usize];
+                let parity = parity(block.coord);
+                let parents = fine.parents.map(|parent| {
+                    (parent != NO_BLOCK).then(|| {
+                        let (rows, moments) = from.of_block(plan, parent);
+                        (rows, moments, &plan.blocks[parent as usize].columns)
+                    })
+                });
+                for bit in bits(block.value & block.constrained) {
+                    let axes = block.columns.axes_of(bit);
                     let mut row = F64x4::splat(0.0);
                     let mut sums = [row; D];
-                    for link in links.of(i) {
-                        let step = &steps[link.offset as usize];
-                        let [x, y, z, _] = coarse.row(link.node).0;
+                    for parent in table.of_node::<D>(parity, bit) {
+                        let Some((rows, moments, columns)) = parents[usize::from(parent.corner) % 8] else {
+                            continue;
+                        };
+                        let step = &steps[usize::from(parent.offset)];
+                        let [x, y, z, _] = rows[usize::from(parent.bit)].0;
                         let value = F64x4::new([x, y, z, 0.0]);
                         row = step.weight.mul_add(value, row);
                         for axis in axes_in::<D>(axes) {
                             sums[axis] = step.weighted_delta[axis].mul_add(value, sums[axis]);
                         }
-                        coarse.each_column(link, |axis, moment| {
-                            sums[axis] = step.weight.mul_add(moment, sums[axis]);
-                        });
+                        if columns.nodes() >> parent.bit & 1 == 1 {
+                            let of_parent = columns.read(moments, parent.bit.into());
+                            for axis in axes_in::<D>(axes) {
+                                sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
+                            }
+                        }
                     }
-                    to.rows[at] = Row(row.to_array());
-                    columns.write(to.moments, at as u32, &sums.map(|sum| Row(sum.to_array())));
+                    to.rows[bit as usize] = Row(row.to_array());
+                    block.columns.write(to.moments, bit, &sums.map(|sum| Row(sum.to_array())));
                 }
             });
-            for linked in &links.blocks {
-                self.dirty[linked.block as usize] |= self.needed[linked.block as usize];
+            for fine in &links.fine {
+                self.dirty[fine.block as usize] |= self.needed[fine.block as usize];
             }
         }
     }
@@ -105,11 +128,10 @@ impl<const D: usize> NodeFields<D> {
     fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         let needed = self.needed.par_iter_mut().enumerate().with_min_len(1024);
         needed.for_each(|(block, needed)| *needed = arenas.reach(block));
-        for links in plan.prolongation.iter().rev() {
-            for linked in &links.blocks {
-                if self.needed[linked.block as usize] {
-                    links.others(linked).iter().for_each(|&other| self.needed[other as usize] = true);
-                }
+        for fine in plan.links.iter().rev().flat_map(|links| &links.fine) {
+            if self.needed[fine.block as usize] {
+                let parents = fine.parents.iter().filter(|parent| **parent != NO_BLOCK);
+                parents.for_each(|&parent| self.needed[parent as usize] = true);
             }
         }
     }
@@ -142,19 +164,12 @@ struct Half<'a, const D: usize> {
 }
 
 impl<const D: usize> Half<'_, D> {
-    /// Row of a node.
+    /// Rows and first moments of a block.
     #[inline(always)]
-    fn row(&self, node: u32) -> &Row {
-        &self.rows[node as usize - self.first_block * block_nodes(D)]
-    }
-
-    /// Calls `f` with axis and value of each column of first moments that the node of a link has.
-    #[inline(always)]
-    fn each_column(&self, link: &Link, mut f: impl FnMut(usize, F64x4)) {
-        if link.axes != 0 {
-            let columns = &self.moments[link.moments as usize - self.first_column..];
-            axes_in::<D>(link.axes).zip(columns).for_each(|(axis, column)| f(axis, F64x4::new(column.0)));
-        }
+    fn of_block(&self, plan: &GridPlan<D>, block: u32) -> (&[Row], &[Row]) {
+        let (nodes, columns) = (block_nodes(D), plan.moments_of(block as usize));
+        let rows = &self.rows[(block as usize - self.first_block) * nodes..][..nodes];
+        (rows, &self.moments[columns.start - self.first_column..columns.end - self.first_column])
     }
 }
 
@@ -185,21 +200,19 @@ impl<const D: usize> Step<D> {
     }
 }
 
-/// Calls `work` in parallel for every linked block of `half` whose flag is set, with the block, its first node
-/// and the numbers of its linked nodes.
-fn for_each_linked<const D: usize>(
+/// Calls `work` in parallel with each of some blocks of `half`, which ascend, and what comes with it.
+fn for_each_linked<'a, const D: usize, T: Sync + 'a>(
     half: Half<'_, D>,
     plan: &GridPlan<D>,
-    links: &Links,
-    flags: &[bool],
-    work: impl Fn(BlockMut<'_>, usize, std::ops::Range<usize>) + Sync,
+    blocks: impl Iterator<Item = (u32, &'a T)>,
+    work: impl Fn(BlockMut<'_>, &T) + Sync,
 ) {
     let nodes = block_nodes(D);
     let Half { mut rows, mut moments, first_block, first_column } = half;
     let (mut next_block, mut next_column) = (first_block, first_column);
     let mut tasks = Vec::new();
-    for linked in links.blocks.iter().filter(|linked| flags[linked.block as usize]) {
-        let block = linked.block as usize;
+    for (block, with) in blocks {
+        let block = block as usize;
         let (_, rest) = std::mem::take(&mut rows).split_at_mut((block - next_block) * nodes);
         let (own, rest) = rest.split_at_mut(nodes);
         (rows, next_block) = (rest, block + 1);
@@ -207,9 +220,7 @@ fn for_each_linked<const D: usize>(
         let (_, rest) = std::mem::take(&mut moments).split_at_mut(columns.start - next_column);
         let (own_moments, rest) = rest.split_at_mut(columns.len());
         (moments, next_column) = (rest, columns.end);
-        tasks.push((linked, BlockMut { rows: own, moments: own_moments }));
+        tasks.push((with, BlockMut { rows: own, moments: own_moments }));
     }
-    tasks.into_par_iter().with_min_len(4).for_each(|(linked, block)| {
-        work(block, linked.block as usize * nodes, linked.nodes.start as usize..linked.nodes.end as usize);
-    });
+    tasks.into_par_iter().with_min_len(4).for_each(|(with, block)| work(block, with));
 }

@@ -1,36 +1,84 @@
-//! Links between constrained nodes and their parents, over which sums are restricted and values prolonged.
+//! Which blocks hold the parents of constrained nodes: over these sums are restricted and values prolonged.
+//!
+//! Where the parents of a node lie follows from its place in its block and the parity of the block's coordinates. A table has
+//! this for all blocks; a plan lists pairs of blocks only.
+use std::sync::LazyLock;
 
 use rustc_hash::FxHashMap;
 
 use super::columns::{Columns, axes_in};
 use super::constraint::{block_and_bit, node_coord, parents_of};
-use super::mask::{bits, block_nodes, offset, offset_index, opposite};
-use super::plan::{Block, GridPlan};
+use super::mask::{bits, block_nodes, node_of_bit, offset, offset_index};
+use super::plan::{Block, GridPlan, NO_BLOCK};
 
-/// A link between a constrained node and one of its parents.
-#[derive(Clone, Copy, Debug)]
-pub struct Link {
-    /// Node at the other end (block number × nodes per block + bit).
-    pub node: u32,
-    /// Place of that node's first column of first moments, if it has any.
-    pub moments: u32,
-    /// Axes of these columns, a bit each.
-    pub axes: u8,
-    /// Offset number of parent minus constrained node, in cells of the finer level. The weight follows from it, see
-    /// [`weight_of`].
+/// A parent of a node of a fine block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParentNode {
+    /// The parent's block: bit `k` tells whether it is the upper one along axis `k` of those that hold parents.
+    pub corner: u8,
+    /// The parent in its block.
+    pub bit: u8,
+    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see [`weight_of`].
     pub offset: u8,
 }
 
-impl Link {
-    /// To a node of a block, which has a number.
-    fn to<const D: usize>(block: &Block<D>, number: u32, bit: u32, offset: u8) -> Self {
-        Self {
-            node: number * block_nodes(D) as u32 + bit,
-            moments: block.moments + block.columns.first_of(bit) as u32,
-            axes: block.columns.axes_of(bit),
-            offset,
-        }
+/// Parents of the nodes of fine blocks, by parity of the blocks' coordinates.
+pub struct ParentTable {
+    parents: Vec<ParentNode>,
+    /// First parent of each node, by parity.
+    start: Vec<u16>,
+    /// Nodes that have a parent in the block at each corner, by parity.
+    having: Vec<[u64; 8]>,
+}
+
+static TWO: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<2>);
+static THREE: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<3>);
+
+impl ParentTable {
+    /// The table for `D` dimensions.
+    pub fn of<const D: usize>() -> &'static Self {
+        if D == 2 { &TWO } else { &THREE }
     }
+
+    fn new<const D: usize>() -> Self {
+        let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
+        for parity in 0..1u32 << D {
+            let mut corners = [0; 8];
+            // Any block of this parity that is not at the lower faces shows the pattern.
+            let block = std::array::from_fn(|axis| 2 + (parity >> axis & 1));
+            for bit in 0..block_nodes(D) as u32 {
+                start.push(parents.len() as u16);
+                for parent in parents_of::<D>(node_coord(block, bit)) {
+                    let (coarse, place) = block_and_bit(parent.node);
+                    let corner = (0..D).fold(0, |corner, axis| corner | (coarse[axis] - 1) << axis);
+                    corners[corner as usize] |= 1 << bit;
+                    let offset = offset_index(parent.offset) as u8;
+                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
+                    parents.push(ParentNode { corner: corner as u8, bit: place as u8, offset });
+                }
+            }
+            having.push(corners);
+        }
+        start.push(parents.len() as u16);
+        Self { parents, start, having }
+    }
+
+    /// Parents of node `bit` of a block of some parity, in lexicographic order.
+    #[inline(always)]
+    pub fn of_node<const D: usize>(&self, parity: usize, bit: u32) -> &[ParentNode] {
+        let node = parity * block_nodes(D) + bit as usize;
+        &self.parents[usize::from(self.start[node])..usize::from(self.start[node + 1])]
+    }
+
+    /// Nodes of blocks of some parity that have a parent in the block at a corner.
+    pub fn having(&self, parity: usize, corner: u8) -> u64 {
+        self.having[parity][usize::from(corner)]
+    }
+}
+
+/// Parity of coordinates, a bit for each axis.
+pub fn parity<const D: usize>(coord: [u32; D]) -> usize {
+    (0..D).fold(0, |parity, axis| parity | (coord[axis] as usize & 1) << axis)
 }
 
 /// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
@@ -38,186 +86,184 @@ pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
     offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
 }
 
-/// The nodes of one block that gather over links.
-#[derive(Clone, Debug)]
-pub struct LinkedBlock {
-    /// The block.
+/// A block with constrained nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct FineBlock {
+    /// Its number.
     pub block: u32,
-    /// Its nodes, as numbers of [`Links::nodes`].
-    pub nodes: std::ops::Range<u32>,
-    /// The blocks at the other ends, as numbers of [`Links::others`].
-    pub others: std::ops::Range<u32>,
+    /// Blocks that hold parents, by corner; [`NO_BLOCK`] where none are needed.
+    pub parents: [u32; 8],
 }
 
-/// Links of a list of nodes: `links[start[i]..start[i + 1]]` belong to `nodes[i]`. Nodes ascend.
+/// A block whose nodes are parents of nodes that are summed.
+#[derive(Clone, Debug)]
+pub struct CoarseBlock {
+    /// Its number.
+    pub block: u32,
+    /// The blocks of the children, as numbers of [`Links::children`].
+    pub children: std::ops::Range<u32>,
+}
+
+/// A block that holds children of a coarser one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Child {
+    /// Its number.
+    pub block: u32,
+    /// The corner at which it has the coarser block.
+    pub corner: u8,
+}
+
+/// Pairs of blocks of one level and the level one coarser.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
-    /// The nodes by block.
-    pub blocks: Vec<LinkedBlock>,
-    /// Blocks at the other ends of the links, block by block.
-    pub others: Vec<u32>,
-    /// The nodes that gather.
-    pub nodes: Vec<u32>,
-    /// Start of each node's links.
-    pub start: Vec<u32>,
-    /// The links.
-    pub links: Vec<Link>,
+    /// Blocks of the finer level.
+    pub fine: Vec<FineBlock>,
+    /// Blocks of the coarser level.
+    pub coarse: Vec<CoarseBlock>,
+    /// Children of the coarser blocks: of one block in the order of their numbers, that is along the curve.
+    pub children: Vec<Child>,
 }
 
 impl Links {
-    /// Groups `(node, order, link)` by node; `order` fixes the order of a node's links.
-    pub(super) fn group(mut entries: Vec<(u32, u32, Link)>, block_nodes: u32) -> Self {
-        entries.sort_unstable_by_key(|&(node, order, _)| (node, order));
-        let mut grouped = Self::default();
-        for of_block in entries.chunk_by(|a, b| a.0 / block_nodes == b.0 / block_nodes) {
-            let (first, first_other) = (grouped.nodes.len() as u32, grouped.others.len() as u32);
-            let mut others: Vec<u32> = of_block.iter().map(|entry| entry.2.node / block_nodes).collect();
-            others.sort_unstable();
-            others.dedup();
-            grouped.others.extend(others);
-            grouped.add(of_block);
-            grouped.blocks.push(LinkedBlock {
-                block: of_block[0].0 / block_nodes,
-                nodes: first..grouped.nodes.len() as u32,
-                others: first_other..grouped.others.len() as u32,
-            });
-        }
-        grouped.start.push(grouped.links.len() as u32);
-        grouped
+    /// Blocks that hold children of a coarser one.
+    pub fn of(&self, coarse: &CoarseBlock) -> &[Child] {
+        &self.children[coarse.children.start as usize..coarse.children.end as usize]
     }
 
-    fn add(&mut self, entries: &[(u32, u32, Link)]) {
-        for &(node, _, link) in entries {
-            if self.nodes.last() != Some(&node) {
-                self.nodes.push(node);
-                self.start.push(self.links.len() as u32);
-            }
-            self.links.push(link);
+    /// Groups pairs of coarser block and child.
+    fn group(&mut self, mut pairs: Vec<(u32, Child)>) {
+        pairs.sort_unstable();
+        for children in pairs.chunk_by(|a, b| a.0 == b.0) {
+            let first = self.children.len() as u32;
+            self.children.extend(children.iter().map(|(_, child)| *child));
+            self.coarse
+                .push(CoarseBlock { block: children[0].0, children: first..self.children.len() as u32 });
         }
     }
-
-    /// Blocks at the other ends of a block's links.
-    pub fn others(&self, linked: &LinkedBlock) -> &[u32] {
-        &self.others[linked.others.start as usize..linked.others.end as usize]
-    }
-
-    /// Links of the `i`-th node.
-    pub fn of(&self, i: usize) -> &[Link] {
-        &self.links[self.start[i] as usize..self.start[i + 1] as usize]
-    }
-}
-
-/// A parent that a rank has of a constrained node.
-struct Found {
-    /// The constrained node in its block.
-    bit: u32,
-    /// Number among the node's parents.
-    order: u32,
-    /// The parent's block and its place there.
-    block: u32,
-    parent: u32,
-    /// Offset number of parent minus constrained node.
-    offset: u8,
 }
 
 impl<const D: usize> GridPlan<D> {
     /// Lists the links of all levels and finds which first moments nodes have; `number` numbers the blocks.
     pub(super) fn link_levels(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>) {
-        let nodes = block_nodes(D) as u32;
-        let levels = self.levels();
-        let mut restriction: Vec<Vec<(u32, u32, Link)>> = vec![Vec::new(); levels];
-        let mut prolongation = restriction.clone();
-        let mut parents = Vec::new();
+        let table = ParentTable::of::<D>();
+        self.links = vec![Links::default(); self.levels()];
+        let mut pairs: Vec<Vec<(u32, Child)>> = vec![Vec::new(); self.levels()];
         for index in 0..self.blocks.len() {
-            self.find_columns(index, number, &mut parents);
             let block = &self.blocks[index];
-            let level = block.level as usize;
-            for &Found { bit, order, block: coarse_block, parent, offset } in &parents {
-                let coarse = &self.blocks[coarse_block as usize];
-                if block.sum >> bit & 1 == 1 && coarse.sum >> parent & 1 == 1 {
-                    // A parent meets its children in lexicographic order of their position.
-                    let order = u32::from(opposite(D, offset as usize) as u8);
-                    let link = Link::to(block, index as u32, bit, offset);
-                    restriction[level - 1].push((coarse_block * nodes + parent, order, link));
-                }
-                if block.value >> bit & 1 == 1 {
-                    let link = Link::to(coarse, coarse_block, parent, offset);
-                    prolongation[level].push((index as u32 * nodes + bit, order, link));
+            let (level, parity) = (block.level, parity(block.coord));
+            let (summed, needed) =
+                (block.sum & block.constrained, (block.sum | block.value) & block.constrained);
+            let mut fine = FineBlock { block: index as u32, parents: [NO_BLOCK; 8] };
+            for corner in (0..1u8 << D).filter(|&corner| table.having(parity, corner) & needed != 0) {
+                let coord = std::array::from_fn(|axis| block.coord[axis] / 2 + u32::from(corner >> axis & 1));
+                let Some(&coarse) = number.get(&(level - 1, coord)) else { continue };
+                fine.parents[usize::from(corner)] = coarse;
+                if table.having(parity, corner) & summed != 0 && self.blocks[coarse as usize].sum != 0 {
+                    pairs[usize::from(level)].push((coarse, Child { block: index as u32, corner }));
                 }
             }
+            // Coarser blocks come before finer ones.
+            let columns = self.columns_of(&fine, needed);
+            let block = &mut self.blocks[index];
+            (block.columns, block.moments) = (columns, self.columns as u32);
+            self.columns += columns.len();
+            if needed != 0 {
+                self.links[usize::from(level)].fine.push(fine);
+            }
         }
-        self.restriction = restriction.into_iter().map(|entries| Links::group(entries, nodes)).collect();
-        self.prolongation = prolongation.into_iter().map(|entries| Links::group(entries, nodes)).collect();
+        self.links.iter_mut().zip(pairs).for_each(|(links, pairs)| links.group(pairs));
     }
 
-    /// Finds the parents of the constrained nodes of a block, and of these nodes the columns of first moments: those along
-    /// which a parent lies beside the node, and those of its parents. Coarser blocks come before finer ones.
-    fn find_columns(
-        &mut self,
-        index: usize,
-        number: &FxHashMap<(u8, [u32; D]), u32>,
-        parents: &mut Vec<Found>,
-    ) {
-        parents.clear();
-        let mut columns = Columns::NONE;
-        let block = &self.blocks[index];
-        for bit in bits((block.sum | block.value) & block.constrained) {
-            for (order, parent) in parents_of::<D>(node_coord(block.coord, bit)).enumerate() {
-                let offset = offset_index(parent.offset);
-                debug_assert_eq!(parent.weight, weight_of(parent.offset));
-                columns.insert(bit, beside(parent.offset));
-                let (coord, bit_of_parent) = block_and_bit(parent.node);
-                let Some(&coarse) = number.get(&(block.level - 1, coord)) else { continue };
-                columns.insert(bit, self.blocks[coarse as usize].columns.axes_of(bit_of_parent));
-                parents.push(Found {
-                    bit,
-                    order: order as u32,
-                    block: coarse,
-                    parent: bit_of_parent,
-                    offset: offset as u8,
-                });
+    /// The columns of first moments that the constrained nodes `needed` of a block have: those along which a parent lies
+    /// beside the node, and those of its parents.
+    fn columns_of(&self, fine: &FineBlock, needed: u64) -> Columns<D> {
+        let mut columns = Columns::new(odd_nodes::<D>()).within(needed);
+        let of_parents = fine
+            .parents
+            .map(|block| self.blocks.get(block as usize).map_or(Columns::NONE, |block| block.columns));
+        if of_parents.iter().any(|columns| !columns.is_empty()) {
+            let parity = parity(self.blocks[fine.block as usize].coord);
+            for bit in bits(needed) {
+                for parent in ParentTable::of::<D>().of_node::<D>(parity, bit) {
+                    let axes = of_parents[usize::from(parent.corner)].axes_of(parent.bit.into());
+                    columns.insert(bit, axes);
+                }
             }
         }
-        let moments = self.columns as u32;
-        self.columns += columns.len();
-        let block = &mut self.blocks[index];
-        (block.columns, block.moments) = (columns, moments);
+        columns
     }
 
     /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along the axis of each
     /// column of first moments; along others they are zero.
     pub(super) fn constraint_spread(&self) -> Vec<f64> {
-        let nodes = block_nodes(D);
+        let table = ParentTable::of::<D>();
         let mut spread = vec![0.0; self.columns];
-        for level in 1..self.levels() {
+        for (level, links) in self.links.iter().enumerate() {
             let cell_squared = self.cell(level as u8).powi(2);
-            let links = &self.prolongation[level];
-            for (i, &node) in links.nodes.iter().enumerate() {
-                let block = &self.blocks[node as usize / nodes];
-                let bit = node % nodes as u32;
-                let mut sum = [0.0; D];
-                for link in links.of(i) {
-                    let delta = offset::<D>(link.offset as usize);
-                    let weight = weight_of(delta);
-                    let mut place = link.moments as usize;
-                    for axis in 0..D {
-                        sum[axis] += weight * f64::from(delta[axis] * delta[axis]) * cell_squared;
-                        if link.axes >> axis & 1 == 1 {
-                            sum[axis] += weight * spread[place];
-                            place += 1;
+            for fine in &links.fine {
+                let block = &self.blocks[fine.block as usize];
+                for bit in bits(block.columns.nodes()) {
+                    let mut sum = [0.0; D];
+                    for parent in table.of_node::<D>(parity(block.coord), bit) {
+                        let delta = offset::<D>(parent.offset.into());
+                        let weight = weight_of(delta);
+                        for axis in 0..D {
+                            sum[axis] += weight * f64::from(delta[axis] * delta[axis]) * cell_squared;
                         }
+                        let coarse = fine.parents[usize::from(parent.corner)];
+                        let Some(coarse) = self.blocks.get(coarse as usize) else { continue };
+                        let (first, axes) = place_of(coarse, parent.bit.into());
+                        axes_in::<D>(axes)
+                            .zip(first..)
+                            .for_each(|(axis, at)| sum[axis] += weight * spread[at]);
                     }
+                    let (first, axes) = place_of(block, bit);
+                    axes_in::<D>(axes).zip(first..).for_each(|(axis, at)| spread[at] = sum[axis]);
                 }
-                let first = block.moments as usize + block.columns.first_of(bit);
-                let axes = axes_in::<D>(block.columns.axes_of(bit));
-                axes.zip(first..).for_each(|(axis, place)| spread[place] = sum[axis]);
             }
         }
         spread
     }
 }
 
-/// Axes along which an offset leads elsewhere, a bit each.
-fn beside<const D: usize>(offset: [i32; D]) -> u8 {
-    (0..D).fold(0, |axes, axis| axes | u8::from(offset[axis] != 0) << axis)
+/// Nodes of a block whose coordinate is odd, by axis.
+fn odd_nodes<const D: usize>() -> [u64; D] {
+    std::array::from_fn(|axis| {
+        let is_odd = |bit: &u32| node_of_bit::<D>(*bit)[axis] % 2 == 1;
+        (0..block_nodes(D) as u32).filter(is_odd).fold(0, |nodes, bit| nodes | 1 << bit)
+    })
+}
+
+/// Number of the first column of a node, and the axes of its columns.
+fn place_of<const D: usize>(block: &Block<D>, bit: u32) -> (usize, u8) {
+    (block.moments as usize + block.columns.first_of(bit), block.columns.axes_of(bit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_the_parents_of_every_node() {
+        let table = ParentTable::of::<3>();
+        for coord in [[2, 4, 6], [3, 4, 6], [3, 5, 7], [8, 9, 1]] {
+            for bit in 0..64 {
+                let found: Vec<_> = table
+                    .of_node::<3>(parity(coord), bit)
+                    .iter()
+                    .map(|parent| {
+                        let block =
+                            [0, 1, 2].map(|axis| coord[axis] / 2 + u32::from(parent.corner >> axis & 1));
+                        assert_eq!(table.having(parity(coord), parent.corner) >> bit & 1, 1);
+                        (node_coord(block, parent.bit.into()), offset::<3>(parent.offset.into()))
+                    })
+                    .collect();
+                let expected: Vec<_> =
+                    parents_of(node_coord(coord, bit)).map(|parent| (parent.node, parent.offset)).collect();
+                assert_eq!(found, expected);
+            }
+        }
+        // Blocks with even coordinates have all parents in one block.
+        assert_eq!((1..8).map(|corner| table.having(0, corner)).max(), Some(0));
+    }
 }

@@ -79,10 +79,8 @@ pub struct GridPlan<const D: usize> {
     pub pieces: Vec<Piece<D>>,
     pub(super) parts: Vec<Part>,
     pub(super) part_start: Vec<u32>,
-    /// Per level, restriction into its nodes from constrained nodes one level finer.
-    pub restriction: Vec<Links>,
-    /// Per level, prolongation into its constrained nodes from one level coarser.
-    pub prolongation: Vec<Links>,
+    /// Per level, links to the parents of its constrained nodes.
+    pub links: Vec<Links>,
     /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of columns of first moments.
@@ -117,8 +115,7 @@ impl<const D: usize> GridPlan<D> {
             pieces: Vec::new(),
             parts: Vec::new(),
             part_start: Vec::new(),
-            restriction: Vec::new(),
-            prolongation: Vec::new(),
+            links: Vec::new(),
             face_nodes: Vec::new(),
             columns: 0,
             constraints: Arc::default(),
