@@ -14,6 +14,8 @@ pub struct ArenaConstraints<const D: usize> {
     pub nodes: ConstrainedNodes,
     /// Per offset number of a block, its columns in the arena and the number of the first.
     parts: Vec<(Columns<D>, u16)>,
+    /// By number, the place of the column among those of its block.
+    places: Vec<u8>,
 }
 
 /// The columns that the blocks around a bin share with its arena, by offset number.
@@ -44,22 +46,22 @@ impl<const D: usize> Tables<D> {
     /// Number of the table for the columns around a bin; `second` holds the second moments of all columns.
     pub fn number(&mut self, blocks: &[Block<D>], around: &[u32; 27], second: &[f64]) -> u32 {
         let mut parts = vec![(Columns::NONE, 0); offset_count(D)];
-        let mut all: Vec<Column> = Vec::new();
+        let (mut all, mut places): (Vec<Column>, Vec<u8>) = Default::default();
         for (index, block, columns) in shared(blocks, around) {
             parts[index] = (columns, all.len() as u16);
             let block = &blocks[block as usize];
-            let mut taken = (u32::MAX, 0);
-            all.extend(columns.iter().map(|(bit, axis)| {
-                // A node is in the arena with all its columns.
-                taken = if taken.0 == bit { (bit, taken.1 + 1) } else { (bit, block.columns.first_of(bit)) };
-                let second = second[block.moments as usize + taken.1];
-                Column { node: arena_index::<D>(index, bit), axis, second }
-            }));
+            let of_block = block.columns.iter().enumerate();
+            for (place, (bit, axis)) in of_block.filter(|(_, (bit, _))| columns.nodes() >> bit & 1 == 1) {
+                let second = second[block.moments as usize + place];
+                all.push(Column { node: arena_index::<D>(index, bit), axis, second });
+                places.push(place as u8);
+            }
         }
         let sets = parts.iter().flat_map(|(columns, _)| columns.along());
-        let content: Vec<u64> = sets.chain(all.iter().map(|column| column.second.to_bits())).collect();
+        let seconds = all.iter().map(|column| column.second.to_bits());
+        let content: Vec<u64> = sets.chain(seconds).chain(places.iter().map(|&place| place.into())).collect();
         *self.numbers.entry(content).or_insert_with(|| {
-            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts });
+            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts, places });
             self.tables.len() as u32 - 1
         })
     }
@@ -78,9 +80,19 @@ impl<const D: usize> ArenaConstraints<D> {
         (columns, usize::from(first))
     }
 
+    /// Copies the columns in the arena of the block at offset number `index` from all moments of that block.
+    #[inline(always)]
+    pub fn copy_block(&self, index: usize, from: &[Row], arena: &mut [Row]) {
+        let (columns, first) = self.of_block(index);
+        let here = first..first + columns.len();
+        let to = arena[here.clone()].iter_mut().zip(&self.places[here]);
+        to.for_each(|(to, &place)| *to = from[usize::from(place)]);
+    }
+
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.nodes.heap_bytes() + self.parts.capacity() * size_of::<(Columns<D>, u16)>()
+        let parts = self.parts.capacity() * size_of::<(Columns<D>, u16)>();
+        self.nodes.heap_bytes() + parts + self.places.capacity()
     }
 }
 

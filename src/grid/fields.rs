@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::arena::Arenas;
-use super::columns::{Columns, axes_in};
+use super::columns::axes_in;
 use super::exchange::ReceivedSums;
 use super::mask::{bits, block_nodes, offset_count};
 use super::mixed::Mixed;
@@ -216,10 +216,7 @@ impl<const D: usize> NodeFields<D> {
             let Some(shared) = window.shared(index) else { continue };
             copy_rows(shared, rows, &mut arena.rows);
             if let Some(constraints) = constraints {
-                let (here, first) = constraints.of_block(index);
-                let (all, moments) =
-                    (plan.blocks[block as usize].columns, self.moments_of(plan, block as usize));
-                copy_columns(&here, &all, moments, &mut arena.moments[first..]);
+                constraints.copy_block(index, self.moments_of(plan, block as usize), &mut arena.moments);
             }
         }
     }
@@ -240,16 +237,6 @@ pub fn load_rows<const D: usize>(
         if let Some(shared) = window.shared(index) {
             copy_rows(shared, &rows[block as usize * nodes..][..nodes], arena);
         }
-    }
-}
-
-/// Copies the columns `here` from the moments of a block, which has the columns `all`.
-#[inline(always)]
-fn copy_columns<const D: usize>(here: &Columns<D>, all: &Columns<D>, moments: &[Row], to: &mut [Row]) {
-    let mut to = to[..here.len()].iter_mut();
-    for bit in bits(here.nodes()) {
-        let own = &moments[all.first_of(bit)..][..here.axes_of(bit).count_ones() as usize];
-        own.iter().zip(&mut to).for_each(|(from, to)| *to = *from);
     }
 }
 
