@@ -106,7 +106,7 @@ impl Batch {
         }
     }
 
-    /// The first particles of a list, and their number. Where at least half of the next [`LANES`] particles of the chunk
+    /// The first particles of a list, and their number. Where at least a quarter of the next [`LANES`] particles of the chunk
     /// are on the list, as is usual beside level jumps, these are read as they stand; elsewhere they are picked.
     #[inline(always)]
     fn of_list(list: &[u32], stride: usize) -> (Self, usize) {
@@ -135,7 +135,7 @@ impl Batch {
             count += 1;
             least = p + 1;
         }
-        if (count >= LANES / 2 || count == list.len()) && end as usize <= stride {
+        if (count >= LANES / 4 || count == list.len()) && end as usize <= stride {
             return (Self { index, lanes, contiguous: true, ahead: Place::default() }, count);
         }
         (Self::from_indices(list, |&p| p), list.len().min(LANES))
