@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::arena::Arenas;
 use super::columns::axes_in;
 use super::fields::NodeFields;
-use super::links::{ParentNode, ParentTable, parity, weight_of};
+use super::links::{Child, FineBlock, ParentNode, ParentTable, parity, weight_of};
 use super::mask::{bits, block_nodes, offset};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
@@ -20,7 +20,6 @@ impl<const D: usize> NodeFields<D> {
     /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:
     /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent meets its children block by block along the curve.
     pub fn restrict(&mut self, plan: &GridPlan<D>) {
-        let table = ParentTable::of::<D>();
         for level in (1..plan.levels()).rev() {
             let links = &plan.links[level];
             for coarse in &links.coarse {
@@ -34,39 +33,9 @@ impl<const D: usize> NodeFields<D> {
             let (to, from) = split(&mut self.rows, &mut self.moments, plan, level, first);
             let coarse = links.coarse.iter().filter(|coarse| active[coarse.block as usize]);
             let coarse = coarse.map(|coarse| (coarse.block, coarse));
-            for_each_linked(to, plan, coarse, |to, coarse| {
-                let Block { sum, columns, .. } = &plan.blocks[coarse.block as usize];
+            for_each_linked(to, plan, coarse, |mut to, coarse| {
                 for child in links.of(coarse).iter().filter(|child| active[child.block as usize]) {
-                    let block = &plan.blocks[child.block as usize];
-                    let parity = parity(block.coord);
-                    let (rows, moments) = from.of_block(plan, child.block);
-                    for bit in bits(block.sum & block.constrained & table.having(parity, child.corner)) {
-                        let row = F64x4::new(rows[bit as usize].0);
-                        let own = &moments[block.columns.first_of(bit)..];
-                        let own = || axes_in::<D>(block.columns.axes_of(bit)).zip(own);
-                        let parents = table.of_node::<D>(parity, bit).iter();
-                        let here = |parent: &&ParentNode| {
-                            parent.corner == child.corner && sum >> parent.bit & 1 == 1
-                        };
-                        for parent in parents.filter(here) {
-                            let step = &steps[usize::from(parent.offset)];
-                            let value = own().fold(row, |value, (axis, column)| {
-                                F64x4::new(column.0).mul_add(step.delta[axis], value)
-                            });
-                            let total = &mut to.rows[usize::from(parent.bit)].0;
-                            *total = step.weight.mul_add(value, F64x4::new(*total)).to_array();
-                            // Real nodes have no moments.
-                            if columns.nodes() >> parent.bit & 1 == 1 {
-                                let mut sums = columns.read(to.moments, parent.bit.into());
-                                for (axis, column) in own() {
-                                    let total = F64x4::new(sums[axis].0);
-                                    sums[axis] =
-                                        Row(step.weight.mul_add(F64x4::new(column.0), total).to_array());
-                                }
-                                columns.write(to.moments, parent.bit.into(), &sums);
-                            }
-                        }
-                    }
+                    hand_up(plan, &steps, &from, *child, coarse.block, &mut to);
                 }
             });
         }
@@ -76,47 +45,14 @@ impl<const D: usize> NodeFields<D> {
     /// level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real nodes.
     pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         self.mark_needed(plan, arenas);
-        let table = ParentTable::of::<D>();
         for level in 1..plan.levels() {
             let links = &plan.links[level];
             let steps = Step::<D>::of_all(plan.cell(level as u8));
             let (needed, first) = (&self.needed, self.first_column[level]);
             let (from, to) = split(&mut self.rows, &mut self.moments, plan, level, first);
             let fine = links.fine.iter().filter(|fine| needed[fine.block as usize]);
-            for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |to, fine| {
-                let block = &plan.blocks[fine.block as usize];
-                let parity = parity(block.coord);
-                let parents = fine.parents.map(|parent| {
-                    (parent != NO_BLOCK).then(|| {
-                        let (rows, moments) = from.of_block(plan, parent);
-                        (rows, moments, &plan.blocks[parent as usize].columns)
-                    })
-                });
-                for bit in bits(block.value & block.constrained) {
-                    let axes = block.columns.axes_of(bit);
-                    let mut row = F64x4::splat(0.0);
-                    let mut sums = [row; D];
-                    for parent in table.of_node::<D>(parity, bit) {
-                        let Some((rows, moments, columns)) = parents[usize::from(parent.corner) % 8] else {
-                            continue;
-                        };
-                        let step = &steps[usize::from(parent.offset)];
-                        let [x, y, z, _] = rows[usize::from(parent.bit)].0;
-                        let value = F64x4::new([x, y, z, 0.0]);
-                        row = step.weight.mul_add(value, row);
-                        for axis in axes_in::<D>(axes) {
-                            sums[axis] = step.weighted_delta[axis].mul_add(value, sums[axis]);
-                        }
-                        if columns.nodes() >> parent.bit & 1 == 1 {
-                            let of_parent = columns.read(moments, parent.bit.into());
-                            for axis in axes_in::<D>(axes) {
-                                sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
-                            }
-                        }
-                    }
-                    to.rows[bit as usize] = Row(row.to_array());
-                    block.columns.write(to.moments, bit, &sums.map(|sum| Row(sum.to_array())));
-                }
+            for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |mut to, fine| {
+                interpolate(plan, &steps, &from, fine, &mut to);
             });
             for fine in &links.fine {
                 self.dirty[fine.block as usize] |= self.needed[fine.block as usize];
@@ -134,6 +70,79 @@ impl<const D: usize> NodeFields<D> {
                 parents.for_each(|&parent| self.needed[parent as usize] = true);
             }
         }
+    }
+}
+
+/// Adds the sums of the constrained nodes of one block to their parents in the block `coarse`.
+#[inline(always)]
+fn hand_up<const D: usize>(
+    plan: &GridPlan<D>,
+    steps: &[Step<D>; 27],
+    from: &Half<'_, D>,
+    child: Child,
+    coarse: u32,
+    to: &mut BlockMut<'_>,
+) {
+    let table = ParentTable::of::<D>();
+    let (fine, Block { sum, columns, .. }) =
+        (&plan.blocks[child.block as usize], &plan.blocks[coarse as usize]);
+    let (parity, (rows, moments)) = (parity(fine.coord), from.of_block(plan, child.block));
+    let is_here = |parent: &&ParentNode| parent.corner == child.corner && sum >> parent.bit & 1 == 1;
+    for bit in bits(fine.sum & fine.constrained & table.having(parity, child.corner)) {
+        let row = F64x4::new(rows[bit as usize].0);
+        let own = &moments[fine.columns.first_of(bit)..];
+        let own = || axes_in::<D>(fine.columns.axes_of(bit)).zip(own);
+        for parent in table.of_node::<D>(parity, bit).iter().filter(is_here) {
+            let step = &steps[usize::from(parent.offset)];
+            let value = own()
+                .fold(row, |value, (axis, column)| F64x4::new(column.0).mul_add(step.delta[axis], value));
+            step.add(value, &mut to.rows[usize::from(parent.bit)]);
+            // Real nodes have no moments.
+            if columns.nodes() >> parent.bit & 1 == 1 {
+                let mut sums = columns.read(to.moments, parent.bit.into());
+                own().for_each(|(axis, column)| step.add(F64x4::new(column.0), &mut sums[axis]));
+                columns.write(to.moments, parent.bit.into(), &sums);
+            }
+        }
+    }
+}
+
+/// Gives the constrained nodes of a block the values and moments of their parents.
+#[inline(always)]
+fn interpolate<const D: usize>(
+    plan: &GridPlan<D>,
+    steps: &[Step<D>; 27],
+    from: &Half<'_, D>,
+    fine: &FineBlock,
+    to: &mut BlockMut<'_>,
+) {
+    let block = &plan.blocks[fine.block as usize];
+    let (table, parity) = (ParentTable::of::<D>(), parity(block.coord));
+    let parents = fine.parents.map(|parent| {
+        (parent != NO_BLOCK).then(|| (from.of_block(plan, parent), &plan.blocks[parent as usize].columns))
+    });
+    for bit in bits(block.value & block.constrained) {
+        let axes = block.columns.axes_of(bit);
+        let mut row = F64x4::splat(0.0);
+        let mut sums = [row; D];
+        for parent in table.of_node::<D>(parity, bit) {
+            let Some(((rows, moments), columns)) = parents[usize::from(parent.corner) % 8] else { continue };
+            let step = &steps[usize::from(parent.offset)];
+            let [x, y, z, _] = rows[usize::from(parent.bit)].0;
+            let value = F64x4::new([x, y, z, 0.0]);
+            row = step.weight.mul_add(value, row);
+            for axis in axes_in::<D>(axes) {
+                sums[axis] = step.weighted_delta[axis].mul_add(value, sums[axis]);
+            }
+            if columns.nodes() >> parent.bit & 1 == 1 {
+                let of_parent = columns.read(moments, parent.bit.into());
+                for axis in axes_in::<D>(axes) {
+                    sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
+                }
+            }
+        }
+        to.rows[bit as usize] = Row(row.to_array());
+        block.columns.write(to.moments, bit, &sums.map(|sum| Row(sum.to_array())));
     }
 }
 
@@ -197,6 +206,12 @@ impl<const D: usize> Step<D> {
             }
         };
         std::array::from_fn(step)
+    }
+
+    /// `to += weight value`.
+    #[inline(always)]
+    fn add(&self, value: F64x4, to: &mut Row) {
+        *to = Row(self.weight.mul_add(value, F64x4::new(to.0)).to_array());
     }
 }
 
