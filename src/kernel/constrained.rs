@@ -43,34 +43,20 @@ pub struct ConstrainedNodes {
 }
 
 impl ConstrainedNodes {
-    /// The given columns, none twice. They are numbered in the order given.
+    /// The given columns, none twice. They are numbered in the order given, in which stencils visit them.
     pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>) -> Self {
-        let mut second = Vec::new();
-        let mut found: Vec<(u16, Visit)> = Vec::new();
-        for Column { node, axis, second: moment } in columns {
-            let column = second.len() as u16;
-            second.push(moment);
-            for visit in 0..3usize.pow(D as u32) {
-                // The stencil has the node at `visit` if its base is a valid one.
-                let base = (0..D).try_fold(0, |base, k| {
-                    let at = node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE;
-                    let first = at.checked_sub(visit / 3usize.pow(k as u32) % 3)?;
-                    (first < stencil_bases(1)).then(|| base + first * stencil_bases(k))
-                });
-                if let Some(base) = base {
-                    found.push((
-                        (D * base + axis) as u16,
-                        Visit { node: visit as u8, axis: axis as u8, column },
-                    ));
-                }
-            }
-        }
-        found.sort_unstable_by_key(|&(list, visit)| (list, visit.node));
-        let lists = (D * stencil_bases(D)) as u16;
-        let start = (0..=lists).map(|list| found.partition_point(|&(at, _)| at < list) as u16).collect();
-        // Not in the place of what it is made from, which is several times as large.
-        let visits = found.iter().map(|&(_, visit)| visit).collect();
-        Self { visits, start, second }
+        let columns: Vec<Column> = columns.into_iter().collect();
+        let lists = D * stencil_bases(D);
+        let mut start = vec![0; lists + 1];
+        each_visit::<D>(&columns, |list, _| start[list + 1] += 1);
+        (0..lists).for_each(|list| start[list + 1] += start[list]);
+        let mut visits = vec![Visit::default(); usize::from(start[lists])];
+        let mut next = start.clone();
+        each_visit::<D>(&columns, |list, visit| {
+            visits[usize::from(next[list])] = visit;
+            next[list] += 1;
+        });
+        Self { visits, start, second: columns.iter().map(|column| column.second).collect() }
     }
 
     /// Number of columns.
@@ -163,6 +149,23 @@ impl ConstrainedNodes {
             }
         }
         *spread = values.map(Lanes::new);
+    }
+}
+
+/// Calls `f` with the list and the visit of each column in each stencil.
+fn each_visit<const D: usize>(columns: &[Column], mut f: impl FnMut(usize, Visit)) {
+    for (column, &Column { node, axis, .. }) in (0..).zip(columns) {
+        let at: [usize; D] = std::array::from_fn(|k| node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE);
+        for visit in 0..3usize.pow(D as u32) {
+            // The stencil has the node at `visit` if its base is a valid one.
+            let base = (0..D).try_fold(0, |base, k| {
+                let first = at[k].checked_sub(visit / 3usize.pow(k as u32) % 3)?;
+                (first < stencil_bases(1)).then(|| base + first * stencil_bases(k))
+            });
+            if let Some(base) = base {
+                f(D * base + axis, Visit { node: visit as u8, axis: axis as u8, column });
+            }
+        }
     }
 }
 
