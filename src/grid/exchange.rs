@@ -8,7 +8,7 @@ use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use super::arena::Arenas;
-use super::columns::{Columns, Moments};
+use super::columns::{Columns, Moments, axes_in};
 use super::feeders::NO_BIN;
 use super::fields::NodeFields;
 use super::mask::{bits, block_nodes};
@@ -273,12 +273,10 @@ fn append<const D: usize>(
             values.extend_from_slice(&[x, y, mass]);
         }
     }
-    let mut node = (u32::MAX, [ZERO; D]);
-    for (bit, axis) in piece.columns.within(nodes).iter() {
-        if node.0 != bit {
-            node = (bit, columns.read(moments, bit));
-        }
-        values.extend_from_slice(&node.1[axis].0[..D]);
+    let wanted = piece.columns.within(nodes);
+    for bit in bits(wanted.nodes()) {
+        let moments = columns.read(moments, bit);
+        axes_in::<D>(wanted.axes_of(bit)).for_each(|axis| values.extend_from_slice(&moments[axis].0[..D]));
     }
     if is_all { Extent::All } else { Extent::Some }
 }

@@ -32,8 +32,6 @@ pub struct NodeFields<const D: usize> {
     pub(super) needed: Vec<bool>,
     /// Per block, whether its rows may differ from zero.
     pub(super) dirty: Vec<bool>,
-    /// First column of first moments of each level.
-    pub(super) first_column: Vec<usize>,
 }
 
 /// Blocks that one task adds up.
@@ -80,7 +78,6 @@ impl<const D: usize> NodeFields<D> {
             touched: vec![0; plan.blocks.len()],
             needed: vec![false; plan.blocks.len()],
             dirty: vec![false; plan.blocks.len()],
-            first_column: plan.first_columns(),
         }
     }
 

@@ -29,8 +29,8 @@ impl<const D: usize> NodeFields<D> {
                 }
             }
             let steps = Step::<D>::of_all(plan.cell(level as u8));
-            let (active, first) = (&self.active, self.first_column[level]);
-            let (to, from) = split(&mut self.rows, &mut self.moments, plan, level, first);
+            let active = &self.active;
+            let (to, from) = split(&mut self.rows, &mut self.moments, plan, level);
             let coarse = links.coarse.iter().filter(|coarse| active[coarse.block as usize]);
             let coarse = coarse.map(|coarse| (coarse.block, coarse));
             for_each_linked(to, plan, coarse, |mut to, coarse| {
@@ -48,8 +48,8 @@ impl<const D: usize> NodeFields<D> {
         for level in 1..plan.levels() {
             let links = &plan.links[level];
             let steps = Step::<D>::of_all(plan.cell(level as u8));
-            let (needed, first) = (&self.needed, self.first_column[level]);
-            let (from, to) = split(&mut self.rows, &mut self.moments, plan, level, first);
+            let needed = &self.needed;
+            let (from, to) = split(&mut self.rows, &mut self.moments, plan, level);
             let fine = links.fine.iter().filter(|fine| needed[fine.block as usize]);
             for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |mut to, fine| {
                 interpolate(plan, &steps, &from, fine, &mut to);
@@ -146,16 +146,14 @@ fn interpolate<const D: usize>(
     }
 }
 
-/// The fields of the levels below `level`, whose first column of first moments is number `column`, and those of `level` and
-/// deeper.
+/// The fields of the levels below `level`, and those of `level` and deeper.
 fn split<'a, const D: usize>(
     rows: &'a mut [Row],
     moments: &'a mut [Row],
     plan: &GridPlan<D>,
     level: usize,
-    column: usize,
 ) -> (Half<'a, D>, Half<'a, D>) {
-    let (nodes, block) = (block_nodes(D), plan.level_start[level]);
+    let (nodes, block, column) = (block_nodes(D), plan.level_start[level], plan.first_column(level));
     let (coarse_rows, fine_rows) = rows.split_at_mut(block * nodes);
     let (coarse_moments, fine_moments) = moments.split_at_mut(column);
     (

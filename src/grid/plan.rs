@@ -282,11 +282,9 @@ impl<const D: usize> GridPlan<D> {
         *moments as usize..*moments as usize + columns.len()
     }
 
-    /// Number of the first column of first moments of each level, and of all at the end.
-    pub(super) fn first_columns(&self) -> Vec<usize> {
-        let first =
-            |&start: &usize| self.blocks.get(start).map_or(self.columns, |block| block.moments as usize);
-        self.level_start.iter().map(first).collect()
+    /// Number of the first column of first moments of a level.
+    pub(super) fn first_column(&self, level: usize) -> usize {
+        self.blocks.get(self.level_start[level]).map_or(self.columns, |block| block.moments as usize)
     }
 }
 

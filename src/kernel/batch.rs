@@ -1,6 +1,5 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
-use super::constrained::lanes_in;
 use super::simd::{LANES, Lanes, Mask, prefetch};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
@@ -244,4 +243,14 @@ impl Batch {
         // The material is the low half word of a packed tag.
         std::array::from_fn(|lane| tags[self.particle(lane)] as u16)
     }
+}
+
+/// The lanes of a set that has a bit for each.
+#[inline(always)]
+pub(super) fn lanes_in(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = set.trailing_zeros() as usize;
+        set &= set.wrapping_sub(1);
+        (lane < LANES).then_some(lane)
+    })
 }

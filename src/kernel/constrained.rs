@@ -2,7 +2,7 @@
 //!
 //! In most arenas beside a level jump a few layers of nodes are constrained, and of their moments most columns are zero
 //! (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its own nodes.
-use super::batch::Batch;
+use super::batch::{Batch, lanes_in};
 use super::simd::{LANES, Lanes};
 use super::weights::Weights;
 use super::{ARENA_EDGE, stencil_bases};
@@ -175,14 +175,4 @@ impl Visit {
     fn weight<const D: usize>(self, weights: &Weights<D>, lane: usize) -> f64 {
         weights.nodes[usize::from(self.node) % STENCIL.next_power_of_two()][lane]
     }
-}
-
-/// The lanes of a set that has a bit for each.
-#[inline(always)]
-pub(super) fn lanes_in(mut set: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = set.trailing_zeros() as usize;
-        set &= set.wrapping_sub(1);
-        (lane < LANES).then_some(lane)
-    })
 }

@@ -1,6 +1,6 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
-use super::batch::Batch;
-use super::constrained::{ConstrainedNodes, lanes_in};
+use super::batch::{Batch, lanes_in};
+use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, LANES};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Row};

@@ -14,8 +14,8 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
-use super::batch::{Batch, Batches};
-use super::constrained::{ConstrainedNodes, lanes_in};
+use super::batch::{Batch, Batches, lanes_in};
+use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
 use super::weights::Weights;
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
