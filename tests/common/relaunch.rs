@@ -5,11 +5,15 @@ use std::sync::Mutex;
 
 use partition::comm::{Comm, World};
 
+/// What a process prints that has found the test it was started for.
+const STARTED: &str = "this process runs the test";
+
 /// Runs `body` on one thread if this process is one of those that [`relaunch`] started; says whether it is.
 pub fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
     if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_none() {
         return false;
     }
+    println!("{STARTED}");
     let world = World::init().expect("MPI starts");
     // One thread that works is enough, as ranks share the cores.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
@@ -30,10 +34,11 @@ pub fn relaunch(test: &str, ranks: usize, seconds: u32) -> String {
         .env("MPIEXEC_TIMEOUT", seconds.to_string())
         .args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()])
         .arg(std::env::current_exe().expect("own path"))
-        .args(["--exact", test, "--nocapture", "--test-threads=1"])
+        .args(["--exact", test, "--include-ignored", "--nocapture", "--test-threads=1"])
         .output()
         .expect("mpirun starts");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{test} on {ranks} ranks:\n{text}");
+    assert!(text.contains(STARTED), "no test is called {test}:\n{text}");
     text.into_owned()
 }
