@@ -98,7 +98,7 @@ impl Batch {
     #[inline(always)]
     pub fn of_particles(list: &[u32]) -> Self {
         match list.first_chunk() {
-            Some(next) if next[LANES - 1] == next[0] + LANES as u32 - 1 => {
+            Some(next) if is_run(next) => {
                 Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() }
             }
             _ => Self::from_indices(list, |&p| p),
@@ -109,9 +109,8 @@ impl Batch {
     /// are on the list, as is usual beside level jumps, these are read as they stand; elsewhere they are picked.
     #[inline(always)]
     fn of_list(list: &[u32], stride: usize) -> (Self, usize) {
-        let first = list[0];
         if let Some(next) = list.first_chunk::<LANES>()
-            && next[LANES - 1] == first + LANES as u32 - 1
+            && is_run(next)
         {
             let batch = Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() };
             return (batch, LANES);
@@ -243,6 +242,12 @@ impl Batch {
         // The material is the low half word of a packed tag.
         std::array::from_fn(|lane| tags[self.particle(lane)] as u16)
     }
+}
+
+/// Whether particles follow each other in the chunk. All are looked at: members of a family come in any order.
+#[inline(always)]
+fn is_run(list: &[u32; LANES]) -> bool {
+    (0..LANES).fold(true, |is_run, lane| is_run & (list[lane] == list[0].wrapping_add(lane as u32)))
 }
 
 /// The lanes of a set that has a bit for each.

@@ -78,7 +78,7 @@ pub struct Frame<const D: usize> {
 pub enum Select<'a> {
     /// All, in the order of the chunk.
     All,
-    /// These; ascending, no index twice.
+    /// These, in any order; none twice where a kernel writes.
     List(&'a [u32]),
 }
 

@@ -107,9 +107,8 @@ fn over_a_ball() {
     on_ranks("sweeps::over_a_ball", &[1], |comm| sweeps::<3>(comm, &body, 40, 250, 1e-2));
 }
 
-/// As [`over_a_ball`]; takes minutes. The ball is slower, so that it does not reach a wall.
+/// As [`over_a_ball`], but slower, so that the ball does not reach a wall.
 #[test]
-#[ignore = "the long form of over_a_ball"]
 fn over_a_ball_a_thousand_times() {
     let body = ball([0.2, 0.1, -0.15]);
     on_ranks("sweeps::over_a_ball_a_thousand_times", &[1], |comm| sweeps::<3>(comm, &body, 170, 1000, 5e-2));

@@ -172,6 +172,19 @@ fn moments_are_scattered_and_gathered() {
     moments_follow::<3>();
 }
 
+/// First and last of this list are as far apart as those of a run of particles.
+#[test]
+fn lists_come_in_any_order() {
+    let materials = materials();
+    let (chunk, frame, scheme) = (particles::<3>(40, 6, 3), frame::<3>(), scheme(&materials, Transfer::Apic));
+    let (mut all, mut listed) = (Vec::new(), Vec::new());
+    domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut all);
+    for list in [[0, 10, 11, 12, 13, 6, 3, 7], [8, 9, 11, 10, 12, 13, 14, 15], [3, 3, 4, 5, 6, 7, 8, 10]] {
+        domain::half_widths(&chunk, Select::List(&list), CELL, &frame.extent, &scheme, &mut listed);
+        assert_eq!(listed, list.map(|p| all[p as usize]), "{list:?}");
+    }
+}
+
 #[test]
 fn boxes_stay_in_the_domain_and_follow_the_policy() {
     let materials = materials();
