@@ -48,6 +48,8 @@ pub(super) fn mixtures<const D: usize>(
     level: u8,
     refused: &mut Vec<u64>,
 ) -> Mixtures<D> {
+    // What takes least time to find comes first.
+    keep(&mut groups, chunk, refused, |_, group| is_alike(chunk, group, limits));
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
     let mut out = chunk.gathered(&groups.iter().map(|group| group.members[0]).collect::<Vec<u32>>());
@@ -58,24 +60,12 @@ pub(super) fn mixtures<const D: usize>(
         start = range.end;
         motions.push(mix_motion(&mut out, number, chunk, setting, group, &half[range]));
     }
-    // What a member differs from the others in most often takes least time to find.
-    let is_close = |number: usize| {
-        let group = &groups[number];
+    let close = keep(&mut groups, chunk, refused, |number, group| {
         let material = usize::from(Tag::unpack(chunk.tags()[group.members[0] as usize]).material);
-        let speed = limits.velocity * setting.scheme.materials[material].wave_speed();
-        motions[number].difference <= speed && is_alike(chunk, group, limits)
-    };
-    let close: Vec<u32> = (0..groups.len() as u32).filter(|&number| is_close(number as usize)).collect();
+        motions[number].difference <= limits.velocity * setting.scheme.materials[material].wave_speed()
+    });
     let mut out = out.gathered(&close);
     let motions: Vec<&Motion<D>> = close.iter().map(|&number| &motions[number as usize]).collect();
-    let mut number = 0..;
-    groups.retain(|group| {
-        let stays = number.next().is_some_and(|number| close.binary_search(&number).is_ok());
-        if !stays {
-            refused.extend(group.members.iter().map(|&p| chunk.ids()[p as usize]));
-        }
-        stays
-    });
 
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let strain = hencky(chunk, &members);
@@ -116,15 +106,59 @@ pub(super) fn mixtures<const D: usize>(
     Mixtures { groups, chunk: out, energy }
 }
 
-/// Whether the history of each member is about that of the first, so that it may be about the mean.
+/// Leaves the groups that pass and returns their numbers; identifiers of all others are appended to `refused`.
+fn keep<const D: usize>(
+    groups: &mut Vec<Group>,
+    chunk: &Chunk<D>,
+    refused: &mut Vec<u64>,
+    passes: impl Fn(usize, &Group) -> bool,
+) -> Vec<u32> {
+    let mut kept = Vec::with_capacity(groups.len());
+    let mut number = 0;
+    groups.retain(|group| {
+        let stays = passes(number, group);
+        if stays {
+            kept.push(number as u32);
+        } else {
+            refused.extend(group.members.iter().map(|&p| chunk.ids()[p as usize]));
+        }
+        number += 1;
+        stays
+    });
+    kept
+}
+
+/// Whether no member differs from the first by so much that one of them must be too far from the mean: either may be as far
+/// from it on its own side. Strains are not known yet; as `|a - b| <= λ |ln a - ln b|` for the greatest eigenvalue λ of
+/// two positive definite tensors, which is below the greater trace, those of b give a bound.
 fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) -> bool {
+    let first = group.members[0] as usize;
     let within = |column: usize, limit: f64| {
         let values = chunk.column(column);
-        let first = values[group.members[0] as usize];
-        group.members.iter().all(|&p| (values[p as usize] - first).abs() <= 2.0 * limit)
+        group.members.iter().all(|&p| (values[p as usize] - values[first]).abs() <= 2.0 * limit)
     };
-    // Either may be as far from the mean on its own side.
-    within(Layout::<D>::HISTORY, limits.history) && within(Layout::<D>::HISTORY + 1, limits.volume)
+    let strains_may_be = || {
+        let tensor = |p: usize| symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+        let trace = |b: &[f64; 6]| b[0] + b[1] + b[2];
+        let own = tensor(first);
+        group.members[1..].iter().all(|&p| {
+            let other = tensor(p as usize);
+            let difference: [f64; 6] = std::array::from_fn(|c| other[c] - own[c]);
+            // Hencky strains are halves of logarithms.
+            let bound = 4.0 * limits.strain * trace(&own).max(trace(&other));
+            square(&difference).sqrt() <= bound * (1.0 + 1e-9) + 1e-12
+        })
+    };
+    within(Layout::<D>::HISTORY, limits.history)
+        && within(Layout::<D>::HISTORY + 1, limits.volume)
+        && strains_may_be()
+}
+
+/// Squared Frobenius norm of a symmetric tensor.
+fn square(tensor: &[f64; 6]) -> f64 {
+    (0..6).fold(0.0, |square, c| {
+        f64::mul_add(if c < 3 { tensor[c] } else { 2.0 * tensor[c] }, tensor[c], square)
+    })
 }
 
 /// Sum of the first `2^k` and the others, so that `2^k` equal numbers have an exact sum.
@@ -288,12 +322,9 @@ fn mix_matter<const D: usize>(
     let mut strain = mean(&shares, |i| strains[i]);
     let mut difference = Difference { strain: 0.0, volume: 0.0, history: 0.0 };
     for (i, own) in strains.iter().enumerate() {
-        let square = (0..6).fold(0.0, |square, c| {
-            let rest = own[c] - strain[c];
-            f64::mul_add(if c < 3 { rest } else { 2.0 * rest }, rest, square)
-        });
+        let rest: [f64; 6] = std::array::from_fn(|c| own[c] - strain[c]);
         let gain = (history(i)[1] - mean_history[1]).abs();
-        difference.strain = difference.strain.max(square.sqrt());
+        difference.strain = difference.strain.max(square(&rest).sqrt());
         difference.volume = difference.volume.max(gain);
         difference.history = difference.history.max((history(i)[0] - mean_history[0]).abs());
     }
