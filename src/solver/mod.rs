@@ -25,6 +25,7 @@ pub mod time_step;
 pub mod totals;
 pub mod transfer;
 pub mod update;
+mod widths;
 
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 use super::bins::{BinLists, BinMissing, BoxWidths};
 use super::contact::SUMS;
 use super::grid::Grid;
-use super::leaf_bins::values;
 use super::migrate::Departed;
 use super::phases::{Phase, Phases};
 use super::resample::Resampling;
 use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
+use super::widths::Widths;
 use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
@@ -21,12 +21,10 @@ use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::simd::{Lanes, prefetch};
-use crate::kernel::{
-    BoxPolicy, Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, domain, g2p, p2g, spread,
-};
+use crate::kernel::simd::prefetch;
+use crate::kernel::{Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, g2p, p2g, spread};
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Place, Tag};
+use crate::particle::chunk::{Layout, Place};
 
 /// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
 const READ_AHEAD: usize = 25;
@@ -81,50 +79,6 @@ pub(super) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
 fn frame<const D: usize>(plan: &GridPlan<D>, bin: &Bin<D>) -> Frame<D> {
     let cell = plan.cell(bin.block.level);
     Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: extent(plan) }
-}
-
-/// Half widths as the kernels compute them.
-struct Widths<'a, const D: usize> {
-    scheme: Scheme<'a>,
-    extent: [f64; D],
-}
-
-impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
-    fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D] {
-        domain::full_half_widths_of(chunk, particles, cell, &self.extent, &self.scheme)
-    }
-
-    fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes {
-        let half = || values(chunk, Layout::<D>::HALF, first);
-        match self.scheme.boxes {
-            BoxPolicy::Fixed => half(),
-            BoxPolicy::Volume { max_stretch, .. } => half() * max_stretch,
-            BoxPolicy::Cell => Lanes::new(std::array::from_fn(|lane| {
-                let level = chunk.tags().get(first + lane).map_or(0, |&tag| Tag::unpack(tag).level);
-                0.5 * self.scheme.root_cell / f64::from(1u32 << level)
-            })),
-        }
-    }
-
-    fn read_ahead(&self, chunk: &Chunk<D>, first: usize) {
-        domain::read_ahead::<D>(chunk.place(), first);
-    }
-
-    fn bound(&self, chunk: &Chunk<D>) -> f64 {
-        width_bound(chunk, &self.scheme)
-    }
-}
-
-/// A bound on the half widths of all boxes that the particles of a chunk can have, m.
-pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>) -> f64 {
-    match scheme.boxes {
-        BoxPolicy::Fixed => chunk.greatest_half(),
-        BoxPolicy::Volume { max_stretch, .. } => max_stretch * chunk.greatest_half(),
-        BoxPolicy::Cell => {
-            let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
-            coarsest.map_or(0.0, |level| 0.5 * scheme.root_cell / f64::from(1u32 << level))
-        }
-    }
 }
 
 /// Constrained nodes in the arena of a bin, if there are any.
