@@ -74,7 +74,7 @@ pub fn constrained_nodes<const D: usize>(tree: &KnownTree<D>, level: u8, coord: 
 struct Builder<'a, const D: usize> {
     tree: &'a KnownTree<D>,
     overlaps: Vec<u64>,
-    kinship: Kinship,
+    kinship: &'static Kinship,
     containers: FxHashMap<(u8, [u32; D]), bool>,
     levels: Vec<FxHashMap<[u32; D], NodeSets>>,
     received: FxHashMap<(u8, [u32; D]), u64>,
@@ -87,7 +87,7 @@ impl<const D: usize> Closure<D> {
         let mut builder = Builder {
             tree,
             overlaps: (0..offset_count(D)).map(|index| arena_overlap::<D>(offset(index))).collect(),
-            kinship: Kinship::new::<D>(),
+            kinship: Kinship::of::<D>(),
             containers: FxHashMap::default(),
             levels: vec![FxHashMap::default(); deepest as usize + 1],
             received: FxHashMap::default(),

@@ -4,6 +4,8 @@
 //! (Gao et al. 2017, section 4.2): along an axis where its coordinate is even it coincides with the parent
 //! `x/2`; where it is odd the parents `(x ± 1)/2` take part with one half each. Restriction is the
 //! transpose. Parents may be constrained themselves; chains over several levels follow by recursion.
+use std::sync::LazyLock;
+
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 
 /// One parent of a constrained node.
@@ -53,9 +55,16 @@ pub struct Kinship {
     parents: Vec<[u64; 64]>,
 }
 
+static TWO: LazyLock<Kinship> = LazyLock::new(Kinship::new::<2>);
+static THREE: LazyLock<Kinship> = LazyLock::new(Kinship::new::<3>);
+
 impl Kinship {
-    /// The table in `D` dimensions.
-    pub fn new<const D: usize>() -> Self {
+    /// The table for `D` dimensions.
+    pub fn of<const D: usize>() -> &'static Self {
+        if D == 2 { &TWO } else { &THREE }
+    }
+
+    fn new<const D: usize>() -> Self {
         let mut kinship =
             Self { children: vec![[0; 64]; offset_count(D)], parents: vec![[0; 64]; offset_count(D)] };
         // Any block that is not at the lower faces shows the pattern.
@@ -113,7 +122,7 @@ mod tests {
 
     #[test]
     fn children_are_the_nodes_that_name_the_block_as_parent() {
-        let kinship = Kinship::new::<2>();
+        let kinship = Kinship::of::<2>();
         let number = |offset: [i32; 2]| offset_index(offset);
         assert_eq!(kinship.children(number([0, 0]), 1), 0b0000_0000_0011_0011);
         assert_eq!(kinship.children(number([-1, -1]), 1), 1 << 15);

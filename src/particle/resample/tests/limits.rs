@@ -46,6 +46,29 @@ fn limits_are_respected() {
     );
 }
 
+/// What is found from elastic tensors, before there are strains, must not keep anyone apart whom the limit does not.
+#[test]
+fn strains_count_whatever_the_stretch() {
+    let materials = materials();
+    let scheme = scheme(&materials, Transfer::Apic);
+    let mut family = particles::<2>(4, 1, 1, Some(0)).gathered(&[0]);
+    set_matter(&mut family, 0, [2.0, 0.6, 1.1, 0.0, 0.0, 0.0], [0.0; 2]);
+    split_all(&mut family, &setting(&scheme, 2));
+    for strain in [1e-6, 0.01, 0.2, 0.7] {
+        for (child, sign) in [(0, 1.0), (0, -1.0), (3, 1.0), (3, -1.0)] {
+            // A quarter of what one of four differs by is in the mean.
+            let merges = |difference: f64| {
+                let mut chunk = family.clone();
+                let xx = &mut chunk.column_mut(Layout::<2>::LEFT_CAUCHY_GREEN)[child];
+                *xx *= f64::exp(2.0 * sign * difference / 0.75);
+                let limits = Limits { strain, ..OPEN };
+                merge_all(&mut chunk, &setting(&scheme, 1), &limits).0.families == 1
+            };
+            assert!(merges(0.99 * strain) && !merges(1.01 * strain), "{strain} {child} {sign}");
+        }
+    }
+}
+
 #[test]
 fn others_do_not_matter() {
     let materials = materials();
