@@ -13,11 +13,12 @@ use std::collections::BTreeMap;
 use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::constraint::{self, Kinship, parents_of};
+use super::constraint::{self, parents_of};
 use super::known::{Cover, KnownTree};
 use super::mask::{
     arena_overlap, bits, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
 };
+use super::parents::ParentTable;
 use super::reach::{SourceSearch, bin_container, interior, own_bins};
 
 /// Node sets of one block.
@@ -74,7 +75,7 @@ pub fn constrained_nodes<const D: usize>(tree: &KnownTree<D>, level: u8, coord: 
 struct Builder<'a, const D: usize> {
     tree: &'a KnownTree<D>,
     overlaps: Vec<u64>,
-    kinship: &'static Kinship,
+    parents: &'static ParentTable,
     containers: FxHashMap<(u8, [u32; D]), bool>,
     levels: Vec<FxHashMap<[u32; D], NodeSets>>,
     received: FxHashMap<(u8, [u32; D]), u64>,
@@ -87,7 +88,7 @@ impl<const D: usize> Closure<D> {
         let mut builder = Builder {
             tree,
             overlaps: (0..offset_count(D)).map(|index| arena_overlap::<D>(offset(index))).collect(),
-            kinship: Kinship::of::<D>(),
+            parents: ParentTable::of::<D>(),
             containers: FxHashMap::default(),
             levels: vec![FxHashMap::default(); deepest as usize + 1],
             received: FxHashMap::default(),
@@ -171,7 +172,7 @@ impl<const D: usize> Builder<'_, D> {
                 }
                 for index in 0..offset_count(D) {
                     let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
-                    let children = self.kinship.children(index, sum);
+                    let children = self.parents.children(index, sum);
                     if children == 0 {
                         continue;
                     }
@@ -218,7 +219,7 @@ impl<const D: usize> Builder<'_, D> {
             for index in 0..offset_count(D) {
                 let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
                 let from = constrained_nodes(self.tree, level + 1, fine) & self.receives(level + 1, fine);
-                mask |= self.kinship.parents(index, from);
+                mask |= self.parents.parents(index, from);
             }
         }
         mask &= nodes_in_domain(self.tree, level, coord);

@@ -4,9 +4,7 @@
 //! (Gao et al. 2017, section 4.2): along an axis where its coordinate is even it coincides with the parent
 //! `x/2`; where it is odd the parents `(x ± 1)/2` take part with one half each. Restriction is the
 //! transpose. Parents may be constrained themselves; chains over several levels follow by recursion.
-use std::sync::LazyLock;
-
-use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
+use super::mask::{bit_of_node, node_of_bit};
 
 /// One parent of a constrained node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,64 +44,9 @@ pub fn block_and_bit<const D: usize>(node: [u32; D]) -> ([u32; D], u32) {
     (node.map(|x| x / 4), bit_of_node::<D>(node.map(|x| x % 4)))
 }
 
-/// Which nodes of fine blocks have which parents in a block one level coarser. The coarse block at `coord` has
-/// children in the fine blocks at `2 coord + offset`, by offset number.
-pub struct Kinship {
-    /// Per offset number and node of the coarse block, its children in the fine block.
-    children: Vec<[u64; 64]>,
-    /// Per offset number and node of the fine block, its parents in the coarse block.
-    parents: Vec<[u64; 64]>,
-}
-
-static TWO: LazyLock<Kinship> = LazyLock::new(Kinship::new::<2>);
-static THREE: LazyLock<Kinship> = LazyLock::new(Kinship::new::<3>);
-
-impl Kinship {
-    /// The table for `D` dimensions.
-    pub fn of<const D: usize>() -> &'static Self {
-        if D == 2 { &TWO } else { &THREE }
-    }
-
-    fn new<const D: usize>() -> Self {
-        let mut kinship =
-            Self { children: vec![[0; 64]; offset_count(D)], parents: vec![[0; 64]; offset_count(D)] };
-        // Any block that is not at the lower faces shows the pattern.
-        let coarse = [1u32; D];
-        for index in 0..offset_count(D) {
-            let Some(fine) = shifted(coarse.map(|c| 2 * c), offset::<D>(index)) else { continue };
-            for bit in 0..block_nodes(D) as u32 {
-                for parent in parents_of::<D>(node_coord(fine, bit)) {
-                    let (block, parent_bit) = block_and_bit(parent.node);
-                    if block == coarse {
-                        kinship.children[index][parent_bit as usize] |= 1 << bit;
-                        kinship.parents[index][bit as usize] |= 1 << parent_bit;
-                    }
-                }
-            }
-        }
-        kinship
-    }
-
-    /// Nodes of the fine block at offset number `index` that have a parent in `mask`.
-    pub fn children(&self, index: usize, mask: u64) -> u64 {
-        bits(mask).fold(0, |children, bit| children | self.children[index][bit as usize])
-    }
-
-    /// Nodes of the coarse block that are parents of `mask` in the fine block at offset number `index`.
-    pub fn parents(&self, index: usize, mask: u64) -> u64 {
-        bits(mask).fold(0, |parents, bit| parents | self.parents[index][bit as usize])
-    }
-}
-
-/// Number of nodes in a mask, as `usize`.
-pub fn count(mask: u64) -> usize {
-    bits(mask).count()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::mask::offset_index;
 
     #[test]
     fn weights_of_parents_sum_to_one_and_reproduce_the_node() {
@@ -118,16 +61,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn children_are_the_nodes_that_name_the_block_as_parent() {
-        let kinship = Kinship::of::<2>();
-        let number = |offset: [i32; 2]| offset_index(offset);
-        assert_eq!(kinship.children(number([0, 0]), 1), 0b0000_0000_0011_0011);
-        assert_eq!(kinship.children(number([-1, -1]), 1), 1 << 15);
-        assert_eq!(kinship.children(number([1, 1]), 1), 0);
-        assert_eq!(kinship.parents(number([0, 0]), 0b11), 0b11);
-        assert_eq!(kinship.parents(number([-1, -1]), 1 << 15), 1);
     }
 }

@@ -1,90 +1,12 @@
 //! Which blocks hold the parents of constrained nodes: over these sums are restricted and values prolonged.
 //!
-//! Where the parents of a node lie follows from its place in its block and the parity of the block's coordinates. A table has
-//! this for all blocks; a plan lists pairs of blocks only.
-use std::sync::LazyLock;
-
+//! Where the parents of a node lie is in a table for all blocks (`parents.rs`); a plan lists pairs of blocks only.
 use rustc_hash::FxHashMap;
 
 use super::columns::{Columns, axes_in};
-use super::constraint::{block_and_bit, node_coord, parents_of};
-use super::mask::{bits, block_nodes, node_of_bit, offset, offset_index};
+use super::mask::{bits, block_nodes, node_of_bit, offset};
+use super::parents::{ParentTable, parity, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
-
-/// A parent of a node of a fine block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ParentNode {
-    /// The parent's block: bit `k` tells whether it is the upper one along axis `k` of those that hold parents.
-    pub corner: u8,
-    /// The parent in its block.
-    pub bit: u8,
-    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see [`weight_of`].
-    pub offset: u8,
-}
-
-/// Parents of the nodes of fine blocks, by parity of the blocks' coordinates.
-pub struct ParentTable {
-    parents: Vec<ParentNode>,
-    /// First parent of each node, by parity.
-    start: Vec<u16>,
-    /// Nodes that have a parent in the block at each corner, by parity.
-    having: Vec<[u64; 8]>,
-}
-
-static TWO: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<2>);
-static THREE: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<3>);
-
-impl ParentTable {
-    /// The table for `D` dimensions.
-    pub fn of<const D: usize>() -> &'static Self {
-        if D == 2 { &TWO } else { &THREE }
-    }
-
-    fn new<const D: usize>() -> Self {
-        let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
-        for parity in 0..1u32 << D {
-            let mut corners = [0; 8];
-            // Any block of this parity that is not at the lower faces shows the pattern.
-            let block = std::array::from_fn(|axis| 2 + (parity >> axis & 1));
-            for bit in 0..block_nodes(D) as u32 {
-                start.push(parents.len() as u16);
-                for parent in parents_of::<D>(node_coord(block, bit)) {
-                    let (coarse, place) = block_and_bit(parent.node);
-                    let corner = (0..D).fold(0, |corner, axis| corner | (coarse[axis] - 1) << axis);
-                    corners[corner as usize] |= 1 << bit;
-                    let offset = offset_index(parent.offset) as u8;
-                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
-                    parents.push(ParentNode { corner: corner as u8, bit: place as u8, offset });
-                }
-            }
-            having.push(corners);
-        }
-        start.push(parents.len() as u16);
-        Self { parents, start, having }
-    }
-
-    /// Parents of node `bit` of a block of some parity, in lexicographic order.
-    #[inline(always)]
-    pub fn of_node<const D: usize>(&self, parity: usize, bit: u32) -> &[ParentNode] {
-        let node = parity * block_nodes(D) + bit as usize;
-        &self.parents[usize::from(self.start[node])..usize::from(self.start[node + 1])]
-    }
-
-    /// Nodes of blocks of some parity that have a parent in the block at a corner.
-    pub fn having(&self, parity: usize, corner: u8) -> u64 {
-        self.having[parity][usize::from(corner)]
-    }
-}
-
-/// Parity of coordinates, a bit for each axis.
-pub fn parity<const D: usize>(coord: [u32; D]) -> usize {
-    (0..D).fold(0, |parity, axis| parity | (coord[axis] as usize & 1) << axis)
-}
-
-/// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
-pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
-    offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
-}
 
 /// A block with constrained nodes.
 #[derive(Clone, Copy, Debug)]
@@ -237,33 +159,4 @@ fn odd_nodes<const D: usize>() -> [u64; D] {
 /// Number of the first column of a node, and the axes of its columns.
 fn place_of<const D: usize>(block: &Block<D>, bit: u32) -> (usize, u8) {
     (block.moments as usize + block.columns.first_of(bit), block.columns.axes_of(bit))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_table_has_the_parents_of_every_node() {
-        let table = ParentTable::of::<3>();
-        for coord in [[2, 4, 6], [3, 4, 6], [3, 5, 7], [8, 9, 1]] {
-            for bit in 0..64 {
-                let found: Vec<_> = table
-                    .of_node::<3>(parity(coord), bit)
-                    .iter()
-                    .map(|parent| {
-                        let block =
-                            [0, 1, 2].map(|axis| coord[axis] / 2 + u32::from(parent.corner >> axis & 1));
-                        assert_eq!(table.having(parity(coord), parent.corner) >> bit & 1, 1);
-                        (node_coord(block, parent.bit.into()), offset::<3>(parent.offset.into()))
-                    })
-                    .collect();
-                let expected: Vec<_> =
-                    parents_of(node_coord(coord, bit)).map(|parent| (parent.node, parent.offset)).collect();
-                assert_eq!(found, expected);
-            }
-        }
-        // Blocks with even coordinates have all parents in one block.
-        assert_eq!((1..8).map(|corner| table.having(0, corner)).max(), Some(0));
-    }
 }

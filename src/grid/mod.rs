@@ -19,6 +19,7 @@ pub mod links;
 pub mod mask;
 mod mixed;
 pub mod order;
+pub mod parents;
 pub mod plan;
 pub mod reach;
 pub mod region;

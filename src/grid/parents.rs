@@ -1,0 +1,144 @@
+//! Parents of the nodes of fine blocks, in one table for all blocks.
+//!
+//! Where the parents of a node lie follows from its place in its block and the parity of the block's coordinates.
+use std::sync::LazyLock;
+
+use super::constraint::{block_and_bit, node_coord, parents_of};
+use super::mask::{bits, block_nodes, offset_count, offset_index};
+
+/// A parent of a node of a fine block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParentNode {
+    /// The parent's block: bit `k` tells whether it is the upper one along axis `k` of those that hold parents.
+    pub corner: u8,
+    /// The parent in its block.
+    pub bit: u8,
+    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see [`weight_of`].
+    pub offset: u8,
+}
+
+/// Parents of the nodes of fine blocks, by parity of the blocks' coordinates.
+pub struct ParentTable {
+    parents: Vec<ParentNode>,
+    /// First parent of each node, by parity.
+    start: Vec<u16>,
+    /// Nodes that have a parent in the block at each corner, by parity.
+    having: Vec<[u64; 8]>,
+    /// Per place of the fine block and node of the coarse one, its children; see [`ParentTable::children`].
+    children: Vec<[u64; 64]>,
+    /// Per place and node of the fine block, its parents.
+    parents_at: Vec<[u64; 64]>,
+}
+
+static TWO: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<2>);
+static THREE: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<3>);
+
+impl ParentTable {
+    /// The table for `D` dimensions.
+    pub fn of<const D: usize>() -> &'static Self {
+        if D == 2 { &TWO } else { &THREE }
+    }
+
+    fn new<const D: usize>() -> Self {
+        let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
+        let none = vec![[0; 64]; offset_count(D)];
+        let (mut children, mut parents_at) = (none.clone(), none);
+        for parity in 0..1u32 << D {
+            let mut corners = [0; 8];
+            // Any block of this parity that is not at the lower faces shows the pattern.
+            let block: [u32; D] = std::array::from_fn(|axis| 2 + (parity >> axis & 1));
+            for bit in 0..block_nodes(D) as u32 {
+                start.push(parents.len() as u16);
+                for parent in parents_of::<D>(node_coord(block, bit)) {
+                    let (coarse, parent_bit) = block_and_bit(parent.node);
+                    let corner = (0..D).fold(0, |corner, axis| corner | (coarse[axis] - 1) << axis);
+                    corners[corner as usize] |= 1 << bit;
+                    let offset = offset_index(parent.offset) as u8;
+                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
+                    parents.push(ParentNode { corner: corner as u8, bit: parent_bit as u8, offset });
+                    let place =
+                        offset_index::<D>(std::array::from_fn(|k| block[k] as i32 - 2 * coarse[k] as i32));
+                    children[place][parent_bit as usize] |= 1 << bit;
+                    parents_at[place][bit as usize] |= 1 << parent_bit;
+                }
+            }
+            having.push(corners);
+        }
+        start.push(parents.len() as u16);
+        Self { parents, start, having, children, parents_at }
+    }
+
+    /// Parents of node `bit` of a block of some parity, in lexicographic order.
+    #[inline(always)]
+    pub fn of_node<const D: usize>(&self, parity: usize, bit: u32) -> &[ParentNode] {
+        let node = parity * block_nodes(D) + bit as usize;
+        &self.parents[usize::from(self.start[node])..usize::from(self.start[node + 1])]
+    }
+
+    /// Nodes of blocks of some parity that have a parent in the block at a corner.
+    pub fn having(&self, parity: usize, corner: u8) -> u64 {
+        self.having[parity][usize::from(corner)]
+    }
+
+    /// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate of the
+    /// coarse block to the fine one.
+    pub fn children(&self, place: usize, mask: u64) -> u64 {
+        bits(mask).fold(0, |children, bit| children | self.children[place][bit as usize])
+    }
+
+    /// Nodes of the coarse block that are parents of `mask` in the fine block at a place, as in [`ParentTable::children`].
+    pub fn parents(&self, place: usize, mask: u64) -> u64 {
+        bits(mask).fold(0, |parents, bit| parents | self.parents_at[place][bit as usize])
+    }
+}
+
+/// Parity of coordinates, a bit for each axis.
+pub fn parity<const D: usize>(coord: [u32; D]) -> usize {
+    (0..D).fold(0, |parity, axis| parity | (coord[axis] as usize & 1) << axis)
+}
+
+/// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
+pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
+    offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::mask::offset;
+
+    #[test]
+    fn the_table_has_the_parents_of_every_node() {
+        let table = ParentTable::of::<3>();
+        for coord in [[2, 4, 6], [3, 4, 6], [3, 5, 7], [8, 9, 1]] {
+            for bit in 0..64 {
+                let found: Vec<_> = table
+                    .of_node::<3>(parity(coord), bit)
+                    .iter()
+                    .map(|parent| {
+                        let block =
+                            [0, 1, 2].map(|axis| coord[axis] / 2 + u32::from(parent.corner >> axis & 1));
+                        assert_eq!(table.having(parity(coord), parent.corner) >> bit & 1, 1);
+                        (node_coord(block, parent.bit.into()), offset::<3>(parent.offset.into()))
+                    })
+                    .collect();
+                let expected: Vec<_> =
+                    parents_of(node_coord(coord, bit)).map(|parent| (parent.node, parent.offset)).collect();
+                assert_eq!(found, expected);
+            }
+        }
+        // Blocks with even coordinates have all parents in one block.
+        assert_eq!((1..8).map(|corner| table.having(0, corner)).max(), Some(0));
+    }
+
+    #[test]
+    fn children_are_the_nodes_that_name_the_block_as_parent() {
+        let table = ParentTable::of::<2>();
+        let number = |offset: [i32; 2]| offset_index(offset);
+        assert_eq!(table.children(number([0, 0]), 1), 0b0000_0000_0011_0011);
+        assert_eq!(table.children(number([-1, -1]), 1), 1 << 15);
+        assert_eq!(table.children(number([1, 1]), 1), 0);
+        assert_eq!(table.parents(number([0, 0]), 0b11), 0b11);
+        assert_eq!(table.parents(number([-1, -1]), 1 << 15), 1);
+    }
+}
