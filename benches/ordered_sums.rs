@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use agimp::grid::arena::Arenas;
-use agimp::grid::fields::Part;
 use agimp::grid::mask::{block_nodes, offset_count};
 use agimp::grid::plan::NO_BLOCK;
+use agimp::grid::waves;
 use agimp::grid::{GridPlan, NodeFields};
 use agimp::job::{self, AnyProblem};
 use agimp::run::setup;
@@ -45,18 +45,19 @@ fn main() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let mut solver = setup::solver(world.comm(), &problem).expect("a first state");
         let particles: usize = solver.chunks.iter().map(|chunk| chunk.len()).sum();
+        solver.keep_arenas();
         let mut times: [Vec<f64>; 4] = Default::default();
         for _ in 0..ROUNDS {
             times[0].push(timed(|| solver.step(1.0, Requests::default()).expect("a step")));
             let grid = solver.grid();
             let (plan, arenas) = (&grid.plan, grid.arenas());
-            // Nothing is asked by other ranks.
-            let asked = vec![false; plan.blocks.len()];
             let mut ordered = NodeFields::new(plan);
             let mut plain = vec![0.0; 4 * plan.blocks.len() * block_nodes(D)];
             pool.install(|| {
-                ordered.sum(plan, arenas, &asked, Part::Rest);
-                times[1].push(timed(|| ordered.sum(plan, arenas, &asked, Part::Rest)));
+                // All own bins are in one wave behind the first, which is empty.
+                let wave = waves::FIRST + 1;
+                ordered.sum(plan, arenas, wave);
+                times[1].push(timed(|| ordered.sum(plan, arenas, wave)));
                 if threads == 1 {
                     times[2].push(timed(|| add_directly(plan, arenas, &mut plain)));
                 } else {

@@ -2,26 +2,33 @@
 use std::sync::Arc;
 
 use super::constrained::{ArenaConstraints, ArenaMoments};
-use super::plan::{GridPlan, NO_BLOCK};
+use super::plan::GridPlan;
+use super::waves::{Seam, Waves};
 use super::window::Window;
 use crate::kernel::{Row, arena_nodes};
 
 /// No arena.
 const NONE: u32 = u32::MAX;
 
-/// Arenas of the bins that are occupied in a step; empty bins hold no memory.
+/// Arenas of the bins that are occupied in a step; empty bins hold no memory. Bins of one wave (see [`Waves`]) leave
+/// theirs to those of later ones.
 #[derive(Clone, Debug, Default)]
 pub struct Arenas<const D: usize> {
     rows: Vec<Row>,
     /// First moments, bin by bin, by number of the column.
     moments: Vec<Row>,
-    /// Per bin, number of its arena.
+    /// Per bin, its number among the occupied ones.
+    number: Vec<u32>,
+    /// Per bin, its arena.
     slot: Vec<u32>,
-    /// What is known of each arena.
+    /// Occupied bins, ascending.
     occupied: Vec<Occupied<D>>,
+    waves: Waves,
+    keep: bool,
     constraints: Arc<Vec<ArenaConstraints<D>>>,
-    /// Per block, what reaches it.
-    reached: Vec<Reached>,
+    /// Per block, whether a bin reaches it whose block lies outside its leaf; in most steps few do: boxes must be wide, or
+    /// lie across a change of level.
+    outer_reach: Vec<bool>,
 }
 
 /// An occupied bin.
@@ -34,15 +41,6 @@ struct Occupied<const D: usize> {
     moments: [u32; 2],
     /// The nodes that its particles touch.
     window: Window<D>,
-}
-
-/// Which occupied bins reach a block.
-#[derive(Clone, Copy, Debug, Default)]
-struct Reached {
-    /// Some bin whose block lies in its leaf.
-    inner: bool,
-    /// Some other bin; in most steps there are few: boxes must be wide, or lie across a change of level.
-    outer: bool,
 }
 
 /// The arena of one bin.
@@ -64,6 +62,8 @@ pub struct ArenaMut<'a, const D: usize> {
     pub rows: &'a mut [Row],
     /// First moments, in the order of [`ArenaConstraints`].
     pub moments: &'a mut [Row],
+    /// Address of the arena that comes next, to read ahead.
+    pub next: usize,
 }
 
 impl<const D: usize> ArenaMut<'_, D> {
@@ -75,69 +75,102 @@ impl<const D: usize> ArenaMut<'_, D> {
 }
 
 impl<const D: usize> Arenas<D> {
+    /// Has every bin keep its arena until the next step, for what looks at them afterwards.
+    pub fn keep(&mut self) {
+        self.keep = true;
+    }
+
     /// Makes room for the occupied bins, which come in order with the nodes that their particles touch. Contents are left
     /// over from earlier steps.
-    pub fn occupy(&mut self, plan: &GridPlan<D>, occupied: impl Iterator<Item = (usize, Window<D>)>) {
+    pub fn occupy(
+        &mut self,
+        plan: &GridPlan<D>,
+        seam: &Seam,
+        occupied: impl Iterator<Item = (usize, Window<D>)>,
+    ) {
         self.constraints = Arc::clone(&plan.constraints);
-        if self.slot.len() == plan.bins.len() {
+        if self.number.len() == plan.bins.len() {
             // Most bins were not occupied and need no second look.
-            self.occupied.iter().for_each(|arena| self.slot[arena.bin as usize] = NONE);
+            for arena in &self.occupied {
+                self.number[arena.bin as usize] = NONE;
+                self.slot[arena.bin as usize] = NONE;
+            }
         } else {
-            self.slot.clear();
-            self.slot.resize(plan.bins.len(), NONE);
+            for values in [&mut self.number, &mut self.slot] {
+                values.clear();
+                values.resize(plan.bins.len(), NONE);
+            }
         }
         self.occupied.clear();
-        self.reached.clear();
-        self.reached.resize(plan.blocks.len(), Reached::default());
+        self.outer_reach.clear();
+        self.outer_reach.resize(plan.blocks.len(), false);
         let mut moments = 0;
         for (number, window) in occupied {
             let bin = &plan.bins[number];
-            for &block in bin.around.iter().filter(|&&block| block != NO_BLOCK) {
-                let reached = &mut self.reached[block as usize];
-                reached.inner |= bin.is_inner;
-                reached.outer |= !bin.is_inner;
+            if !bin.is_inner {
+                bin.reached().for_each(|block| self.outer_reach[block] = true);
             }
-            self.slot[number] = self.occupied.len() as u32;
+            self.number[number] = self.occupied.len() as u32;
             let count = bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
             let (bin, touched) = (number as u32, bin.touched);
-            self.occupied.push(Occupied { bin, touched, moments: [moments, moments + count], window });
+            let moments_of_bin = [moments, moments + count];
+            self.occupied.push(Occupied { bin, touched, moments: moments_of_bin, window });
             moments += count;
         }
-        grow(&mut self.rows, self.occupied.len() * arena_nodes(D), Row([0.0; 4]));
+        self.waves.plan(plan, seam, self.keep, self.occupied.iter().map(|arena| arena.bin));
+        for (number, arena) in self.occupied.iter().enumerate() {
+            self.slot[arena.bin as usize] = self.waves.slot(number);
+        }
+        grow(&mut self.rows, self.waves.arenas() * arena_nodes(D), Row([0.0; 4]));
         grow(&mut self.moments, moments as usize, Row([0.0; 4]));
     }
 
-    /// The arenas of all occupied bins, mutable and disjoint, in bin order.
-    pub fn each_mut(&mut self) -> Vec<ArenaMut<'_, D>> {
-        let mut rest = &mut self.moments[..];
-        let each = self.occupied.iter().zip(self.rows.chunks_mut(arena_nodes(D)));
-        each.map(|(arena, rows)| {
-            let [first, end] = arena.moments;
-            let (moments, others) = std::mem::take(&mut rest).split_at_mut((end - first) as usize);
-            rest = others;
-            ArenaMut { bin: arena.bin as usize, rows, moments }
-        })
-        .collect()
+    /// In which order bins scatter and blocks are summed up.
+    pub fn waves(&self) -> &Waves {
+        &self.waves
+    }
+
+    /// The arenas of the bins of a wave, mutable and disjoint, in bin order.
+    pub fn of_wave(&mut self, wave: usize) -> Vec<ArenaMut<'_, D>> {
+        let (mut rows, mut moments) = (self.rows.chunks_mut(arena_nodes(D)), &mut self.moments[..]);
+        let (mut next_slot, mut next_moment) = (0, 0);
+        let own = self.waves.bins(wave).iter().map(|&number| &self.occupied[number as usize]);
+        let mut arenas: Vec<ArenaMut<'_, D>> = own
+            .filter_map(|arena| {
+                let slot = self.slot[arena.bin as usize];
+                let rows = rows.nth((slot - next_slot) as usize)?;
+                next_slot = slot + 1;
+                let [first, end] = arena.moments;
+                let (_, rest) = std::mem::take(&mut moments).split_at_mut((first - next_moment) as usize);
+                let (own, rest) = rest.split_at_mut((end - first) as usize);
+                (moments, next_moment) = (rest, end);
+                Some(ArenaMut { bin: arena.bin as usize, rows, moments: own, next: 0 })
+            })
+            .collect();
+        for first in 1..arenas.len() {
+            arenas[first - 1].next = arenas[first].rows.as_ptr().addr();
+        }
+        arenas
     }
 
     /// The nodes that the particles of an occupied bin touch.
     pub fn window(&self, bin: usize) -> Window<D> {
-        self.occupied[self.slot[bin] as usize].window
+        self.occupied[self.number[bin] as usize].window
     }
 
     /// Whether an occupied bin reaches a block.
     pub fn reach(&self, block: usize) -> bool {
-        self.reached[block].inner || self.reached[block].outer
+        self.waves.reach(block)
     }
 
     /// Whether one does whose block lies outside its leaf.
     pub fn outer_reach(&self, block: usize) -> bool {
-        self.reached[block].outer
+        self.outer_reach[block]
     }
 
     /// Whether a bin is occupied.
     pub fn is_occupied(&self, bin: usize) -> bool {
-        self.slot[bin] != NONE
+        self.number[bin] != NONE
     }
 
     /// Momentum and mass in the arena of a bin, if it is occupied.
@@ -149,14 +182,12 @@ impl<const D: usize> Arenas<D> {
 
     /// The arena of a bin, if it is occupied.
     pub fn get(&self, bin: u32) -> Option<Arena<'_, D>> {
-        let slot = self.slot[bin as usize];
-        let arena = self.occupied.get(slot as usize)?;
+        let (arena, rows) = (self.occupied.get(self.number[bin as usize] as usize)?, self.rows(bin)?);
         let [first, end] = arena.moments.map(|moment| moment as usize);
         let moments = arena.touched.map(|table| ArenaMoments {
             values: &self.moments[first..end],
             constraints: &self.constraints[table as usize],
         });
-        let rows = &self.rows[slot as usize * arena_nodes(D)..][..arena_nodes(D)];
         Some(Arena { rows, moments, window: arena.window })
     }
 

@@ -17,6 +17,7 @@ use super::plan::GridPlan;
 use super::region::Regions;
 use super::sources::Piece;
 use super::sums::{BlockSum, Sources};
+use super::waves::Seam;
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -123,8 +124,13 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.neighbours()
     }
 
+    /// What own bins and blocks have to do with other ranks.
+    pub fn seam(&self, plan: &GridPlan<D>) -> Seam {
+        Seam::new(plan, self.sent_bins(plan), self.asked.clone())
+    }
+
     /// Per bin, whether it reaches a block of which some neighbour needs sums.
-    pub fn sent_bins(&self, plan: &GridPlan<D>) -> Vec<bool> {
+    fn sent_bins(&self, plan: &GridPlan<D>) -> Vec<bool> {
         let mut sent = vec![false; plan.bins.len()];
         let overlap = &Regions::of::<D>().overlap;
         for piece in self.sent.iter().flatten() {
@@ -146,11 +152,6 @@ impl<const D: usize> ArenaExchange<D> {
     /// Messages and bytes so far.
     pub fn traffic(&self) -> Traffic {
         self.exchange.traffic()
-    }
-
-    /// Per block, whether neighbours need sums of all own bins that reach some nodes.
-    pub fn asked(&self) -> &[bool] {
-        &self.asked
     }
 
     /// What each neighbour needs of the own bins.

@@ -9,9 +9,10 @@ use super::columns::axes_in;
 use super::exchange::ReceivedSums;
 use super::mask::{bits, block_nodes, offset_count};
 use super::mixed::Mixed;
-use super::plan::{Block, GridPlan, NO_BLOCK};
+use super::plan::{GridPlan, NO_BLOCK};
 use super::region::Regions;
 use super::sums::{BlockSum, Sources};
+use super::waves::FIRST;
 use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
 
@@ -34,29 +35,8 @@ pub struct NodeFields<const D: usize> {
     pub(super) dirty: Vec<bool>,
 }
 
-/// Blocks that one task adds up.
+/// Blocks that one task adds up, at least.
 const TASK: usize = 16;
-
-/// The first moments of the blocks of each task.
-fn moment_tasks<'a, const D: usize>(plan: &GridPlan<D>, moments: &'a mut [Row]) -> Vec<&'a mut [Row]> {
-    let mut rest = moments;
-    let columns = |blocks: &[Block<D>]| blocks.iter().map(|block| block.columns.len()).sum();
-    let task = |blocks: &[Block<D>]| {
-        let (own, others) = std::mem::take(&mut rest).split_at_mut(columns(blocks));
-        rest = others;
-        own
-    };
-    plan.blocks.chunks(TASK).map(task).collect()
-}
-
-/// Which blocks to sum.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Blocks of which other ranks ask for sums; first, so that they can be sent.
-    Asked,
-    /// All others.
-    Rest,
-}
 
 /// One block of the fields with what is noted of it, mutable.
 struct Slot<'a> {
@@ -86,32 +66,28 @@ impl<const D: usize> NodeFields<D> {
         self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Row>()
     }
 
-    /// Not collective. Adds up the own arenas that reach each block of `part`; `asked` says of each block whether other ranks
-    /// ask for its sums.
-    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, asked: &[bool], part: Part) {
-        if part == Part::Asked && !asked.contains(&true) {
-            return;
+    /// Not collective. Adds up the own arenas that reach each block of a wave. The first wave comes first.
+    pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, wave: usize) {
+        if wave == FIRST {
+            self.clear(plan, arenas);
         }
         let sources = Sources { plan, arenas, received: None };
-        let is_wanted = |index: usize| asked[index] == (part == Part::Asked);
-        self.for_each_block(plan, |scratch, index, slot| {
-            if !is_wanted(index) {
-                return;
+        let blocks = arenas.waves().blocks(wave);
+        self.for_each_block(plan, blocks, |scratch, place, slot| {
+            if let Some(&next) = blocks.get(place + 1) {
+                sources.read_ahead(next as usize);
             }
-            let next = index + 1;
-            if next < plan.blocks.len() && arenas.reach(next) && is_wanted(next) {
-                sources.read_ahead(next);
-            }
+            let index = blocks[place] as usize;
             let block = &plan.blocks[index];
             let mut is_reached = false;
             *slot.touched = 0;
-            if arenas.reach(index) && (asked[index] || block.sum != 0) {
+            if wave == FIRST || block.sum != 0 {
                 let mut sum = BlockSum::find(sources, scratch, index, None);
                 is_reached = !sum.is_empty();
                 if is_reached {
                     sum.sum_rows(u32::MAX, slot.rows);
                     sum.sum_moments(u64::MAX, slot.moments);
-                    if part == Part::Asked {
+                    if wave == FIRST {
                         *slot.touched = sum.own_nodes();
                     }
                 }
@@ -125,15 +101,28 @@ impl<const D: usize> NodeFields<D> {
         });
     }
 
+    /// Sets blocks to zero that hold values of the last step and that no own bin reaches in this one.
+    fn clear(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
+        let is_left = |&block: &u32| self.dirty[block as usize] && !arenas.reach(block as usize);
+        let left: Vec<u32> = (0..).take(plan.blocks.len()).filter(is_left).collect();
+        self.for_each_block(plan, &left, |_, _, slot| {
+            slot.rows.fill(ZERO);
+            slot.moments.fill(ZERO);
+            (*slot.active, *slot.dirty, *slot.touched) = (false, false, 0);
+        });
+    }
+
     /// Not collective. Adds what other ranks have sent. Where their share and the own one are one subtree each, that is all; other
     /// regions are added up anew.
     pub fn add_received(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>) {
         if plan.pieces.is_empty() {
             return;
         }
+        let blocks: Vec<u32> = (0..).take(plan.blocks.len()).filter(|&i| plan.is_seam(i as usize)).collect();
         let sources = Sources { plan, arenas, received: Some(received) };
         let regions = Regions::of::<D>();
-        self.for_each_block(plan, |scratch, index, slot| {
+        self.for_each_block(plan, &blocks, |scratch, place, slot| {
+            let index = blocks[place] as usize;
             let (mut rest, columns) = (0, plan.blocks[index].columns);
             for part in plan.parts(index) {
                 let touched = received.touched(part.piece) & regions.nodes[part.region as usize];
@@ -162,27 +151,39 @@ impl<const D: usize> NodeFields<D> {
         });
     }
 
-    /// Calls `work` in parallel for all blocks.
-    fn for_each_block(&mut self, plan: &GridPlan<D>, work: impl Fn(&mut Mixed<D>, usize, Slot<'_>) + Sync) {
-        let nodes = block_nodes(D);
-        let rows = self.rows.par_chunks_mut(TASK * nodes);
-        let active = self.active.par_chunks_mut(TASK);
-        let flags = active.zip(self.dirty.par_chunks_mut(TASK)).zip(self.touched.par_chunks_mut(TASK));
-        let moments = moment_tasks(plan, &mut self.moments);
-        let tasks = rows.zip(flags).zip(moments).enumerate();
-        tasks.for_each_init(Mixed::default, |scratch, (task, ((rows, flags), moments))| {
-            let mut rest = moments;
-            let ((active, dirty), touched) = flags;
-            let flags = active.iter_mut().zip(dirty).zip(touched);
-            for (index, (rows, ((active, dirty), touched))) in
-                (task * TASK..).zip(rows.chunks_mut(nodes).zip(flags))
-            {
-                let (moments, others) =
-                    std::mem::take(&mut rest).split_at_mut(plan.blocks[index].columns.len());
-                rest = others;
-                work(scratch, index, Slot { rows, moments, active, dirty, touched });
-            }
-        });
+    /// Calls `work` in parallel for some blocks, which ascend, with their places among these.
+    fn for_each_block(
+        &mut self,
+        plan: &GridPlan<D>,
+        blocks: &[u32],
+        work: impl Fn(&mut Mixed<D>, usize, Slot<'_>) + Sync,
+    ) {
+        let slots = self.slots(plan, blocks).into_par_iter().enumerate().with_min_len(TASK);
+        slots.for_each_init(Mixed::default, |scratch, (place, slot)| work(scratch, place, slot));
+    }
+
+    /// Some blocks, which ascend.
+    fn slots(&mut self, plan: &GridPlan<D>, blocks: &[u32]) -> Vec<Slot<'_>> {
+        let mut rows = self.rows.chunks_mut(block_nodes(D));
+        let (mut active, mut dirty) = (self.active.iter_mut(), self.dirty.iter_mut());
+        let (mut touched, mut moments) = (self.touched.iter_mut(), &mut self.moments[..]);
+        let (mut next, mut next_moment) = (0, 0);
+        let slot = |&block: &u32| {
+            let between = (block - next) as usize;
+            next = block + 1;
+            let columns = plan.moments_of(block as usize);
+            let (_, rest) = std::mem::take(&mut moments).split_at_mut(columns.start - next_moment);
+            let (own, rest) = rest.split_at_mut(columns.len());
+            (moments, next_moment) = (rest, columns.end);
+            Some(Slot {
+                rows: rows.nth(between)?,
+                moments: own,
+                active: active.nth(between)?,
+                dirty: dirty.nth(between)?,
+                touched: touched.nth(between)?,
+            })
+        };
+        blocks.iter().filter_map(slot).collect()
     }
 
     /// Nodes that own arenas touch in this step, of a block whose sums other ranks ask for.

@@ -25,10 +25,12 @@ pub mod reach;
 pub mod region;
 pub mod sources;
 mod sums;
+pub mod waves;
 pub mod window;
 
 pub use exchange::ArenaExchange;
 pub use fields::NodeFields;
 pub use known::{Cover, KnownTree};
 pub use plan::GridPlan;
+pub use waves::Seam;
 pub use window::Window;

@@ -91,6 +91,13 @@ pub struct GridPlan<const D: usize> {
     pub rounds: usize,
 }
 
+impl<const D: usize> Bin<D> {
+    /// The blocks around, in order.
+    pub fn reached(&self) -> impl Iterator<Item = usize> {
+        self.around.iter().filter(|block| **block != NO_BLOCK).map(|block| *block as usize)
+    }
+}
+
 impl<const D: usize> GridPlan<D> {
     /// Collective. Builds the ghost layer and the grid of each rank.
     pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {

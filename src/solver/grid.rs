@@ -15,7 +15,7 @@ use crate::grid::arena::Arenas;
 use crate::grid::census::{Census, surface_bytes};
 use crate::grid::exchange::ReceivedSums;
 use crate::grid::known::Allowance;
-use crate::grid::{ArenaExchange, GridPlan, NodeFields};
+use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::Scheme;
 use crate::particle::Chunk;
 
@@ -30,8 +30,7 @@ pub struct Grid<const D: usize> {
     pub(super) received: ReceivedSums<D>,
     pub(super) migration: Migration<D>,
     pub(super) lists: BinLists<D>,
-    /// Per bin, whether a neighbour needs it.
-    pub(super) is_sent: Vec<bool>,
+    pub(super) seam: Seam,
 }
 
 impl<const D: usize> Grid<D> {
@@ -50,7 +49,7 @@ impl<const D: usize> Grid<D> {
             increments: Increments::default(),
             migration: Migration::new(comm, &plan, neighbours, physics.leaving),
             lists: BinLists::new(&plan),
-            is_sent: exchange.sent_bins(&plan),
+            seam: exchange.seam(&plan),
             exchange,
             received,
             plan,
@@ -68,6 +67,11 @@ impl<const D: usize> Grid<D> {
     /// What the particles scattered last.
     pub fn arenas(&self) -> &Arenas<D> {
         &self.arenas
+    }
+
+    /// In how many waves bins scatter.
+    pub(super) fn waves(&self) -> usize {
+        self.arenas.waves().len()
     }
 
     /// Heap bytes held.
@@ -117,6 +121,11 @@ impl<const D: usize> Solver<D> {
             messages: self.sent_before.messages + now.messages,
             bytes: self.sent_before.bytes + now.bytes,
         }
+    }
+
+    /// Has the arenas of a step stay as they are until the next, for measurements.
+    pub fn keep_arenas(&mut self) {
+        self.grid.arenas.keep();
     }
 
     /// The grid of the current tree and partition.

@@ -43,10 +43,9 @@ use self::resample::Books;
 use self::survey::Survey;
 use self::time_step::StepControl;
 use self::totals::Weighed;
-use self::transfer::Reach;
 use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
-use crate::grid::fields::Part;
+use crate::grid::waves;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
 use crate::particle::Chunk;
@@ -254,11 +253,13 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. P2G, exchange, node sums and restriction: momentum with the impulse of stress
     /// over `dt`, and mass, on real nodes.
     pub(super) fn nodes_from_particles(&mut self, dt: f64) {
-        self.scatter(dt, Reach::Neighbours);
-        self.sum_nodes(Part::Asked);
+        self.scatter(dt, waves::FIRST);
+        self.sum_nodes(waves::FIRST);
         let pending = self.send_sums();
-        self.scatter(dt, Reach::Own);
-        self.sum_nodes(Part::Rest);
+        for wave in waves::FIRST + 1..self.grid.waves() {
+            self.scatter(dt, wave);
+            self.sum_nodes(wave);
+        }
         self.add_sums_of_neighbours(pending);
         self.restrict();
     }

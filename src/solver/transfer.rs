@@ -15,7 +15,7 @@ use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
 use crate::grid::arena::ArenaMut;
-use crate::grid::fields::{Part, VelocityArena, load_rows};
+use crate::grid::fields::{VelocityArena, load_rows};
 use crate::grid::plan::Bin;
 use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
@@ -28,15 +28,6 @@ use crate::particle::chunk::{Layout, Place};
 
 /// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
 const READ_AHEAD: usize = 25;
-
-/// Which bins a scatter treats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reach {
-    /// Bins that another rank needs; these come first, so that their exchange can start.
-    Neighbours,
-    /// All others.
-    Own,
-}
 
 impl<const D: usize> Physics<D> {
     /// What the kernels need to know.
@@ -86,9 +77,8 @@ fn constrained<'a, const D: usize>(plan: &'a GridPlan<D>, bin: &Bin<D>) -> Optio
     Some(&plan.constraints[bin.touched? as usize].nodes)
 }
 
-/// Asks for the first lines of the arena behind one, which is cleared next.
-fn read_ahead(rows: &[Row]) {
-    let next = rows.as_ptr_range().end.addr();
+/// Asks for the first lines of the arena at an address, which is cleared next.
+fn read_ahead(next: usize) {
     (0..READ_AHEAD).for_each(|line| prefetch(next + 64 * line));
 }
 
@@ -131,7 +121,7 @@ pub(super) fn sort_with<const D: usize>(
         grid.lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
             spread::of_parts(chunk, parts, &frame(plan, bin), constrained(plan, bin), each);
         });
-        grid.arenas.occupy(plan, grid.lists.occupied(plan, chunks));
+        grid.arenas.occupy(plan, &grid.seam, grid.lists.occupied(plan, chunks));
         sorted
     })
 }
@@ -148,14 +138,13 @@ impl<const D: usize> Solver<D> {
         )
     }
 
-    /// P2G: scatters mass, affine momentum and the impulse of stress of the bins in `reach` into their
+    /// P2G: scatters mass, affine momentum and the impulse of stress of the bins of a wave into their
     /// arenas.
-    pub(super) fn scatter(&mut self, dt: f64, reach: Reach) {
+    pub(super) fn scatter(&mut self, dt: f64, wave: usize) {
         let scheme = self.physics.scheme();
         let (grid, chunks, costs) = (&mut self.grid, &self.chunks, &self.costs);
         let (plan, lists) = (&grid.plan, &grid.lists);
-        let mut arenas = grid.arenas.each_mut();
-        arenas.retain(|arena| grid.is_sent[arena.bin] == (reach == Reach::Neighbours));
+        let arenas = grid.arenas.of_wave(wave);
         self.phases.time(Phase::Scatter, || {
             let scatter_bin = |mut arena: ArenaMut<'_, D>| {
                 let bin = &plan.bins[arena.bin];
@@ -163,8 +152,8 @@ impl<const D: usize> Solver<D> {
                 let chunk = &chunks[leaf];
                 let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
                 arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
+                read_ahead(arena.next);
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
-                read_ahead(rows);
                 let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
                     let moments = nodes.map(|nodes| MomentSums { nodes, sums: &mut *sums });
@@ -222,11 +211,10 @@ impl<const D: usize> Solver<D> {
         Ok(())
     }
 
-    /// Adds up own arenas on the nodes of `part`.
-    pub(super) fn sum_nodes(&mut self, part: Part) {
+    /// Adds up own arenas on the nodes of the blocks of a wave.
+    pub(super) fn sum_nodes(&mut self, wave: usize) {
         let grid = &mut self.grid;
-        let asked = grid.exchange.asked();
-        self.phases.time(Phase::Sum, || grid.fields.sum(&grid.plan, &grid.arenas, asked, part));
+        self.phases.time(Phase::Sum, || grid.fields.sum(&grid.plan, &grid.arenas, wave));
     }
 
     /// Hands sums of constrained nodes to their parents.
