@@ -15,16 +15,17 @@ use super::sums::{BlockSum, Sources};
 use super::waves::FIRST;
 use super::window::{Shared, Window};
 use crate::kernel::{Row, arena_nodes};
+use crate::memory::Block;
 
 pub(super) const ZERO: Row = Row([0.0; 4]);
 
 /// Rows of all blocks of a plan: momentum and mass after the sums, velocity after the update.
 #[derive(Clone, Debug)]
 pub struct NodeFields<const D: usize> {
-    /// One row per node, block by block.
-    pub rows: Vec<Row>,
+    /// One row per node, block by block. Those of blocks that nothing ever reaches take no memory.
+    pub rows: Block<Row>,
     /// First moments, block by block, by number of the column.
-    pub moments: Vec<Row>,
+    pub moments: Block<Row>,
     /// Per block, whether something was summed in it in this step.
     pub active: Vec<bool>,
     /// Nodes that own arenas touch in this step, of blocks whose sums other ranks ask for.
@@ -52,8 +53,8 @@ impl<const D: usize> NodeFields<D> {
     pub fn new(plan: &GridPlan<D>) -> Self {
         let nodes = block_nodes(D);
         Self {
-            rows: vec![ZERO; plan.blocks.len() * nodes],
-            moments: vec![ZERO; plan.columns],
+            rows: Block::zeroed(plan.blocks.len() * nodes),
+            moments: Block::zeroed(plan.columns),
             active: vec![false; plan.blocks.len()],
             touched: vec![0; plan.blocks.len()],
             needed: vec![false; plan.blocks.len()],
@@ -63,7 +64,7 @@ impl<const D: usize> NodeFields<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Row>()
+        size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }
 
     /// Not collective. Adds up the own arenas that reach each block of a wave. The first wave comes first.

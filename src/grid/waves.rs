@@ -8,8 +8,8 @@ use std::collections::BinaryHeap;
 
 use super::plan::GridPlan;
 
-/// Bins of a wave, for each thread.
-const BINS_PER_THREAD: usize = 128;
+/// Bins of a wave, for each thread: enough that threads rarely wait for the last ones.
+const BINS_PER_THREAD: usize = 64;
 
 /// What bins and blocks have to do with other ranks.
 #[derive(Clone, Debug, Default)]
@@ -58,18 +58,24 @@ const NONE: u32 = u32::MAX;
 pub const FIRST: usize = 0;
 
 impl Waves {
-    /// The waves in which `occupied` bins, which ascend, are best treated. With `keep` there is one beside the first, and all
-    /// arenas stay.
-    pub fn plan<const D: usize>(
+    /// Bins of a wave for all threads.
+    pub fn usual_size() -> usize {
+        BINS_PER_THREAD * rayon::current_num_threads()
+    }
+
+    /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` says which blocks a bin reaches. Without
+    /// a size all but those of the first wave are in one, and every bin keeps its arena.
+    pub fn plan<I: Iterator<Item = usize>>(
         &mut self,
-        plan: &GridPlan<D>,
+        size: Option<usize>,
         seam: &Seam,
-        keep: bool,
+        reached: impl Fn(u32) -> I,
         occupied: impl Iterator<Item = u32> + Clone,
     ) {
-        let size = if keep { usize::MAX } else { BINS_PER_THREAD * rayon::current_num_threads() };
+        let keep = size.is_none();
+        let size = size.unwrap_or(usize::MAX);
         self.wave_of_block.clear();
-        self.wave_of_block.resize(plan.blocks.len(), NONE);
+        self.wave_of_block.resize(seam.is_asked.len(), NONE);
         self.wave_of_bin.clear();
         let mut before = 0;
         for bin in occupied.clone() {
@@ -77,7 +83,7 @@ impl Waves {
             let wave = if is_sent { FIRST } else { 1 + before / size };
             before += usize::from(!is_sent);
             self.wave_of_bin.push(wave as u32);
-            for block in plan.bins[bin as usize].reached() {
+            for block in reached(bin) {
                 // Blocks that are not asked for can wait while the first sums are on their way.
                 let least = if seam.is_asked[block] { wave } else { wave.max(1) };
                 let last = &mut self.wave_of_block[block];
@@ -93,8 +99,7 @@ impl Waves {
             if keep || seam.is_kept[bin as usize] {
                 return NONE;
             }
-            let sums = plan.bins[bin as usize].reached().map(|block| self.wave_of_block[block]);
-            sums.max().unwrap_or(FIRST as u32)
+            reached(bin).map(|block| self.wave_of_block[block]).max().unwrap_or(FIRST as u32)
         };
         self.freed.fill(waves, occupied.map(last_use));
         self.assign_slots(waves);
@@ -124,8 +129,8 @@ impl Waves {
     }
 
     /// Number of waves.
-    pub fn len(&self) -> usize {
-        self.bins.len()
+    pub fn count(&self) -> usize {
+        self.bins.count()
     }
 
     /// Bins of a wave, by their numbers among the occupied ones; their arenas ascend as they do.
@@ -177,11 +182,82 @@ impl Groups {
         self.start[0] = 0;
     }
 
-    fn len(&self) -> usize {
+    fn count(&self) -> usize {
         self.start.len().saturating_sub(1)
     }
 
     fn of(&self, group: usize) -> &[u32] {
         &self.members[self.start[group] as usize..self.start[group + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EDGE: usize = 12;
+
+    /// Blocks around one of a cube of blocks.
+    fn around(bin: u32) -> impl Iterator<Item = usize> + Clone {
+        let place = [1, EDGE, EDGE * EDGE].map(|stride| bin as usize / stride % EDGE);
+        (0..27usize).filter_map(move |offset| {
+            (0..3).try_fold(0, |block, axis| {
+                let along = (place[axis] + offset / 3usize.pow(axis as u32) % 3).checked_sub(1)?;
+                (along < EDGE).then_some(block + along * EDGE.pow(axis as u32))
+            })
+        })
+    }
+
+    /// The blocks of the lowest layers are asked for.
+    fn seam(layers: usize) -> Seam {
+        let blocks = EDGE.pow(3);
+        let is_asked: Vec<bool> = (0..blocks).map(|block| block / (EDGE * EDGE) < layers).collect();
+        let is_sent: Vec<bool> =
+            (0..blocks).map(|bin| around(bin as u32).any(|block| is_asked[block])).collect();
+        Seam { is_kept: is_sent.clone(), is_sent, is_asked }
+    }
+
+    #[test]
+    fn arenas_last_until_all_that_needs_them_is_summed() {
+        let some = |bin: &u32| bin.wrapping_mul(2_654_435_761) >> 29 != 0;
+        for (layers, size) in [(0, Some(1)), (0, Some(40)), (2, Some(40)), (3, Some(100_000)), (1, None)] {
+            let (seam, mut waves) = (seam(layers), Waves::default());
+            let occupied: Vec<u32> = (0..EDGE.pow(3) as u32).filter(some).collect();
+            // The second plan finds what the first has left.
+            for _ in 0..2 {
+                waves.plan(size, &seam, around, occupied.iter().copied());
+            }
+            let mut holder = vec![None; waves.arenas()];
+            let (mut scattered, mut summed) = (vec![false; EDGE.pow(3)], vec![false; EDGE.pow(3)]);
+            let slot = |bin: u32| waves.slot(occupied.binary_search(&bin).unwrap()) as usize;
+            for wave in 0..waves.count() {
+                let bins = waves.bins(wave).iter().map(|&number| occupied[number as usize]);
+                assert!(bins.clone().is_sorted_by_key(slot));
+                for bin in bins {
+                    assert_eq!(seam.is_sent[bin as usize], wave == FIRST);
+                    let before: Option<u32> = holder[slot(bin)].replace(bin);
+                    let is_done =
+                        |bin: u32| around(bin).all(|block| summed[block]) && !seam.is_kept[bin as usize];
+                    assert!(before.is_none_or(is_done), "{size:?}: an arena is taken too early");
+                    scattered[bin as usize] = true;
+                }
+                for &block in waves.blocks(wave) {
+                    let block = block as usize;
+                    assert_eq!(seam.is_asked[block], wave == FIRST);
+                    assert!(!std::mem::replace(&mut summed[block], true), "summed twice");
+                    // Who reaches a block lies around it.
+                    let bins = around(block as u32).map(|bin| bin as u32).filter(some);
+                    assert!(
+                        bins.clone().all(|bin| scattered[bin as usize] && holder[slot(bin)] == Some(bin))
+                    );
+                    assert!(waves.reach(block) && bins.count() > 0);
+                }
+            }
+            assert!(scattered.iter().zip(0..).all(|(scattered, bin)| *scattered == some(&bin)));
+            assert!((0..EDGE.pow(3)).all(|block| summed[block] == waves.reach(block)));
+            if layers == 0 {
+                assert!(waves.arenas() < occupied.len() / 2, "{size:?}: {}", waves.arenas());
+            }
+        }
     }
 }

@@ -10,6 +10,7 @@ use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
 pub use super::layout::{Layout, Tag};
 use super::widest::{Widest, greatest};
+use crate::memory::Block;
 
 /// One cache line of a column. Columns begin with a line, so that a batch of lanes never straddles two.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -18,14 +19,13 @@ struct Line([f64; CAPACITY_STEP]);
 
 /// Particles of one leaf: `Layout::<D>::REALS` columns of `f64` and two of `u64` (id and tag).
 ///
-/// All columns live in one allocation per type with a common capacity.
+/// All columns lie one after the other in one block, with a common capacity. Leaves at the surface of a moving body become fuller or
+/// emptier all the time; in the heap each size that they pass through would leave a hole that is too small for the next.
 #[derive(Clone, Debug, Default)]
 pub struct Chunk<const D: usize> {
     len: usize,
     capacity: usize,
-    lines: Vec<Line>,
-    ids: Vec<u64>,
-    tags: Vec<u64>,
+    block: Block<Line>,
     widest: Widest,
 }
 
@@ -45,6 +45,13 @@ pub struct Place {
 const CAPACITY_STEP: usize = 8;
 
 impl<const D: usize> Chunk<D> {
+    /// Column of identifiers.
+    const IDS: usize = Layout::<D>::REALS;
+    /// Column of tags.
+    const TAGS: usize = Self::IDS + 1;
+    /// Number of columns.
+    const COLUMNS: usize = Self::TAGS + 1;
+
     /// An empty chunk.
     pub fn new() -> Self {
         Self::default()
@@ -74,7 +81,7 @@ impl<const D: usize> Chunk<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        size_of::<Line>() * self.lines.capacity() + 8 * (self.ids.capacity() + self.tags.capacity())
+        size_of_val(&*self.block)
     }
 
     /// Column `column` (see [`Layout`]), `len` values.
@@ -92,24 +99,41 @@ impl<const D: usize> Chunk<D> {
 
     fn values_mut(&mut self, column: usize) -> &mut [f64] {
         let start = column * self.capacity;
-        &mut cast_slice_mut(&mut self.lines)[start..][..self.len]
+        &mut cast_slice_mut(&mut self.block)[start..][..self.len]
+    }
+
+    fn words(&self, column: usize) -> &[u64] {
+        &cast_slice(&self.block)[column * self.capacity..][..self.len]
+    }
+
+    fn words_mut(&mut self, column: usize) -> &mut [u64] {
+        let start = column * self.capacity;
+        &mut cast_slice_mut(&mut self.block)[start..][..self.len]
+    }
+
+    fn all_reals_mut(&mut self) -> &mut [f64] {
+        &mut cast_slice_mut(&mut self.block)[..Layout::<D>::REALS * self.capacity]
     }
 
     /// All columns at once: `(reals, stride)`; column `c` of particle `p` is `reals[c * stride + p]`.
     pub fn reals(&self) -> (&[f64], usize) {
-        (cast_slice(&self.lines), self.capacity)
+        (&cast_slice(&self.block)[..Layout::<D>::REALS * self.capacity], self.capacity)
     }
 
     /// All columns at once, mutable.
     pub fn reals_mut(&mut self) -> (&mut [f64], usize) {
         self.widest = Widest::UNKNOWN;
-        (cast_slice_mut(&mut self.lines), self.capacity)
+        let stride = self.capacity;
+        (self.all_reals_mut(), stride)
     }
 
     /// Real columns (with their stride) and tags at once, for kernels that write the former, undeformed half widths
     /// excepted, and read the latter.
     pub fn reals_mut_and_tags(&mut self) -> (&mut [f64], usize, &[u64]) {
-        (cast_slice_mut(&mut self.lines), self.capacity, &self.tags[..self.len])
+        let (len, stride) = (self.len, self.capacity);
+        let (reals, others) = self.block.split_at_mut(Layout::<D>::REALS * stride / CAPACITY_STEP);
+        let tags = &cast_slice(others)[(Self::TAGS - Self::IDS) * stride..][..len];
+        (cast_slice_mut(reals), stride, tags)
     }
 
     /// Where the columns lie in memory.
@@ -118,27 +142,28 @@ impl<const D: usize> Chunk<D> {
             return Place::default();
         }
         let stride = self.capacity * size_of::<f64>();
-        Place { columns: self.lines.as_ptr().addr(), stride, tags: self.tags.as_ptr().addr() }
+        let columns = self.block.as_ptr().addr();
+        Place { columns, stride, tags: columns + Self::TAGS * stride }
     }
 
     /// Identifiers, unique over the run.
     pub fn ids(&self) -> &[u64] {
-        &self.ids[..self.len]
+        self.words(Self::IDS)
     }
 
     /// Identifiers, mutable.
     pub fn ids_mut(&mut self) -> &mut [u64] {
-        &mut self.ids[..self.len]
+        self.words_mut(Self::IDS)
     }
 
     /// Packed tags (see [`Tag`]).
     pub fn tags(&self) -> &[u64] {
-        &self.tags[..self.len]
+        self.words(Self::TAGS)
     }
 
     /// Packed tags, mutable.
     pub fn tags_mut(&mut self) -> &mut [u64] {
-        &mut self.tags[..self.len]
+        self.words_mut(Self::TAGS)
     }
 
     /// Greatest undeformed half width, m; 0 without particles.
@@ -166,8 +191,8 @@ impl<const D: usize> Chunk<D> {
         self.len += 1;
         let (reals, stride) = self.reals_mut();
         (0..Layout::<D>::REALS).for_each(|column| reals[column * stride + p] = 0.0);
-        self.ids[p] = id;
-        self.tags[p] = tag.pack();
+        self.ids_mut()[p] = id;
+        self.tags_mut()[p] = tag.pack();
         p
     }
 
@@ -176,11 +201,10 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(1);
         let (p, stride) = (self.len, self.capacity);
         self.len += 1;
-        let reals: &mut [f64] = cast_slice_mut(&mut self.lines);
-        for (column, &word) in columns[..Layout::<D>::REALS].iter().enumerate() {
-            reals[column * stride + p] = f64::from_bits(word);
+        let words: &mut [u64] = cast_slice_mut(&mut self.block);
+        for (column, &word) in columns[..Layout::<D>::REALS].iter().chain(&[id, tag]).enumerate() {
+            words[column * stride + p] = word;
         }
-        (self.ids[p], self.tags[p]) = (id, tag);
         self.widest.add(f64::from_bits(columns[Layout::<D>::HALF]));
     }
 
@@ -189,12 +213,10 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(1);
         let q = self.len;
         self.len += 1;
-        let ((to, stride), (from, source_stride)) = (self.reals_mut(), source.reals());
-        for column in 0..Layout::<D>::REALS {
-            to[column * stride + q] = from[column * source_stride + p];
+        for column in 0..Self::COLUMNS {
+            self.words_mut(column)[q] = source.words(column)[p];
         }
-        self.ids[q] = source.ids[p];
-        self.tags[q] = source.tags[p];
+        self.widest = Widest::UNKNOWN;
     }
 
     /// Appends `n` zeroed particles (id and tag zero) and returns the index of the first.
@@ -202,42 +224,28 @@ impl<const D: usize> Chunk<D> {
         self.grow_for(n);
         let first = self.len;
         self.len += n;
-        let (reals, stride) = self.reals_mut();
-        (0..Layout::<D>::REALS).for_each(|column| reals[column * stride + first..][..n].fill(0.0));
-        self.ids[first..][..n].fill(0);
-        self.tags[first..][..n].fill(0);
+        (0..Self::COLUMNS).for_each(|column| self.words_mut(column)[first..].fill(0));
+        self.widest = Widest::UNKNOWN;
         first
     }
 
     /// Appends all columns as bytes, to send the particles to another rank of the same job.
     pub fn append_to(&self, bytes: &mut Vec<u8>) {
-        bytes.reserve(8 * self.len * (Layout::<D>::REALS + 2));
-        for column in 0..Layout::<D>::REALS {
-            bytes.extend_from_slice(cast_slice(self.column(column)));
-        }
-        bytes.extend_from_slice(cast_slice(self.ids()));
-        bytes.extend_from_slice(cast_slice(self.tags()));
+        bytes.reserve(8 * self.len * Self::COLUMNS);
+        (0..Self::COLUMNS).for_each(|column| bytes.extend_from_slice(cast_slice(self.words(column))));
     }
 
     /// The particles that [`Chunk::append_to`] packed; empty if the bytes are not of that form.
     pub fn from_bytes(bytes: &[u8]) -> Self {
-        let len = bytes.len() / (8 * (Layout::<D>::REALS + 2));
+        let len = bytes.len() / (8 * Self::COLUMNS);
         let mut chunk = Self::with_capacity(len);
-        if bytes.len() != 8 * len * (Layout::<D>::REALS + 2) || len == 0 {
+        if bytes.len() != 8 * len * Self::COLUMNS || len == 0 {
             return chunk;
         }
         chunk.extend_zeroed(len);
-        let mut columns = bytes.chunks_exact(8 * len);
-        let mut next = |to: &mut [u8]| {
-            if let Some(column) = columns.next() {
-                to.copy_from_slice(column);
-            }
-        };
-        for column in 0..Layout::<D>::REALS {
-            next(cast_slice_mut(chunk.column_mut(column)));
+        for (column, values) in bytes.chunks_exact(8 * len).enumerate() {
+            cast_slice_mut(chunk.words_mut(column)).copy_from_slice(values);
         }
-        next(cast_slice_mut(chunk.ids_mut()));
-        next(cast_slice_mut(chunk.tags_mut()));
         chunk
     }
 
@@ -254,13 +262,9 @@ impl<const D: usize> Chunk<D> {
         let halves = self.column(Layout::<D>::HALF);
         gone.iter().for_each(|&p| widest.remove(halves[p as usize]));
         self.widest = widest;
-        for column in 0..Layout::<D>::REALS {
-            let values = self.values_mut(column);
+        for column in 0..Self::COLUMNS {
+            let values = self.words_mut(column);
             moves.iter().for_each(|&(to, from)| values[to] = values[from]);
-        }
-        for (to, from) in moves {
-            self.ids[to] = self.ids[from];
-            self.tags[to] = self.tags[from];
         }
         self.len = len;
         self.give_back();
@@ -271,14 +275,7 @@ impl<const D: usize> Chunk<D> {
         if self.len == 0 {
             *self = Self::new();
         } else if self.capacity > self.len + self.len / 4 + 4 * CAPACITY_STEP {
-            let mut smaller = Self::with_capacity(self.len + self.len / 16);
-            (smaller.len, smaller.widest) = (self.len, self.widest);
-            for column in 0..Layout::<D>::REALS {
-                smaller.values_mut(column).copy_from_slice(self.column(column));
-            }
-            smaller.ids_mut().copy_from_slice(self.ids());
-            smaller.tags_mut().copy_from_slice(self.tags());
-            *self = smaller;
+            self.set_capacity(rounded(self.len + self.len / 16));
         }
     }
 
@@ -286,32 +283,36 @@ impl<const D: usize> Chunk<D> {
     pub fn gathered(&self, source: &[u32]) -> Self {
         let mut out = Self::with_capacity(source.len());
         out.extend_zeroed(source.len());
-        for column in 0..Layout::<D>::REALS {
-            let from = self.column(column);
-            out.column_mut(column).iter_mut().zip(source).for_each(|(value, &p)| *value = from[p as usize]);
+        for column in 0..Self::COLUMNS {
+            let from = self.words(column);
+            out.words_mut(column).iter_mut().zip(source).for_each(|(value, &p)| *value = from[p as usize]);
         }
-        out.ids_mut().iter_mut().zip(source).for_each(|(id, &p)| *id = self.ids[p as usize]);
-        out.tags_mut().iter_mut().zip(source).for_each(|(tag, &p)| *tag = self.tags[p as usize]);
         out
     }
 
     /// Makes room for exactly `capacity` particles (rounded up to an odd multiple of 8) if there is less.
     pub fn reserve_exact(&mut self, capacity: usize) {
-        if capacity <= self.capacity {
-            return;
+        if capacity > self.capacity {
+            self.set_capacity(rounded(capacity));
         }
-        // An odd multiple: with powers of two all columns would share a few sets of the cache.
-        let capacity = (capacity.div_ceil(CAPACITY_STEP) | 1) * CAPACITY_STEP;
-        let mut lines = vec![Line::zeroed(); capacity / CAPACITY_STEP * Layout::<D>::REALS];
-        let reals: &mut [f64] = cast_slice_mut(&mut lines);
-        for column in 0..Layout::<D>::REALS {
-            reals[column * capacity..][..self.len].copy_from_slice(self.column(column));
+    }
+
+    /// Moves the columns apart or closer together.
+    fn set_capacity(&mut self, capacity: usize) {
+        let (before, len) = (self.capacity, self.len);
+        let lines = capacity / CAPACITY_STEP * Self::COLUMNS;
+        let move_column = |words: &mut [u64], column: usize| {
+            words.copy_within(column * before..column * before + len, column * capacity);
+        };
+        if capacity > before {
+            self.block.resize(lines);
+            let words: &mut [u64] = cast_slice_mut(&mut self.block);
+            (0..Self::COLUMNS).rev().for_each(|column| move_column(words, column));
+        } else {
+            let words: &mut [u64] = cast_slice_mut(&mut self.block);
+            (0..Self::COLUMNS).for_each(|column| move_column(words, column));
+            self.block.resize(lines);
         }
-        self.lines = lines;
-        self.ids.reserve_exact(capacity - self.ids.len());
-        self.ids.resize(capacity, 0);
-        self.tags.reserve_exact(capacity - self.tags.len());
-        self.tags.resize(capacity, 0);
         self.capacity = capacity;
     }
 
@@ -322,6 +323,12 @@ impl<const D: usize> Chunk<D> {
             self.reserve_exact(needed.max(self.capacity + self.capacity / 32 + CAPACITY_STEP));
         }
     }
+}
+
+/// The next capacity that is an odd multiple of the step: with powers of two all columns would share a few sets of the
+/// cache.
+fn rounded(capacity: usize) -> usize {
+    (capacity.div_ceil(CAPACITY_STEP) | 1) * CAPACITY_STEP
 }
 
 #[cfg(test)]

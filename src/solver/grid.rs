@@ -17,6 +17,7 @@ use crate::grid::exchange::ReceivedSums;
 use crate::grid::known::Allowance;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::Scheme;
+use crate::memory::Block;
 use crate::particle::Chunk;
 
 /// Plan, arenas, fields and exchanges.
@@ -60,8 +61,8 @@ impl<const D: usize> Grid<D> {
     pub(super) fn clear(&mut self) {
         self.arenas = Arenas::default();
         self.increments = Increments::default();
-        self.fields.rows = Vec::new();
-        self.fields.moments = Vec::new();
+        self.fields.rows = Block::default();
+        self.fields.moments = Block::default();
     }
 
     /// What the particles scattered last.
@@ -71,7 +72,7 @@ impl<const D: usize> Grid<D> {
 
     /// In how many waves bins scatter.
     pub(super) fn waves(&self) -> usize {
-        self.arenas.waves().len()
+        self.arenas.waves().count()
     }
 
     /// Heap bytes held.

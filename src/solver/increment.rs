@@ -14,6 +14,7 @@ use super::Solver;
 use super::phases::Phase;
 use super::update::{apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
+use crate::memory::Block;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 
@@ -21,15 +22,15 @@ use crate::particle::chunk::Layout;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Increments {
     /// What is taken off the new velocity to get what particles take: v_0 (FLIP), or `-Σ v_k` over k from 1 (XPIC).
-    base: Vec<Row>,
+    base: Block<Row>,
     /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
-    pub rows: Vec<Row>,
+    pub rows: Block<Row>,
 }
 
 impl Increments {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        (self.base.capacity() + self.rows.capacity()) * size_of::<Row>()
+        size_of_val(&*self.base) + size_of_val(&*self.rows)
     }
 }
 
@@ -52,8 +53,8 @@ impl<const D: usize> Solver<D> {
         };
         let mut base = std::mem::take(&mut self.grid.increments.base);
         if self.physics.transfer == (Transfer::Xpic { order: 1 }) {
-            base.clear();
-            base.resize(self.grid.fields.rows.len(), Row::default());
+            base.resize(self.grid.fields.rows.len());
+            base.fill(Row::default());
         } else {
             self.scatter_velocities();
             base.clone_from(&self.grid.fields.rows);

@@ -1,7 +1,9 @@
-//! Settings of the system's allocator.
-//!
-//! The only call outside of HDF5, MPI and SIMD that needs `unsafe`.
+//! Settings of the system's allocator, and arrays that do without it.
 #![allow(unsafe_code)]
+
+pub mod block;
+
+pub use block::Block;
 
 /// Blocks of at least this many bytes go back to the system as soon as they are freed: far above what steps allocate, and
 /// below the columns that a file is written from.
