@@ -64,6 +64,8 @@ pub fn section(
     row("particle-steps, millions", steps.map(|steps| steps / 1e6), 0);
     row("wall time, s", [adaptive.wall, uniform.wall], 1);
     row("processor time, s", [adaptive.processor, uniform.processor], 1);
+    let each = [adaptive.processor / steps[0], uniform.processor / steps[1]];
+    row("processor time per particle-step, ns", each.map(|seconds| seconds * 1e9), 0);
     let memory = [adaptive.memory(), uniform.memory()];
     row("memory, MB", memory.map(|bytes| bytes / 1e6), 0);
     row("memory without the program, MB", memory.map(|bytes| (bytes - floor) / 1e6), 0);
