@@ -117,7 +117,7 @@ impl<const D: usize> Arenas<D> {
             self.occupied.push(Occupied { bin, touched, moments: moments_of_bin, window });
             moments += count;
         }
-        let size = (!self.keep).then(Waves::usual_size);
+        let size = (!self.keep).then(Waves::usual_size::<D>);
         let reached = |bin: u32| plan.bins[bin as usize].reached();
         self.waves.plan(size, seam, reached, self.occupied.iter().map(|arena| arena.bin));
         for (number, arena) in self.occupied.iter().enumerate() {

@@ -62,7 +62,7 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
-    /// Heap bytes held.
+    /// Bytes held, those of blocks that were never reached among them, which take none.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }

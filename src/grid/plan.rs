@@ -94,7 +94,8 @@ pub struct GridPlan<const D: usize> {
 impl<const D: usize> Bin<D> {
     /// The blocks around, in order.
     pub fn reached(&self) -> impl Iterator<Item = usize> {
-        self.around.iter().filter(|block| **block != NO_BLOCK).map(|block| *block as usize)
+        let around = &self.around[..offset_count(D)];
+        around.iter().filter(|block| **block != NO_BLOCK).map(|block| *block as usize)
     }
 }
 

@@ -7,9 +7,11 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::plan::GridPlan;
+use crate::kernel::{Row, arena_nodes};
 
-/// Bins of a wave, for each thread: enough that threads rarely wait for the last ones.
-const BINS_PER_THREAD: usize = 64;
+/// Bytes of the arenas of a wave, for each thread: few enough for its cache, and so many bins (64 in 3D) that threads rarely
+/// wait for the last ones.
+const BYTES_PER_THREAD: usize = 64 * size_of::<Row>() * arena_nodes(3);
 
 /// What bins and blocks have to do with other ranks.
 #[derive(Clone, Debug, Default)]
@@ -59,8 +61,8 @@ pub const FIRST: usize = 0;
 
 impl Waves {
     /// Bins of a wave for all threads.
-    pub fn usual_size() -> usize {
-        BINS_PER_THREAD * rayon::current_num_threads()
+    pub fn usual_size<const D: usize>() -> usize {
+        BYTES_PER_THREAD / (size_of::<Row>() * arena_nodes(D)) * rayon::current_num_threads()
     }
 
     /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` says which blocks a bin reaches. Without

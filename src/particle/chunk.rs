@@ -79,7 +79,7 @@ impl<const D: usize> Chunk<D> {
         self.capacity
     }
 
-    /// Heap bytes held.
+    /// Bytes held.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.block)
     }
