@@ -2,6 +2,7 @@
 use std::sync::Arc;
 
 use super::constrained::{ArenaConstraints, ArenaMoments};
+use super::cutter::Cutter;
 use super::plan::GridPlan;
 use super::waves::{Seam, Waves};
 use super::window::Window;
@@ -134,19 +135,15 @@ impl<const D: usize> Arenas<D> {
 
     /// The arenas of the bins of a wave, mutable and disjoint, in bin order.
     pub fn of_wave(&mut self, wave: usize) -> Vec<ArenaMut<'_, D>> {
-        let (mut rows, mut moments) = (self.rows.chunks_mut(arena_nodes(D)), &mut self.moments[..]);
-        let (mut next_slot, mut next_moment) = (0, 0);
+        let nodes = arena_nodes(D);
+        let (mut rows, mut moments) = (Cutter::new(&mut self.rows, 0), Cutter::new(&mut self.moments, 0));
         let own = self.waves.bins(wave).iter().map(|&number| &self.occupied[number as usize]);
         let mut arenas: Vec<ArenaMut<'_, D>> = own
-            .filter_map(|arena| {
-                let slot = self.slot[arena.bin as usize];
-                let rows = rows.nth((slot - next_slot) as usize)?;
-                next_slot = slot + 1;
-                let [first, end] = arena.moments;
-                let (_, rest) = std::mem::take(&mut moments).split_at_mut((first - next_moment) as usize);
-                let (own, rest) = rest.split_at_mut((end - first) as usize);
-                (moments, next_moment) = (rest, end);
-                Some(ArenaMut { bin: arena.bin as usize, rows, moments: own, next: 0 })
+            .map(|arena| {
+                let slot = self.slot[arena.bin as usize] as usize;
+                let rows = rows.cut(slot * nodes..(slot + 1) * nodes);
+                let [first, end] = arena.moments.map(|moment| moment as usize);
+                ArenaMut { bin: arena.bin as usize, rows, moments: moments.cut(first..end), next: 0 }
             })
             .collect();
         for first in 1..arenas.len() {

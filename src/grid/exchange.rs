@@ -42,8 +42,6 @@ pub(super) struct SentPiece<const D: usize> {
 pub struct ArenaExchange<const D: usize> {
     exchange: NeighbourExchange,
     sent: Vec<Vec<SentPiece<D>>>,
-    /// Per block, whether neighbours need sums of all own bins that reach some nodes.
-    asked: Vec<bool>,
     received_from: Vec<std::ops::Range<usize>>,
 }
 
@@ -111,12 +109,8 @@ impl<const D: usize> ArenaExchange<D> {
                 start..plan.pieces.partition_point(|piece| piece.rank <= rank)
             })
             .collect();
-        let mut asked = vec![false; plan.blocks.len()];
-        for piece in sent.iter().flatten().filter(|piece| piece.keys.is_none()) {
-            asked[piece.block as usize] = true;
-        }
         let exchange = NeighbourExchange::new(comm, ranks, TAG);
-        (Self { exchange, sent, asked, received_from }, ReceivedSums::new(plan))
+        (Self { exchange, sent, received_from }, ReceivedSums::new(plan))
     }
 
     /// Ranks with which sums are exchanged.
@@ -126,7 +120,12 @@ impl<const D: usize> ArenaExchange<D> {
 
     /// What own bins and blocks have to do with other ranks.
     pub fn seam(&self, plan: &GridPlan<D>) -> Seam {
-        Seam::new(plan, self.sent_bins(plan), self.asked.clone())
+        // Of these blocks neighbours need sums of all own bins that reach some nodes.
+        let mut is_asked = vec![false; plan.blocks.len()];
+        for piece in self.sent.iter().flatten().filter(|piece| piece.keys.is_none()) {
+            is_asked[piece.block as usize] = true;
+        }
+        Seam::new(plan, self.sent_bins(plan), is_asked)
     }
 
     /// Per bin, whether it reaches a block of which some neighbour needs sums.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::arena::Arenas;
 use super::columns::axes_in;
+use super::cutter::Cutter;
 use super::exchange::ReceivedSums;
 use super::mask::{bits, block_nodes, offset_count};
 use super::mixed::Mixed;
@@ -165,26 +166,21 @@ impl<const D: usize> NodeFields<D> {
 
     /// Some blocks, which ascend.
     fn slots(&mut self, plan: &GridPlan<D>, blocks: &[u32]) -> Vec<Slot<'_>> {
-        let mut rows = self.rows.chunks_mut(block_nodes(D));
-        let (mut active, mut dirty) = (self.active.iter_mut(), self.dirty.iter_mut());
-        let (mut touched, mut moments) = (self.touched.iter_mut(), &mut self.moments[..]);
-        let (mut next, mut next_moment) = (0, 0);
+        let nodes = block_nodes(D);
+        let (mut rows, mut moments) = (Cutter::new(&mut self.rows, 0), Cutter::new(&mut self.moments, 0));
+        let (mut active, mut dirty) = (Cutter::new(&mut self.active, 0), Cutter::new(&mut self.dirty, 0));
+        let mut touched = Cutter::new(&mut self.touched, 0);
         let slot = |&block: &u32| {
-            let between = (block - next) as usize;
-            next = block + 1;
-            let columns = plan.moments_of(block as usize);
-            let (_, rest) = std::mem::take(&mut moments).split_at_mut(columns.start - next_moment);
-            let (own, rest) = rest.split_at_mut(columns.len());
-            (moments, next_moment) = (rest, columns.end);
-            Some(Slot {
-                rows: rows.nth(between)?,
-                moments: own,
-                active: active.nth(between)?,
-                dirty: dirty.nth(between)?,
-                touched: touched.nth(between)?,
-            })
+            let block = block as usize;
+            Slot {
+                rows: rows.cut(block * nodes..(block + 1) * nodes),
+                moments: moments.cut(plan.moments_of(block)),
+                active: &mut active.cut(block..block + 1)[0],
+                dirty: &mut dirty.cut(block..block + 1)[0],
+                touched: &mut touched.cut(block..block + 1)[0],
+            }
         };
-        blocks.iter().filter_map(slot).collect()
+        blocks.iter().map(slot).collect()
     }
 
     /// Nodes that own arenas touch in this step, of a block whose sums other ranks ask for.

@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use super::arena::Arenas;
 use super::columns::axes_in;
+use super::cutter::Cutter;
 use super::fields::NodeFields;
 use super::links::{Child, FineBlock};
 use super::mask::{bits, block_nodes, offset};
@@ -222,19 +223,14 @@ fn for_each_linked<'a, const D: usize, T: Sync + 'a>(
     work: impl Fn(BlockMut<'_>, &T) + Sync,
 ) {
     let nodes = block_nodes(D);
-    let Half { mut rows, mut moments, first_block, first_column } = half;
-    let (mut next_block, mut next_column) = (first_block, first_column);
-    let mut tasks = Vec::new();
-    for (block, with) in blocks {
-        let block = block as usize;
-        let (_, rest) = std::mem::take(&mut rows).split_at_mut((block - next_block) * nodes);
-        let (own, rest) = rest.split_at_mut(nodes);
-        (rows, next_block) = (rest, block + 1);
-        let columns = plan.moments_of(block);
-        let (_, rest) = std::mem::take(&mut moments).split_at_mut(columns.start - next_column);
-        let (own_moments, rest) = rest.split_at_mut(columns.len());
-        (moments, next_column) = (rest, columns.end);
-        tasks.push((with, BlockMut { rows: own, moments: own_moments }));
-    }
+    let mut rows = Cutter::new(half.rows, half.first_block * nodes);
+    let mut moments = Cutter::new(half.moments, half.first_column);
+    let tasks: Vec<_> = blocks
+        .map(|(block, with)| {
+            let block = block as usize;
+            let rows = rows.cut(block * nodes..(block + 1) * nodes);
+            (with, BlockMut { rows, moments: moments.cut(plan.moments_of(block)) })
+        })
+        .collect();
     tasks.into_par_iter().with_min_len(4).for_each(|(with, block)| work(block, with));
 }

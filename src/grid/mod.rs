@@ -9,6 +9,7 @@ pub mod closure;
 pub mod columns;
 pub mod constrained;
 pub mod constraint;
+mod cutter;
 pub mod direct;
 pub mod exchange;
 pub mod feeders;
