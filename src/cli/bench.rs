@@ -3,6 +3,7 @@ use std::io::Write;
 
 use partition::comm::{Comm, World};
 
+use super::message::together;
 use super::run::start_threads;
 use super::{Failure, grouped};
 use crate::bench::jobs::{BenchJob, JOBS};
@@ -58,7 +59,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     }
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    start_threads(comm, Some(arguments.threads))?;
+    together(comm, start_threads(comm, Some(arguments.threads)))?;
     let directory = std::env::temp_dir().join(format!("agimp-bench-{}", std::process::id()));
     let made = if comm.rank() == 0 { std::fs::create_dir_all(&directory) } else { Ok(()) };
     let made = made.map_err(|error| format!("cannot create {}: {error}", directory.display()));
@@ -71,10 +72,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         // Only telemetry of these runs; if it cannot be removed, the system will some day.
         let _ = std::fs::remove_dir_all(&directory);
     }
-    match done {
-        Err(failure) if comm.rank() != 0 => Err(Failure::Elsewhere(failure.exit_code())),
-        done => done,
-    }
+    together(comm, done)
 }
 
 fn measure_all(

@@ -9,6 +9,7 @@ pub mod diff;
 pub mod digest;
 pub mod info;
 pub mod material;
+mod message;
 pub mod new;
 pub mod plot;
 pub mod run;
@@ -67,9 +68,9 @@ pub enum Failure {
     /// The run was asked to stop and has written a checkpoint.
     #[error("stopped on request; go on with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
-    /// Another rank reports the failure; this one only ends with the same exit code.
-    #[error("another rank reports the failure")]
-    Elsewhere(u8),
+    /// All is said; what is left is to end with this exit code.
+    #[error("a failure that has been told")]
+    Told(u8),
 }
 
 /// Exit code for input that cannot be used.
@@ -81,7 +82,7 @@ impl Failure {
         match self {
             Self::Job(_) | Self::Seed(_) | Self::Usage(_) => BAD_INPUT,
             Self::Run(_) => 1,
-            Self::Elsewhere(code) => *code,
+            Self::Told(code) => *code,
             Self::Stopped(_) => crate::run::stop::STOPPED,
         }
     }

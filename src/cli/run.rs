@@ -1,10 +1,11 @@
 //! `agimp run`: runs a job, alone or on the ranks of `mpirun`.
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use partition::comm::{Comm, World};
 
-use super::{BAD_INPUT, Failure};
+use super::Failure;
+use super::message::together;
 use crate::job::problem::AnyProblem;
 use crate::run::stop::StopRequest;
 use crate::run::{self, Options, Outcome, RunError, Summary, restart};
@@ -33,8 +34,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    let problem = load(comm, &arguments.job)?;
-    let threads = start_threads(comm, arguments.threads)?;
+    let problem = together(comm, crate::job::load(&arguments.job).map_err(Failure::from))?;
+    let threads = together(comm, start_threads(comm, arguments.threads))?;
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from {
             "latest" => restart::From::Latest,
@@ -47,31 +48,17 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
-    let failure = match outcome {
-        Ok(Outcome::Finished(summary)) => {
-            if options.speaks {
-                print(&mut std::io::stdout().lock(), &summary)?;
-            }
-            return Ok(());
-        }
-        Ok(Outcome::Stopped { checkpoint }) => Failure::Stopped(checkpoint),
-        Err(error @ RunError::Seed(_)) => Failure::Usage(error.to_string()),
-        Err(error) => Failure::Run(error.to_string()),
-    };
-    // All ranks have the same; one message is enough.
-    Err(if comm.rank() == 0 { failure } else { Failure::Elsewhere(failure.exit_code()) })
+    together(comm, conclude(outcome, options.speaks))
 }
 
-/// Collective. Every rank reads the job. If that fails on any of them, the lowest of these tells why.
-fn load(comm: &Comm, path: &Path) -> Result<AnyProblem, Failure> {
-    let loaded = crate::job::load(path);
-    let ranks = comm.size() as u64;
-    let mut lowest = [if loaded.is_err() { comm.rank() as u64 } else { ranks }];
-    comm.min_u64(&mut lowest);
-    match loaded {
-        Ok(problem) if lowest[0] == ranks => Ok(problem),
-        Err(error) if lowest[0] == comm.rank() as u64 => Err(error.into()),
-        _ => Err(Failure::Elsewhere(BAD_INPUT)),
+/// Tells how a finished run ended; anything else is a failure.
+fn conclude(outcome: Result<Outcome, RunError>, speaks: bool) -> Result<(), Failure> {
+    match outcome {
+        Ok(Outcome::Finished(summary)) if speaks => Ok(print(&mut std::io::stdout().lock(), &summary)?),
+        Ok(Outcome::Finished(_)) => Ok(()),
+        Ok(Outcome::Stopped { checkpoint }) => Err(Failure::Stopped(checkpoint)),
+        Err(error @ RunError::Seed(_)) => Err(Failure::Usage(error.to_string())),
+        Err(error) => Err(Failure::Run(error.to_string())),
     }
 }
 
@@ -89,7 +76,7 @@ fn print(out: &mut impl Write, summary: &Summary) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Collective. Starts the threads of this rank and warns when they do not fit the machine.
+/// Starts the threads of this rank.
 pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = wanted.map_or_else(|| (cores / comm.size()).max(1), usize::from);

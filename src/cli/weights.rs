@@ -7,6 +7,7 @@ use partition::{Brick, Forest, MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
 use super::Failure;
+use super::message::together;
 use crate::grid::direct;
 use crate::grid::known::KnownTree;
 use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
@@ -82,12 +83,15 @@ pub struct NodeWeights {
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    let name = arguments.cases.display();
-    let text =
-        std::fs::read_to_string(&arguments.cases).map_err(|error| Failure::Usage(format!("{name}: {error}")));
-    let text = agreed(comm, text)?;
+    together(comm, print(comm, arguments))
+}
+
+fn print(comm: &Comm, arguments: &Arguments) -> Result<(), Failure> {
+    let explain = |message: String| Failure::Usage(format!("{}: {message}", arguments.cases.display()));
+    let text = comm.agree(std::fs::read_to_string(&arguments.cases));
+    let text = text.map_err(|disagreement| explain(disagreement.message))?;
     let output = evaluate(comm, &text, arguments.direct).map_err(|failure| match failure {
-        Failure::Usage(message) => Failure::Usage(format!("{name}: {message}")),
+        Failure::Usage(message) => explain(message),
         other => other,
     })?;
     if comm.rank() == 0 {
@@ -100,7 +104,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
 /// Collective. Weights of all cases in `text`, on rank 0; by definition if `direct`.
 ///
 /// # Errors
-/// The same kind on all ranks; only rank 0 explains it.
+/// The same on all ranks.
 pub fn evaluate(comm: &Comm, text: &str, direct: bool) -> Result<Output, Failure> {
     let input: Result<Input, _> =
         serde_json::from_str(text).map_err(|error| Failure::Usage(error.to_string()));
@@ -108,22 +112,14 @@ pub fn evaluate(comm: &Comm, text: &str, direct: bool) -> Result<Output, Failure
     match (input.dim, input.cells_per_octant_edge) {
         (2, 4) => evaluate_in::<2>(comm, &input, direct),
         (3, 4) => evaluate_in::<3>(comm, &input, direct),
-        (2 | 3, cells) => fail(comm, format!("octants have 4 cells along an edge, not {cells}")),
-        (dim, _) => fail(comm, format!("`dim` is {dim}; it must be 2 or 3")),
+        (2 | 3, cells) => Err(Failure::Usage(format!("octants have 4 cells along an edge, not {cells}"))),
+        (dim, _) => Err(Failure::Usage(format!("`dim` is {dim}; it must be 2 or 3"))),
     }
 }
 
-fn fail<T>(comm: &Comm, message: String) -> Result<T, Failure> {
-    Err(if comm.rank() == 0 { Failure::Usage(message) } else { Failure::Elsewhere(2) })
-}
-
-/// Collective. Fails on all ranks if any rank failed; one rank explains it.
+/// Collective. Fails on all ranks, in the same words, if any rank failed.
 fn agreed<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
-    let text = result.as_ref().err().map(ToString::to_string);
-    match comm.agree(text.map_or(Ok(()), Err)) {
-        Ok(()) => result,
-        Err(disagreement) => fail(comm, disagreement.message),
-    }
+    comm.agree(result).map_err(|disagreement| Failure::Usage(disagreement.message))
 }
 
 fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Result<Output, Failure> {
@@ -151,7 +147,7 @@ fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Resu
         }
     }
     if used < input.cases.len() {
-        return fail(comm, "a case names a tree that is not in the file".into());
+        return Err(Failure::Usage("a case names a tree that is not in the file".into()));
     }
     Ok(Output { cases: found.into_iter().flatten().collect() })
 }

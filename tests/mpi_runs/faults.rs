@@ -207,6 +207,32 @@ fn an_unwritable_directory_ends_all_ranks() {
     assert!(shown.contains("out/few_leaves: cannot create the directory"), "{shown}");
 }
 
+/// Nobody takes the message of rank 0 for three seconds; `mpirun` leaves others one second once a rank has ended.
+#[test]
+fn ranks_end_after_the_message_has_gone_out() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let directory = home.path();
+    // Another process group, which `mpirun` does not end; the pipe is full, so rank 0 cannot write.
+    let slow = r#"
+        if [ "$OMPI_COMM_WORLD_RANK" = 0 ]; then
+            exec 2> >(exec setsid bash -c 'sleep 3; head -c 65536 >/dev/null; cat >told.part; mv told.part told')
+            head -c 65536 /dev/zero >&2
+        fi
+        exec "$0" run missing.toml"#;
+    let mut command = mpirun(directory, 2);
+    command.args(["bash", "-c", slow, env!("CARGO_BIN_EXE_agimp")]);
+    let output = Running::start(&mut command).finish_within(SOON);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    let started = Instant::now();
+    while !directory.join("told").exists() {
+        assert!(started.elapsed() < SOON, "the listener is still there");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let told = std::fs::read_to_string(directory.join("told")).expect("message");
+    assert!(told.starts_with("agimp: missing.toml: cannot be read"), "{told}");
+}
+
 /// A wrong command line is told before MPI starts.
 #[test]
 fn a_wrong_argument_is_told() {

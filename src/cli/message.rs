@@ -1,0 +1,69 @@
+//! How failures are told: once, whatever the number of ranks.
+use std::io::{IsTerminal as _, Write as _};
+
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use partition::comm::Comm;
+
+use super::Failure;
+use crate::job::{FaultList, JobError};
+
+impl Failure {
+    /// Tells the user, unless that is done.
+    pub fn tell(&self) {
+        match self {
+            Self::Job(JobError::Invalid(list)) => explain_faults(list),
+            Self::Told(_) => {}
+            other => tell(&format!("agimp: {other}")),
+        }
+    }
+}
+
+/// Collective. A failure of one rank or of all ends all: the lowest of those that failed tells why, and every
+/// rank gets its exit code. None goes on before that is told: as soon as one rank has ended without success,
+/// `mpirun` ends the others, whatever these still have to say.
+pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
+    let ranks = comm.size() as u64;
+    let mut lowest = [if result.is_err() { comm.rank() as u64 } else { ranks }];
+    comm.min_u64(&mut lowest);
+    let mut code = [u64::from(u8::MAX)];
+    match &result {
+        Ok(_) if lowest[0] == ranks => return result,
+        Err(failure) if lowest[0] == comm.rank() as u64 => {
+            failure.tell();
+            code = [u64::from(failure.exit_code())];
+        }
+        _ => {}
+    }
+    comm.min_u64(&mut code);
+    Err(Failure::Told(code[0] as u8))
+}
+
+/// Writes a message in one piece: `mpirun` may put its own words between pieces. If nobody listens, nobody is told.
+fn tell(text: &str) {
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
+}
+
+/// Each fault on a line of its own that editors and scripts understand, then its place in the file.
+fn explain_faults(list: &FaultList) {
+    let theme =
+        if std::io::stderr().is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
+    let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
+    for fault in &list.faults {
+        let mut diagnostic = MietteDiagnostic::new(list.headline(fault))
+            .with_label(LabeledSpan::at(fault.span.clone(), "here"));
+        if let Some(help) = &fault.help {
+            diagnostic = diagnostic.with_help(help.clone());
+        }
+        let source = NamedSource::new(list.path.display().to_string(), list.text.clone());
+        let report = Report::new(diagnostic).with_source_code(source);
+        let mut text = String::new();
+        match handler.render_report(&mut text, report.as_ref()) {
+            // Without colours the line begins with the file, as editors and scripts like it.
+            Ok(()) => tell(text.strip_prefix("  x ").unwrap_or(&text)),
+            Err(_) => tell(&list.headline(fault)),
+        }
+    }
+    if list.faults.len() > 1 {
+        tell(&format!("agimp: {} faults in {}", list.faults.len(), list.path.display()));
+    }
+}
