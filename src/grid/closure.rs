@@ -13,12 +13,11 @@ use std::collections::BTreeMap;
 use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::constraint::{self, parents_of};
 use super::known::{Cover, KnownTree};
 use super::mask::{
-    arena_overlap, bits, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
+    arena_overlap, box_offsets, lower_face, offset, offset_count, offset_index, opposite, product, shifted,
 };
-use super::parents::ParentTable;
+use super::parents::{ParentTable, coarser_at, parity};
 use super::reach::{SourceSearch, bin_container, interior, own_bins};
 
 /// Node sets of one block.
@@ -84,13 +83,12 @@ struct Builder<'a, const D: usize> {
 impl<const D: usize> Closure<D> {
     /// Not collective. Closes the node sets over the known tree; see [`Closure::missing`].
     pub fn compute(tree: &KnownTree<D>) -> Self {
-        let deepest = tree.leaves().iter().map(|leaf| leaf.level).max().unwrap_or(0);
         let mut builder = Builder {
             tree,
             overlaps: (0..offset_count(D)).map(|index| arena_overlap::<D>(offset(index))).collect(),
             parents: ParentTable::of::<D>(),
             containers: FxHashMap::default(),
-            levels: vec![FxHashMap::default(); deepest as usize + 1],
+            levels: vec![FxHashMap::default(); usize::from(tree.deepest()) + 1],
             received: FxHashMap::default(),
         };
         let bins = own_bins(tree);
@@ -145,11 +143,14 @@ impl<const D: usize> Builder<'_, D> {
                 .filter(|&(_, mask)| mask != 0)
                 .collect();
             for (coord, mask) in blocks {
-                for bit in bits(mask) {
-                    for parent in parents_of::<D>(constraint::node_coord(coord, bit)) {
-                        let (block, bit) = constraint::block_and_bit(parent.node);
-                        self.sets(level as u8 - 1, block).value |= 1 << bit;
+                for corner in 0..1u8 << D {
+                    if self.parents.having(parity(coord), corner) & mask == 0 {
+                        continue;
                     }
+                    let coarse = coarser_at(coord, corner);
+                    let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
+                    let parents = self.parents.parents(offset_index::<D>(place), mask);
+                    self.sets(level as u8 - 1, coarse).value |= parents;
                 }
             }
         }
@@ -189,10 +190,11 @@ impl<const D: usize> Builder<'_, D> {
 
     /// True when an octant in the neighbourhood `coord + {-1, 0, 1}^D` is subdivided.
     fn is_finer_around(&self, level: u8, coord: [u32; D]) -> bool {
-        (0..offset_count(D)).any(|index| {
-            shifted(coord, offset::<D>(index))
-                .is_some_and(|beside| matches!(self.tree.cover(level, beside), Cover::Finer(_)))
-        })
+        level < self.tree.deepest()
+            && (0..offset_count(D)).any(|index| {
+                shifted(coord, offset::<D>(index))
+                    .is_some_and(|beside| matches!(self.tree.cover(level, beside), Cover::Finer(_)))
+            })
     }
 
     /// Whether there is a bin of `level` at `coord`.

@@ -35,16 +35,47 @@ pub(super) fn has_columns<const D: usize>(blocks: &[Block<D>], around: &[u32; 27
 }
 
 /// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
-#[derive(Default)]
-pub(super) struct Tables<const D: usize> {
-    /// By what a table is made from.
+pub(super) struct Tables<'a, const D: usize> {
+    blocks: &'a [Block<D>],
+    /// Second moments of all columns.
+    second: Vec<f64>,
+    /// By block; blocks with equal columns and second moments have the same number.
+    kinds: Vec<u32>,
+    /// By kinds of the blocks around a bin.
+    of_kinds: FxHashMap<[u32; 27], u32>,
+    /// By what a table is made from: parts of different kinds of blocks may be equal.
     numbers: FxHashMap<Vec<u64>, u32>,
     tables: Vec<ArenaConstraints<D>>,
 }
 
-impl<const D: usize> Tables<D> {
-    /// Number of the table for the columns around a bin; `second` holds the second moments of all columns.
-    pub fn number(&mut self, blocks: &[Block<D>], around: &[u32; 27], second: &[f64]) -> u32 {
+impl<'a, const D: usize> Tables<'a, D> {
+    /// `second` holds the second moments of all columns of the blocks.
+    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
+        let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
+        let kinds = blocks.iter().map(|block| {
+            let own = &second[block.moments as usize..][..block.columns.len()];
+            let content = block.columns.along().into_iter().chain(own.iter().map(|second| second.to_bits()));
+            let next = known.len() as u32;
+            *known.entry(content.collect()).or_insert(next)
+        });
+        let kinds = kinds.collect();
+        let (of_kinds, numbers) = Default::default();
+        Self { blocks, second, kinds, of_kinds, numbers, tables: Vec::new() }
+    }
+
+    /// Number of the table for the columns around a bin.
+    pub fn number(&mut self, around: &[u32; 27]) -> u32 {
+        let kinds = around.map(|block| self.kinds.get(block as usize).copied().unwrap_or(NO_BLOCK));
+        if let Some(&number) = self.of_kinds.get(&kinds) {
+            return number;
+        }
+        let number = self.number_by_content(around);
+        self.of_kinds.insert(kinds, number);
+        number
+    }
+
+    fn number_by_content(&mut self, around: &[u32; 27]) -> u32 {
+        let (blocks, second) = (self.blocks, &self.second);
         let mut parts = vec![(Columns::NONE, 0); offset_count(D)];
         let (mut all, mut places): (Vec<Column>, Vec<u8>) = Default::default();
         for (index, block, columns) in shared(blocks, around) {

@@ -33,26 +33,28 @@ impl Feeders {
             outer_start: vec![0; blocks + 1],
             outer: Vec::new(),
         };
-        let mut outer: Vec<(u32, Outer)> = Vec::new();
+        let outer = || (0..).zip(bins).filter(|(_, bin)| !bin.is_inner);
+        outer().for_each(|(_, bin)| bin.reached().for_each(|block| feeders.outer_start[block + 1] += 1));
+        for block in 0..blocks {
+            feeders.outer_start[block + 1] += feeders.outer_start[block];
+        }
+        let mut next = feeders.outer_start.clone();
+        let none = Outer { bin: NO_BIN, position: 0 };
+        feeders.outer = vec![none; feeders.outer_start[blocks] as usize];
         for (number, bin) in (0..).zip(bins) {
             for (towards, &block) in bin.around.iter().enumerate().take(positions) {
                 if block == NO_BLOCK {
                     continue;
                 }
-                let position = opposite(D, towards);
+                let (block, position) = (block as usize, opposite(D, towards));
                 if bin.is_inner {
-                    feeders.inner[block as usize * positions + position] = number;
+                    feeders.inner[block * positions + position] = number;
                 } else {
-                    feeders.outer_start[block as usize + 1] += 1;
-                    outer.push((block, Outer { bin: number, position: position as u8 }));
+                    feeders.outer[next[block] as usize] = Outer { bin: number, position: position as u8 };
+                    next[block] += 1;
                 }
             }
         }
-        for block in 0..blocks {
-            feeders.outer_start[block + 1] += feeders.outer_start[block];
-        }
-        outer.sort_by_key(|(block, _)| *block);
-        feeders.outer = outer.into_iter().map(|(_, outer)| outer).collect();
         feeders
     }
 

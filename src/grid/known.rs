@@ -31,6 +31,8 @@ pub struct KnownTree<const D: usize> {
     own_len: usize,
     reach: u32,
     graded: bool,
+    /// Level of the finest known leaves.
+    deepest: u8,
 }
 
 /// What the ghost layer has to allow for, the same on every rank.
@@ -58,6 +60,7 @@ impl<const D: usize> KnownTree<D> {
             own_len: leaves.len(),
             reach: allowance.reach,
             graded: allowance.graded,
+            deepest: 0,
             leaves,
         };
         tree.index();
@@ -77,6 +80,7 @@ impl<const D: usize> KnownTree<D> {
 
     fn index(&mut self) {
         self.keys = self.leaves.iter().map(Octant::key).collect();
+        self.deepest = self.leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
         self.first_own = self.owners.iter().position(|&owner| owner as usize == self.rank).unwrap_or(0);
         self.slice();
     }
@@ -131,6 +135,11 @@ impl<const D: usize> KnownTree<D> {
         &self.leaves
     }
 
+    /// Level of the finest known leaves.
+    pub fn deepest(&self) -> u8 {
+        self.deepest
+    }
+
     /// Owner of a known leaf.
     pub fn owner(&self, known: usize) -> usize {
         self.owners[known] as usize
@@ -165,6 +174,7 @@ impl<const D: usize> KnownTree<D> {
             own_len: leaves.len(),
             reach: 0,
             graded: false,
+            deepest: 0,
             leaves,
         };
         tree.leaves.sort_unstable_by_key(Octant::key);
@@ -215,7 +225,8 @@ impl<const D: usize> KnownTree<D> {
     /// The known leaf that contains the finest-level position `key`.
     pub fn locate(&self, key: u64) -> Option<usize> {
         let candidate = self.leaves_below(key, true).checked_sub(1)?;
-        (key < self.leaves[candidate].key_end()).then_some(candidate)
+        // Less work than `key_end`.
+        (key - self.keys[candidate] < self.leaves[candidate].volume()).then_some(candidate)
     }
 
     /// What covers the octant of `level` at `coord`.

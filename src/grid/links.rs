@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::columns::{Columns, axes_in};
 use super::mask::{bits, block_nodes, node_of_bit, offset};
-use super::parents::{ParentTable, parity, weight_of};
+use super::parents::{ParentTable, coarser_at, parity, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 
 /// A block with constrained nodes.
@@ -77,7 +77,7 @@ impl<const D: usize> GridPlan<D> {
                 (block.sum & block.constrained, (block.sum | block.value) & block.constrained);
             let mut fine = FineBlock { block: index as u32, parents: [NO_BLOCK; 8] };
             for corner in (0..1u8 << D).filter(|&corner| table.having(parity, corner) & needed != 0) {
-                let coord = std::array::from_fn(|axis| block.coord[axis] / 2 + u32::from(corner >> axis & 1));
+                let coord = coarser_at(block.coord, corner);
                 let Some(&coarse) = number.get(&(level - 1, coord)) else { continue };
                 fine.parents[usize::from(corner)] = coarse;
                 if table.having(parity, corner) & summed != 0 && self.blocks[coarse as usize].sum != 0 {

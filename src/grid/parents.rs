@@ -97,6 +97,11 @@ pub fn parity<const D: usize>(coord: [u32; D]) -> usize {
     (0..D).fold(0, |parity, axis| parity | (coord[axis] as usize & 1) << axis)
 }
 
+/// Coordinate of the coarser block at a corner of a fine one: `corner` has a bit for each axis.
+pub fn coarser_at<const D: usize>(coord: [u32; D], corner: u8) -> [u32; D] {
+    std::array::from_fn(|axis| coord[axis] / 2 + u32::from(corner >> axis & 1))
+}
+
 /// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
 pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
     offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
@@ -116,8 +121,7 @@ mod tests {
                     .of_node::<3>(parity(coord), bit)
                     .iter()
                     .map(|parent| {
-                        let block =
-                            [0, 1, 2].map(|axis| coord[axis] / 2 + u32::from(parent.corner >> axis & 1));
+                        let block = coarser_at(coord, parent.corner);
                         assert_eq!(table.having(parity(coord), parent.corner) >> bit & 1, 1);
                         (node_coord(block, parent.bit.into()), offset::<3>(parent.offset.into()))
                     })

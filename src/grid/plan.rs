@@ -138,13 +138,12 @@ impl<const D: usize> GridPlan<D> {
         plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.find_face_nodes();
-        let spread = plan.constraint_spread();
-        let (mut tables, mut number) = (Tables::default(), Vec::new());
+        let (mut tables, mut number) = (Tables::new(&plan.blocks, plan.constraint_spread()), Vec::new());
         for bin in &mut plan.bins {
             if let Some(of_block) = bin.touched {
                 // So far blocks are numbered, in the order of the first bin that has them.
                 if of_block as usize == number.len() {
-                    number.push(tables.number(&plan.blocks, &bin.around, &spread));
+                    number.push(tables.number(&bin.around));
                 }
                 bin.touched = Some(number[of_block as usize]);
             }

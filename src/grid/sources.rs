@@ -89,7 +89,8 @@ impl<const D: usize> GridPlan<D> {
         let mut pieces: Vec<Piece<D>> = Vec::new();
         let mut parts: Vec<(u32, Part)> = Vec::new();
         let mut candidates = Vec::new();
-        for block in 0..self.blocks.len() {
+        // A rank that knows no leaves of others needs nothing of them.
+        for block in 0..if self.tree.ghost_len() > 0 { self.blocks.len() } else { 0 } {
             candidates.clear();
             search.add_remote(self, rank, block, &mut candidates);
             if !candidates.is_empty() {

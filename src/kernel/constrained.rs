@@ -2,6 +2,8 @@
 //!
 //! In most arenas beside a level jump a few layers of nodes are constrained, and of their moments most columns are zero
 //! (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its own nodes.
+use std::sync::LazyLock;
+
 use super::batch::{Batch, lanes_in};
 use super::simd::{LANES, Lanes};
 use super::weights::Weights;
@@ -47,15 +49,23 @@ impl ConstrainedNodes {
     pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>) -> Self {
         let columns: Vec<Column> = columns.into_iter().collect();
         let lists = D * stencil_bases(D);
+        let seen = Seen::of::<D>();
         let mut start = vec![0; lists + 1];
-        each_visit::<D>(&columns, |list, _| start[list + 1] += 1);
+        for column in &columns {
+            for &(base, _) in seen.from(column.node) {
+                start[D * usize::from(base) + column.axis + 1] += 1;
+            }
+        }
         (0..lists).for_each(|list| start[list + 1] += start[list]);
         let mut visits = vec![Visit::default(); usize::from(start[lists])];
         let mut next = start.clone();
-        each_visit::<D>(&columns, |list, visit| {
-            visits[usize::from(next[list])] = visit;
-            next[list] += 1;
-        });
+        for (number, column) in (0..).zip(&columns) {
+            for &(base, node) in seen.from(column.node) {
+                let place = &mut next[D * usize::from(base) + column.axis];
+                visits[usize::from(*place)] = Visit { node, axis: column.axis as u8, column: number };
+                *place += 1;
+            }
+        }
         Self { visits, start, second: columns.iter().map(|column| column.second).collect() }
     }
 
@@ -152,20 +162,41 @@ impl ConstrainedNodes {
     }
 }
 
-/// Calls `f` with the list and the visit of each column in each stencil.
-fn each_visit<const D: usize>(columns: &[Column], mut f: impl FnMut(usize, Visit)) {
-    for (column, &Column { node, axis, .. }) in (0..).zip(columns) {
-        let at: [usize; D] = std::array::from_fn(|k| node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE);
-        for visit in 0..3usize.pow(D as u32) {
-            // The stencil has the node at `visit` if its base is a valid one.
-            let base = (0..D).try_fold(0, |base, k| {
-                let first = at[k].checked_sub(visit / 3usize.pow(k as u32) % 3)?;
-                (first < stencil_bases(1)).then(|| base + first * stencil_bases(k))
-            });
-            if let Some(base) = base {
-                f(D * base + axis, Visit { node: visit as u8, axis: axis as u8, column });
+/// Which stencils have each node of an arena.
+struct Seen {
+    /// Base of the stencil and the node's number in it, node by node.
+    from: Vec<(u8, u8)>,
+    /// First of each node, and the end.
+    start: Vec<u16>,
+}
+
+static SEEN_IN_2D: LazyLock<Seen> = LazyLock::new(Seen::new::<2>);
+static SEEN_IN_3D: LazyLock<Seen> = LazyLock::new(Seen::new::<3>);
+
+impl Seen {
+    fn of<const D: usize>() -> &'static Self {
+        if D == 2 { &SEEN_IN_2D } else { &SEEN_IN_3D }
+    }
+
+    fn new<const D: usize>() -> Self {
+        let mut seen = Self { from: Vec::new(), start: vec![0] };
+        for node in 0..ARENA_EDGE.pow(D as u32) {
+            let at: [usize; D] = std::array::from_fn(|k| node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE);
+            for number in 0..3usize.pow(D as u32) {
+                let base = (0..D).try_fold(0, |base, k| {
+                    let first = at[k].checked_sub(number / 3usize.pow(k as u32) % 3)?;
+                    (first < stencil_bases(1)).then(|| base + first * stencil_bases(k))
+                });
+                seen.from.extend(base.map(|base| (base as u8, number as u8)));
             }
+            seen.start.push(seen.from.len() as u16);
         }
+        seen
+    }
+
+    /// Base of each stencil that has a node, and the number of the node in it.
+    fn from(&self, node: usize) -> &[(u8, u8)] {
+        &self.from[usize::from(self.start[node])..usize::from(self.start[node + 1])]
     }
 }
 
