@@ -2,6 +2,7 @@
 use partition::Octant;
 use partition::comm::Comm;
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use super::grid::reach_of_width;
 use super::migrate::leaf_box;
@@ -309,7 +310,8 @@ impl<const D: usize> Solver<D> {
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).enumerate();
         let tried = leaves.with_min_len(64).filter(|(_, (_, look))| look.due || look.stale);
         tried.for_each(|(number, ((chunk, leaf), _))| {
-            let refused = reports.get(number).map_or(&[][..], |report| &report.refused);
+            let nobody = FxHashSet::default();
+            let refused = reports.get(number).map_or(&nobody, |report| &report.refused);
             patience::count(chunk, leaf.level, turns[number], refused);
         });
     }

@@ -11,6 +11,7 @@
 //! the caller tries the combinations of axes in turn.
 use super::super::chunk::Chunk;
 use super::merge::{Limits, of_level};
+use super::numbered::Numbered;
 use super::sieve::Sieve;
 use super::{Setting, ids, patience};
 use crate::particle::chunk::Tag;
@@ -35,6 +36,8 @@ pub(super) struct Sibling {
 pub(super) fn parents<const D: usize>(chunk: &Chunk<D>, of: impl Iterator<Item = u32>) -> Vec<u64> {
     let parent = |p: u32| ids::parent::<D>(chunk.ids()[p as usize]);
     let mut parents: Vec<u64> = of.filter_map(parent).map(|(parent, _)| parent).collect();
+    // Siblings are neighbours in the chunk as a rule.
+    parents.dedup();
     parents.sort_unstable();
     parents.dedup();
     parents
@@ -43,14 +46,21 @@ pub(super) fn parents<const D: usize>(chunk: &Chunk<D>, of: impl Iterator<Item =
 /// Particles of a level that have one of the parents (ascending), by parent and number.
 pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8, parents: &[u64]) -> Vec<Sibling> {
     let sieve = Sieve::of(parents.iter().copied());
-    let with_parent = |(p, tag): (u32, u64)| {
-        let (parent, number) = ids::parent::<D>(chunk.ids()[p as usize])?;
-        let is_one = sieve.may_hold(parent) && parents.binary_search(&parent).is_ok();
-        is_one.then_some(Sibling { parent, tag, number, p })
-    };
-    let mut siblings: Vec<Sibling> = of_level(chunk, level).filter_map(with_parent).collect();
-    siblings.sort_unstable();
-    siblings
+    let (mut found, mut last) = (Vec::new(), 0);
+    for (p, tag) in of_level(chunk, level) {
+        let Some((parent, number)) = ids::parent::<D>(chunk.ids()[p as usize]) else { continue };
+        if parents.get(last) != Some(&parent) {
+            if !sieve.may_hold(parent) {
+                continue;
+            }
+            let Ok(place) = parents.binary_search(&parent) else { continue };
+            last = place;
+        }
+        found.push((last as u32, Sibling { parent, tag, number, p }));
+    }
+    let mut siblings = Numbered::new(&found, parents.len());
+    siblings.each().for_each(|family| family.sort_unstable());
+    siblings.into_items()
 }
 
 /// Whether two are siblings that may become one.
@@ -92,7 +102,7 @@ fn parents_of_split<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<u64> {
     parents
 }
 
-/// Indices, ascending, of particles of a level with one of the parents (ascending) whose siblings may still come, so
+/// Indices of particles of a level with one of the parents (ascending) whose siblings may still come, so
 /// that they are no strangers.
 pub(super) fn waiting<const D: usize>(
     chunk: &Chunk<D>,
@@ -125,7 +135,6 @@ pub(super) fn waiting<const D: usize>(
             waiting.extend(patient.filter(|&p| !patience::has_given_up(chunk.tags()[p as usize])));
         }
     }
-    waiting.sort_unstable();
     waiting
 }
 

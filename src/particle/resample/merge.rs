@@ -1,8 +1,10 @@
 //! Several particles become one.
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
-use super::sieve::Sieve;
+use super::numbered::Numbered;
 use super::{Setting, patience, volume};
 
 /// How different particles may be that become one.
@@ -45,8 +47,8 @@ pub struct Merged {
     /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
     /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
-    /// Identifiers, ascending, of particles that the limits keep apart, or that are alone.
-    pub refused: Vec<u64>,
+    /// Identifiers of particles that the limits keep apart, or that are alone.
+    pub refused: FxHashSet<u64>,
 }
 
 /// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
@@ -107,7 +109,6 @@ pub fn merge<const D: usize>(
             replace(chunk, &mut unnamed, &stays, &mut done, &mixtures.chunk);
         }
     }
-    report.refused.sort_unstable();
     report.unnamed = (0..).zip(unnamed).filter(|(_, unnamed)| *unnamed).map(|(p, _)| p).collect();
     report
 }
@@ -160,7 +161,7 @@ fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Gr
 
 /// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
 /// body and cell; in cells where one of the given ones is. Identifiers of those among the given ones that are alone are
-/// appended to `refused`.
+/// added to `refused`.
 fn strangers<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
@@ -168,37 +169,47 @@ fn strangers<const D: usize>(
     bounds: &Bounds<D>,
     level: u8,
     with: &[u32],
-    refused: &mut Vec<u64>,
+    refused: &mut FxHashSet<u64>,
 ) -> Vec<Group> {
+    let waiting = |of: &[u32]| {
+        let parents = family::parents(chunk, of.iter().copied());
+        let mut waits = vec![false; chunk.len()];
+        let waiting = family::waiting(chunk, setting, limits, bounds, level, &parents);
+        waiting.iter().for_each(|&p| waits[p as usize] = true);
+        waits
+    };
+    // Most of those that the limits keep apart wait for siblings; their cells need not be searched.
+    let waits = waiting(with);
+    let with: Vec<u32> = with.iter().copied().filter(|&p| !waits[p as usize]).collect();
+    if with.is_empty() {
+        return Vec::new();
+    }
     let per_spacing = |body| 0.5 / setting.nominal(Tag { material: 0, body, level }, level - 1);
     let per_spacing: Vec<f64> = (0..setting.nominal.len() as u16).map(per_spacing).collect();
     let cell_of = |p: u32, tag: u64| {
         let per_spacing = per_spacing[usize::from(Tag::unpack(tag).body)];
-        (tag, chunk.position(p as usize).map(|x| (x * per_spacing).floor() as i64))
+        // In one number, which is quick to hash: 42 bits for each coordinate, in their order.
+        let place = |x: f64| ((x * per_spacing).floor() as i64 + (1 << 41)) as u128;
+        (tag, chunk.position(p as usize).iter().fold(0, |cell, &x| cell << 42 | place(x)))
     };
-    let mut cells: Vec<(u64, [i64; D])> =
-        with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize]))).collect();
-    cells.sort_unstable();
-    cells.dedup();
-    let key =
-        |(tag, cell): &(u64, [i64; D])| cell.iter().fold(*tag, |key, &c| key.rotate_left(21) ^ c as u64);
-    let sieve = Sieve::of(cells.iter().map(key));
-    let in_cells = of_level(chunk, level).map(|(p, tag)| (cell_of(p, tag), p));
-    let mut members: Vec<((u64, [i64; D]), u32)> =
-        in_cells.filter(|(cell, _)| sieve.may_hold(key(cell)) && cells.binary_search(cell).is_ok()).collect();
-    let parents = family::parents(chunk, members.iter().map(|(_, p)| *p));
-    let waiting = family::waiting(chunk, setting, limits, bounds, level, &parents);
-    members.retain(|(_, p)| waiting.binary_search(p).is_err());
-    members.sort_unstable();
+    let mut cells: FxHashMap<(u64, u128), u32> = FxHashMap::default();
+    cells.extend(with.iter().map(|&p| (cell_of(p, patience::plain(chunk.tags()[p as usize])), 0)));
+    let mut in_order: Vec<(u64, u128)> = cells.keys().copied().collect();
+    in_order.sort_unstable();
+    (0..).zip(&in_order).for_each(|(number, cell)| *cells.entry(*cell).or_default() = number);
+    let in_cells = of_level(chunk, level).filter_map(|(p, tag)| Some((*cells.get(&cell_of(p, tag))?, p)));
+    let mut members: Vec<(u32, u32)> = in_cells.collect();
+    let waits = waiting(&members.iter().map(|(_, p)| *p).collect::<Vec<u32>>());
+    members.retain(|(_, p)| !waits[*p as usize]);
     let (mut groups, mut alone) = (Vec::new(), Vec::new());
-    for cell in members.chunk_by(|a, b| a.0 == b.0) {
-        let edge = 2.0 * setting.nominal(Tag::unpack(cell[0].0.0), level - 1);
+    for ((tag, _), cell) in in_order.iter().zip(Numbered::new(&members, in_order.len()).each()) {
+        let edge = 2.0 * setting.nominal(Tag::unpack(*tag), level - 1);
         // A lattice of equal parts fills the volume to round-off. More must not come in: boxes wider than a cell by more
         // than that would need another grid.
         let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 8.0 * f64::EPSILON);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
-        for &(_, p) in cell {
+        for &mut p in cell {
             let part = volume(chunk, p as usize);
             if filled + part > room {
                 close(chunk, &mut group, &mut groups, &mut alone);
@@ -209,9 +220,11 @@ fn strangers<const D: usize>(
         }
         close(chunk, &mut group, &mut groups, &mut alone);
     }
-    let alone = alone.iter().filter(|p| with.binary_search(p).is_ok());
+    let mut is_given = vec![false; chunk.len()];
+    with.iter().for_each(|&p| is_given[p as usize] = true);
+    let alone = alone.iter().filter(|&&p| is_given[p as usize]);
     refused.extend(alone.map(|&p| chunk.ids()[p as usize]));
-    groups.retain(|group| group.members.iter().any(|p| with.binary_search(p).is_ok()));
+    groups.retain(|group| group.members.iter().any(|&p| is_given[p as usize]));
     groups
 }
 

@@ -1,4 +1,6 @@
 //! The particle that stands for a group.
+use rustc_hash::FxHashSet;
+
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::{Limits, Setting, read, read_matrix, volume, write, write_matrix};
 use crate::kernel::math::{exp, ln};
@@ -38,7 +40,7 @@ pub(super) struct Mixtures<const D: usize> {
     pub energy: Vec<Option<f64>>,
 }
 
-/// Merges each group into a particle of a level, and says which may do so. Identifiers of the others are appended to
+/// Merges each group into a particle of a level, and says which may do so. Identifiers of the others are added to
 /// `refused`.
 pub(super) fn mixtures<const D: usize>(
     chunk: &Chunk<D>,
@@ -46,7 +48,7 @@ pub(super) fn mixtures<const D: usize>(
     limits: &Limits,
     mut groups: Vec<Group>,
     level: u8,
-    refused: &mut Vec<u64>,
+    refused: &mut FxHashSet<u64>,
 ) -> Mixtures<D> {
     // What takes least time to find comes first.
     keep(&mut groups, chunk, refused, |_, group| is_alike(chunk, group, limits));
@@ -106,11 +108,11 @@ pub(super) fn mixtures<const D: usize>(
     Mixtures { groups, chunk: out, energy }
 }
 
-/// Leaves the groups that pass and returns their numbers; identifiers of all others are appended to `refused`.
+/// Leaves the groups that pass and returns their numbers; identifiers of all others are added to `refused`.
 fn keep<const D: usize>(
     groups: &mut Vec<Group>,
     chunk: &Chunk<D>,
-    refused: &mut Vec<u64>,
+    refused: &mut FxHashSet<u64>,
     passes: impl Fn(usize, &Group) -> bool,
 ) -> Vec<u32> {
     let mut kept = Vec::with_capacity(groups.len());

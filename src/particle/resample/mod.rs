@@ -11,6 +11,7 @@ pub mod family;
 pub mod ids;
 mod merge;
 mod mix;
+mod numbered;
 pub mod patience;
 mod sieve;
 mod split;

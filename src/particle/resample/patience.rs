@@ -10,6 +10,8 @@
 //! they take their chance with strangers: siblings meet across faces of leaves only at the right turn (see [`super::family`]), which is one of
 //! three or seven, and the same for all leaves. Families that met and were too different go on. Those in leaves beside finer ones, which keep siblings apart as well, go on
 //! waiting instead, and begin anew when the finer leaves are gone.
+use rustc_hash::FxHashSet;
+
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 
@@ -166,23 +168,23 @@ pub struct Look {
     pub stale: bool,
 }
 
-/// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf. `refused`: identifiers,
-/// ascending, of those that the limits keep apart.
-pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: Turn, refused: &[u64]) {
+/// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf. `refused`: identifiers
+/// of those that the limits keep apart.
+pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: Turn, refused: &FxHashSet<u64>) {
     for p in 0..chunk.len() {
         let (tag, id) = (chunk.tags()[p], chunk.ids()[p]);
         if Tag::unpack(tag).level <= level {
             chunk.tags_mut()[p] = plain(tag);
         } else if turn.has(tag) {
-            chunk.tags_mut()[p] = tried_again(tag, refused.binary_search(&id).is_ok(), turn.beside_finer);
+            chunk.tags_mut()[p] = tried_again(tag, refused.contains(&id), turn.beside_finer);
         }
     }
 }
 
-/// Notes that the families of some particles (identifiers, ascending) have been seen together.
-pub fn met<const D: usize>(chunk: &mut Chunk<D>, together: &[u64]) {
+/// Notes that the families of some particles (identifiers) have been seen together.
+pub fn met<const D: usize>(chunk: &mut Chunk<D>, together: &FxHashSet<u64>) {
     for p in 0..if together.is_empty() { 0 } else { chunk.len() } {
-        if together.binary_search(&chunk.ids()[p]).is_ok() {
+        if together.contains(&chunk.ids()[p]) {
             chunk.tags_mut()[p] |= MET;
         }
     }
@@ -212,7 +214,8 @@ mod tests {
         let mut chunk = Chunk::<2>::new();
         let (tag, id) = (Tag { material: 1, body: 2, level: 3 }, 7);
         chunk.push_zeroed(id, tag);
-        let (ids, mut tried) = ([id], Vec::new());
+        let mut tried = Vec::new();
+        let refused = if refused { FxHashSet::from_iter([id]) } else { FxHashSet::default() };
         for number in 0..1100 {
             let turn = Turn::new(number, leaf, beside_finer(number));
             let look = look(&chunk, 2, turn);
@@ -220,14 +223,14 @@ mod tests {
             assert_eq!(Levels::of(chunk.tags()).look(2, turn), Some(look));
             if look.due {
                 tried.push(number);
-                count(&mut chunk, 2, turn, if refused { &ids } else { &[] });
+                count(&mut chunk, 2, turn, &refused);
                 assert_eq!(Tag::unpack(chunk.tags()[0]), tag);
             }
         }
         let fits = Levels::of(chunk.tags());
         assert!(look(&chunk, 3, Turn::ALL).stale && fits.look(3, Turn::ALL).is_some_and(|look| look.stale));
         assert!(look(&chunk, 4, Turn::ALL).coarser && fits.look(4, Turn::ALL).is_none());
-        count(&mut chunk, 3, Turn::ALL, &[]);
+        count(&mut chunk, 3, Turn::ALL, &FxHashSet::default());
         assert_eq!(chunk.tags()[0], tag.pack());
         assert_eq!(Levels::of(chunk.tags()).look(3, Turn::ALL), Some(Look::default()));
         tried
@@ -266,7 +269,7 @@ mod tests {
                 let turn = Turn::new(number, 0, false);
                 let seen = look(&chunk, level, turn);
                 assert_eq!(Levels::of(chunk.tags()).look(level, turn), Some(seen));
-                count(&mut chunk, 2, turn, &[1, 2]);
+                count(&mut chunk, 2, turn, &FxHashSet::from_iter([1, 2]));
             }
         }
     }
