@@ -1,10 +1,13 @@
 //! What regrids cost, against the steps between them: through the library, so that single regrids are timed.
 //!
 //! `cargo run --release --example regrid_price -- CASE [PARTICLES [THREADS [REGRIDS]]]`, also under `mpirun`.
+//! `turns JOB RESTART_FILE OTHER_JOB OTHER_RESTART_FILE [THREADS [TURNS]]` has two runs go on in turns, for the price of a
+//! particle-step in either with its regrids.
 use std::process::ExitCode;
 use std::time::Instant;
 
 use agimp::job::{AnyProblem, Problem, parse};
+use agimp::particle::Chunk;
 use agimp::run::restart::{self, From};
 use agimp::run::setup;
 use agimp::solver::parts::Part;
@@ -108,10 +111,13 @@ fn main() -> ExitCode {
     let mut solver = match arguments.first().map(String::as_str) {
         Some("from") if arguments.len() > 2 => {
             start_threads(number(3, 1));
-            let text = std::fs::read_to_string(&arguments[1]).unwrap_or_else(|error| panic!("{error}"));
-            let from = From::File(arguments[2].clone().into());
-            let state = restart::solver(world.comm(), &problem(&text), &from);
-            state.unwrap_or_else(|error| panic!("{error}")).0
+            restarted(world.comm(), &arguments[1], &arguments[2])
+        }
+        Some("turns") if arguments.len() > 4 => {
+            start_threads(number(5, 1));
+            let pair = [1, 3].map(|job| restarted(world.comm(), &arguments[job], &arguments[job + 1]));
+            take_turns(world.comm(), pair, number(6, 10));
+            return ExitCode::SUCCESS;
         }
         Some(name) if Case::named(name).is_some() => {
             start_threads(number(2, 1));
@@ -121,7 +127,8 @@ fn main() -> ExitCode {
         _ => {
             eprintln!(
                 "usage: regrid_price rest|refused|sweep [PARTICLES [THREADS [REGRIDS]]] | \
-                 from JOB RESTART_FILE [THREADS [REGRIDS]]"
+                 from JOB RESTART_FILE [THREADS [REGRIDS]] | \
+                 turns JOB RESTART_FILE OTHER_JOB OTHER_RESTART_FILE [THREADS [TURNS]]"
             );
             return ExitCode::from(2);
         }
@@ -140,6 +147,63 @@ fn problem(text: &str) -> Problem<3> {
         Ok(AnyProblem::Three(problem)) => problem,
         Ok(AnyProblem::Two(_)) => panic!("expected a job in space"),
         Err(faults) => panic!("{faults:?}\n{text}"),
+    }
+}
+
+/// Collective. The state in a restart file of a job.
+fn restarted(comm: &Comm, job: &str, file: &str) -> Solver<3> {
+    let text = std::fs::read_to_string(job).unwrap_or_else(|error| panic!("{job}: {error}"));
+    let state = restart::solver(comm, &problem(&text), &From::File(file.into()));
+    state.unwrap_or_else(|error| panic!("{error}")).0
+}
+
+/// A row for each turn: nanoseconds per particle and step of either run, and those of its regrid among them; then medians.
+/// The first turn, which fills caches and arenas, is left out.
+fn take_turns(comm: &Comm, mut runs: [Solver<3>; 2], turns: usize) {
+    let speaks = comm.rank() == 0;
+    if speaks {
+        println!("| particles | ns | regrid, ns | particles | ns | regrid, ns | ratio |");
+    }
+    let mut rows = Vec::new();
+    for turn in 0..=turns {
+        let row = runs.each_mut().map(|run| {
+            let (start, mut regrids, mut work) = (Instant::now(), 0.0, 0);
+            for _ in 0..EVERY {
+                run.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+                work += run.chunks.iter().map(Chunk::len).sum::<usize>();
+                let start = Instant::now();
+                run.regrid().unwrap_or_else(|error| panic!("{error}"));
+                regrids += start.elapsed().as_secs_f64();
+            }
+            let mut work = [work as u64];
+            comm.sum_u64(&mut work);
+            let per_step = 1e9 / work[0] as f64;
+            [work[0] as f64 / EVERY as f64, start.elapsed().as_secs_f64() * per_step, regrids * per_step]
+        });
+        if turn > 0 {
+            rows.push([
+                row[0][0],
+                row[0][1],
+                row[0][2],
+                row[1][0],
+                row[1][1],
+                row[1][2],
+                row[0][1] / row[1][1],
+            ]);
+        }
+    }
+    let show = |name: &str, row: [f64; 7]| {
+        let row = row.iter().zip([0, 1, 1, 0, 1, 1, 3]).map(|(value, digits)| format!("{value:.digits$}"));
+        println!("{name}| {} |", row.collect::<Vec<String>>().join(" | "));
+    };
+    let median = |column: usize| {
+        let mut values: Vec<f64> = rows.iter().map(|row| row[column]).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    if speaks {
+        rows.iter().for_each(|row| show("", *row));
+        show("medians ", std::array::from_fn(median));
     }
 }
 

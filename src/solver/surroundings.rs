@@ -28,28 +28,22 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Not collective. Finds everything anew if the tree or the partition has changed.
+    /// Not collective. Finds everything anew if the tree or the partition has changed; the plan is that of the forest.
     pub fn update<const D: usize>(&mut self, forest: &Forest<D>, plan: &GridPlan<D>) {
         if self.revision == Some(forest.revision()) {
             return;
         }
+        debug_assert_eq!(plan.revision, forest.revision());
         let leaves = forest.leaves().par_iter().with_min_len(16);
-        let each: Vec<(Vec<u32>, bool, u32)> = leaves
-            .map(|leaf| {
-                let mut touching = Vec::new();
-                forest.own_leaves_in(&Region::of(leaf), &mut |other| touching.push(other as u32));
-                touching.sort_unstable();
-                (touching, !is_inside(&plan.tree, leaf), of_level(&plan.tree, leaf))
-            })
-            .collect();
+        let each: Vec<Around> = leaves.map(|leaf| Around::of(forest, &plan.tree, leaf)).collect();
         self.start = vec![0];
         self.touching.clear();
-        for (touching, ..) in &each {
-            self.touching.extend(touching);
+        for around in &each {
+            self.touching.extend(&around.touching);
             self.start.push(self.touching.len() as u32);
         }
-        self.at_seam = each.iter().map(|each| each.1).collect();
-        self.of_level = each.iter().map(|each| each.2).collect();
+        self.at_seam = each.iter().map(|around| around.at_seam).collect();
+        self.of_level = each.iter().map(|around| around.of_level).collect();
         self.revision = Some(forest.revision());
     }
 
@@ -127,24 +121,43 @@ fn on_leaf<const D: usize>(index: usize) -> u64 {
     }))
 }
 
-/// Whether all leaves that touch the leaf are own leaves.
-fn is_inside<const D: usize>(tree: &KnownTree<D>, leaf: &Octant<D>) -> bool {
-    (0..offset_count(D)).all(|index| {
-        shifted(leaf.coord, offset::<D>(index)).is_none_or(|coord| {
-            !tree.contains(leaf.level, coord) || tree.is_own(&Octant { level: leaf.level, coord })
-        })
-    })
+/// What [`Surroundings`] has of one leaf.
+struct Around {
+    touching: Vec<u32>,
+    at_seam: bool,
+    of_level: u32,
 }
 
-/// Offsets, as bits, at which there is a leaf of the same level.
-fn of_level<const D: usize>(tree: &KnownTree<D>, leaf: &Octant<D>) -> u32 {
-    let is_of_level = |&index: &usize| {
-        shifted(leaf.coord, offset::<D>(index)).is_some_and(|coord| match tree.cover(leaf.level, coord) {
-            Cover::Leaf(other) => tree.leaves()[other].level == leaf.level,
-            Cover::Outside | Cover::Finer(_) | Cover::Unknown => false,
-        })
-    };
-    (0..offset_count(D)).filter(is_of_level).fold(0, |bits, index| bits | 1 << index)
+impl Around {
+    fn of<const D: usize>(forest: &Forest<D>, tree: &KnownTree<D>, leaf: &Octant<D>) -> Self {
+        let mut around = Self { touching: Vec::with_capacity(offset_count(D)), at_seam: false, of_level: 0 };
+        let mut any_finer = false;
+        for index in 0..offset_count(D) {
+            let Some(coord) = shifted(leaf.coord, offset::<D>(index)) else { continue };
+            match tree.cover(leaf.level, coord) {
+                Cover::Outside => {}
+                Cover::Leaf(other) => {
+                    around.of_level |= u32::from(tree.leaves()[other].level == leaf.level) << index;
+                    match tree.local(other) {
+                        Some(own) => around.touching.push(own as u32),
+                        None => around.at_seam = true,
+                    }
+                }
+                Cover::Finer(_) | Cover::Unknown => {
+                    any_finer = true;
+                    around.at_seam |= !tree.is_own(&Octant { level: leaf.level, coord });
+                }
+            }
+        }
+        if any_finer {
+            // Of finer leaves only those that touch count.
+            around.touching.clear();
+            forest.own_leaves_in(&Region::of(leaf), &mut |other| around.touching.push(other as u32));
+        }
+        around.touching.sort_unstable();
+        around.touching.dedup();
+        around
+    }
 }
 
 /// Least and greatest mass of some nodes, kg.

@@ -193,8 +193,8 @@ fn strangers<const D: usize>(
         (tag, chunk.position(p as usize).iter().fold(0, |cell, &x| cell << 42 | place(x)))
     };
     let mut cells: FxHashMap<(u64, u128), u32> = FxHashMap::default();
-    cells.extend(with.iter().map(|&p| (cell_of(p, patience::plain(chunk.tags()[p as usize])), 0)));
-    let mut in_order: Vec<(u64, u128)> = cells.keys().copied().collect();
+    let of_given = with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize])));
+    let mut in_order: Vec<(u64, u128)> = of_given.filter(|&cell| cells.insert(cell, 0).is_none()).collect();
     in_order.sort_unstable();
     (0..).zip(&in_order).for_each(|(number, cell)| *cells.entry(*cell).or_default() = number);
     let in_cells = of_level(chunk, level).filter_map(|(p, tag)| Some((*cells.get(&cell_of(p, tag))?, p)));
