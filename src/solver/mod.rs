@@ -214,7 +214,7 @@ impl<const D: usize> Solver<D> {
         if clock == Clock::default() {
             // A box without a bin stops the first step, which says so.
             let _ = solver.moments_from_affine();
-            solver.signal = solver.chunks.iter().map(|chunk| solver.signal_at_rest(chunk)).collect();
+            solver.signal = solver.signals_at_rest();
             solver.clock.bound = comm.min_f64(solver.local_bound());
         }
         solver

@@ -128,7 +128,7 @@ impl<const D: usize> Solver<D> {
         }
         if is_other {
             // Merged particles are no faster than the fastest of those that they stand for.
-            self.signal = self.chunks.iter().map(|chunk| self.signal_at_rest(chunk)).collect();
+            self.signal = self.signals_at_rest();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);

@@ -1,5 +1,7 @@
 //! Choice of the time step.
-use super::Solver;
+use rayon::prelude::*;
+
+use super::{Physics, Solver};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// Limits on the time step.
@@ -38,15 +40,28 @@ impl<const D: usize> Solver<D> {
         particles.min(self.collider_bound())
     }
 
-    /// Greatest sum of wave speed and particle speed in a chunk, from the materials at rest.
-    pub(super) fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
-        (0..chunk.len()).fold(0.0, |signal, p| {
-            let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
-            let speed = (0..D)
-                .map(|axis| chunk.column(Layout::<D>::VELOCITY + axis)[p])
-                .fold(0.0, |sum: f64, v| v.mul_add(v, sum))
-                .sqrt();
-            f64::max(signal, self.physics.materials[material].wave_speed() + speed)
-        })
+    /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, from the materials at rest.
+    pub(super) fn signals_at_rest(&self) -> Vec<f64> {
+        let physics = &self.physics;
+        self.chunks.par_iter().with_min_len(64).map(|chunk| physics.signal_at_rest(chunk)).collect()
+    }
+}
+
+impl<const D: usize> Physics<D> {
+    fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
+        let velocity: [&[f64]; D] = std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis));
+        let material = |p: usize| usize::from(Tag::unpack(chunk.tags()[p]).material);
+        let (mut signal, mut first) = (0.0, 0);
+        // One root for each run of particles of one material.
+        while first < chunk.len() {
+            let (own, mut p, mut greatest) = (material(first), first, 0.0);
+            while p < chunk.len() && material(p) == own {
+                greatest = f64::max(greatest, velocity.iter().fold(0.0, |sum, v| v[p].mul_add(v[p], sum)));
+                p += 1;
+            }
+            signal = f64::max(signal, self.materials[own].wave_speed() + greatest.sqrt());
+            first = p;
+        }
+        signal
     }
 }
