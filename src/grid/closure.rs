@@ -231,6 +231,9 @@ impl<const D: usize> Builder<'_, D> {
 
     /// What must be known and is not.
     fn missing(&self) -> Vec<Region<D>> {
+        if self.tree.is_whole() {
+            return Vec::new();
+        }
         let mut missing: Vec<Region<D>> = self.unknown_octants().iter().map(interior).collect();
         self.look_for_sources(&mut missing);
         missing

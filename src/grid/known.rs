@@ -1,5 +1,5 @@
 //! The part of the tree that one rank knows: its own leaves and its ghost layer.
-use partition::{Brick, Forest, Octant};
+use partition::{Brick, Forest, MAX_LEVEL, Octant};
 
 use crate::kernel::BLOCK;
 
@@ -138,6 +138,12 @@ impl<const D: usize> KnownTree<D> {
     /// Level of the finest known leaves.
     pub fn deepest(&self) -> u8 {
         self.deepest
+    }
+
+    /// Whether all leaves of the domain are known, as on a rank that is alone.
+    pub fn is_whole(&self) -> bool {
+        let roots = self.brick.roots.iter().map(|&roots| u64::from(roots)).product::<u64>();
+        self.leaves.iter().map(Octant::volume).sum::<u64>() == roots << (D as u32 * u32::from(MAX_LEVEL))
     }
 
     /// Owner of a known leaf.

@@ -24,19 +24,23 @@ pub struct Column {
 }
 
 /// A column as a stencil finds it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Visit {
-    /// Node of the stencil, `a + 3 b (+ 9 c)`.
-    node: u8,
-    axis: u8,
     /// Number of the column.
     column: u16,
+    /// Node of the stencil, `a + 3 b (+ 9 c)`, or [`NO_NODE`].
+    node: u16,
 }
+
+/// In the place of a node: one of the weights behind those of the stencil, which are zero.
+const NO_NODE: u16 = STENCIL.next_power_of_two() as u16 - 1;
 
 /// Which columns of moments the nodes of an arena have, and their second moments.
 #[derive(Clone, Debug)]
 pub struct ConstrainedNodes {
-    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]) and axis.
+    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]), in rounds: one column along each axis, as
+    /// a loop for each axis would be mispredicted as often as there are axes. An axis that has fewer columns than another
+    /// visits some other with [`NO_NODE`].
     visits: Vec<Visit>,
     /// Start of each of these lists, and the end.
     start: Vec<u16>,
@@ -48,23 +52,33 @@ impl ConstrainedNodes {
     /// The given columns, none twice. They are numbered in the order given, in which stencils visit them.
     pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>) -> Self {
         let columns: Vec<Column> = columns.into_iter().collect();
-        let lists = D * stencil_bases(D);
         let seen = Seen::of::<D>();
-        let mut start = vec![0; lists + 1];
+        let mut counts = vec![[0; D]; stencil_bases(D)];
         for column in &columns {
             for &(base, _) in seen.from(column.node) {
-                start[D * usize::from(base) + column.axis + 1] += 1;
+                counts[usize::from(base)][column.axis] += 1;
             }
         }
-        (0..lists).for_each(|list| start[list + 1] += start[list]);
-        let mut visits = vec![Visit::default(); usize::from(start[lists])];
-        let mut next = start.clone();
+        let mut start = vec![0];
+        for count in &counts {
+            let rounds = count.iter().max().map_or(0, |&most: &u16| most);
+            start.push(start[start.len() - 1] + D as u16 * rounds);
+        }
+        let mut visits = vec![Visit { column: 0, node: NO_NODE }; usize::from(start[counts.len()])];
+        let mut next = vec![[0; D]; counts.len()];
         for (number, column) in (0..).zip(&columns) {
             for &(base, node) in seen.from(column.node) {
-                let place = &mut next[D * usize::from(base) + column.axis];
-                visits[usize::from(*place)] = Visit { node, axis: column.axis as u8, column: number };
-                *place += 1;
+                let base = usize::from(base);
+                let round = &mut next[base][column.axis];
+                let place = usize::from(start[base]) + D * *round + column.axis;
+                visits[place] = Visit { column: number, node: u16::from(node) };
+                *round += 1;
             }
+        }
+        // Stores to one and the same column would wait for each other from round to round.
+        for round in visits.chunks_exact_mut(D) {
+            let column = round.iter().find(|visit| visit.node != NO_NODE).map_or(0, |visit| visit.column);
+            round.iter_mut().filter(|visit| visit.node == NO_NODE).for_each(|visit| visit.column = column);
         }
         Self { visits, start, second: columns.iter().map(|column| column.second).collect() }
     }
@@ -89,7 +103,7 @@ impl ConstrainedNodes {
     pub(super) fn prepare<const D: usize>(&self, weights: &mut Weights<D>, batch: &Batch) -> u32 {
         let has_any = |lane: usize| {
             let base = weights.base(lane);
-            self.start[D * base] != self.start[D * base + D]
+            self.start[base] != self.start[base + 1]
         };
         let touched = (0..LANES).fold(0, |lanes, lane| lanes | u32::from(has_any(lane)) << lane);
         let touched = batch.members_among(touched);
@@ -99,21 +113,8 @@ impl ConstrainedNodes {
         touched
     }
 
-    /// What the stencil of a lane visits along the axes `first` to `last`.
-    #[inline(always)]
-    fn visits<const D: usize>(
-        &self,
-        weights: &Weights<D>,
-        lane: usize,
-        first: usize,
-        last: usize,
-    ) -> &[Visit] {
-        let list = D * weights.base(lane);
-        &self.visits[usize::from(self.start[list + first])..usize::from(self.start[list + last + 1])]
-    }
-
-    /// Calls `f` with number and axis of each column in the stencil of a lane of a batch that
-    /// [`ConstrainedNodes::prepare`] has been called for, and the weight of its node.
+    /// Calls `f` with number, axis and weight of each column in the stencil of a lane of a batch that
+    /// [`ConstrainedNodes::prepare`] has been called for, and of some others with weight 0.
     #[inline(always)]
     pub(super) fn for_each<const D: usize>(
         &self,
@@ -121,22 +122,13 @@ impl ConstrainedNodes {
         lane: usize,
         mut f: impl FnMut(usize, usize, f64),
     ) {
-        for visit in self.visits(weights, lane, 0, D - 1) {
-            f(usize::from(visit.column), usize::from(visit.axis), visit.weight(weights, lane));
-        }
-    }
-
-    /// [`ConstrainedNodes::for_each`] of the columns along one axis.
-    #[inline(always)]
-    pub(super) fn for_each_along<const D: usize>(
-        &self,
-        weights: &Weights<D>,
-        lane: usize,
-        axis: usize,
-        mut f: impl FnMut(usize, f64),
-    ) {
-        for visit in self.visits(weights, lane, axis, axis) {
-            f(usize::from(visit.column), visit.weight(weights, lane));
+        let base = weights.base(lane);
+        let list = &self.visits[usize::from(self.start[base])..usize::from(self.start[base + 1])];
+        let (rounds, _) = list.as_chunks::<D>();
+        for round in rounds {
+            for axis in 0..D {
+                f(usize::from(round[axis].column), axis, round[axis].weight(weights, lane));
+            }
         }
     }
 
@@ -150,12 +142,12 @@ impl ConstrainedNodes {
     ) {
         let mut values: [[f64; LANES]; D] = spread.map(Lanes::to_array);
         for lane in lanes_in(touched) {
+            let mut sums = [0.0; D];
+            self.for_each(weights, lane, |column, axis, weight| {
+                sums[axis] = weight.mul_add(self.second[column], sums[axis]);
+            });
             for axis in 0..D {
-                let mut sum = 0.0;
-                self.for_each_along(weights, lane, axis, |column, weight| {
-                    sum = weight.mul_add(self.second[column], sum);
-                });
-                values[axis][lane] += sum;
+                values[axis][lane] += sums[axis];
             }
         }
         *spread = values.map(Lanes::new);

@@ -123,12 +123,12 @@ impl<const D: usize> Sums<D> {
     #[inline(never)]
     fn add_moments(&mut self, weights: &Weights<D>, touched: u32, moments: &Moments) {
         for lane in lanes_in(touched) {
-            for k in 0..D {
-                let mut sum = F64x4::splat(0.0);
-                moments.nodes.for_each_along(weights, lane, k, |column, weight| {
-                    sum = F64x4::splat(weight).mul_add(F64x4::new(moments.first[column].0), sum);
-                });
-                self.affine[k][lane] = self.affine[k][lane] + sum;
+            let mut sums = [F64x4::splat(0.0); D];
+            moments.nodes.for_each(weights, lane, |column, axis, weight| {
+                sums[axis] = F64x4::splat(weight).mul_add(F64x4::new(moments.first[column].0), sums[axis]);
+            });
+            for axis in 0..D {
+                self.affine[axis][lane] = self.affine[axis][lane] + sums[axis];
             }
         }
     }

@@ -81,7 +81,8 @@ impl<const D: usize> LeafBins<D> {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
         let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
-        let mut around = leaves_around(tree, known);
+        // Around leaves of the finest level nothing is finer.
+        let mut around = if here.level < tree.deepest() { leaves_around(tree, known) } else { Vec::new() };
         if around.iter().all(|&leaf| tree.leaves()[leaf].level <= here.level) {
             around.clear();
         }
