@@ -16,6 +16,8 @@ use partition::comm::{Comm, World};
 
 /// Steps from one regrid to the next.
 const EVERY: u64 = 20;
+/// Steps of a turn: as many as the tree of the gallery's jobs stays as it is at most.
+const TURN: u64 = 4 * EVERY;
 /// Cells of level 2 are 20 mm wide, with particles 10 mm apart.
 const SPACING: f64 = 0.01;
 const ROOT: f64 = 0.32;
@@ -168,7 +170,7 @@ fn take_turns(comm: &Comm, mut runs: [Solver<3>; 2], turns: usize) {
     for turn in 0..=turns {
         let row = runs.each_mut().map(|run| {
             let (start, mut regrids, mut work) = (Instant::now(), 0.0, 0);
-            for _ in 0..EVERY {
+            for _ in 0..TURN {
                 run.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
                 work += run.chunks.iter().map(Chunk::len).sum::<usize>();
                 let start = Instant::now();
@@ -178,7 +180,7 @@ fn take_turns(comm: &Comm, mut runs: [Solver<3>; 2], turns: usize) {
             let mut work = [work as u64];
             comm.sum_u64(&mut work);
             let per_step = 1e9 / work[0] as f64;
-            [work[0] as f64 / EVERY as f64, start.elapsed().as_secs_f64() * per_step, regrids * per_step]
+            [work[0] as f64 / TURN as f64, start.elapsed().as_secs_f64() * per_step, regrids * per_step]
         });
         if turn > 0 {
             rows.push([

@@ -11,6 +11,7 @@ mod indicators;
 mod leaf_bins;
 mod members;
 pub mod migrate;
+mod pace;
 pub mod parts;
 pub mod phases;
 pub mod rebalance;

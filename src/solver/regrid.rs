@@ -91,7 +91,7 @@ impl<const D: usize> Solver<D> {
         if self.surveys.len() != self.chunks.len() {
             self.survey_now();
         }
-        let levels_before = self.change_tree();
+        let levels_before = self.steps_between_trees().and_then(|steps| self.change_tree(steps));
         let is_new = levels_before.is_some();
         let mut looks = self.look_at_levels();
         let split = self.split_particles(&looks, levels_before.as_deref());
@@ -143,12 +143,12 @@ impl<const D: usize> Solver<D> {
     /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether the
     /// tree had to change. Particles of a changed tree are to be made anew.
     pub fn regrid_before_start(&mut self) -> bool {
-        if self.physics.adaptivity.is_none() {
+        let Some(steps) = self.physics.adaptivity.as_ref().map(|adaptivity| adaptivity.every) else {
             return false;
-        }
+        };
         self.nodes_of_state();
         self.survey_now();
-        self.change_tree().is_some()
+        self.change_tree(steps).is_some()
     }
 
     /// Collective. Velocities and masses of the nodes as the particles have them between two steps.
@@ -163,9 +163,10 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Refines and coarsens, and moves particles to the leaves that contain them; the partition stays. If
-    /// any leaf of any rank changed: the level of the leaf that each own leaf's particles come from.
-    fn change_tree(&mut self) -> Option<Vec<u8>> {
-        let wishes = self.wishes();
+    /// any leaf of any rank changed: the level of the leaf that each own leaf's particles come from. The next time is in
+    /// `steps`.
+    fn change_tree(&mut self, steps: u64) -> Option<Vec<u8>> {
+        let wishes = self.wishes(steps);
         self.parts.end(Part::Criteria);
         let revision = self.forest.revision();
         let settled = self.recall.settled.as_ref().filter(|settled| settled.revision == revision);
@@ -191,13 +192,13 @@ impl<const D: usize> Solver<D> {
         Some(self.move_to_leaves(old.leaves()))
     }
 
-    /// Collective. What each own leaf wants.
-    fn wishes(&mut self) -> Vec<Wish<D>> {
+    /// Collective. What each own leaf wants for the next `steps`.
+    fn wishes(&mut self, steps: u64) -> Vec<Wish<D>> {
         let values = self.indicators();
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
         let (count, finest) = (adaptivity.criteria.len(), adaptivity.finest_level());
         // One step more than the interval, as particles may have come from next door in this one.
-        let interval = (adaptivity.every + 1) as f64 * self.clock.dt;
+        let interval = (steps + 1) as f64 * self.clock.dt;
         let per_edge = f64::from(1u32 << finest) / self.physics.root_edge;
         let way =
             |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
