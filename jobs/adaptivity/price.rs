@@ -159,8 +159,46 @@ fn restarted(comm: &Comm, job: &str, file: &str) -> Solver<3> {
     state.unwrap_or_else(|error| panic!("{error}")).0
 }
 
-/// A row for each turn: nanoseconds per particle and step of either run, and those of its regrid among them; then medians.
-/// The first turn, which fills caches and arenas, is left out.
+/// What a run took in a turn.
+#[derive(Clone, Copy, Debug)]
+struct Price {
+    /// Mean number of particles.
+    particles: f64,
+    /// Nanoseconds per particle and step, regrids included.
+    step: f64,
+    /// What regrids have of that.
+    regrid: f64,
+}
+
+impl Price {
+    /// Collective. Goes on by a turn.
+    fn of_turn(comm: &Comm, run: &mut Solver<3>) -> Self {
+        let (start, mut regrids, mut work) = (Instant::now(), 0.0, 0);
+        for _ in 0..TURN {
+            run.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+            work += run.chunks.iter().map(Chunk::len).sum::<usize>();
+            let start = Instant::now();
+            run.regrid().unwrap_or_else(|error| panic!("{error}"));
+            regrids += start.elapsed().as_secs_f64();
+        }
+        let mut work = [work as u64];
+        comm.sum_u64(&mut work);
+        let per_step = 1e9 / work[0] as f64;
+        Self {
+            particles: work[0] as f64 / TURN as f64,
+            step: start.elapsed().as_secs_f64() * per_step,
+            regrid: regrids * per_step,
+        }
+    }
+}
+
+impl std::fmt::Display for Price {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.0} | {:.1} | {:.1}", self.particles, self.step, self.regrid)
+    }
+}
+
+/// A row for each turn with the prices of both runs, then medians. The first turn, which fills caches and arenas, is left out.
 fn take_turns(comm: &Comm, mut runs: [Solver<3>; 2], turns: usize) {
     let speaks = comm.rank() == 0;
     if speaks {
@@ -168,44 +206,28 @@ fn take_turns(comm: &Comm, mut runs: [Solver<3>; 2], turns: usize) {
     }
     let mut rows = Vec::new();
     for turn in 0..=turns {
-        let row = runs.each_mut().map(|run| {
-            let (start, mut regrids, mut work) = (Instant::now(), 0.0, 0);
-            for _ in 0..TURN {
-                run.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
-                work += run.chunks.iter().map(Chunk::len).sum::<usize>();
-                let start = Instant::now();
-                run.regrid().unwrap_or_else(|error| panic!("{error}"));
-                regrids += start.elapsed().as_secs_f64();
-            }
-            let mut work = [work as u64];
-            comm.sum_u64(&mut work);
-            let per_step = 1e9 / work[0] as f64;
-            [work[0] as f64 / TURN as f64, start.elapsed().as_secs_f64() * per_step, regrids * per_step]
-        });
+        let prices = runs.each_mut().map(|run| Price::of_turn(comm, run));
         if turn > 0 {
-            rows.push([
-                row[0][0],
-                row[0][1],
-                row[0][2],
-                row[1][0],
-                row[1][1],
-                row[1][2],
-                row[0][1] / row[1][1],
-            ]);
+            rows.push(prices);
         }
     }
-    let show = |name: &str, row: [f64; 7]| {
-        let row = row.iter().zip([0, 1, 1, 0, 1, 1, 3]).map(|(value, digits)| format!("{value:.digits$}"));
-        println!("{name}| {} |", row.collect::<Vec<String>>().join(" | "));
+    let show = |name: &str, [one, other]: [Price; 2], ratio: f64| {
+        println!("{name}| {one} | {other} | {ratio:.3} |");
     };
-    let median = |column: usize| {
-        let mut values: Vec<f64> = rows.iter().map(|row| row[column]).collect();
+    let median = |value: &dyn Fn(&[Price; 2]) -> f64| {
+        let mut values: Vec<f64> = rows.iter().map(value).collect();
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
     };
+    let ratio = |row: &[Price; 2]| row[0].step / row[1].step;
+    let medians = [0, 1].map(|run| Price {
+        particles: median(&|row| row[run].particles),
+        step: median(&|row| row[run].step),
+        regrid: median(&|row| row[run].regrid),
+    });
     if speaks {
-        rows.iter().for_each(|row| show("", *row));
-        show("medians ", std::array::from_fn(median));
+        rows.iter().for_each(|row| show("", *row, ratio(row)));
+        show("medians ", medians, median(&ratio));
     }
 }
 

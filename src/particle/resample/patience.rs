@@ -2,9 +2,9 @@
 //!
 //! Particles that are finer than their leaf are tried at every regrid at first, then more and more rarely, since what
 //! keeps them apart does not go away soon as a rule, and looking is dear. How often a particle has been tried in vain is
-//! part of its state: eight bits of its packed tag. The time between two tries doubles with each, so that nobody waits
-//! longer than about twice what was needed. From every sixteenth regrid on leaves have their turns at different regrids, so
-//! that the work is spread.
+//! part of its state: eight bits of its packed tag. The time between two tries becomes four times as long with each, so that nobody
+//! waits longer than about four times what was needed. From every sixteenth regrid on leaves have their turns at different
+//! regrids, so that the work is spread.
 //!
 //! Particles whose siblings may still come are tried eight times, at every regrid, and eight times at every second, before
 //! they take their chance with strangers: siblings meet across faces of leaves only at the right turn (see [`super::family`]), which is one of
@@ -23,7 +23,8 @@ const COUNT: u64 = 0x7f << SHIFT;
 const MET: u64 = 1 << 47;
 /// All that is noted in a tag.
 const BITS: u64 = COUNT | MET;
-/// By how much the count grows from one interval to the next, which is twice as long.
+/// By how much the count grows from one interval to the next, which is twice as long. A particle that limits keep from merging goes on
+/// by two of them.
 const DOUBLING: u64 = 8;
 /// Greatest count of a particle that limits keep from merging: tried at one regrid of 256.
 const REFUSED: u64 = 8 * DOUBLING;
@@ -195,7 +196,7 @@ fn tried_again(tag: u64, is_refused: bool, beside_finer: bool) -> u64 {
     let tries = count_of(tag);
     let tries = match (is_refused, tries) {
         (true, PARKED) => GIVEN_UP + DOUBLING,
-        (true, _) => (tries + DOUBLING).min(REFUSED),
+        (true, _) => (tries + 2 * DOUBLING).min(REFUSED),
         (false, PARKED) if beside_finer => PARKED,
         (false, PARKED) => 0,
         (false, _) if beside_finer && tries + 1 == GIVEN_UP => PARKED,
@@ -238,7 +239,7 @@ mod tests {
 
     #[test]
     fn ever_more_rarely() {
-        assert_eq!(turns(0, true, |_| false), [0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 768, 1024]);
+        assert_eq!(turns(0, true, |_| false), [0, 4, 16, 64, 256, 512, 768, 1024]);
         let waiting = turns(0, false, |_| false);
         // All turns of the axes come round before siblings are given up.
         assert_eq!(waiting[..18], [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28]);
@@ -250,9 +251,9 @@ mod tests {
         assert_eq!(parked[freed..][..10], [601, 602, 603, 604, 605, 606, 607, 608, 609, 610]);
         // Other leaves, other times.
         let others = turns(5 << 40, true, |_| false);
-        assert_eq!(others[..2], [0, 2]);
+        assert_eq!(others[..2], [0, 4]);
         assert!(
-            others[4..].windows(2).all(|pair| pair[1] - pair[0] <= 256) && !others.contains(&1024),
+            others[3..].windows(2).all(|pair| pair[1] - pair[0] <= 256) && !others.contains(&1024),
             "{others:?}"
         );
     }
