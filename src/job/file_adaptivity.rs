@@ -16,6 +16,7 @@ pub struct Adaptivity {
     pub every_steps: u64,
     /// Part of the edge of a finest leaf that the fastest particle, collider or region may go from one change of the tree to
     /// the next: as long as it goes less, the tree changes at every second or fourth occasion only. By default at all.
+    /// What comes into coarse leaves before the tree has changed is less exact; a buffer helps.
     // Left out of the digest, so that files of jobs without it can be continued.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 4.0))]
