@@ -15,7 +15,7 @@ pub struct Adaptivity {
     #[schemars(range(min = 1, max = 100_000))]
     pub every_steps: u64,
     /// Part of the edge of a finest leaf that the fastest particle, collider or region may go from one change of the tree to
-    /// the next: as long as it goes less, the tree changes at every second or fourth occasion only. By default at all.
+    /// the next: as long as it goes less, the tree changes at every second or fourth occasion only. By default at each.
     /// What comes into coarse leaves before the tree has changed is less exact; a buffer helps.
     // Left out of the digest, so that files of jobs without it can be continued.
     #[serde(default, skip_serializing_if = "is_zero")]
