@@ -39,6 +39,11 @@ impl<const D: usize> Adaptivity<D> {
         criteria.chain(self.regions.iter().map(|(_, level)| *level)).fold(self.base_level, u8::max)
     }
 
+    /// Edges of finest leaves per metre where those of roots are `root_edge` (m).
+    pub fn finest_edges_per_metre(&self, root_edge: f64) -> f64 {
+        f64::from(1u32 << self.finest_level()) / root_edge
+    }
+
     /// Level that a leaf with this box has in any case.
     pub fn least_level(&self, leaf_box: &Aabb<D>) -> u8 {
         least_level(self.base_level, self.regions.iter().map(|(shape, level)| (shape, *level)), leaf_box)

@@ -38,9 +38,8 @@ const NO_NODE: u16 = STENCIL.next_power_of_two() as u16 - 1;
 /// Which columns of moments the nodes of an arena have, and their second moments.
 #[derive(Clone, Debug)]
 pub struct ConstrainedNodes {
-    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]), in rounds: one column along each axis, as
-    /// a loop for each axis would be mispredicted as often as there are axes. An axis that has fewer columns than another
-    /// visits some other with [`NO_NODE`].
+    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]), in rounds: one column along each axis, so
+    /// that one loop does for all axes. An axis that has fewer columns than another visits some other with [`NO_NODE`].
     visits: Vec<Visit>,
     /// Start of each of these lists, and the end.
     start: Vec<u16>,

@@ -27,7 +27,7 @@ impl<const D: usize> Solver<D> {
             return Some(every);
         }
         let speed = self.comm.max_f64(self.greatest_speed());
-        let edges = f64::from(1u32 << adaptivity.finest_level()) / self.physics.root_edge;
+        let edges = adaptivity.finest_edges_per_metre(self.physics.root_edge);
         let steps = every * occasions(speed * every as f64 * self.clock.dt * edges, travel);
         self.clock.step.is_multiple_of(steps).then_some(steps)
     }

@@ -196,10 +196,10 @@ impl<const D: usize> Solver<D> {
     fn wishes(&mut self, steps: u64) -> Vec<Wish<D>> {
         let values = self.indicators();
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
-        let (count, finest) = (adaptivity.criteria.len(), adaptivity.finest_level());
+        let count = adaptivity.criteria.len();
         // One step more than the interval, as particles may have come from next door in this one.
         let interval = (steps + 1) as f64 * self.clock.dt;
-        let per_edge = f64::from(1u32 << finest) / self.physics.root_edge;
+        let per_edge = adaptivity.finest_edges_per_metre(self.physics.root_edge);
         let way =
             |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
         let leaves = self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.surveys).enumerate();
