@@ -7,7 +7,6 @@ use crate::job::{self, AnyProblem, Problem};
 use crate::particle::chunk::Tag;
 use crate::particle::seed::check_counts;
 use crate::run::setup;
-use partition::MAX_LEVEL;
 use partition::comm::World;
 use std::io::Write;
 use std::path::PathBuf;
@@ -54,19 +53,12 @@ fn refined<const D: usize>(problem: &Problem<D>, estimate: Estimate) -> Result<E
     let comm = world.comm();
     let solver = setup::solver(comm, problem).map_err(|error| Failure::Run(error.to_string()))?;
     let mut bodies = vec![0; problem.bodies.len()];
-    let mut levels = [[0; 3]; MAX_LEVEL as usize + 1];
-    for (leaf, chunk) in solver.forest.leaves().iter().zip(&solver.chunks) {
-        let level = &mut levels[usize::from(leaf.level)];
-        let here = [1, u64::from(!chunk.is_empty()), chunk.len() as u64];
-        level.iter_mut().zip(here).for_each(|(sum, here)| *sum += here);
-        chunk.tags().iter().for_each(|&tag| bodies[usize::from(Tag::unpack(tag).body)] += 1);
+    for &tag in solver.chunks.iter().flat_map(|chunk| chunk.tags()) {
+        bodies[usize::from(Tag::unpack(tag).body)] += 1;
     }
-    comm.sum_u64(&mut bodies);
-    comm.sum_u64(levels.as_flattened_mut());
-    let finest = levels.iter().rposition(|[leaves, ..]| *leaves > 0).unwrap_or(0);
-    let levels = levels[..=finest].iter();
-    let levels = levels.map(|&[leaves, filled, particles]| LevelCount { leaves, filled, particles });
-    Ok(estimate.for_tree(problem, bodies, levels.collect()))
+    let particles: Vec<u64> = solver.chunks.iter().map(|chunk| chunk.len() as u64).collect();
+    let levels = LevelCount::of_levels(problem, solver.forest.leaves(), &particles);
+    Ok(estimate.for_tree(problem, bodies, levels))
 }
 
 fn write<const D: usize>(
@@ -115,11 +107,10 @@ fn write<const D: usize>(
     if let Some(adaptivity) = &problem.adaptivity {
         write_refinement(out, problem, adaptivity, is_refined)?;
     }
-    let ranks = f64::from(arguments.ranks);
     writeln!(
         out,
         "memory       about {} per rank on {}",
-        bytes(estimate.memory / ranks),
+        bytes(estimate.memory_per_rank(arguments.ranks)),
         plural(arguments.ranks)
     )?;
     writeln!(out, "time step    about {:.3e} s", estimate.time_step)?;

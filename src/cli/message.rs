@@ -2,7 +2,7 @@
 use std::io::{IsTerminal as _, Write as _};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
-use partition::comm::Comm;
+use partition::comm::{Comm, World};
 
 use super::Failure;
 use crate::job::{FaultList, JobError};
@@ -13,6 +13,8 @@ impl Failure {
         match self {
             Self::Job(JobError::Invalid(list)) => explain_faults(list),
             Self::Told(_) => {}
+            // If nobody listens, nobody is told.
+            Self::Arguments(error) => drop(error.print()),
             other => tell(&format!("agimp: {other}")),
         }
     }
@@ -36,6 +38,17 @@ pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, 
     }
     comm.min_u64(&mut code);
     Err(Failure::Told(code[0] as u8))
+}
+
+/// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the parser
+/// refuses, told once.
+pub fn unusable(error: clap::Error) -> Failure {
+    let is_launched = std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some();
+    let Some(world) = is_launched.then(World::init).and_then(Result::ok) else { return error.into() };
+    match together(world.comm(), Err::<(), _>(error.into())) {
+        Ok(()) => Failure::Told(0),
+        Err(told) => told,
+    }
 }
 
 /// Writes a message in one piece: `mpirun` may put its own words between pieces. If nobody listens, nobody is told.

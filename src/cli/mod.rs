@@ -10,6 +10,7 @@ pub mod digest;
 pub mod info;
 pub mod material;
 mod message;
+pub use message::unusable;
 pub mod new;
 pub mod plot;
 pub mod run;
@@ -59,6 +60,9 @@ pub enum Failure {
     /// The bodies of a job cannot be filled.
     #[error(transparent)]
     Seed(#[from] SeedError),
+    /// The command line is wrong, or asks for help.
+    #[error(transparent)]
+    Arguments(#[from] clap::Error),
     /// The command cannot be carried out as given.
     #[error("{0}")]
     Usage(String),
@@ -82,6 +86,7 @@ impl Failure {
         match self {
             Self::Job(_) | Self::Seed(_) | Self::Usage(_) => BAD_INPUT,
             Self::Run(_) => 1,
+            Self::Arguments(error) => error.exit_code() as u8,
             Self::Told(code) => *code,
             Self::Stopped(_) => crate::run::stop::STOPPED,
         }

@@ -5,7 +5,7 @@ use crate::particle::Layout;
 use crate::particle::seed::{SeedError, count_leaf};
 use partition::Octant;
 use rayon::prelude::*;
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 /// Size and cost of a job.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Estimate {
     pub time_step: f64,
     /// Steps to the end if the first time step were kept.
     pub steps: f64,
-    /// Bytes of memory of all ranks together; about.
+    /// Bytes of memory of all ranks together, without the program itself; about.
     pub memory: f64,
     /// Bytes of one output file with its tree; about.
     pub output_bytes: f64,
@@ -29,6 +29,9 @@ pub struct Estimate {
     pub checkpoint_bytes: f64,
 }
 
+/// Bytes that each rank takes with next to no particles: the program itself and its libraries.
+const PROGRAM: f64 = 33e6;
+
 /// Leaves of one level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LevelCount {
@@ -36,11 +39,50 @@ pub struct LevelCount {
     pub leaves: u64,
     /// Leaves with particles.
     pub filled: u64,
+    /// Leaves that touch one of another level.
+    pub jumps: u64,
+    /// Those of them with particles.
+    pub filled_jumps: u64,
     /// Particles.
     pub particles: u64,
 }
 
+impl LevelCount {
+    /// Not collective. Counts of some leaves by level up to the finest one, given the particles of each.
+    pub fn of_levels<const D: usize>(
+        problem: &Problem<D>,
+        leaves: &[Octant<D>],
+        particles: &[u64],
+    ) -> Vec<Self> {
+        let all: FxHashSet<Octant<D>> = leaves.iter().copied().collect();
+        let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
+        let mut levels = vec![Self::default(); usize::from(finest) + 1];
+        for (leaf, &particles) in leaves.iter().zip(particles) {
+            let mut around = offsets().filter_map(|offset| leaf.neighbour(offset, &problem.brick));
+            let level = &mut levels[usize::from(leaf.level)];
+            level.leaves += 1;
+            level.filled += u64::from(particles > 0);
+            let is_jump = around.any(|neighbour| !all.contains(&neighbour));
+            level.jumps += u64::from(is_jump);
+            level.filled_jumps += u64::from(is_jump && particles > 0);
+            level.particles += particles;
+        }
+        levels
+    }
+}
+
+/// Towards all octants around one, and to itself.
+fn offsets<const D: usize>() -> impl Iterator<Item = [i32; D]> {
+    (0..3_usize.pow(D as u32))
+        .map(|offset| std::array::from_fn(|axis| (offset / 3_usize.pow(axis as u32) % 3) as i32 - 1))
+}
+
 impl Estimate {
+    /// Bytes of memory of each of some ranks that share the work evenly; about.
+    pub fn memory_per_rank(&self, ranks: u32) -> f64 {
+        PROGRAM + self.memory / f64::from(ranks)
+    }
+
     /// Particles of all bodies.
     pub fn total_particles(&self) -> u64 {
         self.particles.iter().sum()
@@ -70,28 +112,22 @@ impl Estimate {
 /// Two bodies share a lattice point.
 pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, SeedError> {
     let leaves = leaves(problem);
-    let counts: Vec<(u8, Vec<u64>)> = leaves
+    let counts: Vec<Vec<u64>> = leaves
         .par_iter()
         .map(|leaf| {
             let mut counts = vec![0; problem.bodies.len()];
             count_leaf(problem, leaf, &mut counts)?;
-            Ok((leaf.level, counts))
+            Ok(counts)
         })
         .collect::<Result<_, SeedError>>()?;
 
     let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
     let mut particles = vec![0; problem.bodies.len()];
-    let mut levels = vec![LevelCount::default(); usize::from(finest) + 1];
-    for (level, counts) in counts {
-        let level = &mut levels[usize::from(level)];
-        let here: u64 = counts.iter().sum();
-        level.leaves += 1;
-        level.filled += u64::from(here > 0);
-        level.particles += here;
-        for (sum, count) in particles.iter_mut().zip(counts) {
-            *sum += count;
-        }
+    for counts in &counts {
+        particles.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
+    let filling: Vec<u64> = counts.iter().map(|counts| counts.iter().sum()).collect();
+    let levels = LevelCount::of_levels(problem, &leaves, &filling);
     // Criteria may make any leaf as fine as they want, which shortens the step of all.
     let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
     let time_step = time_step(problem, criteria.map(|criterion| criterion.level).fold(finest, u8::max));
@@ -142,14 +178,22 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
 fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
     let particles = estimate.total_particles() as f64;
     let leaves = estimate.total_leaves() as f64;
-    let filled: u64 = estimate.levels.iter().map(|level| level.filled).sum();
 
-    // Reals, identifier and tag of a particle; chunks have a few slots to spare.
+    // Reals, identifier and tag of a particle.
     let state = 8.0 * (Layout::<D>::REALS + 2) as f64;
-    // A bin's arena of (4 + 3)^D rows of four reals, and twice as many rows for node values; bins lie
-    // at filled leaves and about as many more where they border finer ones.
-    let bin = 3.0 * 7_f64.powi(D as i32) * 32.0;
-    estimate.memory = 1.05 * particles * state + 2.0 * filled as f64 * bin + leaves * 64.0;
+    // What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
+    // plan, filled ones node fields, arenas and slack of columns; where levels meet there are more blocks and bins, lists of
+    // constrained nodes, and moments.
+    let levels = estimate.levels.iter().map(|level| {
+        let count = [level.leaves, level.filled, level.jumps, level.filled_jumps];
+        count
+            .into_iter()
+            .zip([3.0, 52.0, 38.0, 122.0])
+            .map(|(count, bytes)| count as f64 * bytes)
+            .sum::<f64>()
+    });
+    let rows = 7_f64.powi(D as i32);
+    estimate.memory = particles * state + rows * levels.sum::<f64>();
 
     // A particle in the file: three coordinates, a vertex (connectivity, offset, type), the fields.
     let fields: usize = problem.output.fields.iter().map(|field| field_bytes(*field)).sum();
@@ -172,7 +216,7 @@ fn field_bytes(field: Field) -> usize {
 /// Not collective. All leaves of the tree that the job asks for, along the curve.
 pub fn leaves<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
     // The octants that are split, by level; everything else follows from them.
-    let mut split: Vec<HashSet<Octant<D>>> = vec![HashSet::new(); usize::from(problem.finest_level()) + 1];
+    let mut split = vec![FxHashSet::default(); usize::from(problem.finest_level()) + 1];
     let mut pending = roots(problem);
     while let Some(octant) = pending.pop() {
         if problem.wants_refinement(&octant) {
@@ -198,12 +242,11 @@ pub fn leaves<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
 
 /// An octant that is split has children next to all its neighbours, so those must exist: their parents
 /// are split too. Finest level first; each level only adds to the coarser ones.
-fn balance<const D: usize>(problem: &Problem<D>, split: &mut [HashSet<Octant<D>>]) {
+fn balance<const D: usize>(problem: &Problem<D>, split: &mut [FxHashSet<Octant<D>>]) {
     for level in (1..split.len()).rev() {
         let octants: Vec<Octant<D>> = split[level].iter().copied().collect();
         for octant in octants {
-            for offset in 0..3_usize.pow(D as u32) {
-                let offset = std::array::from_fn(|a| (offset / 3_usize.pow(a as u32) % 3) as i32 - 1);
+            for offset in offsets() {
                 let Some(neighbour) = octant.neighbour(offset, &problem.brick) else { continue };
                 let mut parent = neighbour.parent();
                 while let Some(ancestor) = parent {

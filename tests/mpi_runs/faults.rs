@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::in_turn;
 use crate::launch::{
-    Outcome, Running, agimp, contents, file, is_alive, job, last_step, mpirun, run, signal, succeed, text,
+    Outcome, Running, contents, file, is_alive, job, last_step, mpirun, run, signal, succeed, text,
 };
 
 /// All ranks must have ended this long after one has failed or was killed.
@@ -233,12 +233,22 @@ fn ranks_end_after_the_message_has_gone_out() {
     assert!(told.starts_with("agimp: missing.toml: cannot be read"), "{told}");
 }
 
-/// A wrong command line is told before MPI starts.
+/// A wrong command line is told once as well, and so is help.
 #[test]
-fn a_wrong_argument_is_told() {
+fn a_wrong_argument_is_told_once() {
+    let _turn = in_turn();
     let home = tempfile::tempdir().expect("temporary directory");
-    let output = agimp(home.path()).args(["run", "a.toml", "--threads", "0"]).output().expect("agimp starts");
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    for ranks in [1, 3] {
+        let output =
+            Running::start(&mut run(home.path(), ranks, 0, Path::new("a.toml"), &[])).finish_within(SOON);
+        let shown = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{shown}");
+        assert_eq!(shown.matches("invalid value '0' for '--threads").count(), 1, "one message: {shown}");
+    }
+    let mut command = mpirun(home.path(), 3);
+    let output = Running::start(command.args([env!("CARGO_BIN_EXE_agimp"), "--help"])).finish_within(SOON);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert_eq!(text(&output).matches("Print the JSON schema").count(), 1, "{}", text(&output));
 }
 
 fn all_ended(processes: &[u32]) {

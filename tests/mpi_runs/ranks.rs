@@ -4,7 +4,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::in_turn;
-use crate::launch::{file, job, run, succeed};
+use crate::launch::{agimp, file, job, run, succeed, text};
 
 /// The records of a run.
 fn telemetry(directory: &Path, name: &str) -> Vec<Value> {
@@ -47,6 +47,25 @@ fn check_counts(ranks: usize) {
         let ratio = arenas[1] / surface[1];
         assert!((1.0..=MOST_BYTES).contains(&ratio), "{ratio} times the bytes of the surface");
     }
+}
+
+/// `agimp check` tells the memory of a run before it runs.
+#[test]
+fn memory_is_foretold() {
+    let _turn = in_turn();
+    let (name, home) = ("many_leaves", tempfile::tempdir().expect("temporary directory"));
+    let shown = text(&succeed(agimp(home.path()).arg("check").arg(job(name))));
+    let line = shown.lines().find_map(|line| line.strip_prefix("memory")).expect("memory");
+    let foretold: f64 = line
+        .split_whitespace()
+        .find_map(|word| word.parse().ok())
+        .unwrap_or_else(|| panic!("a number of megabytes: {line}"));
+    assert!(line.contains(" MB "), "{line}");
+    succeed(&mut run(home.path(), 1, 1, &job(name), &["--quiet"]));
+    let memory = telemetry(home.path(), name).last().and_then(|record| record["memory"]["max"].as_f64());
+    let ratio = 1e6 * foretold / memory.expect("memory");
+    println!("{foretold} MB foretold, {ratio:.2} of what it took");
+    assert!((0.7..1.4).contains(&ratio), "{foretold} MB, {ratio} of what it took");
 }
 
 /// Bytes sent over the bytes that the surface between ranks needs, at most.
