@@ -93,6 +93,11 @@ pub(super) struct Departed {
 }
 
 impl Departed {
+    /// Whether there is anything to tell.
+    pub fn is_any(&self) -> bool {
+        !self.records.is_empty() || self.deleted > 0 || self.error.is_some() || self.splits.is_some()
+    }
+
     /// Takes particles, ascending, out of a chunk.
     fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
         let mut departed = Self::default();

@@ -50,6 +50,7 @@ use crate::grid::waves;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
 use crate::particle::Chunk;
+use crate::particle::chunk::Place;
 
 /// What is solved: the same on every rank, constant over a run.
 pub struct Physics<const D: usize> {
@@ -153,6 +154,8 @@ pub struct Solver<const D: usize> {
     pub parts: Parts,
     /// What was noted of each own leaf in the last step.
     surveys: Vec<Survey<D>>,
+    /// Where the columns of each own leaf were at the start of the last G2P.
+    places: Vec<Place>,
     /// What regrids remember; nothing that a bit depends on.
     recall: Recall<D>,
     /// What grids of earlier trees and partitions have sent.
@@ -197,6 +200,7 @@ impl<const D: usize> Solver<D> {
             regrids: 0,
             parts: Parts::default(),
             surveys: Vec::new(),
+            places: Vec::new(),
             recall: Recall::default(),
             sent_before: Traffic::default(),
             arena_bytes: 0,

@@ -244,7 +244,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// G2P: velocity, affine matrix, deformation, stress and position of all particles. Returns what has departed from
-    /// each leaf, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
+    /// leaves, in their order, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
     pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
@@ -257,11 +257,13 @@ impl<const D: usize> Solver<D> {
         let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
         let watch = watch.unwrap_or_default();
         self.surveys.resize(chunks.len(), Survey::default());
+        signal.resize(chunks.len(), 0.0);
         let surveys = &mut self.surveys;
-        let places: Vec<Place> = chunks.iter().map(Chunk::place).collect();
-        let mut departed = Vec::new();
+        self.places.clear();
+        self.places.extend(chunks.iter().map(Chunk::place));
+        let places = &self.places;
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().zip(surveys).enumerate();
+            let leaves = chunks.par_iter_mut().zip(surveys).zip(signal).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
                 let Scratch { arena, increments, gathered, leavers } = scratch;
                 leavers.begin(borders.of_leaf(leaf));
@@ -297,19 +299,26 @@ impl<const D: usize> Solver<D> {
                 leavers.found.sort_unstable();
                 signal.max(fastest)
             };
-            let speeds =
-                leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, (chunk, survey))| {
+            let departed = leaves.map_init(
+                Default::default,
+                |scratch: &mut Scratch<D>, (leaf, ((chunk, survey), signal))| {
+                    if chunk.is_empty() {
+                        *signal = 0.0;
+                        watch.before(chunk, survey);
+                        watch.after(chunk, dt, survey);
+                        return Departed::default();
+                    }
                     costs.time(leaf, || {
                         watch.before(chunk, survey);
-                        let signal = gather_leaf(scratch, leaf, chunk);
+                        *signal = gather_leaf(scratch, leaf, chunk);
                         watch.after(chunk, dt, survey);
-                        let outside = &scratch.leavers.found;
-                        (signal, borders.depart(&plan.tree, leaf, chunk, outside, resampling))
+                        borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling)
                     })
-                });
-            speeds.unzip_into_vecs(signal, &mut departed);
-        });
-        departed
+                },
+            );
+            // Of empty leaves, of which there may be very many, there is nothing.
+            departed.filter(Departed::is_any).collect()
+        })
     }
 
     /// S: velocities of the nodes at all particles, leaf by leaf.
