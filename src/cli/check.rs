@@ -109,7 +109,7 @@ fn write<const D: usize>(
     }
     writeln!(
         out,
-        "memory       about {} per rank on {}",
+        "memory       about {} per rank on {} at the start; outputs and material that spreads add to it",
         bytes(estimate.memory_per_rank(arguments.ranks)),
         plural(arguments.ranks)
     )?;
