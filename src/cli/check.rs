@@ -7,6 +7,7 @@ use crate::job::{self, AnyProblem, Problem};
 use crate::particle::chunk::Tag;
 use crate::particle::seed::check_counts;
 use crate::run::setup;
+use partition::MAX_LEVEL;
 use partition::comm::World;
 use std::io::Write;
 use std::path::PathBuf;
@@ -57,8 +58,15 @@ fn refined<const D: usize>(problem: &Problem<D>, estimate: Estimate) -> Result<E
         bodies[usize::from(Tag::unpack(tag).body)] += 1;
     }
     let particles: Vec<u64> = solver.chunks.iter().map(|chunk| chunk.len() as u64).collect();
-    let levels = LevelCount::of_levels(problem, solver.forest.leaves(), &particles);
-    Ok(estimate.for_tree(problem, bodies, levels))
+    // Under `mpirun` leaves beside those of other ranks count as lying beside another level.
+    let own = LevelCount::of_levels(problem, solver.forest.leaves(), &particles);
+    let mut levels = [[0; 5]; MAX_LEVEL as usize + 1];
+    own.iter().zip(&mut levels).for_each(|(own, level)| *level = own.to_array());
+    comm.sum_u64(&mut bodies);
+    comm.sum_u64(levels.as_flattened_mut());
+    let finest = levels.iter().rposition(|level| level[0] > 0).unwrap_or(0);
+    let levels = levels[..=finest].iter().map(|&level| LevelCount::from_array(level));
+    Ok(estimate.for_tree(problem, bodies, levels.collect()))
 }
 
 fn write<const D: usize>(

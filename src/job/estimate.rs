@@ -69,6 +69,16 @@ impl LevelCount {
         }
         levels
     }
+
+    /// All counts, that of the leaves first.
+    pub fn to_array(self) -> [u64; 5] {
+        [self.leaves, self.filled, self.jumps, self.filled_jumps, self.particles]
+    }
+
+    /// From [`LevelCount::to_array`].
+    pub fn from_array([leaves, filled, jumps, filled_jumps, particles]: [u64; 5]) -> Self {
+        Self { leaves, filled, jumps, filled_jumps, particles }
+    }
 }
 
 /// Towards all octants around one, and to itself.
