@@ -60,13 +60,12 @@ fn refined<const D: usize>(problem: &Problem<D>, estimate: Estimate) -> Result<E
     let particles: Vec<u64> = solver.chunks.iter().map(|chunk| chunk.len() as u64).collect();
     // Under `mpirun` leaves beside those of other ranks count as lying beside another level.
     let own = LevelCount::of_levels(problem, solver.forest.leaves(), &particles);
-    let mut levels = [[0; 5]; MAX_LEVEL as usize + 1];
-    own.iter().zip(&mut levels).for_each(|(own, level)| *level = own.to_array());
+    let mut levels = [LevelCount::default(); MAX_LEVEL as usize + 1];
+    levels[..own.len()].copy_from_slice(&own);
     comm.sum_u64(&mut bodies);
-    comm.sum_u64(levels.as_flattened_mut());
-    let finest = levels.iter().rposition(|level| level[0] > 0).unwrap_or(0);
-    let levels = levels[..=finest].iter().map(|&level| LevelCount::from_array(level));
-    Ok(estimate.for_tree(problem, bodies, levels.collect()))
+    comm.sum_u64(bytemuck::cast_slice_mut(&mut levels));
+    let finest = levels.iter().rposition(|level| level.leaves > 0).unwrap_or(0);
+    Ok(estimate.for_tree(problem, bodies, levels[..=finest].to_vec()))
 }
 
 fn write<const D: usize>(

@@ -1,8 +1,10 @@
 //! What a job will cost, found without running it.
 use super::problem::{Field, Problem};
+use crate::grid::mask::{offset, offset_count};
 use crate::material;
 use crate::particle::Layout;
 use crate::particle::seed::{SeedError, count_leaf};
+use bytemuck::{Pod, Zeroable};
 use partition::Octant;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
@@ -33,7 +35,8 @@ pub struct Estimate {
 const PROGRAM: f64 = 33e6;
 
 /// Leaves of one level.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct LevelCount {
     /// All leaves.
     pub leaves: u64,
@@ -58,7 +61,8 @@ impl LevelCount {
         let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
         let mut levels = vec![Self::default(); usize::from(finest) + 1];
         for (leaf, &particles) in leaves.iter().zip(particles) {
-            let mut around = offsets().filter_map(|offset| leaf.neighbour(offset, &problem.brick));
+            let mut around =
+                (0..offset_count(D)).filter_map(|index| leaf.neighbour(offset(index), &problem.brick));
             let level = &mut levels[usize::from(leaf.level)];
             level.leaves += 1;
             level.filled += u64::from(particles > 0);
@@ -69,22 +73,6 @@ impl LevelCount {
         }
         levels
     }
-
-    /// All counts, that of the leaves first.
-    pub fn to_array(self) -> [u64; 5] {
-        [self.leaves, self.filled, self.jumps, self.filled_jumps, self.particles]
-    }
-
-    /// From [`LevelCount::to_array`].
-    pub fn from_array([leaves, filled, jumps, filled_jumps, particles]: [u64; 5]) -> Self {
-        Self { leaves, filled, jumps, filled_jumps, particles }
-    }
-}
-
-/// Towards all octants around one, and to itself.
-fn offsets<const D: usize>() -> impl Iterator<Item = [i32; D]> {
-    (0..3_usize.pow(D as u32))
-        .map(|offset| std::array::from_fn(|axis| (offset / 3_usize.pow(axis as u32) % 3) as i32 - 1))
 }
 
 impl Estimate {
@@ -256,8 +244,8 @@ fn balance<const D: usize>(problem: &Problem<D>, split: &mut [FxHashSet<Octant<D
     for level in (1..split.len()).rev() {
         let octants: Vec<Octant<D>> = split[level].iter().copied().collect();
         for octant in octants {
-            for offset in offsets() {
-                let Some(neighbour) = octant.neighbour(offset, &problem.brick) else { continue };
+            for index in 0..offset_count(D) {
+                let Some(neighbour) = octant.neighbour(offset(index), &problem.brick) else { continue };
                 let mut parent = neighbour.parent();
                 while let Some(ancestor) = parent {
                     if !split[usize::from(ancestor.level)].insert(ancestor) {

@@ -267,6 +267,9 @@ impl<const D: usize> Solver<D> {
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
                 let Scratch { arena, increments, gathered, leavers } = scratch;
                 leavers.begin(borders.of_leaf(leaf));
+                if chunk.is_empty() {
+                    return 0.0;
+                }
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
@@ -302,21 +305,17 @@ impl<const D: usize> Solver<D> {
             let departed = leaves.map_init(
                 Default::default,
                 |scratch: &mut Scratch<D>, (leaf, ((chunk, survey), signal))| {
-                    if chunk.is_empty() {
-                        *signal = 0.0;
-                        watch.before(chunk, survey);
-                        watch.after(chunk, dt, survey);
-                        return Departed::default();
-                    }
-                    costs.time(leaf, || {
+                    // Of empty leaves there may be very many, and to take the time costs more than they do.
+                    let is_empty = chunk.is_empty();
+                    let mut work = || {
                         watch.before(chunk, survey);
                         *signal = gather_leaf(scratch, leaf, chunk);
                         watch.after(chunk, dt, survey);
                         borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling)
-                    })
+                    };
+                    if is_empty { work() } else { costs.time(leaf, work) }
                 },
             );
-            // Of empty leaves, of which there may be very many, there is nothing.
             departed.filter(Departed::is_any).collect()
         })
     }
