@@ -157,6 +157,12 @@ impl<const D: usize> Arenas<D> {
         self.occupied[self.number[bin] as usize].window
     }
 
+    /// The occupied bin that comes after an occupied one, with its window.
+    pub fn after(&self, bin: usize) -> Option<(usize, Window<D>)> {
+        let next = self.occupied.get(self.number[bin] as usize + 1)?;
+        Some((next.bin as usize, next.window))
+    }
+
     /// Whether an occupied bin reaches a block.
     pub fn reach(&self, block: usize) -> bool {
         self.waves.reach(block)

@@ -15,6 +15,7 @@ use super::region::Regions;
 use super::sums::{BlockSum, Sources};
 use super::waves::FIRST;
 use super::window::{Shared, Window};
+use crate::kernel::simd::prefetch;
 use crate::kernel::{Row, arena_nodes};
 use crate::memory::Block;
 
@@ -213,6 +214,26 @@ impl<const D: usize> NodeFields<D> {
             if let Some(constraints) = constraints {
                 constraints.copy_block(index, self.moments_of(plan, block as usize), &mut arena.moments);
             }
+        }
+    }
+
+    /// Asks for what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the processor to foresee
+    /// them.
+    pub fn read_ahead(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
+        let bin = &plan.bins[bin];
+        let (rows, nodes) = (self.rows.as_ptr().addr(), block_nodes(D));
+        for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
+            if block == NO_BLOCK {
+                continue;
+            }
+            let Some(shared) = window.shared(index) else { continue };
+            shared.for_each_run(|run| {
+                let first = rows + size_of::<Row>() * (block as usize * nodes + run.block);
+                prefetch(first);
+                if run.len > 1 {
+                    prefetch(first + size_of::<Row>() * (run.len - 1));
+                }
+            });
         }
     }
 }

@@ -250,7 +250,8 @@ impl<const D: usize> Solver<D> {
         let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let resampling = resampling.as_ref();
         let borders = &self.grid.migration.borders;
-        let (plan, fields, lists) = (&self.grid.plan, &self.grid.fields, &self.grid.lists);
+        let (plan, fields, lists, arenas) =
+            (&self.grid.plan, &self.grid.fields, &self.grid.lists, &self.grid.arenas);
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
         let adaptivity = self.physics.adaptivity.as_ref();
@@ -274,7 +275,6 @@ impl<const D: usize> Solver<D> {
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
                 let mut signal: f64 = 0.0;
-                let next = places.get(leaf + 1).copied().unwrap_or_default();
                 for (number, bin) in plan.leaf_bins(leaf).enumerate() {
                     let selected = Selected::of(lists, leaf, number, chunk);
                     if selected.is_empty() {
@@ -282,6 +282,10 @@ impl<const D: usize> Solver<D> {
                     }
                     let window = lists.window_of(leaf, number);
                     fields.load(plan, bin, &window, arena);
+                    let next = arenas.after(bin).map_or(Place::default(), |(next, window)| {
+                        fields.read_ahead(plan, next, &window);
+                        places[plan.bins[next].leaf as usize]
+                    });
                     if let Some(changes) = changes {
                         load_rows(plan, bin, &window, changes, increments);
                     }
