@@ -15,7 +15,6 @@ use super::region::Regions;
 use super::sums::{BlockSum, Sources};
 use super::waves::FIRST;
 use super::window::{Shared, Window};
-use crate::kernel::simd::prefetch;
 use crate::kernel::{Row, arena_nodes};
 use crate::memory::Block;
 
@@ -228,11 +227,7 @@ impl<const D: usize> NodeFields<D> {
             }
             let Some(shared) = window.shared(index) else { continue };
             shared.for_each_run(|run| {
-                let first = rows + size_of::<Row>() * (block as usize * nodes + run.block);
-                prefetch(first);
-                if run.len > 1 {
-                    prefetch(first + size_of::<Row>() * (run.len - 1));
-                }
+                run.read_ahead(rows + size_of::<Row>() * (block as usize * nodes + run.block));
             });
         }
     }

@@ -11,7 +11,6 @@ use super::order::Origin;
 use super::plan::GridPlan;
 use super::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
 use super::window::Window;
-use crate::kernel::simd::prefetch;
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 
 pub(super) const ZERO: Row = Row([0.0; 4]);
@@ -325,14 +324,7 @@ impl<const D: usize> Sources<'_, D> {
                 continue;
             };
             let first = rows.as_ptr().addr();
-            shared.for_each_run(|run| {
-                let (from, to) = (first + size_of::<Row>() * run.arena, size_of::<Row>() * (run.len - 1));
-                prefetch(from);
-                if run.len > 2 {
-                    prefetch(from + 64);
-                }
-                prefetch(from + to);
-            });
+            shared.for_each_run(|run| run.read_ahead(first + size_of::<Row>() * run.arena));
         }
     }
 }
