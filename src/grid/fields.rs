@@ -10,7 +10,7 @@ use super::cutter::Cutter;
 use super::exchange::ReceivedSums;
 use super::mask::{bits, block_nodes, offset_count};
 use super::mixed::Mixed;
-use super::plan::{GridPlan, NO_BLOCK};
+use super::plan::{Bin, GridPlan, NO_BLOCK};
 use super::region::Regions;
 use super::sums::{BlockSum, Sources};
 use super::waves::FIRST;
@@ -203,15 +203,10 @@ impl<const D: usize> NodeFields<D> {
             window.for_each_run(|run| arena.rows[run].fill(ZERO));
         }
         let nodes = block_nodes(D);
-        for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
-            if block == NO_BLOCK {
-                continue;
-            }
-            let rows = &self.rows[block as usize * nodes..][..nodes];
-            let Some(shared) = window.shared(index) else { continue };
-            copy_rows(shared, rows, &mut arena.rows);
+        for (index, block, shared) in shared_blocks(bin, window) {
+            copy_rows(shared, &self.rows[block * nodes..][..nodes], &mut arena.rows);
             if let Some(constraints) = constraints {
-                constraints.copy_block(index, self.moments_of(plan, block as usize), &mut arena.moments);
+                constraints.copy_block(index, self.moments_of(plan, block), &mut arena.moments);
             }
         }
     }
@@ -219,16 +214,9 @@ impl<const D: usize> NodeFields<D> {
     /// Asks for what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the processor to foresee
     /// them.
     pub fn read_ahead(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
-        let bin = &plan.bins[bin];
         let (rows, nodes) = (self.rows.as_ptr().addr(), block_nodes(D));
-        for (index, &block) in bin.around.iter().enumerate().take(offset_count(D)) {
-            if block == NO_BLOCK {
-                continue;
-            }
-            let Some(shared) = window.shared(index) else { continue };
-            shared.for_each_run(|run| {
-                run.read_ahead(rows + size_of::<Row>() * (block as usize * nodes + run.block));
-            });
+        for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {
+            shared.for_each_run(|run| run.read_ahead(rows + size_of::<Row>() * (block * nodes + run.block)));
         }
     }
 }
@@ -243,12 +231,21 @@ pub fn load_rows<const D: usize>(
 ) {
     window.for_each_run(|run| arena[run].fill(ZERO));
     let nodes = block_nodes(D);
-    let around = plan.bins[bin].around.iter().take(offset_count(D)).enumerate();
-    for (index, &block) in around.filter(|(_, block)| **block != NO_BLOCK) {
-        if let Some(shared) = window.shared(index) {
-            copy_rows(shared, &rows[block as usize * nodes..][..nodes], arena);
-        }
+    for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {
+        copy_rows(shared, &rows[block * nodes..][..nodes], arena);
     }
+}
+
+/// The blocks around a bin that share nodes of `window`: offset number, block, and the nodes.
+#[inline(always)]
+fn shared_blocks<const D: usize>(
+    bin: &Bin<D>,
+    window: &Window<D>,
+) -> impl Iterator<Item = (usize, usize, Shared<D>)> {
+    let around = bin.around.iter().take(offset_count(D)).enumerate();
+    around
+        .filter(|(_, block)| **block != NO_BLOCK)
+        .filter_map(|(index, &block)| Some((index, block as usize, window.shared(index)?)))
 }
 
 /// Copies the shared nodes from the rows of a block into those of an arena.
