@@ -11,7 +11,7 @@
 //! only after the gain has been given back.
 use super::hencky::Hencky;
 use super::parameters::FrictionMatch;
-use super::spectral::Trial;
+use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
 use crate::kernel::simd::{Lanes, widest};
 
@@ -46,28 +46,21 @@ impl Law for DruckerPrager {
         let zero = Lanes::splat(0.0);
         let one = Lanes::splat(1.0);
         let [shear, gain] = state.history;
-        let trial = Trial::of(&state.elastic, plane);
+        let trial = Strain::of(&state.elastic, plane);
         let booked = gain * self.correction;
         let trace = trial.trace + booked;
-        let mean = trace * (1.0 / 3.0);
         let norm = trial.norm;
         let excess = trace.mul_add(Lanes::splat(self.slope), norm);
         // An unstrained particle is elastic, so that it keeps its bits.
         let apart = zero.lt(trace) | (zero.le(trace) & zero.lt(norm));
         let flows = !apart & zero.lt(excess);
         // Strain without plastic flow; differs from the trial only where a gain of volume is booked.
-        let third = booked * (1.0 / 3.0);
         let returns = zero.lt(booked.abs()) & !apart;
         let changed = apart | flows | returns;
-        let mut strain = trial.strain;
+        let mut kept = one;
         state.work = zero;
         if changed.any() {
-            let kept = one - excess / norm;
-            for k in 0..3 {
-                let sheared = trial.deviator[k].mul_add(kept, mean);
-                let moved = flows.select(sheared, trial.strain[k] + third);
-                strain[k] = changed.select(apart.select(zero, moved), trial.strain[k]);
-            }
+            kept = apart.select(zero, flows.select(one - excess / norm, one));
             let slip = apart.select(norm, flows.select(excess, zero));
             state.history[0] = shear + slip;
             // What the elastic part gives up; nothing is booked any more once the material is closed.
@@ -77,7 +70,8 @@ impl Law for DruckerPrager {
             let retained = norm - excess;
             state.work = flows.select(retained * excess * (2.0 * self.solid.shear_modulus()), zero);
         }
-        trial.finish(&self.solid, state, &strain, changed, apart, plane);
+        let trace = apart.select(zero, trace);
+        trial.finish(&self.solid, state, [trace, kept], changed, apart, plane);
     }
 }
 

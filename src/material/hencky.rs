@@ -1,7 +1,7 @@
 //! Hencky elasticity: `W = μ Σ ε² + λ/2 (Σ ε)²`, `τ = 2μ ε + λ tr(ε) I` with the logarithmic strain
 //! `ε = ½ ln b`. Also the elastic part of the plastic models.
 use super::eigen::greatest_bound;
-use super::spectral::principal_strains;
+use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric};
 use crate::kernel::simd::{Lanes, each, widest};
 
@@ -25,17 +25,21 @@ impl Hencky {
         self.lame.mu
     }
 
-    /// Principal Kirchhoff stresses.
+    /// Writes Kirchhoff stress and wave speed of a strain with this trace and this deviator.
     #[inline(always)]
-    pub(super) fn principal_stresses(&self, strain: &[Lanes; 3]) -> [Lanes; 3] {
-        let pressure = (strain[0] + strain[1] + strain[2]) * self.lame.lambda;
-        each(*strain, |e| e.mul_add(Lanes::splat(2.0 * self.lame.mu), pressure))
+    pub(super) fn load(&self, state: &mut State, trace: Lanes, deviator: &Symmetric) {
+        let pressure = trace * (self.lame.lambda + 2.0 / 3.0 * self.lame.mu);
+        state.stress = each(*deviator, |component| component * (2.0 * self.lame.mu));
+        for normal in &mut state.stress[..3] {
+            *normal += pressure;
+        }
+        state.wave_speed = self.wave_speed_under(&state.stress);
     }
 
     /// Bound of the wave speeds: along a principal direction `ρ₀ c² = s² ∂P/∂F = λ + 2μ - τ`, greatest
     /// where the stress is most compressive.
     #[inline(always)]
-    pub(super) fn wave_speed_under(&self, stress: &Symmetric) -> Lanes {
+    fn wave_speed_under(&self, stress: &Symmetric) -> Lanes {
         let compression = greatest_bound(&each(*stress, |s| -s)).max(Lanes::splat(0.0));
         ((compression + Lanes::splat(self.lame.pressure_wave())) * (1.0 / self.density)).sqrt()
     }
@@ -44,9 +48,8 @@ impl Hencky {
 impl Law for Hencky {
     #[inline(always)]
     fn respond(&self, state: &mut State, plane: bool) {
-        let (eigen, strain) = principal_strains(&state.elastic, plane);
-        state.stress = eigen.compose(&self.principal_stresses(&strain), plane);
-        state.wave_speed = self.wave_speed_under(&state.stress);
+        let strain = Strain::of(&state.elastic, plane);
+        self.load(state, strain.trace, &strain.deviator);
         state.work = Lanes::splat(0.0);
     }
 }
@@ -57,9 +60,8 @@ impl Material for Hencky {
     }
 
     fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {
-        let (_, e) = principal_strains(b, plane);
-        let trace = e[0] + e[1] + e[2];
-        (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) * self.lame.mu + trace * trace * (0.5 * self.lame.lambda)
+        let Strain { trace, norm, .. } = Strain::of(b, plane);
+        norm * norm * self.lame.mu + trace * trace * (0.5 * self.lame.lambda + self.lame.mu / 3.0)
     }
 
     fn density(&self) -> f64 {

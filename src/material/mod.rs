@@ -1,8 +1,7 @@
 //! Constitutive models: one trait over batches of particles, one file per model.
 //!
 //! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
-//! elastic state. Plastic models map a trial `b` back to their yield surface in principal Hencky
-//! strains.
+//! elastic state. Plastic models map a trial `b` back to their yield surface in Hencky strains.
 use crate::kernel::simd::{Kernel, LANES, Lanes, Mask};
 
 pub mod driver;
@@ -10,9 +9,10 @@ pub mod drucker_prager;
 pub mod eigen;
 pub mod fixed_corotated;
 pub mod hencky;
+mod near_unit;
 pub mod neo_hookean;
 pub mod parameters;
-mod spectral;
+mod strain;
 pub mod von_mises;
 
 pub use eigen::Symmetric;

@@ -1,9 +1,9 @@
-//! Hencky elasticity with von Mises yield and linear isotropic hardening; radial return in principal
-//! logarithmic strains (Simo 1992).
+//! Hencky elasticity with von Mises yield and linear isotropic hardening; radial return in logarithmic
+//! strains (Simo 1992).
 //!
 //! `f = |dev τ| - √(2/3) (σ_y + H κ)`, closed form: `Δγ = f / (2μ + 2H/3)`, `Δκ = √(2/3) Δγ`.
 use super::hencky::Hencky;
-use super::spectral::Trial;
+use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
 use crate::kernel::simd::{Lanes, Mask, widest};
 
@@ -30,26 +30,22 @@ impl Law for VonMises {
         let one = Lanes::splat(1.0);
         let root = (2.0_f64 / 3.0).sqrt();
         let mu = self.solid.shear_modulus();
-        let trial = Trial::of(&state.elastic, plane);
+        let trial = Strain::of(&state.elastic, plane);
         let radius = |kappa: Lanes| {
             kappa.mul_add(Lanes::splat(root * self.hardening), Lanes::splat(root * self.yield_stress))
         };
         let excess = trial.norm.mul_add(Lanes::splat(2.0 * mu), -radius(state.history[0]));
         let flows = zero.lt(excess);
-        let mut strain = trial.strain;
+        let mut kept = one;
         state.work = zero;
         if flows.any() {
             let flow = excess * (1.0 / (2.0 * mu + 2.0 / 3.0 * self.hardening));
-            let kept = one - flow / trial.norm;
-            let mean = trial.trace * (1.0 / 3.0);
-            for k in 0..3 {
-                strain[k] = flows.select(trial.deviator[k].mul_add(kept, mean), strain[k]);
-            }
+            kept = flows.select(one - flow / trial.norm, one);
             let kappa = flow.mul_add(Lanes::splat(root), state.history[0]);
             state.history[0] = flows.select(kappa, state.history[0]);
             state.work = flows.select(radius(kappa) * flow, zero);
         }
-        trial.finish(&self.solid, state, &strain, flows, Mask::from_bits(0), plane);
+        trial.finish(&self.solid, state, [trial.trace, kept], flows, Mask::from_bits(0), plane);
     }
 }
 

@@ -1,0 +1,200 @@
+//! Logarithmic strains of elastic tensors and the way back: what all models in Hencky strains share.
+//!
+//! Elastic strains of metals and soils are small, so most tensors are near a multiple of the unit tensor and need no
+//! eigenvectors (`near_unit.rs`). The others are decomposed; which way a particle goes follows from its own state.
+use super::eigen::{Eigen, decompose};
+use super::hencky::Hencky;
+use super::near_unit::TraceFree;
+use super::{State, Symmetric};
+use crate::kernel::math::{exp, ln};
+use crate::kernel::simd::{Lanes, Mask, each};
+
+/// The logarithmic strain `½ ln b` of a trial tensor.
+pub(super) struct Strain {
+    /// Trace.
+    pub trace: Lanes,
+    /// Deviator.
+    pub deviator: Symmetric,
+    /// Norm of the deviator.
+    pub norm: Lanes,
+    /// Lanes that are not near a multiple of the unit tensor, if there are any.
+    far: Option<Far>,
+}
+
+/// Lanes that were decomposed.
+struct Far {
+    lanes: Mask,
+    eigen: Eigen,
+    /// Principal strains less their mean.
+    deviator: [Lanes; 3],
+}
+
+impl Strain {
+    /// Strain of a tensor.
+    #[inline(always)]
+    pub fn of(b: &Symmetric, plane: bool) -> Self {
+        let (mean, beside) = TraceFree::beside_unit(b);
+        let near = beside.is_small() & Lanes::splat(0.0).lt(mean);
+        let (trace, deviator) = beside.ln_of_one_plus();
+        let mut strain = Self {
+            trace: ln(mean).mul_add(Lanes::splat(1.5), trace * 0.5),
+            deviator: each(deviator, |component| component * 0.5),
+            norm: mean,
+            far: None,
+        };
+        if !near.all() {
+            strain.decompose(b, !near, plane);
+        }
+        let [xx, yy, zz, xy, xz, yz] = strain.deviator;
+        let shear = xy.mul_add(xy, xz.mul_add(xz, yz * yz));
+        strain.norm = xx.mul_add(xx, yy.mul_add(yy, zz.mul_add(zz, shear + shear))).sqrt();
+        strain
+    }
+
+    /// Takes some lanes from the eigenvalues.
+    #[cold]
+    #[inline(never)]
+    fn decompose(&mut self, b: &Symmetric, lanes: Mask, plane: bool) {
+        let eigen = decompose(b, plane);
+        let strain = each(eigen.value, |value| ln(value) * 0.5);
+        let trace = strain[0] + strain[1] + strain[2];
+        let deviator = each(strain, |e| e - trace * (1.0 / 3.0));
+        let tensor = eigen.compose(&deviator, plane);
+        self.trace = lanes.select(trace, self.trace);
+        for c in 0..6 {
+            self.deviator[c] = lanes.select(tensor[c], self.deviator[c]);
+        }
+        self.far = Some(Far { lanes, eigen, deviator });
+    }
+
+    /// The elastic tensor with another trace of the strain and `kept` times its deviator, from 0 to 1.
+    #[inline(always)]
+    fn elastic(&self, trace: Lanes, kept: Lanes, plane: bool) -> Symmetric {
+        let twice_kept = kept + kept;
+        let volumetric = exp(trace * (2.0 / 3.0));
+        let deviatoric = TraceFree::new(each(self.deviator, |component| component * twice_kept)).exp();
+        let mut elastic = each(deviatoric, |component| component * volumetric);
+        if let Some(far) = &self.far {
+            far.replace(&mut elastic, trace, twice_kept, plane);
+        }
+        elastic
+    }
+
+    /// Writes the final state, which has another trace of the strain and `kept` times its deviator where `changed` and
+    /// the trial one elsewhere: elastic tensor, stress, wave speed. Lanes in `unstrained` get exactly the unit tensor, and
+    /// lanes that have not changed keep the bits of the trial tensor.
+    #[inline(always)]
+    pub fn finish(
+        &self,
+        solid: &Hencky,
+        state: &mut State,
+        [trace, kept]: [Lanes; 2],
+        changed: Mask,
+        unstrained: Mask,
+        plane: bool,
+    ) {
+        if !changed.any() {
+            return solid.load(state, self.trace, &self.deviator);
+        }
+        let elastic = self.elastic(trace, kept, plane);
+        let kept = changed.select(kept, Lanes::splat(1.0));
+        for c in 0..6 {
+            let unit = Lanes::splat(if c < 3 { 1.0 } else { 0.0 });
+            let returned = unstrained.select(unit, elastic[c]);
+            state.elastic[c] = changed.select(returned, state.elastic[c]);
+        }
+        let deviator = each(self.deviator, |component| component * kept);
+        solid.load(state, changed.select(trace, self.trace), &deviator);
+    }
+}
+
+impl Far {
+    /// Takes these lanes of [`Strain::elastic`] from the eigenvectors.
+    #[cold]
+    #[inline(never)]
+    fn replace(&self, elastic: &mut Symmetric, trace: Lanes, twice_kept: Lanes, plane: bool) {
+        let twice_mean = trace * (2.0 / 3.0);
+        let value = each(self.deviator, |e| exp(e.mul_add(twice_kept, twice_mean)));
+        let tensor = self.eigen.compose(&value, plane);
+        for c in 0..6 {
+            elastic[c] = self.lanes.select(tensor[c], elastic[c]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernel::simd::LANES;
+
+    /// Strains of tensors on both sides of the limit of the series, from eigenvalues as well.
+    fn agrees_with_eigenvalues(b: &Symmetric, plane: bool, tolerance: f64) -> Result<(), TestCaseError> {
+        let strain = Strain::of(b, plane);
+        let eigen = decompose(b, plane);
+        let principal = each(eigen.value, |value| ln(value) * 0.5);
+        let expected = eigen.compose(&principal, plane);
+        let back = strain.elastic(strain.trace, Lanes::splat(1.0), plane);
+        for lane in 0..LANES {
+            let at = |value: Lanes| value.to_array()[lane];
+            let mean = at(strain.trace) / 3.0;
+            for c in 0..6 {
+                let found = at(strain.deviator[c]) + if c < 3 { mean } else { 0.0 };
+                let error = (found - at(expected[c])).abs();
+                prop_assert!(error <= tolerance, "{c}: {error}");
+                let scale = at(b[0]) + at(b[1]) + at(b[2]);
+                prop_assert!(
+                    (at(back[c]) - at(b[c])).abs() <= 2.0 * tolerance * scale,
+                    "{c} on the way back"
+                );
+            }
+            let trace = principal.iter().map(|&e| at(e)).sum::<f64>();
+            prop_assert!((at(strain.trace) - trace).abs() <= tolerance);
+            prop_assert_eq!(at(strain.trace).to_bits(), at(of_one_lane(b, lane, plane)).to_bits());
+        }
+        Ok(())
+    }
+
+    /// Trace of the strain of one lane alone.
+    fn of_one_lane(b: &Symmetric, lane: usize, plane: bool) -> Lanes {
+        Strain::of(&each(*b, |component| Lanes::splat(component.to_array()[lane])), plane).trace
+    }
+
+    proptest! {
+        #[test]
+        fn strains_agree_with_eigenvalues(
+            normal in prop::array::uniform3(prop::array::uniform8(-1.0_f64..1.0)),
+            shear in prop::array::uniform3(prop::array::uniform8(-1.0_f64..1.0)),
+            width in prop::sample::select(vec![1e-9, 1e-3, 0.05, 0.1, 0.3]),
+            volume in 0.3_f64..3.0,
+        ) {
+            let normal = normal.map(|x| Lanes::new(x.map(|x| volume * (1.0 + width * x))));
+            let [xy, xz, yz] = shear.map(|x| Lanes::new(x.map(|x| volume * width * x)));
+            let [xx, yy, zz] = normal;
+            agrees_with_eigenvalues(&[xx, yy, zz, xy, xz, yz], false, 4e-15)?;
+            let zero = Lanes::splat(0.0);
+            agrees_with_eigenvalues(&[xx, yy, zz, xy, zero, zero], true, 4e-15)?;
+        }
+    }
+
+    #[test]
+    fn no_strain_is_exactly_none() {
+        let [zero, one] = [0.0, 1.0].map(Lanes::splat);
+        let strain = Strain::of(&[one, one, one, zero, zero, zero], false);
+        for value in strain.deviator.iter().chain([&strain.trace, &strain.norm]) {
+            assert_eq!(value.to_array(), [0.0; LANES]);
+        }
+    }
+
+    /// What is no deformation must not pass for one near the unit tensor.
+    #[test]
+    fn indefinite_tensors_are_decomposed() {
+        let zero = Lanes::splat(0.0);
+        for diagonal in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
+            let b = [diagonal; 3].map(Lanes::splat);
+            let strain = Strain::of(&[b[0], b[1], b[2], zero, zero, zero], false);
+            assert!(strain.far.is_some_and(|far| far.lanes.all()), "{diagonal}");
+        }
+    }
+}
