@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use super::batch::{Batch, lanes_in};
 use super::simd::{LANES, Lanes};
-use super::weights::Weights;
+use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, stencil_bases};
 
 /// Nodes of a stencil in 3D.
@@ -97,9 +97,14 @@ impl ConstrainedNodes {
         size_of::<Visit>() * self.visits.capacity() + 2 * self.start.capacity() + 8 * self.second.capacity()
     }
 
-    /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made ready.
+    /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made ready in `nodes`.
     #[inline(always)]
-    pub(super) fn prepare<const D: usize>(&self, weights: &mut Weights<D>, batch: &Batch) -> u32 {
+    pub(super) fn prepare<const D: usize>(
+        &self,
+        weights: &Weights<D>,
+        nodes: &mut NodeWeights,
+        batch: &Batch,
+    ) -> u32 {
         let has_any = |lane: usize| {
             let base = weights.base(lane);
             self.start[base] != self.start[base + 1]
@@ -107,7 +112,7 @@ impl ConstrainedNodes {
         let touched = (0..LANES).fold(0, |lanes, lane| lanes | u32::from(has_any(lane)) << lane);
         let touched = batch.members_among(touched);
         if touched != 0 {
-            weights.fill_nodes();
+            nodes.fill(weights);
         }
         touched
     }
@@ -118,6 +123,7 @@ impl ConstrainedNodes {
     pub(super) fn for_each<const D: usize>(
         &self,
         weights: &Weights<D>,
+        nodes: &NodeWeights,
         lane: usize,
         mut f: impl FnMut(usize, usize, f64),
     ) {
@@ -126,7 +132,7 @@ impl ConstrainedNodes {
         let (rounds, _) = list.as_chunks::<D>();
         for round in rounds {
             for axis in 0..D {
-                f(usize::from(round[axis].column), axis, round[axis].weight(weights, lane));
+                f(usize::from(round[axis].column), axis, round[axis].weight(nodes, lane));
             }
         }
     }
@@ -136,13 +142,14 @@ impl ConstrainedNodes {
     pub(super) fn add_spread<const D: usize>(
         &self,
         weights: &Weights<D>,
+        nodes: &NodeWeights,
         touched: u32,
         spread: &mut [Lanes; D],
     ) {
         let mut values: [[f64; LANES]; D] = spread.map(Lanes::to_array);
         for lane in lanes_in(touched) {
             let mut sums = [0.0; D];
-            self.for_each(weights, lane, |column, axis, weight| {
+            self.for_each(weights, nodes, lane, |column, axis, weight| {
                 sums[axis] = weight.mul_add(self.second[column], sums[axis]);
             });
             for axis in 0..D {
@@ -194,7 +201,7 @@ impl Seen {
 impl Visit {
     /// Weight of the node for the box of a lane.
     #[inline(always)]
-    fn weight<const D: usize>(self, weights: &Weights<D>, lane: usize) -> f64 {
-        weights.nodes[usize::from(self.node) % STENCIL.next_power_of_two()][lane]
+    fn weight(self, nodes: &NodeWeights, lane: usize) -> f64 {
+        nodes.0[usize::from(self.node) % STENCIL.next_power_of_two()][lane]
     }
 }

@@ -12,7 +12,7 @@ pub use super::gathered::{Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
 use super::simd::{Kernel, LANES, Lanes, widest};
-use super::weights::Weights;
+use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
 use crate::particle::chunk::{Chunk, Layout, Place};
@@ -54,7 +54,7 @@ impl<const D: usize> Kernel for Gather<'_, D> {
         let batches = Batches::new(select, chunk, next);
         let (reals, stride, tags) = chunk.reals_mut_and_tags();
         let cell = frame.cell;
-        let mut weights = Weights::new();
+        let (mut weights, mut nodes) = (Weights::new(), fields.moments.map(|_| NodeWeights::new()));
         let mut sums = Sums::new();
         let mut greatest = Lanes::splat(0.0);
         for batch in batches {
@@ -71,7 +71,7 @@ impl<const D: usize> Kernel for Gather<'_, D> {
                 scheme,
             );
             weights.fill(frame, &position, &position, &half);
-            sums.gather(&mut weights, &batch, fields);
+            sums.gather(&weights, &mut nodes, &batch, fields);
             greatest =
                 advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
         }
@@ -89,14 +89,14 @@ pub fn gather_sub_boxes<const D: usize>(
     gathered: &mut [Gathered<D>],
 ) {
     let (reals, stride) = chunk.reals();
-    let mut weights = Weights::new();
+    let (mut weights, mut nodes) = (Weights::new(), fields.moments.map(|_| NodeWeights::new()));
     let mut sums = Sums::new();
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        sums.gather(&mut weights, &batch, fields);
+        sums.gather(&weights, &mut nodes, &batch, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }

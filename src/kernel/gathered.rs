@@ -2,7 +2,7 @@
 use super::batch::{Batch, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, LANES};
-use super::weights::Weights;
+use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Row};
 
 /// First moments of the constrained nodes of an arena.
@@ -99,9 +99,15 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// The members of a batch, with all that the fields offer.
+    /// The members of a batch, with all that the fields offer; `nodes` is of use where they have moments.
     #[inline(always)]
-    pub fn gather(&mut self, weights: &mut Weights<D>, batch: &Batch, fields: &Fields) {
+    pub fn gather(
+        &mut self,
+        weights: &Weights<D>,
+        nodes: &mut Option<NodeWeights>,
+        batch: &Batch,
+        fields: &Fields,
+    ) {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = weights.first(lane);
@@ -112,19 +118,19 @@ impl<const D: usize> Sums<D> {
                 self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
             }
         }
-        if let Some(moments) = &fields.moments {
-            let touched = moments.nodes.prepare(weights, batch);
+        if let (Some(moments), Some(nodes)) = (&fields.moments, nodes) {
+            let touched = moments.nodes.prepare(weights, nodes, batch);
             if touched != 0 {
-                self.add_moments(weights, touched, moments);
+                self.add_moments(weights, nodes, touched, moments);
             }
         }
     }
 
     #[inline(never)]
-    fn add_moments(&mut self, weights: &Weights<D>, touched: u32, moments: &Moments) {
+    fn add_moments(&mut self, weights: &Weights<D>, nodes: &NodeWeights, touched: u32, moments: &Moments) {
         for lane in lanes_in(touched) {
             let mut sums = [F64x4::splat(0.0); D];
-            moments.nodes.for_each(weights, lane, |column, axis, weight| {
+            moments.nodes.for_each(weights, nodes, lane, |column, axis, weight| {
                 sums[axis] = F64x4::splat(weight).mul_add(F64x4::new(moments.first[column].0), sums[axis]);
             });
             for axis in 0..D {

@@ -17,7 +17,7 @@
 use super::batch::{Batch, Batches, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
-use super::weights::Weights;
+use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
@@ -85,7 +85,7 @@ pub fn scatter_sub_boxes<const D: usize>(
     mut moments: Option<MomentSums>,
 ) {
     let (reals, stride) = chunk.reals();
-    let mut prepared = Prepared::new();
+    let (mut prepared, mut nodes) = (Prepared::new(), NodeWeights::new());
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
@@ -95,8 +95,8 @@ pub fn scatter_sub_boxes<const D: usize>(
         prepared.share(parts);
         prepared.add(&batch, arena);
         if let Some(moments) = &mut moments {
-            let touched = moments.nodes.prepare(&mut prepared.weights, &batch);
-            prepared.add_moments(touched, moments);
+            let touched = moments.nodes.prepare(&prepared.weights, &mut nodes, &batch);
+            prepared.add_moments(&nodes, touched, moments);
         }
     }
 }
@@ -115,6 +115,7 @@ fn scatter_all<const D: usize>(
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut prepared = Prepared::new();
+    let mut nodes = moments.is_some().then(NodeWeights::new);
     for batch in Batches::new(select, chunk, next) {
         let position = batch.positions(reals, stride);
         let half =
@@ -122,16 +123,16 @@ fn scatter_all<const D: usize>(
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
         let mut touched = 0;
-        if let Some(moments) = &moments {
-            touched = moments.nodes.prepare(&mut prepared.weights, &batch);
+        if let (Some(moments), Some(nodes)) = (&moments, &mut nodes) {
+            touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
             if touched != 0 {
-                moments.nodes.add_spread(&prepared.weights, touched, &mut spread);
+                moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
             }
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(&batch, arena);
-        if let Some(moments) = &mut moments {
-            prepared.add_moments(touched, moments);
+        if let (Some(moments), Some(nodes)) = (&mut moments, &nodes) {
+            prepared.add_moments(nodes, touched, moments);
         }
     }
 }
@@ -266,9 +267,9 @@ impl<const D: usize> Prepared<D> {
 
     /// Adds first moments of the lanes in `touched`.
     #[inline(always)]
-    fn add_moments(&self, touched: u32, moments: &mut MomentSums) {
+    fn add_moments(&self, nodes: &NodeWeights, touched: u32, moments: &mut MomentSums) {
         for lane in lanes_in(touched) {
-            moments.nodes.for_each(&self.weights, lane, |column, axis, weight| {
+            moments.nodes.for_each(&self.weights, nodes, lane, |column, axis, weight| {
                 let sum = &mut moments.sums[column].0;
                 let affine = self.affine[axis.min(D - 1)][lane];
                 *sum = F64x4::splat(weight).mul_add(affine, F64x4::new(*sum)).to_array();

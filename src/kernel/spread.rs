@@ -6,7 +6,7 @@
 use super::batch::{Batch, Batches};
 use super::constrained::ConstrainedNodes;
 use super::simd::{LANES, Lanes};
-use super::weights::Weights;
+use super::weights::{NodeWeights, Weights};
 use super::{Frame, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Place};
 
@@ -63,8 +63,9 @@ fn complete<const D: usize>(
 ) -> [[f64; LANES]; D] {
     let mut spread = weights.spread;
     if let Some(constraints) = constraints {
-        let touched = constraints.prepare(weights, batch);
-        constraints.add_spread(weights, touched, &mut spread);
+        let mut nodes = NodeWeights::new();
+        let touched = constraints.prepare(weights, &mut nodes, batch);
+        constraints.add_spread(weights, &nodes, touched, &mut spread);
     }
     spread.map(Lanes::to_array)
 }

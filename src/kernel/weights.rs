@@ -24,10 +24,11 @@ pub(super) struct Weights<const D: usize> {
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
     pub spread: [Lanes; D],
-    /// Weights node by node, `a + 3 b (+ 9 c)`; only after [`Weights::fill_nodes`]. Padded, so that no index is out of
-    /// bounds.
-    pub nodes: [[f64; LANES]; 32],
 }
+
+/// Weights of a batch node by node, `a + 3 b (+ 9 c)`, which only batches with constrained nodes need. Padded, so that
+/// no index is out of bounds.
+pub(super) struct NodeWeights(pub [[f64; LANES]; 32]);
 
 /// 2^52: integers added to it stand in the low bits.
 const TWO_52: f64 = 4_503_599_627_370_496.0;
@@ -41,7 +42,6 @@ impl<const D: usize> Weights<D> {
             axis: [Factors { weight: none, arm: none, slope: none }; D],
             product: [none; 3],
             spread: [Lanes::splat(0.0); D],
-            nodes: [[0.0; LANES]; 32],
         }
     }
 
@@ -81,20 +81,6 @@ impl<const D: usize> Weights<D> {
         (base + Lanes::splat(TWO_52)).store(&mut self.base);
     }
 
-    /// Multiplies out the weights of all nodes, which most batches can do without.
-    #[inline(never)]
-    pub fn fill_nodes(&mut self) {
-        for c in 0..if D == 3 { 3 } else { 1 } {
-            for b in 0..3 {
-                let across = Lanes::load(if D == 3 { &self.product[b][c] } else { &self.axis[1].weight[b] });
-                for a in 0..3 {
-                    let along = Lanes::load(&self.axis[0].weight[a]);
-                    (along * across).store(&mut self.nodes[a + 3 * (b + 3 * c)]);
-                }
-            }
-        }
-    }
-
     /// Index of the lowest node in the arena.
     #[inline(always)]
     pub fn first(&self, lane: usize) -> usize {
@@ -118,6 +104,27 @@ impl<const D: usize> Weights<D> {
                 let across = of(if D == 3 { &self.product[b][c] } else { &self.axis[1].weight[b] });
                 for a in 0..3 {
                     f(a + ARENA_EDGE * (b + ARENA_EDGE * c), along[a] * across);
+                }
+            }
+        }
+    }
+}
+
+impl NodeWeights {
+    pub fn new() -> Self {
+        Self([[0.0; LANES]; 32])
+    }
+
+    /// Multiplies out the weights of all nodes.
+    #[inline(never)]
+    pub fn fill<const D: usize>(&mut self, weights: &Weights<D>) {
+        let Weights { product, axis, .. } = weights;
+        for c in 0..if D == 3 { 3 } else { 1 } {
+            for b in 0..3 {
+                let across = Lanes::load(if D == 3 { &product[b][c] } else { &axis[1].weight[b] });
+                for a in 0..3 {
+                    let along = Lanes::load(&axis[0].weight[a]);
+                    (along * across).store(&mut self.0[a + 3 * (b + 3 * c)]);
                 }
             }
         }
