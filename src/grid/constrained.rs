@@ -1,5 +1,8 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
-use rustc_hash::FxHashMap;
+use std::hash::Hasher;
+use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHasher};
 
 use super::columns::{Columns, Moments};
 use super::mask::{arena_overlap, offset, offset_count};
@@ -16,6 +19,8 @@ pub struct ArenaConstraints<const D: usize> {
     parts: Vec<(Columns<D>, u16)>,
     /// By number, the place of the column among those of its block.
     places: Vec<u8>,
+    /// Of what it was made from.
+    hash: u64,
 }
 
 /// The columns that the blocks around a bin share with its arena, by offset number.
@@ -34,7 +39,8 @@ pub(super) fn has_columns<const D: usize>(blocks: &[Block<D>], around: &[u32; 27
     shared(blocks, around).any(|(_, _, columns)| !columns.is_empty())
 }
 
-/// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
+/// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again, also in the next
+/// plan, after the tree has changed.
 pub(super) struct Tables<'a, const D: usize> {
     blocks: &'a [Block<D>],
     /// Second moments of all columns.
@@ -43,14 +49,16 @@ pub(super) struct Tables<'a, const D: usize> {
     kinds: Vec<u32>,
     /// By kinds of the blocks around a bin.
     of_kinds: FxHashMap<[u32; 27], u32>,
-    /// By what a table is made from: parts of different kinds of blocks may be equal.
-    numbers: FxHashMap<Vec<u64>, u32>,
-    tables: Vec<ArenaConstraints<D>>,
+    /// By hash of what a table is made from: parts of different kinds of blocks may be equal.
+    numbers: FxHashMap<u64, u32>,
+    tables: Vec<Arc<ArenaConstraints<D>>>,
+    /// Tables of an earlier plan, by their hash.
+    known: FxHashMap<u64, &'a Arc<ArenaConstraints<D>>>,
 }
 
 impl<'a, const D: usize> Tables<'a, D> {
-    /// `second` holds the second moments of all columns of the blocks.
-    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
+    /// `second` holds the second moments of all columns of the blocks; `earlier` are tables of an earlier plan.
+    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>, earlier: &'a [Arc<ArenaConstraints<D>>]) -> Self {
         let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
         let kinds = blocks.iter().map(|block| {
             let own = &second[block.moments as usize..][..block.columns.len()];
@@ -59,8 +67,9 @@ impl<'a, const D: usize> Tables<'a, D> {
             *known.entry(content.collect()).or_insert(next)
         });
         let kinds = kinds.collect();
-        let (of_kinds, numbers) = Default::default();
-        Self { blocks, second, kinds, of_kinds, numbers, tables: Vec::new() }
+        let known = earlier.iter().map(|table| (table.hash, table)).collect();
+        let (of_kinds, numbers, tables) = Default::default();
+        Self { blocks, second, kinds, of_kinds, numbers, tables, known }
     }
 
     /// Number of the table for the columns around a bin.
@@ -88,22 +97,46 @@ impl<'a, const D: usize> Tables<'a, D> {
                 places.push(place as u8);
             }
         }
-        let sets = parts.iter().flat_map(|(columns, _)| columns.along());
-        let seconds = all.iter().map(|column| column.second.to_bits());
-        let content: Vec<u64> = sets.chain(seconds).chain(places.iter().map(|&place| place.into())).collect();
-        *self.numbers.entry(content).or_insert_with(|| {
-            self.tables.push(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts, places });
-            self.tables.len() as u32 - 1
-        })
+        let mut hasher = FxHasher::default();
+        parts.iter().flat_map(|(columns, _)| columns.along()).for_each(|set| hasher.write_u64(set));
+        all.iter().for_each(|column| hasher.write_u64(column.second.to_bits()));
+        hasher.write(&places);
+        let mut hash = hasher.finish();
+        loop {
+            match self.numbers.get(&hash) {
+                Some(&number) if self.tables[number as usize].is_of(&parts, &places, &all) => return number,
+                // Another table has this hash.
+                Some(_) => hash = hash.wrapping_add(1),
+                None => break,
+            }
+        }
+        let number = self.tables.len() as u32;
+        self.numbers.insert(hash, number);
+        let known = self.known.get(&hash).filter(|table| table.is_of(&parts, &places, &all));
+        self.tables.push(match known {
+            Some(&table) => Arc::clone(table),
+            None => {
+                Arc::new(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts, places, hash })
+            }
+        });
+        number
     }
 
     /// The tables by number.
-    pub fn finish(self) -> Vec<ArenaConstraints<D>> {
+    pub fn finish(self) -> Vec<Arc<ArenaConstraints<D>>> {
         self.tables
     }
 }
 
 impl<const D: usize> ArenaConstraints<D> {
+    /// Whether it was made from these columns. Parts and places tell nodes and axes.
+    fn is_of(&self, parts: &[(Columns<D>, u16)], places: &[u8], columns: &[Column]) -> bool {
+        let second = columns.iter().map(|column| column.second.to_bits());
+        self.parts == parts
+            && self.places == places
+            && self.nodes.second().iter().map(|second| second.to_bits()).eq(second)
+    }
+
     /// Columns in the arena of the block at offset number `index`, and the number of the first.
     #[inline(always)]
     pub fn of_block(&self, index: usize) -> (Columns<D>, usize) {

@@ -86,7 +86,7 @@ pub struct GridPlan<const D: usize> {
     /// Number of columns of first moments.
     pub columns: usize,
     /// Constrained nodes of arenas, for [`Bin::touched`].
-    pub constraints: Arc<Vec<ArenaConstraints<D>>>,
+    pub constraints: Arc<Vec<Arc<ArenaConstraints<D>>>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -100,8 +100,15 @@ impl<const D: usize> Bin<D> {
 }
 
 impl<const D: usize> GridPlan<D> {
-    /// Collective. Builds the ghost layer and the grid of each rank.
-    pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
+    /// Collective. Builds the ghost layer and the grid of each rank. `earlier` are [`GridPlan::constraints`] of an earlier
+    /// plan, if there is one; what occurs again is not made again.
+    pub fn build(
+        comm: &Comm,
+        forest: &Forest<D>,
+        root_edge: f64,
+        allowance: Allowance,
+        earlier: &[Arc<ArenaConstraints<D>>],
+    ) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);
         let mut rounds = 0;
         let (needed, bins) = loop {
@@ -138,7 +145,8 @@ impl<const D: usize> GridPlan<D> {
         plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.find_face_nodes();
-        let (mut tables, mut number) = (Tables::new(&plan.blocks, plan.constraint_spread()), Vec::new());
+        let mut tables = Tables::new(&plan.blocks, plan.constraint_spread(), earlier);
+        let mut number = Vec::new();
         for bin in &mut plan.bins {
             if let Some(of_block) = bin.touched {
                 // So far blocks are numbered, in the order of the first bin that has them.
@@ -188,7 +196,7 @@ impl<const D: usize> GridPlan<D> {
             + self.feeders.heap_bytes()
             + self.pieces.capacity() * size_of::<Piece<D>>()
             + self.parts.capacity() * size_of::<Part>()
-            + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
+            + self.constraints.iter().map(|table| table.heap_bytes()).sum::<usize>()
     }
 
     fn list_blocks(&mut self, needed: &NeededBlocks<D>) {

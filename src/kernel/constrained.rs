@@ -82,6 +82,11 @@ impl ConstrainedNodes {
         Self { visits, start, second: columns.iter().map(|column| column.second).collect() }
     }
 
+    /// Second moments, by column, m².
+    pub fn second(&self) -> &[f64] {
+        &self.second
+    }
+
     /// Number of columns.
     pub fn len(&self) -> usize {
         self.second.len()
