@@ -102,7 +102,8 @@ impl ConstrainedNodes {
         size_of::<Visit>() * self.visits.capacity() + 2 * self.start.capacity() + 8 * self.second.capacity()
     }
 
-    /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made ready in `nodes`.
+    /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made
+    /// ready in `nodes`.
     #[inline(always)]
     pub(super) fn prepare<const D: usize>(
         &self,

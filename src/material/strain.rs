@@ -36,35 +36,13 @@ impl Strain {
         let (mean, beside) = TraceFree::beside_unit(b);
         let near = beside.is_small() & Lanes::splat(0.0).lt(mean);
         let (trace, deviator) = beside.ln_of_one_plus();
-        let mut strain = Self {
-            trace: ln(mean).mul_add(Lanes::splat(1.5), trace * 0.5),
-            deviator: each(deviator, |component| component * 0.5),
-            norm: mean,
-            far: None,
-        };
-        if !near.all() {
-            strain.decompose(b, !near, plane);
-        }
-        let [xx, yy, zz, xy, xz, yz] = strain.deviator;
+        let mut trace = ln(mean).mul_add(Lanes::splat(1.5), trace * 0.5);
+        let mut deviator = each(deviator, |component| component * 0.5);
+        let far = (!near.all()).then(|| Far::of(b, !near, plane, &mut trace, &mut deviator));
+        let [xx, yy, zz, xy, xz, yz] = deviator;
         let shear = xy.mul_add(xy, xz.mul_add(xz, yz * yz));
-        strain.norm = xx.mul_add(xx, yy.mul_add(yy, zz.mul_add(zz, shear + shear))).sqrt();
-        strain
-    }
-
-    /// Takes some lanes from the eigenvalues.
-    #[cold]
-    #[inline(never)]
-    fn decompose(&mut self, b: &Symmetric, lanes: Mask, plane: bool) {
-        let eigen = decompose(b, plane);
-        let strain = each(eigen.value, |value| ln(value) * 0.5);
-        let trace = strain[0] + strain[1] + strain[2];
-        let deviator = each(strain, |e| e - trace * (1.0 / 3.0));
-        let tensor = eigen.compose(&deviator, plane);
-        self.trace = lanes.select(trace, self.trace);
-        for c in 0..6 {
-            self.deviator[c] = lanes.select(tensor[c], self.deviator[c]);
-        }
-        self.far = Some(Far { lanes, eigen, deviator });
+        let norm = xx.mul_add(xx, yy.mul_add(yy, zz.mul_add(zz, shear + shear))).sqrt();
+        Self { trace, deviator, norm, far }
     }
 
     /// The elastic tensor with another trace of the strain and `kept` times its deviator, from 0 to 1.
@@ -109,6 +87,22 @@ impl Strain {
 }
 
 impl Far {
+    /// Decomposes some lanes, and takes trace and deviator of their strains from that.
+    #[cold]
+    #[inline(never)]
+    fn of(b: &Symmetric, lanes: Mask, plane: bool, trace: &mut Lanes, tensor: &mut Symmetric) -> Self {
+        let eigen = decompose(b, plane);
+        let strain = each(eigen.value, |value| ln(value) * 0.5);
+        let sum = strain[0] + strain[1] + strain[2];
+        let deviator = each(strain, |e| e - sum * (1.0 / 3.0));
+        let composed = eigen.compose(&deviator, plane);
+        *trace = lanes.select(sum, *trace);
+        for c in 0..6 {
+            tensor[c] = lanes.select(composed[c], tensor[c]);
+        }
+        Self { lanes, eigen, deviator }
+    }
+
     /// Takes these lanes of [`Strain::elastic`] from the eigenvectors.
     #[cold]
     #[inline(never)]
