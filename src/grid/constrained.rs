@@ -53,7 +53,7 @@ pub(super) struct Tables<'a, const D: usize> {
     numbers: FxHashMap<u64, u32>,
     tables: Vec<Arc<ArenaConstraints<D>>>,
     /// Tables of an earlier plan, by their hash.
-    known: FxHashMap<u64, &'a Arc<ArenaConstraints<D>>>,
+    earlier: FxHashMap<u64, &'a Arc<ArenaConstraints<D>>>,
 }
 
 impl<'a, const D: usize> Tables<'a, D> {
@@ -67,9 +67,9 @@ impl<'a, const D: usize> Tables<'a, D> {
             *known.entry(content.collect()).or_insert(next)
         });
         let kinds = kinds.collect();
-        let known = earlier.iter().map(|table| (table.hash, table)).collect();
+        let earlier = earlier.iter().map(|table| (table.hash, table)).collect();
         let (of_kinds, numbers, tables) = Default::default();
-        Self { blocks, second, kinds, of_kinds, numbers, tables, known }
+        Self { blocks, second, kinds, of_kinds, numbers, tables, earlier }
     }
 
     /// Number of the table for the columns around a bin.
@@ -112,8 +112,8 @@ impl<'a, const D: usize> Tables<'a, D> {
         }
         let number = self.tables.len() as u32;
         self.numbers.insert(hash, number);
-        let known = self.known.get(&hash).filter(|table| table.is_of(&parts, &places, &all));
-        self.tables.push(match known {
+        let same = self.earlier.get(&hash).filter(|table| table.is_of(&parts, &places, &all));
+        self.tables.push(match same {
             Some(&table) => Arc::clone(table),
             None => {
                 Arc::new(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts, places, hash })
