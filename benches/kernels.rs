@@ -3,7 +3,8 @@
 //! A million particles in blocks of their own, so that columns come from memory as in a run; eight
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of their leaf's
 //! particles, whose stencils touch constrained nodes.
-use agimp::kernel::constrained::{Column, ConstrainedNodes};
+use agimp::kernel::constrained::ConstrainedNodes;
+use agimp::kernel::hanging::HangingNodes;
 use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
 use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
@@ -140,14 +141,10 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
 /// Of how many particles in four a block beside a level jump has, and whether their stencils touch constrained nodes.
 const MIXES: [(u32, bool); 5] = [(4, false), (4, true), (3, false), (3, true), (1, true)];
 
-/// Three layers of constrained nodes, as beside a face: each has a column of first moments along every axis on which its
-/// coordinate is odd.
+/// Two layers of hanging nodes, as beside a face.
 fn constrained() -> ConstrainedNodes {
-    let columns = (0..arena_nodes(3)).filter(|node| node % 7 < 3).flat_map(|node| {
-        let is_odd = move |axis: &usize| (node / 7usize.pow(*axis as u32)).is_multiple_of(2);
-        (0..3).filter(is_odd).map(move |axis| Column { node, axis, second: 0.0 })
-    });
-    ConstrainedNodes::new::<3>(columns)
+    let is_hanging: Vec<bool> = (0..arena_nodes(3)).map(|node| node % 7 < 2).collect();
+    ConstrainedNodes::new::<3>([], HangingNodes::new::<3>(&is_hanging))
 }
 
 /// The particles that a block of a level mix has, in each leaf: whole quarters along x, as beside a face.
@@ -159,14 +156,13 @@ fn members(quarters: u32) -> Vec<u32> {
 fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut arena = vec![Row::default(); arena_nodes(3)];
-    let mut sums = vec![Row::default(); 3 * arena_nodes(3)];
     let nodes = constrained();
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<3>()) {
             arena.fill(Row::default());
-            let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut sums });
+            let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut [] });
             p2g::scatter(
                 chunk,
                 Select::List(&list),
@@ -187,11 +183,11 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
     let mut leavers = Leavers::default();
-    let (nodes, first) = (constrained(), vec![Row::default(); 3 * arena_nodes(3)]);
+    let nodes = constrained();
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
         let scheme = setting.scheme();
-        let moments = jump.then_some(g2p::Moments { nodes: &nodes, first: &first });
+        let moments = jump.then_some(g2p::Moments { nodes: &nodes, first: &[] });
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
             greatest.max(g2p::gather(

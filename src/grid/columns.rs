@@ -1,8 +1,8 @@
-//! Which first moments constrained nodes have.
+//! Which first moments constrained nodes have whose parents are constrained, and those that these pass through. The others
+//! need none (`kernel/hanging.rs`).
 //!
 //! First moments are matrices, and what counts of their columns are those along axes on which a node's value comes from
-//! nodes beside it: where its coordinate is odd, or where a constrained parent has that column. A hanging node in the
-//! plane of a face has one column on average, and the others are zero or meet factors of zero.
+//! nodes beside it: where its coordinate is odd, or where a constrained parent has that column.
 use super::mask::bits;
 use crate::kernel::Row;
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use rustc_hash::{FxHashMap, FxHasher};
 
 use super::columns::{Columns, Moments};
-use super::mask::{arena_overlap, offset, offset_count};
+use super::mask::{arena_overlap, bits, offset, offset_count};
 use super::plan::{Block, NO_BLOCK, arena_index};
-use crate::kernel::Row;
 use crate::kernel::constrained::{Column, ConstrainedNodes};
+use crate::kernel::hanging::HangingNodes;
+use crate::kernel::{Row, arena_nodes};
 
 /// Columns of first moments in the arena of a bin: numbered block by block around the bin, each in the order of [`Columns`].
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub struct ArenaConstraints<const D: usize> {
     parts: Vec<(Columns<D>, u16)>,
     /// By number, the place of the column among those of its block.
     places: Vec<u8>,
+    /// Per offset number of a block, its hanging nodes in the arena.
+    hanging: Vec<u64>,
     /// Of what it was made from.
     hash: u64,
 }
@@ -30,13 +33,15 @@ fn shared<const D: usize>(
 ) -> impl Iterator<Item = (usize, u32, Columns<D>)> {
     let around = around.iter().copied().enumerate().take(offset_count(D));
     around.filter(|(_, block)| *block != NO_BLOCK).map(|(index, block)| {
-        (index, block, blocks[block as usize].columns.within(arena_overlap::<D>(offset(index))))
+        let Block { columns, chained, .. } = &blocks[block as usize];
+        (index, block, columns.within(chained & arena_overlap::<D>(offset(index))))
     })
 }
 
-/// Whether the arena of a bin has first moments.
-pub(super) fn has_columns<const D: usize>(blocks: &[Block<D>], around: &[u32; 27]) -> bool {
-    shared(blocks, around).any(|(_, _, columns)| !columns.is_empty())
+/// Whether the arena of a bin has constrained nodes.
+pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32; 27]) -> bool {
+    shared(blocks, around)
+        .any(|(index, block, _)| blocks[block as usize].constrained & arena_overlap::<D>(offset(index)) != 0)
 }
 
 /// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again, also in the next
@@ -62,7 +67,8 @@ impl<'a, const D: usize> Tables<'a, D> {
         let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
         let kinds = blocks.iter().map(|block| {
             let own = &second[block.moments as usize..][..block.columns.len()];
-            let content = block.columns.along().into_iter().chain(own.iter().map(|second| second.to_bits()));
+            let nodes = [block.constrained, block.chained].into_iter().chain(block.columns.along());
+            let content = nodes.chain(own.iter().map(|second| second.to_bits()));
             let next = known.len() as u32;
             *known.entry(content.collect()).or_insert(next)
         });
@@ -87,9 +93,11 @@ impl<'a, const D: usize> Tables<'a, D> {
         let (blocks, second) = (self.blocks, &self.second);
         let mut parts = vec![(Columns::NONE, 0); offset_count(D)];
         let (mut all, mut places): (Vec<Column>, Vec<u8>) = Default::default();
+        let mut hanging = vec![0; offset_count(D)];
         for (index, block, columns) in shared(blocks, around) {
             parts[index] = (columns, all.len() as u16);
             let block = &blocks[block as usize];
+            hanging[index] = block.constrained & !block.chained & arena_overlap::<D>(offset(index));
             let of_block = block.columns.iter().enumerate();
             for (place, (bit, axis)) in of_block.filter(|(_, (bit, _))| columns.nodes() >> bit & 1 == 1) {
                 let second = second[block.moments as usize + place];
@@ -101,10 +109,13 @@ impl<'a, const D: usize> Tables<'a, D> {
         parts.iter().flat_map(|(columns, _)| columns.along()).for_each(|set| hasher.write_u64(set));
         all.iter().for_each(|column| hasher.write_u64(column.second.to_bits()));
         hasher.write(&places);
+        hanging.iter().for_each(|&nodes| hasher.write_u64(nodes));
         let mut hash = hasher.finish();
         loop {
             match self.numbers.get(&hash) {
-                Some(&number) if self.tables[number as usize].is_of(&parts, &places, &all) => return number,
+                Some(&number) if self.tables[number as usize].is_of(&parts, &places, &hanging, &all) => {
+                    return number;
+                }
                 // Another table has this hash.
                 Some(_) => hash = hash.wrapping_add(1),
                 None => break,
@@ -112,11 +123,12 @@ impl<'a, const D: usize> Tables<'a, D> {
         }
         let number = self.tables.len() as u32;
         self.numbers.insert(hash, number);
-        let same = self.earlier.get(&hash).filter(|table| table.is_of(&parts, &places, &all));
+        let same = self.earlier.get(&hash).filter(|table| table.is_of(&parts, &places, &hanging, &all));
         self.tables.push(match same {
             Some(&table) => Arc::clone(table),
             None => {
-                Arc::new(ArenaConstraints { nodes: ConstrainedNodes::new::<D>(all), parts, places, hash })
+                let nodes = ConstrainedNodes::new::<D>(all, hanging_nodes::<D>(&hanging));
+                Arc::new(ArenaConstraints { nodes, parts, places, hanging, hash })
             }
         });
         number
@@ -128,12 +140,22 @@ impl<'a, const D: usize> Tables<'a, D> {
     }
 }
 
+/// For the kernels, from the nodes in the blocks around a bin.
+fn hanging_nodes<const D: usize>(hanging: &[u64]) -> HangingNodes {
+    let mut is_hanging = vec![false; arena_nodes(D)];
+    for (index, &nodes) in hanging.iter().enumerate() {
+        bits(nodes).for_each(|bit| is_hanging[arena_index::<D>(index, bit)] = true);
+    }
+    HangingNodes::new::<D>(&is_hanging)
+}
+
 impl<const D: usize> ArenaConstraints<D> {
     /// Whether it was made from these columns. Parts and places tell nodes and axes.
-    fn is_of(&self, parts: &[(Columns<D>, u16)], places: &[u8], columns: &[Column]) -> bool {
+    fn is_of(&self, parts: &[(Columns<D>, u16)], places: &[u8], hanging: &[u64], columns: &[Column]) -> bool {
         let second = columns.iter().map(|column| column.second.to_bits());
         self.parts == parts
             && self.places == places
+            && self.hanging == hanging
             && self.nodes.second().iter().map(|second| second.to_bits()).eq(second)
     }
 
@@ -156,7 +178,7 @@ impl<const D: usize> ArenaConstraints<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let parts = self.parts.capacity() * size_of::<(Columns<D>, u16)>();
-        self.nodes.heap_bytes() + parts + self.places.capacity()
+        self.nodes.heap_bytes() + parts + self.places.capacity() + 8 * self.hanging.capacity()
     }
 }
 

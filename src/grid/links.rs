@@ -3,8 +3,9 @@
 //! Where the parents of a node lie is in a table for all blocks (`parents.rs`); a plan lists pairs of blocks only.
 use rustc_hash::FxHashMap;
 
+use super::closure::constrained_nodes;
 use super::columns::{Columns, axes_in};
-use super::mask::{bits, block_nodes, node_of_bit, offset};
+use super::mask::{bits, block_nodes, node_of_bit, offset, offset_index};
 use super::parents::{ParentTable, coarser_at, parity, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 
@@ -84,28 +85,70 @@ impl<const D: usize> GridPlan<D> {
                     pairs[usize::from(level)].push((coarse, Child { block: index as u32, corner }));
                 }
             }
-            // Coarser blocks come before finer ones.
-            let columns = self.columns_of(&fine, needed);
-            let block = &mut self.blocks[index];
-            (block.columns, block.moments) = (columns, self.columns as u32);
-            self.columns += columns.len();
             if needed != 0 {
                 self.links[usize::from(level)].fine.push(fine);
             }
         }
         self.links.iter_mut().zip(pairs).for_each(|(links, pairs)| links.group(pairs));
+        self.find_columns();
     }
 
-    /// The columns of first moments that the constrained nodes `needed` of a block have: those along which a parent lies
+    /// Finds which nodes have constrained parents, and which first moments these and their parents have.
+    fn find_columns(&mut self) {
+        let links = std::mem::take(&mut self.links);
+        // Nodes that first moments pass through on their way between levels.
+        let mut passed = vec![0; self.blocks.len()];
+        for fine in links.iter().flat_map(|links| &links.fine) {
+            self.find_chained(fine, &mut passed);
+        }
+        // Coarser blocks come before finer ones.
+        for fine in links.iter().flat_map(|links| &links.fine) {
+            let index = fine.block as usize;
+            self.blocks[index].columns = self.columns_of(fine, self.blocks[index].chained | passed[index]);
+        }
+        for block in &mut self.blocks {
+            block.moments = self.columns as u32;
+            self.columns += block.columns.len();
+        }
+        self.links = links;
+    }
+
+    /// Finds the nodes of a block with constrained parents, and notes these parents.
+    fn find_chained(&mut self, fine: &FineBlock, passed: &mut [u64]) {
+        let table = ParentTable::of::<D>();
+        let Block { level, coord, sum, value, constrained, .. } = self.blocks[fine.block as usize];
+        let needed = (sum | value) & constrained;
+        for corner in (0..1u8 << D).filter(|&corner| table.having(parity(coord), corner) & needed != 0) {
+            let coarse = coarser_at(coord, corner);
+            let parents = fine.parents[usize::from(corner)];
+            // Which nodes these are must not depend on what this rank needs.
+            let of_coarse = match self.blocks.get(parents as usize) {
+                Some(block) => block.constrained,
+                None => constrained_nodes(&self.tree, level - 1, coarse),
+            };
+            if of_coarse == 0 {
+                continue;
+            }
+            let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
+            let place = offset_index::<D>(place);
+            let children = table.children(place, of_coarse) & needed;
+            self.blocks[fine.block as usize].chained |= children;
+            if let Some(passed) = passed.get_mut(parents as usize) {
+                *passed |= table.parents(place, children) & of_coarse;
+            }
+        }
+    }
+
+    /// The columns of first moments that constrained nodes of a block have: those along which a parent lies
     /// beside the node, and those of its parents.
-    fn columns_of(&self, fine: &FineBlock, needed: u64) -> Columns<D> {
-        let mut columns = Columns::new(odd_nodes::<D>()).within(needed);
+    fn columns_of(&self, fine: &FineBlock, nodes: u64) -> Columns<D> {
+        let mut columns = Columns::new(odd_nodes::<D>()).within(nodes);
         let of_parents = fine
             .parents
             .map(|block| self.blocks.get(block as usize).map_or(Columns::NONE, |block| block.columns));
         if of_parents.iter().any(|columns| !columns.is_empty()) {
             let parity = parity(self.blocks[fine.block as usize].coord);
-            for bit in bits(needed) {
+            for bit in bits(nodes) {
                 for parent in ParentTable::of::<D>().of_node::<D>(parity, bit) {
                     let axes = of_parents[usize::from(parent.corner)].axes_of(parent.bit.into());
                     columns.insert(bit, axes);

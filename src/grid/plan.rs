@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::closure::{Closure, NeededBlocks, nodes_in_domain};
 use super::columns::Columns;
-use super::constrained::{ArenaConstraints, Tables, has_columns};
+use super::constrained::{ArenaConstraints, Tables, has_constrained};
 use super::constraint::node_coord;
 use super::feeders::Feeders;
 use super::known::{Allowance, Cover, KnownTree};
@@ -33,9 +33,11 @@ pub struct Block<const D: usize> {
     pub sum: u64,
     /// Nodes that touch a coarser leaf.
     pub constrained: u64,
+    /// Nodes needed that have constrained parents.
+    pub chained: u64,
     /// Real nodes that this rank counts when it sums over the grid.
     pub owned: u64,
-    /// First moments of those needed.
+    /// First moments of nodes that are chained, and of those that moments of finer ones pass through.
     pub columns: Columns<D>,
     /// Place of these among those of all blocks.
     pub moments: u32,
@@ -53,7 +55,7 @@ pub struct Bin<const D: usize> {
     pub is_inner: bool,
     /// Blocks around, by offset number; [`NO_BLOCK`] outside the domain.
     pub around: [u32; 27],
-    /// Its columns of first moments among [`GridPlan::constraints`], if it has any.
+    /// Its constrained nodes among [`GridPlan::constraints`], if it has any.
     pub touched: Option<u32>,
 }
 
@@ -208,6 +210,7 @@ impl<const D: usize> GridPlan<D> {
                 value: sets.value,
                 sum: sets.sum,
                 constrained: sets.constrained,
+                chained: 0,
                 owned: self.owned_nodes(level, coord, sets.value & !sets.constrained),
                 columns: Columns::NONE,
                 moments: 0,
@@ -264,7 +267,7 @@ impl<const D: usize> GridPlan<D> {
                         *slot = found;
                     }
                 }
-                let touched = has_columns(&self.blocks, &around).then_some(tables);
+                let touched = has_constrained(&self.blocks, &around).then_some(tables);
                 tables += u32::from(touched.is_some());
                 self.bins.push(Bin { leaf: leaf as u32, block, is_inner, around, touched });
             }

@@ -146,7 +146,7 @@ impl<const D: usize> GridPlan<D> {
         parts: &mut Vec<(u32, Part)>,
     ) {
         let regions = Regions::of::<D>();
-        let Block { sum, columns, .. } = self.blocks[block];
+        let Block { sum, columns, chained, .. } = self.blocks[block];
         let known = pieces.len();
         let mut found: Vec<(usize, u64, u64, u8)> = Vec::new();
         for region in 0..offset_count(D) {
@@ -185,7 +185,7 @@ impl<const D: usize> GridPlan<D> {
                     });
                 }
                 pieces[piece].nodes |= nodes;
-                pieces[piece].columns = pieces[piece].columns.union(&columns.within(nodes));
+                pieces[piece].columns = pieces[piece].columns.union(&columns.within(chained & nodes));
                 let is_only = found.len() == 1 && own <= 1;
                 let (block, region, piece) = (block as u32, region as u8, piece as u32);
                 parts.push((block, Part { region, piece, key: first, home, is_only }));

@@ -8,7 +8,7 @@ use super::feeders::NO_BIN;
 use super::mask::{bits, block_nodes, opposite};
 use super::mixed::{Mixed, Other};
 use super::order::Origin;
-use super::plan::GridPlan;
+use super::plan::{Block, GridPlan};
 use super::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
 use super::window::Window;
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
@@ -271,14 +271,18 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     /// The moments at nodes of a region in the fixed pattern; `from` has those of each position.
     fn add_moments(&self, region: usize, nodes: u64, is_mixed: bool, from: &[&[Row]; 32], to: &mut [Row]) {
         let none = [ZERO; D];
-        let columns = self.plan.blocks[self.block].columns;
+        let Block { columns, chained, .. } = &self.plan.blocks[self.block];
         let count = self.regions.bins[region];
         for bit in bits(nodes) {
-            let (below, axes) = (columns.within((1 << bit) - 1), columns.axes_of(bit));
+            let (first, axes) = (columns.first_of(bit), columns.axes_of(bit));
+            let below = columns.within(chained & ((1 << bit) - 1));
             let here = axes.count_ones() as usize;
             let mut at = [&none[..]; MOST_BINS];
             for (at, slot) in at.iter_mut().zip(&self.order[region]).take(count) {
                 let position = slot.position as usize % 32;
+                if chained >> bit & 1 == 0 {
+                    continue;
+                }
                 // The whole arena has moments; they are zero where particles touch nothing.
                 let first = below.within(self.regions.overlap[position]).len();
                 if let Some(found) = from[position].get(first..first + here) {
@@ -296,7 +300,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
                     at[placed.slot] = &others[placed.slot];
                 }
             }
-            for (i, to) in to[below.len()..][..here].iter_mut().enumerate() {
+            for (i, to) in to[first..][..here].iter_mut().enumerate() {
                 let pair = |slot: usize| at[slot][i].plus(&at[slot + 1][i]);
                 let sum = match count {
                     1 => at[0][i],

@@ -1,10 +1,12 @@
-//! Constrained nodes of an arena, those that first and second moments belong to.
+//! Constrained nodes of an arena: hanging ones, and those that first and second moments belong to.
 //!
-//! In most arenas beside a level jump a few layers of nodes are constrained, and of their moments most columns are zero
-//! (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its own nodes.
+//! Moments are for nodes whose parents are constrained themselves, beside jumps over more than one level. Most of their
+//! columns are zero (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its
+//! own nodes.
 use std::sync::LazyLock;
 
 use super::batch::{Batch, lanes_in};
+use super::hanging::HangingNodes;
 use super::simd::{LANES, Lanes};
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, stencil_bases};
@@ -35,9 +37,12 @@ struct Visit {
 /// In the place of a node: one of the weights behind those of the stencil, which are zero.
 const NO_NODE: u16 = STENCIL.next_power_of_two() as u16 - 1;
 
-/// Which columns of moments the nodes of an arena have, and their second moments.
+/// The constrained nodes of an arena: which are hanging, and which columns of moments the others have, with their second
+/// moments.
 #[derive(Clone, Debug)]
 pub struct ConstrainedNodes {
+    /// Those without columns.
+    pub hanging: HangingNodes,
     /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]), in rounds: one column along each axis, so
     /// that one loop does for all axes. An axis that has fewer columns than another visits some other with [`NO_NODE`].
     visits: Vec<Visit>,
@@ -48,8 +53,9 @@ pub struct ConstrainedNodes {
 }
 
 impl ConstrainedNodes {
-    /// The given columns, none twice. They are numbered in the order given, in which stencils visit them.
-    pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>) -> Self {
+    /// The given columns, none twice, and hanging nodes. Columns are numbered in the order given, in which stencils visit
+    /// them.
+    pub fn new<const D: usize>(columns: impl IntoIterator<Item = Column>, hanging: HangingNodes) -> Self {
         let columns: Vec<Column> = columns.into_iter().collect();
         let seen = Seen::of::<D>();
         let mut counts = vec![[0; D]; stencil_bases(D)];
@@ -79,7 +85,7 @@ impl ConstrainedNodes {
             let column = round.iter().find(|visit| visit.node != NO_NODE).map_or(0, |visit| visit.column);
             round.iter_mut().filter(|visit| visit.node == NO_NODE).for_each(|visit| visit.column = column);
         }
-        Self { visits, start, second: columns.iter().map(|column| column.second).collect() }
+        Self { hanging, visits, start, second: columns.iter().map(|column| column.second).collect() }
     }
 
     /// Second moments, by column, m².
@@ -99,7 +105,8 @@ impl ConstrainedNodes {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        size_of::<Visit>() * self.visits.capacity() + 2 * self.start.capacity() + 8 * self.second.capacity()
+        let lists = size_of::<Visit>() * self.visits.capacity() + 2 * self.start.capacity();
+        self.hanging.heap_bytes() + lists + 8 * self.second.capacity()
     }
 
     /// Members of a batch whose stencils have columns, a bit each; if there are any, the weights of all nodes are made
@@ -111,6 +118,9 @@ impl ConstrainedNodes {
         nodes: &mut NodeWeights,
         batch: &Batch,
     ) -> u32 {
+        if self.is_empty() {
+            return 0;
+        }
         let has_any = |lane: usize| {
             let base = weights.base(lane);
             self.start[base] != self.start[base + 1]

@@ -71,7 +71,7 @@ impl<const D: usize> Kernel for Gather<'_, D> {
                 scheme,
             );
             weights.fill(frame, &position, &position, &half);
-            sums.gather(&weights, &mut nodes, &batch, fields);
+            sums.gather(&weights, &mut nodes, &batch, frame.cell, fields);
             greatest =
                 advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
         }
@@ -96,7 +96,7 @@ pub fn gather_sub_boxes<const D: usize>(
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        sums.gather(&weights, &mut nodes, &batch, fields);
+        sums.gather(&weights, &mut nodes, &batch, frame.cell, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }

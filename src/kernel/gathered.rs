@@ -1,6 +1,7 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
 use super::batch::{Batch, lanes_in};
 use super::constrained::ConstrainedNodes;
+use super::hanging::HangingNodes;
 use super::simd::{F64x4, LANES};
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Row};
@@ -106,6 +107,7 @@ impl<const D: usize> Sums<D> {
         weights: &Weights<D>,
         nodes: &mut Option<NodeWeights>,
         batch: &Batch,
+        cell: f64,
         fields: &Fields,
     ) {
         let span = super::stencil_span(D);
@@ -119,9 +121,33 @@ impl<const D: usize> Sums<D> {
             }
         }
         if let (Some(moments), Some(nodes)) = (&fields.moments, nodes) {
+            let hanging = &moments.nodes.hanging;
+            let touched = hanging.touched(weights, batch);
+            if touched != 0 {
+                self.add_hanging(weights, hanging, touched, cell, fields.velocity);
+            }
             let touched = moments.nodes.prepare(weights, nodes, batch);
             if touched != 0 {
                 self.add_moments(weights, nodes, touched, moments);
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn add_hanging(
+        &mut self,
+        weights: &Weights<D>,
+        hanging: &HangingNodes,
+        touched: u32,
+        cell: f64,
+        velocity: &[Row],
+    ) {
+        let span = super::stencil_span(D);
+        for lane in lanes_in(touched) {
+            let first = weights.first(lane);
+            let sums = hanging.gather(weights, lane, &velocity[first..first + span]);
+            for k in 0..D {
+                self.affine[k][lane] = sums[k].mul_add(F64x4::splat(cell), self.affine[k][lane]);
             }
         }
     }

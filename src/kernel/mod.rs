@@ -13,6 +13,7 @@ pub mod constrained;
 pub mod domain;
 pub mod g2p;
 mod gathered;
+pub mod hanging;
 pub mod leavers;
 pub mod math;
 pub mod p2g;

@@ -16,6 +16,7 @@
 //! ```
 use super::batch::{Batch, Batches, lanes_in};
 use super::constrained::ConstrainedNodes;
+use super::hanging::HangingNodes;
 use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
@@ -95,6 +96,8 @@ pub fn scatter_sub_boxes<const D: usize>(
         prepared.share(parts);
         prepared.add(&batch, arena);
         if let Some(moments) = &mut moments {
+            let hanging = &moments.nodes.hanging;
+            prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
             let touched = moments.nodes.prepare(&prepared.weights, &mut nodes, &batch);
             prepared.add_moments(&nodes, touched, moments);
         }
@@ -122,8 +125,12 @@ fn scatter_all<const D: usize>(
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
-        let mut touched = 0;
+        let (mut touched, mut hanging) = (0, 0);
         if let (Some(moments), Some(nodes)) = (&moments, &mut nodes) {
+            hanging = moments.nodes.hanging.touched(&prepared.weights, &batch);
+            if hanging != 0 {
+                moments.nodes.hanging.add_spread(&prepared.weights, hanging, cell, &mut spread);
+            }
             touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
             if touched != 0 {
                 moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
@@ -132,6 +139,7 @@ fn scatter_all<const D: usize>(
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(&batch, arena);
         if let (Some(moments), Some(nodes)) = (&mut moments, &nodes) {
+            prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
             prepared.add_moments(nodes, touched, moments);
         }
     }
@@ -262,6 +270,20 @@ impl<const D: usize> Prepared<D> {
                     *node = weight_x[a].mul_add(other, sum).to_array();
                 }
             }
+        }
+    }
+
+    /// Adds what hanging nodes of the lanes in `touched` have in place of first moments.
+    #[inline(always)]
+    fn add_hanging(&self, hanging: &HangingNodes, touched: u32, cell: f64, arena: &mut [Row]) {
+        let span = super::stencil_span(D);
+        for lane in lanes_in(touched) {
+            let first = self.weights.first(lane);
+            let mut affine = [F64x4::splat(0.0); D];
+            for k in 0..D {
+                affine[k] = self.affine[k][lane] * F64x4::splat(cell);
+            }
+            hanging.scatter(&self.weights, lane, &affine, &mut arena[first..first + span]);
         }
     }
 

@@ -27,7 +27,7 @@ pub fn of_particles<const D: usize>(
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
-        let spread = complete(&mut weights, &batch, constraints);
+        let spread = complete(&mut weights, &batch, frame.cell, constraints);
         for lane in batch.members() {
             each(batch.particle(lane), spread.map(|axis| axis[lane]));
         }
@@ -49,7 +49,7 @@ pub fn of_parts<const D: usize>(
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        let spread = complete(&mut weights, &batch, constraints);
+        let spread = complete(&mut weights, &batch, frame.cell, constraints);
         for lane in batch.members() {
             each(first + lane, spread.map(|axis| axis[lane]));
         }
@@ -59,10 +59,13 @@ pub fn of_parts<const D: usize>(
 fn complete<const D: usize>(
     weights: &mut Weights<D>,
     batch: &Batch,
+    cell: f64,
     constraints: Option<&ConstrainedNodes>,
 ) -> [[f64; LANES]; D] {
     let mut spread = weights.spread;
     if let Some(constraints) = constraints {
+        let hanging = constraints.hanging.touched(weights, batch);
+        constraints.hanging.add_spread(weights, hanging, cell, &mut spread);
         let mut nodes = NodeWeights::new();
         let touched = constraints.prepare(weights, &mut nodes, batch);
         constraints.add_spread(weights, &nodes, touched, &mut spread);

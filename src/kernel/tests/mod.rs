@@ -1,6 +1,7 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::constrained::{Column, ConstrainedNodes};
 use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather_sub_boxes};
+use super::hanging::HangingNodes;
 use super::leavers::Leavers;
 use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
 use super::*;
