@@ -34,6 +34,6 @@ fn column_3d(bencher: Bencher, reach: u32) {
         let allowance = Allowance { reach, graded: true };
         bencher
             .counter(divan::counter::ItemsCount::new(forest.leaves().len()))
-            .bench_local(|| GridPlan::build(world.comm(), &forest, 1.0, allowance, &[]));
+            .bench_local(|| GridPlan::build(world.comm(), &forest, 1.0, allowance));
     });
 }

@@ -26,7 +26,7 @@ pub struct Arenas<const D: usize> {
     occupied: Vec<Occupied<D>>,
     waves: Waves,
     keep: bool,
-    constraints: Arc<Vec<Arc<ArenaConstraints<D>>>>,
+    constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Per block, whether a bin reaches it whose block lies outside its leaf; in most steps few do: boxes must be wide, or
     /// lie across a change of level.
     outer_reach: Vec<bool>,

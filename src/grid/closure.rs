@@ -8,8 +8,6 @@
 //!
 //! A node that is needed at a seam is summed and updated by every rank that needs it, from the same
 //! contributions in the same order; one exchange of arenas per step is then enough.
-use std::collections::BTreeMap;
-
 use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -31,13 +29,10 @@ pub struct NodeSets {
     pub constrained: u64,
 }
 
-/// The blocks that a rank needs, by level and coordinate.
-pub type NeededBlocks<const D: usize> = BTreeMap<(u8, [u32; D]), NodeSets>;
-
 /// Result of one attempt to close the node sets over the known part of the tree.
 pub struct Closure<const D: usize> {
-    /// The needed blocks.
-    pub blocks: NeededBlocks<D>,
+    /// The needed blocks, in no particular order.
+    pub blocks: Vec<(Octant<D>, NodeSets)>,
     /// Bins of each own leaf.
     pub bins: Vec<Vec<Octant<D>>>,
     /// Where the rank must learn the leaves before the sets can be trusted; empty when done.
@@ -101,7 +96,7 @@ impl<const D: usize> Closure<D> {
             .iter()
             .enumerate()
             .flat_map(|(level, blocks)| {
-                blocks.iter().map(move |(&coord, &sets)| ((level as u8, coord), sets))
+                blocks.iter().map(move |(&coord, &sets)| (Octant { level: level as u8, coord }, sets))
             })
             .collect();
         Self { blocks, bins, missing }
@@ -168,7 +163,7 @@ impl<const D: usize> Builder<'_, D> {
                 .filter(|&(_, sum)| sum != 0)
                 .collect();
             for (coord, sum) in blocks {
-                if !self.is_finer_around(level, coord) {
+                if !self.tree.is_beside_finer(level, coord) {
                     continue;
                 }
                 for index in 0..offset_count(D) {
@@ -186,15 +181,6 @@ impl<const D: usize> Builder<'_, D> {
                 }
             }
         }
-    }
-
-    /// True when an octant in the neighbourhood `coord + {-1, 0, 1}^D` is subdivided.
-    fn is_finer_around(&self, level: u8, coord: [u32; D]) -> bool {
-        level < self.tree.deepest()
-            && (0..offset_count(D)).any(|index| {
-                shifted(coord, offset::<D>(index))
-                    .is_some_and(|beside| matches!(self.tree.cover(level, beside), Cover::Finer(_)))
-            })
     }
 
     /// Whether there is a bin of `level` at `coord`.
@@ -217,7 +203,7 @@ impl<const D: usize> Builder<'_, D> {
                 mask |= self.overlaps[opposite(D, index)];
             }
         }
-        if self.is_finer_around(level, coord) {
+        if self.tree.is_beside_finer(level, coord) {
             for index in 0..offset_count(D) {
                 let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
                 let from = constrained_nodes(self.tree, level + 1, fine) & self.receives(level + 1, fine);

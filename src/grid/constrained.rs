@@ -1,8 +1,5 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
-use std::hash::Hasher;
-use std::sync::Arc;
-
-use rustc_hash::{FxHashMap, FxHasher};
+use rustc_hash::FxHashMap;
 
 use super::columns::{Columns, Moments};
 use super::mask::{arena_overlap, bits, offset, offset_count};
@@ -20,10 +17,6 @@ pub struct ArenaConstraints<const D: usize> {
     parts: Vec<(Columns<D>, u16)>,
     /// By number, the place of the column among those of its block.
     places: Vec<u8>,
-    /// Per offset number of a block, its hanging nodes in the arena.
-    hanging: Vec<u64>,
-    /// Of what it was made from.
-    hash: u64,
 }
 
 /// The columns that the blocks around a bin share with its arena, by offset number.
@@ -44,26 +37,23 @@ pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32
         .any(|(index, block, _)| blocks[block as usize].constrained & arena_overlap::<D>(offset(index)) != 0)
 }
 
-/// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again, also in the next
-/// plan, after the tree has changed.
+/// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
 pub(super) struct Tables<'a, const D: usize> {
     blocks: &'a [Block<D>],
     /// Second moments of all columns.
     second: Vec<f64>,
-    /// By block; blocks with equal columns and second moments have the same number.
+    /// By block; blocks with equal nodes, columns and second moments have the same number.
     kinds: Vec<u32>,
     /// By kinds of the blocks around a bin.
     of_kinds: FxHashMap<[u32; 27], u32>,
-    /// By hash of what a table is made from: parts of different kinds of blocks may be equal.
-    numbers: FxHashMap<u64, u32>,
-    tables: Vec<Arc<ArenaConstraints<D>>>,
-    /// Tables of an earlier plan, by their hash.
-    earlier: FxHashMap<u64, &'a Arc<ArenaConstraints<D>>>,
+    /// By what a table is made from: parts of different kinds of blocks may be equal.
+    of_content: FxHashMap<Vec<u64>, u32>,
+    tables: Vec<ArenaConstraints<D>>,
 }
 
 impl<'a, const D: usize> Tables<'a, D> {
-    /// `second` holds the second moments of all columns of the blocks; `earlier` are tables of an earlier plan.
-    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>, earlier: &'a [Arc<ArenaConstraints<D>>]) -> Self {
+    /// `second` holds the second moments of all columns of the blocks.
+    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
         let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
         let kinds = blocks.iter().map(|block| {
             let own = &second[block.moments as usize..][..block.columns.len()];
@@ -73,9 +63,8 @@ impl<'a, const D: usize> Tables<'a, D> {
             *known.entry(content.collect()).or_insert(next)
         });
         let kinds = kinds.collect();
-        let earlier = earlier.iter().map(|table| (table.hash, table)).collect();
-        let (of_kinds, numbers, tables) = Default::default();
-        Self { blocks, second, kinds, of_kinds, numbers, tables, earlier }
+        let (of_kinds, of_content, tables) = Default::default();
+        Self { blocks, second, kinds, of_kinds, of_content, tables }
     }
 
     /// Number of the table for the columns around a bin.
@@ -105,37 +94,20 @@ impl<'a, const D: usize> Tables<'a, D> {
                 places.push(place as u8);
             }
         }
-        let mut hasher = FxHasher::default();
-        parts.iter().flat_map(|(columns, _)| columns.along()).for_each(|set| hasher.write_u64(set));
-        all.iter().for_each(|column| hasher.write_u64(column.second.to_bits()));
-        hasher.write(&places);
-        hanging.iter().for_each(|&nodes| hasher.write_u64(nodes));
-        let mut hash = hasher.finish();
-        loop {
-            match self.numbers.get(&hash) {
-                Some(&number) if self.tables[number as usize].is_of(&parts, &places, &hanging, &all) => {
-                    return number;
-                }
-                // Another table has this hash.
-                Some(_) => hash = hash.wrapping_add(1),
-                None => break,
-            }
+        let columns = parts.iter().flat_map(|(columns, _)| columns.along());
+        let seconds = all.iter().map(|column| column.second.to_bits());
+        let content = columns.chain(seconds).chain(places.iter().map(|&place| place.into()));
+        let next = self.tables.len() as u32;
+        let number = *self.of_content.entry(content.chain(hanging.iter().copied()).collect()).or_insert(next);
+        if number == next {
+            let nodes = ConstrainedNodes::new::<D>(all, hanging_nodes::<D>(&hanging));
+            self.tables.push(ArenaConstraints { nodes, parts, places });
         }
-        let number = self.tables.len() as u32;
-        self.numbers.insert(hash, number);
-        let same = self.earlier.get(&hash).filter(|table| table.is_of(&parts, &places, &hanging, &all));
-        self.tables.push(match same {
-            Some(&table) => Arc::clone(table),
-            None => {
-                let nodes = ConstrainedNodes::new::<D>(all, hanging_nodes::<D>(&hanging));
-                Arc::new(ArenaConstraints { nodes, parts, places, hanging, hash })
-            }
-        });
         number
     }
 
     /// The tables by number.
-    pub fn finish(self) -> Vec<Arc<ArenaConstraints<D>>> {
+    pub fn finish(self) -> Vec<ArenaConstraints<D>> {
         self.tables
     }
 }
@@ -150,15 +122,6 @@ fn hanging_nodes<const D: usize>(hanging: &[u64]) -> HangingNodes {
 }
 
 impl<const D: usize> ArenaConstraints<D> {
-    /// Whether it was made from these columns. Parts and places tell nodes and axes.
-    fn is_of(&self, parts: &[(Columns<D>, u16)], places: &[u8], hanging: &[u64], columns: &[Column]) -> bool {
-        let second = columns.iter().map(|column| column.second.to_bits());
-        self.parts == parts
-            && self.places == places
-            && self.hanging == hanging
-            && self.nodes.second().iter().map(|second| second.to_bits()).eq(second)
-    }
-
     /// Columns in the arena of the block at offset number `index`, and the number of the first.
     #[inline(always)]
     pub fn of_block(&self, index: usize) -> (Columns<D>, usize) {
@@ -178,7 +141,7 @@ impl<const D: usize> ArenaConstraints<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let parts = self.parts.capacity() * size_of::<(Columns<D>, u16)>();
-        self.nodes.heap_bytes() + parts + self.places.capacity() + 8 * self.hanging.capacity()
+        self.nodes.heap_bytes() + parts + self.places.capacity()
     }
 }
 

@@ -1,6 +1,9 @@
 //! The part of the tree that one rank knows: its own leaves and its ghost layer.
 use partition::{Brick, Forest, MAX_LEVEL, Octant};
 
+use rustc_hash::FxHashSet;
+
+use super::mask::{offset, offset_count, shifted};
 use crate::kernel::BLOCK;
 
 /// What covers an octant, as far as this rank knows.
@@ -33,6 +36,8 @@ pub struct KnownTree<const D: usize> {
     graded: bool,
     /// Level of the finest known leaves.
     deepest: u8,
+    /// By level, the octants in whose neighbourhood, themselves included, one holds smaller leaves.
+    beside_finer: Vec<FxHashSet<[u32; D]>>,
 }
 
 /// What the ghost layer has to allow for, the same on every rank.
@@ -61,6 +66,7 @@ impl<const D: usize> KnownTree<D> {
             reach: allowance.reach,
             graded: allowance.graded,
             deepest: 0,
+            beside_finer: Vec::new(),
             leaves,
         };
         tree.index();
@@ -83,6 +89,28 @@ impl<const D: usize> KnownTree<D> {
         self.deepest = self.leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
         self.first_own = self.owners.iter().position(|&owner| owner as usize == self.rank).unwrap_or(0);
         self.slice();
+        self.find_beside_finer();
+    }
+
+    fn find_beside_finer(&mut self) {
+        self.beside_finer.clear();
+        for level in 0..self.deepest {
+            let mut beside = FxHashSet::default();
+            let mut last = None;
+            for leaf in self.leaves.iter().filter(|leaf| leaf.level > level) {
+                let octant = leaf.ancestor(level);
+                if last.replace(octant) != Some(octant) {
+                    let offsets = (0..offset_count(D)).map(offset::<D>);
+                    beside.extend(offsets.filter_map(|offset| shifted(octant.coord, offset)));
+                }
+            }
+            self.beside_finer.push(beside);
+        }
+    }
+
+    /// Whether an octant in the neighbourhood `coord + {-1, 0, 1}^D` is known to hold leaves of a finer level.
+    pub fn is_beside_finer(&self, level: u8, coord: [u32; D]) -> bool {
+        self.beside_finer.get(usize::from(level)).is_some_and(|beside| beside.contains(&coord))
     }
 
     /// Cuts the known part of the curve into about twice as many equal slices as there are leaves, so that
@@ -181,6 +209,7 @@ impl<const D: usize> KnownTree<D> {
             reach: 0,
             graded: false,
             deepest: 0,
+            beside_finer: Vec::new(),
             leaves,
         };
         tree.leaves.sort_unstable_by_key(Octant::key);

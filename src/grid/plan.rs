@@ -6,7 +6,7 @@ use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
-use super::closure::{Closure, NeededBlocks, nodes_in_domain};
+use super::closure::{Closure, NodeSets, nodes_in_domain};
 use super::columns::Columns;
 use super::constrained::{ArenaConstraints, Tables, has_constrained};
 use super::constraint::node_coord;
@@ -88,7 +88,7 @@ pub struct GridPlan<const D: usize> {
     /// Number of columns of first moments.
     pub columns: usize,
     /// Constrained nodes of arenas, for [`Bin::touched`].
-    pub constraints: Arc<Vec<Arc<ArenaConstraints<D>>>>,
+    pub constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
 }
@@ -102,15 +102,8 @@ impl<const D: usize> Bin<D> {
 }
 
 impl<const D: usize> GridPlan<D> {
-    /// Collective. Builds the ghost layer and the grid of each rank. `earlier` are [`GridPlan::constraints`] of an earlier
-    /// plan, if there is one; what occurs again is not made again.
-    pub fn build(
-        comm: &Comm,
-        forest: &Forest<D>,
-        root_edge: f64,
-        allowance: Allowance,
-        earlier: &[Arc<ArenaConstraints<D>>],
-    ) -> Self {
+    /// Collective. Builds the ghost layer and the grid of each rank.
+    pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);
         let mut rounds = 0;
         let (needed, bins) = loop {
@@ -147,7 +140,7 @@ impl<const D: usize> GridPlan<D> {
         plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.find_face_nodes();
-        let mut tables = Tables::new(&plan.blocks, plan.constraint_spread(), earlier);
+        let mut tables = Tables::new(&plan.blocks, plan.constraint_spread());
         let mut number = Vec::new();
         for bin in &mut plan.bins {
             if let Some(of_block) = bin.touched {
@@ -198,13 +191,13 @@ impl<const D: usize> GridPlan<D> {
             + self.feeders.heap_bytes()
             + self.pieces.capacity() * size_of::<Piece<D>>()
             + self.parts.capacity() * size_of::<Part>()
-            + self.constraints.iter().map(|table| table.heap_bytes()).sum::<usize>()
+            + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
 
-    fn list_blocks(&mut self, needed: &NeededBlocks<D>) {
+    fn list_blocks(&mut self, needed: &[(Octant<D>, NodeSets)]) {
         let mut blocks: Vec<Block<D>> = needed
             .iter()
-            .map(|(&(level, coord), sets)| Block {
+            .map(|&(Octant { level, coord }, sets)| Block {
                 level,
                 coord,
                 value: sets.value,
@@ -276,14 +269,19 @@ impl<const D: usize> GridPlan<D> {
     }
 
     fn find_face_nodes(&mut self) {
+        let roots = self.tree.brick().roots;
         for (index, block) in self.blocks.iter().enumerate() {
+            // Blocks one past the last octant hold the nodes on upper faces.
+            if (0..D).all(|axis| ![0, roots[axis] << block.level].contains(&block.coord[axis])) {
+                continue;
+            }
             let real =
                 block.value & !block.constrained & nodes_in_domain(&self.tree, block.level, block.coord);
             for bit in bits(real) {
                 let node = node_coord(block.coord, bit);
                 let mut faces = 0u8;
                 for axis in 0..D {
-                    let last = 4 * (self.tree.brick().roots[axis] << block.level);
+                    let last = 4 * (roots[axis] << block.level);
                     faces |= u8::from(node[axis] == 0) << (2 * axis);
                     faces |= u8::from(node[axis] == last) << (2 * axis + 1);
                 }

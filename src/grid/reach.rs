@@ -71,8 +71,8 @@ pub fn leaves_around<const D: usize>(tree: &KnownTree<D>, leaf: usize) -> Vec<us
 
 /// Known finer leaves in the same-size neighbours of an octant.
 fn finer_neighbours<const D: usize>(tree: &KnownTree<D>, here: Octant<D>) -> impl Iterator<Item = Octant<D>> {
-    // Around leaves of the finest level there are none.
-    (0..if here.level < tree.deepest() { offset_count(D) } else { 0 })
+    // Most leaves have none.
+    (0..if tree.is_beside_finer(here.level, here.coord) { offset_count(D) } else { 0 })
         .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
         .filter(move |&beside| beside != here.coord && tree.contains(here.level, beside))
         // Most neighbours are leaves of this size or larger, which is quickly seen.

@@ -55,12 +55,17 @@ pub struct HangingNodes {
     boxes: Vec<NodeBox>,
     /// First box of each stencil by its base (see [`stencil_bases`]), and the end.
     start: Vec<u16>,
+    /// By base, [`HAS_BOXES`] if there are any, and a bit for each axis if all lie at the third node along it.
+    classes: Vec<u8>,
 }
+
+/// In [`HangingNodes::classes`].
+const HAS_BOXES: u8 = 1 << 3;
 
 impl HangingNodes {
     /// `is_hanging` has a value for each node of the arena. The lowest node of an arena has odd coordinates.
     pub fn new<const D: usize>(is_hanging: &[bool]) -> Self {
-        let (mut boxes, mut start) = (Vec::new(), vec![0]);
+        let (mut boxes, mut start): (Vec<NodeBox>, _) = (Vec::new(), vec![0]);
         for base in 0..stencil_bases(D) {
             let first: [usize; 3] =
                 std::array::from_fn(|k| if k < D { base / BASES.pow(k as u32) % BASES } else { 0 });
@@ -82,22 +87,37 @@ impl HangingNodes {
             }
             start.push(boxes.len() as u16);
         }
-        Self { boxes, start }
+        let class = |range: &[u16]| {
+            let own = &boxes[usize::from(range[0])..usize::from(range[1])];
+            let is_third = |k: usize| own.iter().all(|nodes| nodes[k] & 0b111 == 0b100);
+            let axes = (0..D).filter(|&k| is_third(k)).fold(0, |axes, k| axes | 1 << k);
+            if own.is_empty() { 0 } else { HAS_BOXES | axes }
+        };
+        let classes = start.windows(2).map(class).collect();
+        Self { boxes, start, classes }
     }
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        size_of::<NodeBox>() * self.boxes.capacity() + 2 * self.start.capacity()
+        size_of::<NodeBox>() * self.boxes.capacity() + 2 * self.start.capacity() + self.classes.capacity()
     }
 
-    /// Members of a batch whose stencils have hanging nodes, a bit each.
+    /// Members of a batch whose stencils have hanging nodes, a bit each. Boxes that lie in one cell along an axis have a third
+    /// node of weight 0 there, which does not count.
     #[inline(always)]
     pub(super) fn touched<const D: usize>(&self, weights: &Weights<D>, batch: &Batch) -> u32 {
-        let has_any = |lane: usize| {
-            let base = weights.base(lane);
-            self.start[base] != self.start[base + 1]
-        };
-        batch.members_among((0..LANES).fold(0, |lanes, lane| lanes | u32::from(has_any(lane)) << lane))
+        let class = |lane: usize| u64::from(self.classes[weights.base(lane)]) << (8 * lane);
+        let classes = (0..LANES).fold(0, |classes, lane| classes | class(lane));
+        let mut zeros = 0;
+        for k in 0..D {
+            zeros |= Lanes::load(&weights.axis[k].weight[2]).le(Lanes::splat(0.0)).bytes() << k;
+        }
+        let ones = u64::from_le_bytes([1; 8]);
+        // Bytes up to 7 and this have their highest bit set if they are not 0.
+        let without = ((classes & zeros) + 0x7f * ones) >> 7;
+        let touched = (classes / u64::from(HAS_BOXES)) & !without & ones;
+        // Bit 8 i goes to bit 56 + i.
+        batch.members_among((touched.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32)
     }
 
     /// Boxes of nodes of the stencil of a lane.

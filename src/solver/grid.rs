@@ -38,17 +38,10 @@ impl<const D: usize> Grid<D> {
     /// Collective. The grid for the current tree and partition.
     ///
     /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
-    /// [`needed_reach`] gives it. `earlier` is the plan of the grid that it takes the place of.
-    pub(super) fn build(
-        comm: &Comm,
-        forest: &Forest<D>,
-        physics: &Physics<D>,
-        reach: u32,
-        earlier: Option<&GridPlan<D>>,
-    ) -> Self {
+    /// [`needed_reach`] gives it.
+    pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>, reach: u32) -> Self {
         let allowance = Allowance { reach, graded: physics.graded };
-        let known = earlier.map_or(&[][..], |plan| &plan.constraints);
-        let plan = GridPlan::build(comm, forest, physics.root_edge, allowance, known);
+        let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
         let neighbours = exchange.neighbours().to_vec();
         Self {

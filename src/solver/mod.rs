@@ -183,7 +183,7 @@ impl<const D: usize> Solver<D> {
         clock: Clock,
     ) -> Self {
         let start = thread_time();
-        let grid = Grid::build(comm, &forest, &physics, 0, None);
+        let grid = Grid::build(comm, &forest, &physics, 0);
         let partitioned = LastPartition::at_start(start);
         let mut solver = Self {
             comm: comm.clone(),
@@ -276,8 +276,7 @@ impl<const D: usize> Solver<D> {
         let arenas = std::mem::take(&mut self.grid.arenas);
         // The new one shall not stand beside all of the old one.
         self.grid.clear();
-        let earlier = Some(&self.grid.plan);
-        self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach, earlier);
+        self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
         self.grid.arenas = arenas;
     }
 

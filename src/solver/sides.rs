@@ -8,15 +8,7 @@ use super::migrate::leaf_box;
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::Bin;
-use crate::kernel::simd::{LANES, Lanes, Mask};
-
-/// Lanes that are set, as the lowest bit of each byte.
-#[inline(always)]
-fn by_lane(lanes: Mask) -> u64 {
-    // Byte i gets bit i of eight, from where carries bring it to the highest bit of the byte.
-    let bits = u64::from(lanes.bits()).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
-    (bits.wrapping_add(0x0040_6070_787c_7e7f) >> 7) & 0x0101_0101_0101_0101
-}
+use crate::kernel::simd::{LANES, Lanes};
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]
@@ -172,7 +164,7 @@ impl<const D: usize> Sides<D> {
             let (slack, below) = (Lanes::splat(self.slack[axis]), centre[axis] - half[axis]);
             let above_lower = Lanes::splat(self.lower[axis]).le(below - slack);
             let below_upper = (centre[axis] + half[axis] + slack).le(Lanes::splat(self.upper[axis]));
-            faces |= by_lane(!above_lower) << (2 * axis) | by_lane(!below_upper) << (2 * axis + 1);
+            faces |= (!above_lower).bytes() << (2 * axis) | (!below_upper).bytes() << (2 * axis + 1);
         }
         faces.to_le_bytes()
     }
@@ -180,25 +172,12 @@ impl<const D: usize> Sides<D> {
     /// Children of the leaf that contain the points of a batch.
     #[inline(always)]
     fn children_of_batch(&self, centre: &[Lanes; D]) -> [u8; LANES] {
-        let upper = |axis: usize| by_lane(Lanes::splat(self.middle[axis]).le(centre[axis])) << axis;
+        let upper = |axis: usize| Lanes::splat(self.middle[axis]).le(centre[axis]).bytes() << axis;
         (0..D).fold(0, |children, axis| children | upper(axis)).to_le_bytes()
     }
 
     /// Where a box scatters that crosses some faces.
     pub fn side(&self, faces: usize) -> Side {
         self.sides[faces]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lanes_become_bytes() {
-        for bits in 0..1u32 << LANES {
-            let bytes = by_lane(Mask::from_bits(bits)).to_le_bytes();
-            assert_eq!(bytes, std::array::from_fn(|lane| (bits >> lane & 1) as u8));
-        }
     }
 }

@@ -198,6 +198,14 @@ impl Mask {
     pub fn bits(self) -> u32 {
         self.0[0].bits() | self.0[1].bits() << 4
     }
+    /// Lanes that are set, as the lowest bit of each byte.
+    #[inline(always)]
+    pub fn bytes(self) -> u64 {
+        // Byte i gets bit i of eight, from where carries bring it to the highest bit of the byte.
+        let bits = u64::from(self.bits()).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
+        (bits.wrapping_add(0x0040_6070_787c_7e7f) >> 7) & 0x0101_0101_0101_0101
+    }
+
     /// Lane `i` is bit `i`.
     #[inline(always)]
     pub fn from_bits(bits: u32) -> Self {

@@ -84,3 +84,11 @@ fn rows_and_columns_are_inverse() {
     }
     assert_eq!(Mask::from_bits(0b1010_0110).bits(), 0b1010_0110);
 }
+
+#[test]
+fn lanes_become_bytes() {
+    for bits in 0..1u32 << LANES {
+        let bytes = Mask::from_bits(bits).bytes().to_le_bytes();
+        assert_eq!(bytes, std::array::from_fn(|lane| (bits >> lane & 1) as u8));
+    }
+}
