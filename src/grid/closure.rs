@@ -15,7 +15,7 @@ use super::known::{Cover, KnownTree};
 use super::mask::{
     arena_overlap, box_offsets, lower_face, offset, offset_count, offset_index, opposite, product, shifted,
 };
-use super::parents::{ParentTable, coarser_at, parity};
+use super::parents::{ParentTable, children, coarser_at, parents, parity};
 use super::reach::{SourceSearch, bin_container, interior, own_bins};
 
 /// Node sets of one block.
@@ -144,7 +144,7 @@ impl<const D: usize> Builder<'_, D> {
                     }
                     let coarse = coarser_at(coord, corner);
                     let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
-                    let parents = self.parents.parents(offset_index::<D>(place), mask);
+                    let parents = parents::<D>(offset_index::<D>(place), mask);
                     self.sets(level as u8 - 1, coarse).value |= parents;
                 }
             }
@@ -168,7 +168,7 @@ impl<const D: usize> Builder<'_, D> {
                 }
                 for index in 0..offset_count(D) {
                     let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
-                    let children = self.parents.children(index, sum);
+                    let children = children::<D>(index, sum);
                     if children == 0 {
                         continue;
                     }
@@ -207,7 +207,7 @@ impl<const D: usize> Builder<'_, D> {
             for index in 0..offset_count(D) {
                 let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
                 let from = constrained_nodes(self.tree, level + 1, fine) & self.receives(level + 1, fine);
-                mask |= self.parents.parents(index, from);
+                mask |= parents::<D>(index, from);
             }
         }
         mask &= nodes_in_domain(self.tree, level, coord);

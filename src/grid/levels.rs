@@ -90,17 +90,25 @@ fn hand_up<const D: usize>(
         (&plan.blocks[child.block as usize], &plan.blocks[coarse as usize]);
     let (parity, (rows, moments)) = (parity(fine.coord), from.of_block(plan, child.block));
     let is_here = |parent: &&ParentNode| parent.corner == child.corner && sum >> parent.bit & 1 == 1;
+    let (with_moments, passing) = (fine.columns.nodes(), columns.nodes());
     for bit in bits(fine.sum & fine.constrained & table.having(parity, child.corner)) {
         let row = F64x4::new(rows[bit as usize].0);
+        let parents = table.of_node::<D>(parity, bit).iter().filter(is_here);
+        if with_moments >> bit & 1 == 0 {
+            parents.for_each(|parent| {
+                steps[usize::from(parent.offset)].add(row, &mut to.rows[usize::from(parent.bit)]);
+            });
+            continue;
+        }
         let own = &moments[fine.columns.first_of(bit)..];
         let own = || axes_in::<D>(fine.columns.axes_of(bit)).zip(own);
-        for parent in table.of_node::<D>(parity, bit).iter().filter(is_here) {
+        for parent in parents {
             let step = &steps[usize::from(parent.offset)];
             let value = own()
                 .fold(row, |value, (axis, column)| F64x4::new(column.0).mul_add(step.delta[axis], value));
             step.add(value, &mut to.rows[usize::from(parent.bit)]);
             // Real nodes have no moments.
-            if columns.nodes() >> parent.bit & 1 == 1 {
+            if passing >> parent.bit & 1 == 1 {
                 let mut sums = columns.read(to.moments, parent.bit.into());
                 own().for_each(|(axis, column)| step.add(F64x4::new(column.0), &mut sums[axis]));
                 columns.write(to.moments, parent.bit.into(), &sums);
@@ -123,27 +131,31 @@ fn interpolate<const D: usize>(
     let parents = fine.parents.map(|parent| {
         (parent != NO_BLOCK).then(|| (from.of_block(plan, parent), &plan.blocks[parent as usize].columns))
     });
+    let with_moments = block.columns.nodes();
     for bit in bits(block.value & block.constrained) {
-        let axes = block.columns.axes_of(bit);
         let mut row = F64x4::splat(0.0);
-        let mut sums = [row; D];
+        for parent in table.of_node::<D>(parity, bit) {
+            let Some(((rows, _), _)) = parents[usize::from(parent.corner) % 8] else { continue };
+            let [x, y, z, _] = rows[usize::from(parent.bit)].0;
+            row = steps[usize::from(parent.offset)].weight.mul_add(F64x4::new([x, y, z, 0.0]), row);
+        }
+        to.rows[bit as usize] = Row(row.to_array());
+        if with_moments >> bit & 1 == 0 {
+            continue;
+        }
+        let axes = block.columns.axes_of(bit);
+        let mut sums = [F64x4::splat(0.0); D];
         for parent in table.of_node::<D>(parity, bit) {
             let Some(((rows, moments), columns)) = parents[usize::from(parent.corner) % 8] else { continue };
             let step = &steps[usize::from(parent.offset)];
             let [x, y, z, _] = rows[usize::from(parent.bit)].0;
-            let value = F64x4::new([x, y, z, 0.0]);
-            row = step.weight.mul_add(value, row);
+            // Of real nodes these are zero.
+            let of_parent = columns.read(moments, parent.bit.into());
             for axis in axes_in::<D>(axes) {
-                sums[axis] = step.weighted_delta[axis].mul_add(value, sums[axis]);
-            }
-            if columns.nodes() >> parent.bit & 1 == 1 {
-                let of_parent = columns.read(moments, parent.bit.into());
-                for axis in axes_in::<D>(axes) {
-                    sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
-                }
+                sums[axis] = step.weighted_delta[axis].mul_add(F64x4::new([x, y, z, 0.0]), sums[axis]);
+                sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
             }
         }
-        to.rows[bit as usize] = Row(row.to_array());
         block.columns.write(to.moments, bit, &sums.map(|sum| Row(sum.to_array())));
     }
 }

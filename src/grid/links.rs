@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use super::closure::constrained_nodes;
 use super::columns::{Columns, axes_in};
 use super::mask::{bits, block_nodes, node_of_bit, offset, offset_index};
-use super::parents::{ParentTable, coarser_at, parity, weight_of};
+use super::parents::{ParentTable, children, coarser_at, parents, parity, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 
 /// A block with constrained nodes.
@@ -120,9 +120,9 @@ impl<const D: usize> GridPlan<D> {
         let needed = (sum | value) & constrained;
         for corner in (0..1u8 << D).filter(|&corner| table.having(parity(coord), corner) & needed != 0) {
             let coarse = coarser_at(coord, corner);
-            let parents = fine.parents[usize::from(corner)];
+            let number = fine.parents[usize::from(corner)];
             // Which nodes these are must not depend on what this rank needs.
-            let of_coarse = match self.blocks.get(parents as usize) {
+            let of_coarse = match self.blocks.get(number as usize) {
                 Some(block) => block.constrained,
                 None => constrained_nodes(&self.tree, level - 1, coarse),
             };
@@ -131,10 +131,10 @@ impl<const D: usize> GridPlan<D> {
             }
             let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
             let place = offset_index::<D>(place);
-            let children = table.children(place, of_coarse) & needed;
-            self.blocks[fine.block as usize].chained |= children;
-            if let Some(passed) = passed.get_mut(parents as usize) {
-                *passed |= table.parents(place, children) & of_coarse;
+            let chained = children::<D>(place, of_coarse) & needed;
+            self.blocks[fine.block as usize].chained |= chained;
+            if let Some(passed) = passed.get_mut(number as usize) {
+                *passed |= parents::<D>(place, chained) & of_coarse;
             }
         }
     }

@@ -89,6 +89,26 @@ const ALONG: [[u64; 16]; 3] = {
     along
 };
 
+/// The nodes of `mask` with coordinate `k` along an axis, moved to all coordinates along it that are in `set`.
+#[inline(always)]
+pub fn moved_along(mask: u64, axis: usize, k: usize, set: u8) -> u64 {
+    // Nodes on the axis itself. A product with them moves what has coordinate 0 to each of them, without carries.
+    let line = LINES[axis][usize::from(set & 0b1111)];
+    (mask >> (k << (2 * axis)) & ALONG[axis][1]).wrapping_mul(line)
+}
+
+/// Nodes on an axis whose coordinate is in a set.
+const LINES: [[u64; 16]; 3] = {
+    let mut lines = [[0; 16]; 3];
+    let mut entry = 0;
+    while entry < 3 * 16 * 4 {
+        let (axis, set, k) = (entry / 64, entry / 4 % 16, entry % 4);
+        lines[axis][set] |= (set as u64 >> k & 1) << (k << (2 * axis));
+        entry += 1;
+    }
+    lines
+};
+
 /// The nodes of block `bin + offset` that lie in the arena of `bin`: the arena reaches from one node below
 /// the block to the second node above it.
 pub fn arena_overlap<const D: usize>(offset: [i32; D]) -> u64 {

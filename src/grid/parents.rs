@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::constraint::{block_and_bit, node_coord, parents_of};
-use super::mask::{bits, block_nodes, offset_count, offset_index};
+use super::mask::{block_nodes, moved_along, offset, offset_index};
 
 /// A parent of a node of a fine block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,10 +24,39 @@ pub struct ParentTable {
     start: Vec<u16>,
     /// Nodes that have a parent in the block at each corner, by parity.
     having: Vec<[u64; 8]>,
-    /// Per place of the fine block and node of the coarse one, its children; see [`ParentTable::children`].
-    children: Vec<[u64; 64]>,
-    /// Per place and node of the fine block, its parents.
-    parents_at: Vec<[u64; 64]>,
+}
+
+/// By offset of a fine block from the coarse one (both along an axis, the coarse coordinate doubled) and node of the coarse
+/// one: its children, a bit each, along the axis.
+const CHILDREN: [[u8; 4]; 3] = relatives(false);
+/// The same by node of the fine block: its parents.
+const PARENTS: [[u8; 4]; 3] = relatives(true);
+
+/// Where a node of the one block has relatives in the other: nodes of a fine block at most a fine cell from one of a coarse
+/// block have it as parent.
+const fn relatives(is_upwards: bool) -> [[u8; 4]; 3] {
+    let mut relatives = [[0; 4]; 3];
+    let mut entry = 0;
+    while entry < 3 * 16 {
+        let (place, fine, coarse) = (entry / 16, entry / 4 % 4, entry % 4);
+        let way = 2 * coarse as i32 - (4 * (place as i32 - 1) + fine as i32);
+        if -1 <= way && way <= 1 {
+            let (from, to) = if is_upwards { (fine, coarse) } else { (coarse, fine) };
+            relatives[place][from] |= 1 << to;
+        }
+        entry += 1;
+    }
+    relatives
+}
+
+/// Relatives of the nodes in `mask` in the other block, axis by axis.
+#[inline(always)]
+fn related<const D: usize>(along: &[[u8; 4]; 3], place: usize, mask: u64) -> u64 {
+    let place = offset::<D>(place);
+    (0..D).fold(mask, |mask, axis| {
+        let sets = along[(place[axis] + 1) as usize];
+        (0..4).fold(0, |all, k| all | moved_along(mask, axis, k, sets[k]))
+    })
 }
 
 static TWO: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<2>);
@@ -41,8 +70,6 @@ impl ParentTable {
 
     fn new<const D: usize>() -> Self {
         let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
-        let none = vec![[0; 64]; offset_count(D)];
-        let (mut children, mut parents_at) = (none.clone(), none);
         for parity in 0..1u32 << D {
             let mut corners = [0; 8];
             // Any block of this parity that is not at the lower faces shows the pattern.
@@ -56,16 +83,12 @@ impl ParentTable {
                     let offset = offset_index(parent.offset) as u8;
                     debug_assert_eq!(parent.weight, weight_of(parent.offset));
                     parents.push(ParentNode { corner: corner as u8, bit: parent_bit as u8, offset });
-                    let place =
-                        offset_index::<D>(std::array::from_fn(|k| block[k] as i32 - 2 * coarse[k] as i32));
-                    children[place][parent_bit as usize] |= 1 << bit;
-                    parents_at[place][bit as usize] |= 1 << parent_bit;
                 }
             }
             having.push(corners);
         }
         start.push(parents.len() as u16);
-        Self { parents, start, having, children, parents_at }
+        Self { parents, start, having }
     }
 
     /// Parents of node `bit` of a block of some parity, in lexicographic order.
@@ -79,17 +102,17 @@ impl ParentTable {
     pub fn having(&self, parity: usize, corner: u8) -> u64 {
         self.having[parity][usize::from(corner)]
     }
+}
 
-    /// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate of the
-    /// coarse block to the fine one.
-    pub fn children(&self, place: usize, mask: u64) -> u64 {
-        bits(mask).fold(0, |children, bit| children | self.children[place][bit as usize])
-    }
+/// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate of the
+/// coarse block to the fine one.
+pub fn children<const D: usize>(place: usize, mask: u64) -> u64 {
+    related::<D>(&CHILDREN, place, mask)
+}
 
-    /// Nodes of the coarse block that are parents of `mask` in the fine block at a place, as in [`ParentTable::children`].
-    pub fn parents(&self, place: usize, mask: u64) -> u64 {
-        bits(mask).fold(0, |parents, bit| parents | self.parents_at[place][bit as usize])
-    }
+/// Nodes of the coarse block that are parents of `mask` in the fine block at a place, as in [`children`].
+pub fn parents<const D: usize>(place: usize, mask: u64) -> u64 {
+    related::<D>(&PARENTS, place, mask)
 }
 
 /// Parity of coordinates, a bit for each axis.
@@ -110,7 +133,6 @@ pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::mask::offset;
 
     #[test]
     fn the_table_has_the_parents_of_every_node() {
@@ -137,12 +159,30 @@ mod tests {
 
     #[test]
     fn children_are_the_nodes_that_name_the_block_as_parent() {
-        let table = ParentTable::of::<2>();
+        let table = ParentTable::of::<3>();
+        for place in 0..27 {
+            for mask in [1, 1 << 63, 0x8421_1248_8421_1248, 0xf0f0_0000_1234_5678, u64::MAX] {
+                let coord: [u32; 3] = offset::<3>(place).map(|o| (4 + o) as u32);
+                let is_parent = |parent: &&ParentNode| {
+                    coarser_at(coord, parent.corner) == [2; 3] && mask >> parent.bit & 1 == 1
+                };
+                let named = (0..64)
+                    .filter(|&bit| table.of_node::<3>(parity(coord), bit).iter().any(|p| is_parent(&p)));
+                assert_eq!(children::<3>(place, mask), named.fold(0, |all, bit| all | 1 << bit));
+                let of_mask = (0..64).filter(|bit| mask >> bit & 1 == 1).flat_map(|bit| {
+                    table
+                        .of_node::<3>(parity(coord), bit)
+                        .iter()
+                        .filter(|p| coarser_at(coord, p.corner) == [2; 3])
+                });
+                assert_eq!(parents::<3>(place, mask), of_mask.fold(0, |all, parent| all | 1 << parent.bit));
+            }
+        }
         let number = |offset: [i32; 2]| offset_index(offset);
-        assert_eq!(table.children(number([0, 0]), 1), 0b0000_0000_0011_0011);
-        assert_eq!(table.children(number([-1, -1]), 1), 1 << 15);
-        assert_eq!(table.children(number([1, 1]), 1), 0);
-        assert_eq!(table.parents(number([0, 0]), 0b11), 0b11);
-        assert_eq!(table.parents(number([-1, -1]), 1 << 15), 1);
+        assert_eq!(children::<2>(number([0, 0]), 1), 0b0000_0000_0011_0011);
+        assert_eq!(children::<2>(number([-1, -1]), 1), 1 << 15);
+        assert_eq!(children::<2>(number([1, 1]), 1), 0);
+        assert_eq!(parents::<2>(number([0, 0]), 0b11), 0b11);
+        assert_eq!(parents::<2>(number([-1, -1]), 1 << 15), 1);
     }
 }

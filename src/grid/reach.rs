@@ -173,7 +173,7 @@ struct Reach<'a, const D: usize> {
     leaf: Octant<D>,
     region: Extent<D>,
     any_box: bool,
-    /// Finer leaves around, once somebody has asked.
+    /// Finer leaves in the region, once somebody has asked.
     finer: OnceCell<Vec<Octant<D>>>,
 }
 
@@ -185,7 +185,10 @@ impl<'a, const D: usize> Reach<'a, D> {
     }
 
     fn finer(&self) -> &[Octant<D>] {
-        self.finer.get_or_init(|| finer_neighbours(self.tree, self.leaf).collect())
+        self.finer.get_or_init(|| {
+            let around = finer_neighbours(self.tree, self.leaf);
+            around.filter(|finer| self.region.overlaps(finer)).collect()
+        })
     }
 
     /// As [`Reach::of`], but not empty for leaves whose boxes are transferred whole.
@@ -207,7 +210,7 @@ impl<'a, const D: usize> Reach<'a, D> {
             return true;
         }
         let near_bin = Extent::grown(bin, 2, self.leaf.level);
-        self.finer().iter().any(|finer| self.region.overlaps(finer) && near_bin.overlaps(finer))
+        self.finer().iter().any(|finer| near_bin.overlaps(finer))
     }
 }
 

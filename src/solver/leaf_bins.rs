@@ -81,8 +81,10 @@ impl<const D: usize> LeafBins<D> {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
         let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
-        // Around leaves of the finest level nothing is finer.
-        let mut around = if here.level < tree.deepest() { leaves_around(tree, known) } else { Vec::new() };
+        // Around most leaves nothing is finer.
+        let is_far = tree.reach_in_leaves() > 1;
+        let looks = is_far || tree.is_beside_finer(here.level, here.coord);
+        let mut around = if looks { leaves_around(tree, known) } else { Vec::new() };
         if around.iter().all(|&leaf| tree.leaves()[leaf].level <= here.level) {
             around.clear();
         }
