@@ -4,7 +4,7 @@
 //! ```text
 //! v = Σ w v_j,  ∇v = Σ v_j ⊗ ∇w,  B = Σ w (v_j ⊗ d + V_j),  D_k = Σ w (d_k² + S_j,k)
 //! ```
-//! where V and S are the first and second moments that constrained nodes inherit (zero
+//! where V and S are the first and second moments that constrained nodes inherit (see [`super::hanging`]; zero
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches};

@@ -6,10 +6,10 @@ use super::simd::{F64x4, LANES};
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Row};
 
-/// First moments of the constrained nodes of an arena.
+/// Constrained nodes of an arena, and first moments of those that have them.
 #[derive(Clone, Copy)]
 pub struct Moments<'a> {
-    /// The columns of the constrained nodes.
+    /// Hanging nodes, and columns of moments.
     pub nodes: &'a ConstrainedNodes,
     /// By column; that of axis k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
     pub first: &'a [Row],
@@ -23,7 +23,7 @@ pub struct Fields<'a> {
     /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`] the velocities that
     /// particles take on.
     pub increment: Option<&'a [Row]>,
-    /// Moments, where the block touches constrained nodes.
+    /// Where the block touches constrained nodes.
     pub moments: Option<Moments<'a>>,
 }
 
@@ -100,7 +100,8 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// The members of a batch, with all that the fields offer; `nodes` is of use where they have moments.
+    /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes` is of use where they
+    /// have moments.
     #[inline(always)]
     pub fn gather(
         &mut self,

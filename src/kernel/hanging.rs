@@ -113,7 +113,7 @@ impl HangingNodes {
             zeros |= Lanes::load(&weights.axis[k].weight[2]).le(Lanes::splat(0.0)).bytes() << k;
         }
         let ones = u64::from_le_bytes([1; 8]);
-        // Bytes up to 7 and this have their highest bit set if they are not 0.
+        // A byte from 1 to 7 plus this has its highest bit set.
         let without = ((classes & zeros) + 0x7f * ones) >> 7;
         let touched = (classes / u64::from(HAS_BOXES)) & !without & ones;
         // Bit 8 i goes to bit 56 + i.
@@ -218,6 +218,7 @@ struct BoxFactors<const D: usize> {
 }
 
 impl<const D: usize> BoxFactors<D> {
+    /// For the box of nodes `nodes` in the stencil of a lane.
     #[inline(always)]
     fn new(weights: &Weights<D>, lane: usize, nodes: &NodeBox) -> Self {
         let zero = F64x4::splat(0.0);
@@ -230,11 +231,12 @@ impl<const D: usize> BoxFactors<D> {
                 factors.weight[k][i] = weight * F64x4::splat(along.inside[i]);
                 odd[i] = weight * F64x4::splat(along.odd[i]);
             }
-            factors.arm[k] = [zero - (odd[0] + odd[1]), odd[0] - odd[2], odd[1] + odd[2]];
+            factors.arm[k] = [-(odd[0] + odd[1]), odd[0] - odd[2], odd[1] + odd[2]];
         }
         factors
     }
 
+    /// Adds `Σ m C e_k` times weight and arm to the nodes, as P2G does with the usual factors.
     #[inline(always)]
     fn scatter(&self, affine: &[F64x4; D], nodes: &mut [Row]) {
         let nodes = &mut nodes[..super::stencil_span(D)];
@@ -259,6 +261,7 @@ impl<const D: usize> BoxFactors<D> {
         }
     }
 
+    /// Adds the sums of nodes times weight and arm, as G2P forms B with the usual factors.
     #[inline(always)]
     fn gather(&self, nodes: &[Row], sums: &mut [F64x4; D]) {
         let nodes = &nodes[..super::stencil_span(D)];

@@ -22,16 +22,16 @@ use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
-/// First moments `A = Σ w m C` of the constrained nodes of an arena.
+/// Constrained nodes of an arena, and first moments `A = Σ w m C` of those that have them.
 pub struct MomentSums<'a> {
-    /// The columns of the constrained nodes, with their second moments.
+    /// Hanging nodes, and columns of moments with their second moments.
     pub nodes: &'a ConstrainedNodes,
     /// By column; that of axis k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
     pub sums: &'a mut [Row],
 }
 
-/// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also first
-/// moments of the constrained nodes.
+/// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also what
+/// constrained nodes need: first moments, or other factors (see [`super::hanging`]).
 ///
 /// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
 /// the arena, which holds when its centre lies in the block. `next` is the place of the chunk that will be read after
