@@ -12,10 +12,8 @@ use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::known::{Cover, KnownTree};
-use super::mask::{
-    arena_overlap, box_offsets, lower_face, offset, offset_count, offset_index, opposite, product, shifted,
-};
-use super::parents::{ParentTable, children, coarser_at, parents, parity};
+use super::mask::{arena_overlap, box_offsets, lower_face, offset, offset_count, opposite, product, shifted};
+use super::parents::{ParentTable, children, coarser_at, parents, parity, place_beside};
 use super::reach::{SourceSearch, bin_container, interior, own_bins};
 
 /// Node sets of one block.
@@ -143,8 +141,7 @@ impl<const D: usize> Builder<'_, D> {
                         continue;
                     }
                     let coarse = coarser_at(coord, corner);
-                    let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
-                    let parents = parents::<D>(offset_index::<D>(place), mask);
+                    let parents = parents::<D>(place_beside(coord, coarse), mask);
                     self.sets(level as u8 - 1, coarse).value |= parents;
                 }
             }

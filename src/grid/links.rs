@@ -5,8 +5,8 @@ use rustc_hash::FxHashMap;
 
 use super::closure::constrained_nodes;
 use super::columns::{Columns, axes_in};
-use super::mask::{bits, block_nodes, node_of_bit, offset, offset_index};
-use super::parents::{ParentTable, children, coarser_at, parents, parity, weight_of};
+use super::mask::{bits, block_nodes, node_of_bit, offset};
+use super::parents::{ParentTable, children, coarser_at, parents, parity, place_beside, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 
 /// A block with constrained nodes.
@@ -129,8 +129,7 @@ impl<const D: usize> GridPlan<D> {
             if of_coarse == 0 {
                 continue;
             }
-            let place = std::array::from_fn(|axis| coord[axis] as i32 - 2 * coarse[axis] as i32);
-            let place = offset_index::<D>(place);
+            let place = place_beside(coord, coarse);
             let chained = children::<D>(place, of_coarse) & needed;
             self.blocks[fine.block as usize].chained |= chained;
             if let Some(passed) = passed.get_mut(number as usize) {

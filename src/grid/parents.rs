@@ -125,6 +125,11 @@ pub fn coarser_at<const D: usize>(coord: [u32; D], corner: u8) -> [u32; D] {
     std::array::from_fn(|axis| coord[axis] / 2 + u32::from(corner >> axis & 1))
 }
 
+/// Offset number from twice the coordinate of a coarser block to a fine block that has parents in it.
+pub fn place_beside<const D: usize>(fine: [u32; D], coarse: [u32; D]) -> usize {
+    offset_index::<D>(std::array::from_fn(|axis| fine[axis] as i32 - 2 * coarse[axis] as i32))
+}
+
 /// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
 pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
     offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)

@@ -1,10 +1,10 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
+use super::Row;
 use super::batch::{Batch, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::simd::{F64x4, LANES};
-use super::weights::{NodeWeights, Weights};
-use super::{ARENA_EDGE, Row};
+use super::weights::{NodeWeights, Weights, dot, pencils};
 
 /// Constrained nodes of an arena, and first moments of those that have them.
 #[derive(Clone, Copy)]
@@ -168,41 +168,23 @@ impl<const D: usize> Sums<D> {
 
     /// Velocity, gradient and affine sums.
     ///
-    /// Each needs the nodes averaged over all axes but one: the pencil along x is
-    /// `X_a = Σ_bc wy_b wz_c v_abc`, and so on. All three come from one pass over the nodes.
+    /// Each needs the nodes averaged over all axes but one; see [`pencils`].
     #[inline(always)]
     fn contract(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
-        let nodes = &nodes[..super::stencil_span(D)];
-        let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
+        let all = |factors: &[[f64; LANES]; 3]| [of(&factors[0]), of(&factors[1]), of(&factors[2])];
         let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
-        let weight_x = [of(&x.weight[0]), of(&x.weight[1]), of(&x.weight[2])];
-        let mut pencil = [[zero; 3]; D];
-        for c in 0..if D == 3 { 3 } else { 1 } {
-            for b in 0..3 {
-                let product = of(if D == 3 { &weights.product[b][c] } else { &y.weight[b] });
-                let mut across = zero;
-                for a in 0..3 {
-                    let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
-                    pencil[0][a] = product.mul_add(row, pencil[0][a]);
-                    across = weight_x[a].mul_add(row, across);
-                }
-                if D == 3 {
-                    pencil[1][b] = of(&z.weight[c]).mul_add(across, pencil[1][b]);
-                    pencil[D - 1][c] = of(&y.weight[b]).mul_add(across, pencil[D - 1][c]);
-                } else {
-                    pencil[1][b] = across;
-                }
-            }
-        }
-        let dot = |factor: &[[f64; LANES]; 3], pencil: &[F64x4; 3]| {
-            let sum = of(&factor[1]).mul_add(pencil[1], of(&factor[0]) * pencil[0]);
-            of(&factor[2]).mul_add(pencil[2], sum)
-        };
-        self.velocity[lane] = dot(&x.weight, &pencil[0]);
+        let pencil = pencils::<D>(
+            nodes,
+            &all(&x.weight),
+            |b| of(&y.weight[b]),
+            |c| of(&z.weight[c]),
+            |b, c| of(&weights.product[b][c]),
+        );
+        self.velocity[lane] = dot(&all(&x.weight), &pencil[0]);
         for k in 0..D {
-            self.affine[k][lane] = dot(&weights.axis[k].arm, &pencil[k]);
-            self.gradient[k][lane] = dot(&weights.axis[k].slope, &pencil[k]);
+            self.affine[k][lane] = dot(&all(&weights.axis[k].arm), &pencil[k]);
+            self.gradient[k][lane] = dot(&all(&weights.axis[k].slope), &pencil[k]);
         }
     }
 }

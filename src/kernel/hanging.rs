@@ -13,7 +13,7 @@
 //! factors are those of each axis.
 use super::batch::{Batch, lanes_in};
 use super::simd::{F64x4, LANES, Lanes};
-use super::weights::Weights;
+use super::weights::{Weights, add_products, dot, pencils};
 use super::{ARENA_EDGE, BASES, Row, stencil_bases};
 
 /// A box of hanging nodes in a stencil: by axis an index of [`ALONG`].
@@ -204,11 +204,6 @@ fn alike<T: Copy + PartialEq>(values: impl Iterator<Item = T>) -> impl Iterator<
     found.into_iter().flatten()
 }
 
-#[inline(always)]
-fn dot(factors: &[F64x4; 3], rows: &[F64x4; 3]) -> F64x4 {
-    factors[2].mul_add(rows[2], factors[1].mul_add(rows[1], factors[0] * rows[0]))
-}
-
 /// Factors of one particle for a box of nodes.
 struct BoxFactors<const D: usize> {
     /// Weights, 0 outside the box.
@@ -239,52 +234,19 @@ impl<const D: usize> BoxFactors<D> {
     /// Adds `Σ m C e_k` times weight and arm to the nodes, as P2G does with the usual factors.
     #[inline(always)]
     fn scatter(&self, affine: &[F64x4; D], nodes: &mut [Row]) {
-        let nodes = &mut nodes[..super::stencil_span(D)];
         let mut along = self.arm;
         for k in 0..D {
             along[k] = along[k].map(|arm| arm * affine[k]);
         }
         let (x, y, z) = (&self.weight[0], &self.weight[1], &self.weight[D - 1]);
-        for c in 0..if D == 3 { 3 } else { 1 } {
-            for b in 0..3 {
-                let (product, other) = if D == 3 {
-                    (y[b] * z[c], z[c].mul_add(along[1][b], y[b] * along[D - 1][c]))
-                } else {
-                    (y[b], along[1][b])
-                };
-                for a in 0..3 {
-                    let node = &mut nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0;
-                    let sum = product.mul_add(along[0][a], F64x4::new(*node));
-                    *node = x[a].mul_add(other, sum).to_array();
-                }
-            }
-        }
+        add_products(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c], &along);
     }
 
     /// Adds the sums of nodes times weight and arm, as G2P forms B with the usual factors.
     #[inline(always)]
     fn gather(&self, nodes: &[Row], sums: &mut [F64x4; D]) {
-        let nodes = &nodes[..super::stencil_span(D)];
-        let zero = F64x4::splat(0.0);
         let (x, y, z) = (&self.weight[0], &self.weight[1], &self.weight[D - 1]);
-        let mut pencil = [[zero; 3]; D];
-        for c in 0..if D == 3 { 3 } else { 1 } {
-            for b in 0..3 {
-                let product = if D == 3 { y[b] * z[c] } else { y[b] };
-                let mut across = zero;
-                for a in 0..3 {
-                    let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
-                    pencil[0][a] = product.mul_add(row, pencil[0][a]);
-                    across = x[a].mul_add(row, across);
-                }
-                if D == 3 {
-                    pencil[1][b] = z[c].mul_add(across, pencil[1][b]);
-                    pencil[D - 1][c] = y[b].mul_add(across, pencil[D - 1][c]);
-                } else {
-                    pencil[1][b] = across;
-                }
-            }
-        }
+        let pencil = pencils::<D>(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c]);
         for k in 0..D {
             sums[k] = sums[k] + dot(&self.arm[k], &pencil[k]);
         }

@@ -18,8 +18,8 @@ use super::batch::{Batch, Batches, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
-use super::weights::{NodeWeights, Weights};
-use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::weights::{NodeWeights, Weights, add_products};
+use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// Constrained nodes of an arena, and first moments `A = Σ w m C` of those that have them.
@@ -236,7 +236,6 @@ impl<const D: usize> Prepared<D> {
 
     #[inline(always)]
     fn add_one(&self, lane: usize, nodes: &mut [Row]) {
-        let nodes = &mut nodes[..super::stencil_span(D)];
         let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let mut along = [[zero; 3]; D];
@@ -252,25 +251,9 @@ impl<const D: usize> Prepared<D> {
             weight_x[a] = of(&self.weights.axis[0].weight[a]);
             along[0][a] = weight_x[a].mul_add(self.momentum[lane], along[0][a]);
         }
-        for c in 0..if D == 3 { 3 } else { 1 } {
-            for b in 0..3 {
-                let weight_y = of(&self.weights.axis[1].weight[b]);
-                let (product, other) = if D == 3 {
-                    let weight_z = of(&self.weights.axis[D - 1].weight[c]);
-                    (
-                        of(&self.weights.product[b][c]),
-                        weight_z.mul_add(along[1][b], weight_y * along[D - 1][c]),
-                    )
-                } else {
-                    (weight_y, along[1][b])
-                };
-                for a in 0..3 {
-                    let node = &mut nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0;
-                    let sum = product.mul_add(along[0][a], F64x4::new(*node));
-                    *node = weight_x[a].mul_add(other, sum).to_array();
-                }
-            }
-        }
+        let (y, z) = (&self.weights.axis[1].weight, &self.weights.axis[D - 1].weight);
+        let product = |b: usize, c: usize| of(&self.weights.product[b][c]);
+        add_products(nodes, &weight_x, |b| of(&y[b]), |c| of(&z[c]), product, &along);
     }
 
     /// Adds what hanging nodes of the lanes in `touched` have in place of first moments.

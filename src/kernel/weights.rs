@@ -1,7 +1,7 @@
 //! Tensor-product stencils of a batch of boxes.
 use super::simd::{F64x4, LANES, Lanes};
 use super::stencil::Axis;
-use super::{ARENA_EDGE, BASES, Frame};
+use super::{ARENA_EDGE, BASES, Frame, Row};
 
 /// Factors of one axis, node by node and lane by lane.
 #[derive(Clone, Copy)]
@@ -108,6 +108,73 @@ impl<const D: usize> Weights<D> {
             }
         }
     }
+}
+
+/// Adds to the nodes of a stencil a sum of products of factors of the axes: `product X_a + x_a (z_c Y_b + y_b Z_c)`, where X, Y
+/// and Z are `along` the axes and `product` is `y_b z_c`. In 2D there is no z.
+#[inline(always)]
+pub(super) fn add_products<const D: usize>(
+    nodes: &mut [Row],
+    x: &[F64x4; 3],
+    y: impl Fn(usize) -> F64x4,
+    z: impl Fn(usize) -> F64x4,
+    product: impl Fn(usize, usize) -> F64x4,
+    along: &[[F64x4; 3]; D],
+) {
+    let nodes = &mut nodes[..super::stencil_span(D)];
+    for c in 0..if D == 3 { 3 } else { 1 } {
+        for b in 0..3 {
+            let (product, other) = if D == 3 {
+                (product(b, c), z(c).mul_add(along[1][b], y(b) * along[D - 1][c]))
+            } else {
+                (y(b), along[1][b])
+            };
+            for a in 0..3 {
+                let node = &mut nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0;
+                let sum = product.mul_add(along[0][a], F64x4::new(*node));
+                *node = x[a].mul_add(other, sum).to_array();
+            }
+        }
+    }
+}
+
+/// The nodes of a stencil averaged over all axes but one, for each axis: along x it is `X_a = Σ_bc y_b z_c v_abc`, and so on.
+/// All come from one pass over the nodes.
+#[inline(always)]
+pub(super) fn pencils<const D: usize>(
+    nodes: &[Row],
+    x: &[F64x4; 3],
+    y: impl Fn(usize) -> F64x4,
+    z: impl Fn(usize) -> F64x4,
+    product: impl Fn(usize, usize) -> F64x4,
+) -> [[F64x4; 3]; D] {
+    let nodes = &nodes[..super::stencil_span(D)];
+    let zero = F64x4::splat(0.0);
+    let mut pencil = [[zero; 3]; D];
+    for c in 0..if D == 3 { 3 } else { 1 } {
+        for b in 0..3 {
+            let product = if D == 3 { product(b, c) } else { y(b) };
+            let mut across = zero;
+            for a in 0..3 {
+                let row = F64x4::new(nodes[a + ARENA_EDGE * (b + ARENA_EDGE * c)].0);
+                pencil[0][a] = product.mul_add(row, pencil[0][a]);
+                across = x[a].mul_add(row, across);
+            }
+            if D == 3 {
+                pencil[1][b] = z(c).mul_add(across, pencil[1][b]);
+                pencil[D - 1][c] = y(b).mul_add(across, pencil[D - 1][c]);
+            } else {
+                pencil[1][b] = across;
+            }
+        }
+    }
+    pencil
+}
+
+/// The sum of a pencil with the factors of its axis.
+#[inline(always)]
+pub(super) fn dot(factors: &[F64x4; 3], pencil: &[F64x4; 3]) -> F64x4 {
+    factors[2].mul_add(pencil[2], factors[1].mul_add(pencil[1], factors[0] * pencil[0]))
 }
 
 impl NodeWeights {
