@@ -105,11 +105,22 @@ fn blocks<const D: usize>() -> usize {
 fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
     let setting = Setting::<D>::new(model, distinct);
     let mut arena = vec![Row::default(); arena_nodes(D)];
+    let mut scratch = p2g::Scratch::default();
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            p2g::scatter(chunk, Select::All, &setting.frame, &scheme, DT, &mut arena, None, Place::default());
+            p2g::scatter(
+                &mut scratch,
+                chunk,
+                Select::All,
+                &setting.frame,
+                &scheme,
+                DT,
+                &mut arena,
+                None,
+                Place::default(),
+            );
         }
         arena[100 % arena_nodes(D)]
     });
@@ -118,13 +129,14 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
 fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
     let mut setting = Setting::<D>::new(model, distinct);
     let mut chunks = std::mem::take(&mut setting.chunks);
-    let mut leavers = Leavers::default();
+    let (mut scratch, mut leavers) = (g2p::Scratch::default(), Leavers::default());
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
             greatest.max(g2p::gather(
+                &mut scratch,
                 chunk,
                 Select::All,
                 &setting.frame,
@@ -156,6 +168,7 @@ fn members(quarters: u32) -> Vec<u32> {
 fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut arena = vec![Row::default(); arena_nodes(3)];
+    let mut scratch = p2g::Scratch::default();
     let nodes = constrained();
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
@@ -164,6 +177,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
             arena.fill(Row::default());
             let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut [] });
             p2g::scatter(
+                &mut scratch,
                 chunk,
                 Select::List(&list),
                 &setting.frame,
@@ -182,7 +196,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
 fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
-    let mut leavers = Leavers::default();
+    let (mut scratch, mut leavers) = (g2p::Scratch::default(), Leavers::default());
     let nodes = constrained();
     let list = members(quarters);
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
@@ -191,6 +205,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
             greatest.max(g2p::gather(
+                &mut scratch,
                 chunk,
                 Select::List(&list),
                 &setting.frame,

@@ -17,10 +17,24 @@ use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
+/// Memory that is used from bin to bin, as it takes a while to set it up.
+pub struct Scratch<const D: usize> {
+    weights: Weights<D>,
+    nodes: NodeWeights,
+    sums: Sums<D>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { weights: Weights::new(), nodes: NodeWeights::new(), sums: Sums::new() }
+    }
+}
+
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
 /// speed and particle speed, m/s, for the time step; infinite if any is not finite. `leavers` notes those that leave its
 /// box; `next` is the place of the chunk that will be read after this one.
 pub fn gather<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
     select: Select,
     frame: &Frame<D>,
@@ -30,11 +44,12 @@ pub fn gather<const D: usize>(
     leavers: &mut Leavers<D>,
     next: Place,
 ) -> f64 {
-    widest(Gather { chunk, select, frame, scheme, dt, fields, leavers, next })
+    widest(Gather { scratch, chunk, select, frame, scheme, dt, fields, leavers, next })
 }
 
 /// [`gather`] with its arguments.
 struct Gather<'a, const D: usize> {
+    scratch: &'a mut Scratch<D>,
     chunk: &'a mut Chunk<D>,
     select: Select<'a>,
     frame: &'a Frame<D>,
@@ -50,12 +65,11 @@ impl<const D: usize> Kernel for Gather<'_, D> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Self { chunk, select, frame, scheme, dt, fields, leavers, next } = self;
+        let Self { scratch, chunk, select, frame, scheme, dt, fields, leavers, next } = self;
         let batches = Batches::new(select, chunk, next);
         let (reals, stride, tags) = chunk.reals_mut_and_tags();
         let cell = frame.cell;
-        let (mut weights, mut nodes) = (Weights::new(), fields.moments.map(|_| NodeWeights::new()));
-        let mut sums = Sums::new();
+        let Scratch { weights, nodes, sums } = scratch;
         let mut greatest = Lanes::splat(0.0);
         for batch in batches {
             let position = batch.positions(reals, stride);
@@ -71,9 +85,9 @@ impl<const D: usize> Kernel for Gather<'_, D> {
                 scheme,
             );
             weights.fill(frame, &position, &position, &half);
-            sums.gather(&weights, &mut nodes, &batch, frame.cell, fields);
+            sums.gather(weights, nodes, &batch, frame.cell, fields);
             greatest =
-                advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
+                advance(reals, stride, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
         }
         largest(greatest)
     }
@@ -82,6 +96,7 @@ impl<const D: usize> Kernel for Gather<'_, D> {
 /// Gathers for parts of boxes and adds each to `gathered[part.slot]`; [`advance_gathered`] follows
 /// when all parts of a particle have been added.
 pub fn gather_sub_boxes<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
@@ -89,14 +104,13 @@ pub fn gather_sub_boxes<const D: usize>(
     gathered: &mut [Gathered<D>],
 ) {
     let (reals, stride) = chunk.reals();
-    let (mut weights, mut nodes) = (Weights::new(), fields.moments.map(|_| NodeWeights::new()));
-    let mut sums = Sums::new();
+    let Scratch { weights, nodes, sums } = scratch;
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        sums.gather(&weights, &mut nodes, &batch, frame.cell, fields);
+        sums.gather(weights, nodes, &batch, frame.cell, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }
@@ -105,6 +119,7 @@ pub fn gather_sub_boxes<const D: usize>(
 
 /// Advances the particles of a list by `dt` with what they gathered. Returns as [`gather`].
 pub fn advance_gathered<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
     particles: &[u32],
     gathered: &[Gathered<D>],
@@ -113,7 +128,7 @@ pub fn advance_gathered<const D: usize>(
     leavers: &mut Leavers<D>,
 ) -> f64 {
     let (reals, stride, tags) = chunk.reals_mut_and_tags();
-    let mut sums = Sums::new();
+    let Scratch { sums, .. } = scratch;
     let mut greatest = Lanes::splat(0.0);
     for (particles, gathered) in particles.chunks(LANES).zip(gathered.chunks(LANES)) {
         let batch = Batch::from_indices(particles, |&p| p);
@@ -121,7 +136,7 @@ pub fn advance_gathered<const D: usize>(
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        greatest = advance(reals, stride, tags, &batch, &position, &sums, scheme, dt, leavers).max(greatest);
+        greatest = advance(reals, stride, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
     }
     largest(greatest)
 }
@@ -129,6 +144,7 @@ pub fn advance_gathered<const D: usize>(
 /// Gathers velocities for the selected particles, `Σ w v_j`, and calls `each` with the particle and its velocity.
 /// Changes no particle.
 pub fn interpolate<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     select: Select,
     frame: &Frame<D>,
@@ -138,7 +154,7 @@ pub fn interpolate<const D: usize>(
 ) {
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
-    let mut weights = Weights::new();
+    let Scratch { weights, .. } = scratch;
     for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half =
@@ -146,7 +162,7 @@ pub fn interpolate<const D: usize>(
         weights.fill(frame, &position, &position, &half);
         for lane in batch.members() {
             let first = weights.first(lane);
-            let row = mean(&weights, lane, &velocity[first..]).to_array();
+            let row = mean(weights, lane, &velocity[first..]).to_array();
             each(batch.particle(lane), std::array::from_fn(|axis| row[axis]));
         }
     }

@@ -106,7 +106,7 @@ impl<const D: usize> Sums<D> {
     pub fn gather(
         &mut self,
         weights: &Weights<D>,
-        nodes: &mut Option<NodeWeights>,
+        nodes: &mut NodeWeights,
         batch: &Batch,
         cell: f64,
         fields: &Fields,
@@ -121,7 +121,7 @@ impl<const D: usize> Sums<D> {
                 self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
             }
         }
-        if let (Some(moments), Some(nodes)) = (&fields.moments, nodes) {
+        if let Some(moments) = &fields.moments {
             let hanging = &moments.nodes.hanging;
             let touched = hanging.touched(weights, batch);
             if touched != 0 {

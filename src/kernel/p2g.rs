@@ -30,6 +30,18 @@ pub struct MomentSums<'a> {
     pub sums: &'a mut [Row],
 }
 
+/// Memory that is used from bin to bin, as it takes a while to set it up.
+pub struct Scratch<const D: usize> {
+    prepared: Prepared<D>,
+    nodes: NodeWeights,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { prepared: Prepared::new(), nodes: NodeWeights::new() }
+    }
+}
+
 /// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also what
 /// constrained nodes need: first moments, or other factors (see [`super::hanging`]).
 ///
@@ -37,6 +49,7 @@ pub struct MomentSums<'a> {
 /// the arena, which holds when its centre lies in the block. `next` is the place of the chunk that will be read after
 /// this one.
 pub fn scatter<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     select: Select,
     frame: &Frame<D>,
@@ -46,11 +59,12 @@ pub fn scatter<const D: usize>(
     moments: Option<MomentSums>,
     next: Place,
 ) {
-    widest(Scatter { chunk, select, frame, scheme, dt, arena, moments, next });
+    widest(Scatter { scratch, chunk, select, frame, scheme, dt, arena, moments, next });
 }
 
 /// [`scatter`] with its arguments.
 struct Scatter<'a, const D: usize> {
+    scratch: &'a mut Scratch<D>,
     chunk: &'a Chunk<D>,
     select: Select<'a>,
     frame: &'a Frame<D>,
@@ -66,17 +80,18 @@ impl<const D: usize> Kernel for Scatter<'_, D> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { chunk, select, frame, scheme, dt, arena, moments, next } = self;
+        let Self { scratch, chunk, select, frame, scheme, dt, arena, moments, next } = self;
         // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
         match moments {
-            None => scatter_all(chunk, select, frame, scheme, dt, arena, None, next),
-            moments => scatter_all(chunk, select, frame, scheme, dt, arena, moments, next),
+            None => scatter_all(scratch, chunk, select, frame, scheme, dt, arena, None, next),
+            moments => scatter_all(scratch, chunk, select, frame, scheme, dt, arena, moments, next),
         }
     }
 }
 
 /// Adds parts of boxes to the arena of their block; the affine term is relative to the particle.
 pub fn scatter_sub_boxes<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
@@ -86,7 +101,7 @@ pub fn scatter_sub_boxes<const D: usize>(
     mut moments: Option<MomentSums>,
 ) {
     let (reals, stride) = chunk.reals();
-    let (mut prepared, mut nodes) = (Prepared::new(), NodeWeights::new());
+    let Scratch { prepared, nodes } = scratch;
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
@@ -98,14 +113,15 @@ pub fn scatter_sub_boxes<const D: usize>(
         if let Some(moments) = &mut moments {
             let hanging = &moments.nodes.hanging;
             prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
-            let touched = moments.nodes.prepare(&prepared.weights, &mut nodes, &batch);
-            prepared.add_moments(&nodes, touched, moments);
+            let touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
+            prepared.add_moments(nodes, touched, moments);
         }
     }
 }
 
 #[inline(always)]
 fn scatter_all<const D: usize>(
+    scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     select: Select,
     frame: &Frame<D>,
@@ -117,8 +133,7 @@ fn scatter_all<const D: usize>(
 ) {
     let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
-    let mut prepared = Prepared::new();
-    let mut nodes = moments.is_some().then(NodeWeights::new);
+    let Scratch { prepared, nodes } = scratch;
     for batch in Batches::new(select, chunk, next) {
         let position = batch.positions(reals, stride);
         let half =
@@ -126,7 +141,7 @@ fn scatter_all<const D: usize>(
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
         let (mut touched, mut hanging) = (0, 0);
-        if let (Some(moments), Some(nodes)) = (&moments, &mut nodes) {
+        if let Some(moments) = &moments {
             hanging = moments.nodes.hanging.touched(&prepared.weights, &batch);
             if hanging != 0 {
                 moments.nodes.hanging.add_spread(&prepared.weights, hanging, cell, &mut spread);
@@ -138,7 +153,7 @@ fn scatter_all<const D: usize>(
         }
         prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(&batch, arena);
-        if let (Some(moments), Some(nodes)) = (&mut moments, &nodes) {
+        if let Some(moments) = &mut moments {
             prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
             prepared.add_moments(nodes, touched, moments);
         }

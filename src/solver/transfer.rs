@@ -43,6 +43,7 @@ impl<const D: usize> Physics<D> {
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
+    kernel: g2p::Scratch<D>,
     arena: VelocityArena<D>,
     increments: Vec<Row>,
     gathered: Vec<Gathered<D>>,
@@ -51,10 +52,10 @@ struct Scratch<const D: usize> {
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        let increments = vec![Row([0.0; 4]); arena_nodes(D)];
         Self {
+            kernel: g2p::Scratch::default(),
             arena: VelocityArena::default(),
-            increments,
+            increments: vec![Row::default(); arena_nodes(D)],
             gathered: Vec::new(),
             leavers: Leavers::default(),
         }
@@ -146,7 +147,7 @@ impl<const D: usize> Solver<D> {
         let (plan, lists) = (&grid.plan, &grid.lists);
         let arenas = grid.arenas.of_wave(wave);
         self.phases.time(Phase::Scatter, || {
-            let scatter_bin = |mut arena: ArenaMut<'_, D>| {
+            let scatter_bin = |scratch: &mut p2g::Scratch<D>, mut arena: ArenaMut<'_, D>| {
                 let bin = &plan.bins[arena.bin];
                 let leaf = bin.leaf as usize;
                 let chunk = &chunks[leaf];
@@ -158,15 +159,16 @@ impl<const D: usize> Solver<D> {
                 if let Some(whole) = selected.whole {
                     let moments = nodes.map(|nodes| MomentSums { nodes, sums: &mut *sums });
                     let next = chunks.get(leaf + 1).map_or(Place::default(), Chunk::place);
-                    p2g::scatter(chunk, whole, &frame, &scheme, dt, rows, moments, next);
+                    p2g::scatter(scratch, chunk, whole, &frame, &scheme, dt, rows, moments, next);
                 }
                 if !selected.parts.is_empty() {
                     let moments = nodes.map(|nodes| MomentSums { nodes, sums });
-                    p2g::scatter_sub_boxes(chunk, selected.parts, &frame, &scheme, dt, rows, moments);
+                    let parts = selected.parts;
+                    p2g::scatter_sub_boxes(scratch, chunk, parts, &frame, &scheme, dt, rows, moments);
                 }
             };
-            arenas.into_par_iter().for_each(|arena| {
-                costs.time(plan.bins[arena.bin].leaf as usize, || scatter_bin(arena));
+            arenas.into_par_iter().for_each_init(Default::default, |scratch, arena| {
+                costs.time(plan.bins[arena.bin].leaf as usize, || scatter_bin(scratch, arena));
             });
         });
     }
@@ -266,7 +268,7 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(surveys).zip(signal).enumerate();
             let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
-                let Scratch { arena, increments, gathered, leavers } = scratch;
+                let Scratch { kernel, arena, increments, gathered, leavers } = scratch;
                 leavers.begin(borders.of_leaf(leaf));
                 if chunk.is_empty() {
                     return 0.0;
@@ -295,13 +297,14 @@ impl<const D: usize> Solver<D> {
                         constrained(plan, bin).map(|nodes| Moments { nodes, first: &arena.moments });
                     let increment = changes.map(|_| &increments[..]);
                     let nodes = Fields { velocity: &arena.rows, increment, moments };
-                    g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
+                    g2p::gather_sub_boxes(kernel, chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
-                        let fastest = g2p::gather(chunk, whole, &frame, &scheme, dt, &nodes, leavers, next);
+                        let fastest =
+                            g2p::gather(kernel, chunk, whole, &frame, &scheme, dt, &nodes, leavers, next);
                         signal = signal.max(fastest);
                     }
                 }
-                let fastest = g2p::advance_gathered(chunk, cut, gathered, &scheme, dt, leavers);
+                let fastest = g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, leavers);
                 // Bins take them in turn.
                 leavers.found.sort_unstable();
                 signal.max(fastest)
@@ -332,7 +335,7 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter().enumerate();
             let all = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                let Scratch { increments: arena, gathered, .. } = scratch;
+                let Scratch { kernel, increments: arena, gathered, .. } = scratch;
                 let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
@@ -345,9 +348,11 @@ impl<const D: usize> Solver<D> {
                     load_rows(plan, bin, &lists.window_of(leaf, number), rows, arena);
                     let frame = frame(plan, &plan.bins[bin]);
                     let nodes = Fields { velocity: arena, increment: None, moments: None };
-                    g2p::gather_sub_boxes(chunk, selected.parts, &frame, &nodes, gathered);
+                    g2p::gather_sub_boxes(kernel, chunk, selected.parts, &frame, &nodes, gathered);
                     if let Some(whole) = selected.whole {
-                        g2p::interpolate(chunk, whole, &frame, &scheme, arena, |p, v| velocities[p] = v);
+                        g2p::interpolate(kernel, chunk, whole, &frame, &scheme, arena, |p, v| {
+                            velocities[p] = v;
+                        });
                     }
                 }
                 for (&p, gathered) in cut.iter().zip(&*gathered) {

@@ -22,7 +22,17 @@ fn gather<const D: usize>(
     fields: &Fields,
     next: Place,
 ) -> f64 {
-    g2p::gather(chunk, select, frame, scheme, dt, fields, &mut Leavers::default(), next)
+    g2p::gather(
+        &mut Default::default(),
+        chunk,
+        select,
+        frame,
+        scheme,
+        dt,
+        fields,
+        &mut Leavers::default(),
+        next,
+    )
 }
 
 /// A small deterministic generator of numbers in [0, 1).
@@ -144,7 +154,17 @@ fn scatter_equals_definition<const D: usize>(transfer: Transfer) {
     let mut half = Vec::new();
     domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
     let mut arena = vec![Row::default(); arena_nodes(D)];
-    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
+    scatter(
+        &mut Default::default(),
+        &chunk,
+        Select::All,
+        &frame,
+        &scheme,
+        DT,
+        &mut arena,
+        None,
+        Place::default(),
+    );
     let at = |column: usize, p: usize| chunk.column(column)[p];
     // C = B D⁻¹ with APIC, the gradient itself with TPIC.
     let spreads: Vec<[f64; D]> = (0..chunk.len())
@@ -319,7 +339,17 @@ fn steps_conserve<const D: usize>() {
     let mass: f64 = chunk.column(Layout::<D>::MASS).iter().sum();
     for _ in 0..50 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena, None, Place::default());
+        scatter(
+            &mut Default::default(),
+            &chunk,
+            Select::All,
+            &frame,
+            &scheme,
+            10.0 * DT,
+            &mut arena,
+            None,
+            Place::default(),
+        );
         assert!((arena.iter().map(|row| row.0[3]).sum::<f64>() - mass).abs() < 1e-13 * mass);
         assert!(close(&momenta_of_nodes(&arena), &before, 1e-12));
         divide_by_mass(&mut arena);
@@ -370,7 +400,17 @@ fn batches_do_not_matter<const D: usize>() {
     let sum = |select: &[Select]| {
         let mut arena = vec![Row::default(); arena_nodes(D)];
         for &select in select {
-            scatter(&all, select, &frame, &scheme, DT, &mut arena, None, Place::default());
+            scatter(
+                &mut Default::default(),
+                &all,
+                select,
+                &frame,
+                &scheme,
+                DT,
+                &mut arena,
+                None,
+                Place::default(),
+            );
         }
         arena
     };

@@ -32,7 +32,17 @@ fn parts_equal_the_whole<const D: usize>() {
     }
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut other = arena.clone();
-    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
+    scatter(
+        &mut Default::default(),
+        &whole,
+        Select::All,
+        &frame,
+        &scheme,
+        DT,
+        &mut arena,
+        None,
+        Place::default(),
+    );
     let mut sums = vec![[0.0; D]; parted.len()];
     spread::of_parts(&parted, &parts, &frame, None, |part, own| {
         let part = &parts[part];
@@ -45,7 +55,7 @@ fn parts_equal_the_whole<const D: usize>() {
             assert!((sum[k] - part.spread[k]).abs() < 1e-13 * part.spread[k]);
         }
     }
-    scatter_sub_boxes(&parted, &parts, &frame, &scheme, DT, &mut other, None);
+    scatter_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &scheme, DT, &mut other, None);
     for (a, b) in arena.iter().zip(&other) {
         for i in 0..4 {
             assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
@@ -54,9 +64,17 @@ fn parts_equal_the_whole<const D: usize>() {
     let fields = Fields { velocity: &arena, increment: None, moments: None };
     gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
-    gather_sub_boxes(&parted, &parts, &frame, &fields, &mut gathered);
+    gather_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
-    advance_gathered(&mut parted, &list, &gathered, &scheme, DT, &mut Leavers::default());
+    advance_gathered(
+        &mut Default::default(),
+        &mut parted,
+        &list,
+        &gathered,
+        &scheme,
+        DT,
+        &mut Leavers::default(),
+    );
     for column in 0..Layout::<D>::REALS {
         for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
             assert!((a - b).abs() <= 1e-11 * a.abs().max(1.0), "column {column}: {a} {b}");
@@ -93,11 +111,31 @@ fn moments_follow<const D: usize>() {
         let constrained = constrained(second);
         let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![Row::default(); columns.len()]);
         let moments = MomentSums { nodes: &constrained, sums: &mut sums };
-        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments), Place::default());
+        scatter(
+            &mut Default::default(),
+            &start,
+            Select::All,
+            &frame,
+            &scheme,
+            DT,
+            &mut arena,
+            Some(moments),
+            Place::default(),
+        );
         (arena, sums)
     };
     let mut plain = vec![Row::default(); nodes];
-    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None, Place::default());
+    scatter(
+        &mut Default::default(),
+        &start,
+        Select::All,
+        &frame,
+        &scheme,
+        DT,
+        &mut plain,
+        None,
+        Place::default(),
+    );
     // Second moments of zero change nothing.
     assert_eq!(plain, scattered(&vec![Row::default(); nodes]).0);
     let mut numbers = Numbers(12);
@@ -266,7 +304,17 @@ fn checksum<const D: usize>() -> u64 {
     let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for _ in 0..4 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
+        scatter(
+            &mut Default::default(),
+            &chunk,
+            Select::All,
+            &frame,
+            &scheme,
+            DT,
+            &mut arena,
+            None,
+            Place::default(),
+        );
         for row in &mut arena {
             row.0.iter().for_each(|&x| add(x));
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
@@ -280,6 +328,38 @@ fn checksum<const D: usize>() -> u64 {
     }
     assert!(chunk.column(Layout::<D>::WORK).iter().any(|&work| work > 0.0));
     hash
+}
+
+/// What the kernels' memory holds of other bins changes no bit, whatever it is.
+#[test]
+fn bits_do_not_depend_on_earlier_bins() {
+    let (materials, frame) = (materials(), frame::<3>());
+    let scheme = scheme(&materials, Transfer::Apic);
+    let (start, mut wild) = (particles::<3>(13, 5, 5), particles::<3>(29, 6, 5));
+    wild.column_mut(Layout::<3>::VELOCITY).fill(f64::NAN);
+    wild.column_mut(Layout::<3>::AFFINE).fill(f64::INFINITY);
+    let velocity: Vec<Row> = (0..arena_nodes(3)).map(|i| Row([i as f64, -1.0, 0.5, 0.0])).collect();
+    let nowhere = vec![Row([f64::NAN; 4]); arena_nodes(3)];
+    let step = |used: bool| {
+        let (mut to_nodes, mut to_particles) = (p2g::Scratch::default(), g2p::Scratch::default());
+        let mut run = |chunk: &mut Chunk<3>, velocity: &[Row]| {
+            let (mut arena, mut leavers) = (vec![Row::default(); arena_nodes(3)], Leavers::default());
+            let place = Place::default();
+            scatter(&mut to_nodes, chunk, Select::All, &frame, &scheme, DT, &mut arena, None, place);
+            let fields = Fields { velocity, increment: None, moments: None };
+            let all = Select::All;
+            g2p::gather(&mut to_particles, chunk, all, &frame, &scheme, DT, &fields, &mut leavers, place);
+            arena
+        };
+        if used {
+            run(&mut wild.clone(), &nowhere);
+        }
+        let mut chunk = start.clone();
+        let arena = run(&mut chunk, &velocity);
+        let columns = (0..Layout::<3>::REALS).flat_map(|column| chunk.column(column).to_vec());
+        columns.chain(arena.into_iter().flat_map(|row| row.0)).map(f64::to_bits).collect::<Vec<_>>()
+    };
+    assert_eq!(step(false), step(true));
 }
 
 #[test]
@@ -374,7 +454,17 @@ fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
     let work = |nodes: &ConstrainedNodes, sums: &mut [Row]| {
         let mut arena = vec![Row::default(); arena_nodes(D)];
         let moments = MomentSums { nodes, sums: &mut *sums };
-        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments), Place::default());
+        scatter(
+            &mut Default::default(),
+            &start,
+            Select::All,
+            &frame,
+            &scheme,
+            DT,
+            &mut arena,
+            Some(moments),
+            Place::default(),
+        );
         let dot = |a: &Row, b: &Row| (0..3).map(|i| a.0[i] * b.0[i]).sum::<f64>();
         let pairs = arena.iter().zip(&velocity).chain(sums.iter().zip(&first));
         pairs.fold((0.0, 0.0), |(sum, size): (f64, f64), (a, v)| (sum + dot(a, v), size + dot(a, v).abs()))
