@@ -110,17 +110,8 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            p2g::scatter(
-                &mut scratch,
-                chunk,
-                Select::All,
-                &setting.frame,
-                &scheme,
-                DT,
-                &mut arena,
-                None,
-                Place::default(),
-            );
+            let (all, place) = (Select::All, Place::default());
+            p2g::scatter(&mut scratch, chunk, all, &setting.frame, &scheme, DT, &mut arena, None, place);
         }
         arena[100 % arena_nodes(D)]
     });
@@ -135,16 +126,17 @@ fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
+            let (all, frame, place) = (Select::All, &setting.frame, Place::default());
             greatest.max(g2p::gather(
                 &mut scratch,
                 chunk,
-                Select::All,
-                &setting.frame,
+                all,
+                frame,
                 &scheme,
                 DT,
                 &fields,
                 &mut leavers,
-                Place::default(),
+                place,
             ))
         })
     });

@@ -1,14 +1,15 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::constrained::{Column, ConstrainedNodes};
-use super::g2p::{Fields, Gathered, Moments, advance_gathered, gather_sub_boxes};
+use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
 use super::leavers::Leavers;
-use super::p2g::{MomentSums, scatter, scatter_sub_boxes};
+use super::p2g::MomentSums;
 use super::*;
 use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
 use crate::material::{Material, Parameters, build};
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
+mod beside_coarser;
 mod leavers;
 mod parts;
 
@@ -33,6 +34,20 @@ fn gather<const D: usize>(
         &mut Leavers::default(),
         next,
     )
+}
+
+/// As [`super::p2g::scatter`], with memory of its own.
+fn scatter<const D: usize>(
+    chunk: &Chunk<D>,
+    select: Select,
+    frame: &Frame<D>,
+    scheme: &Scheme,
+    dt: f64,
+    arena: &mut [Row],
+    moments: Option<MomentSums>,
+    next: Place,
+) {
+    p2g::scatter(&mut Default::default(), chunk, select, frame, scheme, dt, arena, moments, next);
 }
 
 /// A small deterministic generator of numbers in [0, 1).
@@ -154,17 +169,7 @@ fn scatter_equals_definition<const D: usize>(transfer: Transfer) {
     let mut half = Vec::new();
     domain::half_widths(&chunk, Select::All, CELL, &frame.extent, &scheme, &mut half);
     let mut arena = vec![Row::default(); arena_nodes(D)];
-    scatter(
-        &mut Default::default(),
-        &chunk,
-        Select::All,
-        &frame,
-        &scheme,
-        DT,
-        &mut arena,
-        None,
-        Place::default(),
-    );
+    scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let at = |column: usize, p: usize| chunk.column(column)[p];
     // C = B D⁻¹ with APIC, the gradient itself with TPIC.
     let spreads: Vec<[f64; D]> = (0..chunk.len())
@@ -339,17 +344,7 @@ fn steps_conserve<const D: usize>() {
     let mass: f64 = chunk.column(Layout::<D>::MASS).iter().sum();
     for _ in 0..50 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(
-            &mut Default::default(),
-            &chunk,
-            Select::All,
-            &frame,
-            &scheme,
-            10.0 * DT,
-            &mut arena,
-            None,
-            Place::default(),
-        );
+        scatter(&chunk, Select::All, &frame, &scheme, 10.0 * DT, &mut arena, None, Place::default());
         assert!((arena.iter().map(|row| row.0[3]).sum::<f64>() - mass).abs() < 1e-13 * mass);
         assert!(close(&momenta_of_nodes(&arena), &before, 1e-12));
         divide_by_mass(&mut arena);
@@ -400,17 +395,7 @@ fn batches_do_not_matter<const D: usize>() {
     let sum = |select: &[Select]| {
         let mut arena = vec![Row::default(); arena_nodes(D)];
         for &select in select {
-            scatter(
-                &mut Default::default(),
-                &all,
-                select,
-                &frame,
-                &scheme,
-                DT,
-                &mut arena,
-                None,
-                Place::default(),
-            );
+            scatter(&all, select, &frame, &scheme, DT, &mut arena, None, Place::default());
         }
         arena
     };

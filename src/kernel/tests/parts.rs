@@ -32,17 +32,7 @@ fn parts_equal_the_whole<const D: usize>() {
     }
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut other = arena.clone();
-    scatter(
-        &mut Default::default(),
-        &whole,
-        Select::All,
-        &frame,
-        &scheme,
-        DT,
-        &mut arena,
-        None,
-        Place::default(),
-    );
+    scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let mut sums = vec![[0.0; D]; parted.len()];
     spread::of_parts(&parted, &parts, &frame, None, |part, own| {
         let part = &parts[part];
@@ -55,7 +45,7 @@ fn parts_equal_the_whole<const D: usize>() {
             assert!((sum[k] - part.spread[k]).abs() < 1e-13 * part.spread[k]);
         }
     }
-    scatter_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &scheme, DT, &mut other, None);
+    p2g::scatter_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &scheme, DT, &mut other, None);
     for (a, b) in arena.iter().zip(&other) {
         for i in 0..4 {
             assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
@@ -64,9 +54,9 @@ fn parts_equal_the_whole<const D: usize>() {
     let fields = Fields { velocity: &arena, increment: None, moments: None };
     gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
-    gather_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &fields, &mut gathered);
+    g2p::gather_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
-    advance_gathered(
+    g2p::advance_gathered(
         &mut Default::default(),
         &mut parted,
         &list,
@@ -111,31 +101,11 @@ fn moments_follow<const D: usize>() {
         let constrained = constrained(second);
         let (mut arena, mut sums) = (vec![Row::default(); nodes], vec![Row::default(); columns.len()]);
         let moments = MomentSums { nodes: &constrained, sums: &mut sums };
-        scatter(
-            &mut Default::default(),
-            &start,
-            Select::All,
-            &frame,
-            &scheme,
-            DT,
-            &mut arena,
-            Some(moments),
-            Place::default(),
-        );
+        scatter(&start, Select::All, &frame, &scheme, DT, &mut arena, Some(moments), Place::default());
         (arena, sums)
     };
     let mut plain = vec![Row::default(); nodes];
-    scatter(
-        &mut Default::default(),
-        &start,
-        Select::All,
-        &frame,
-        &scheme,
-        DT,
-        &mut plain,
-        None,
-        Place::default(),
-    );
+    scatter(&start, Select::All, &frame, &scheme, DT, &mut plain, None, Place::default());
     // Second moments of zero change nothing.
     assert_eq!(plain, scattered(&vec![Row::default(); nodes]).0);
     let mut numbers = Numbers(12);
@@ -304,17 +274,7 @@ fn checksum<const D: usize>() -> u64 {
     let mut add = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     for _ in 0..4 {
         let mut arena = vec![Row::default(); arena_nodes(D)];
-        scatter(
-            &mut Default::default(),
-            &chunk,
-            Select::All,
-            &frame,
-            &scheme,
-            DT,
-            &mut arena,
-            None,
-            Place::default(),
-        );
+        scatter(&chunk, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
         for row in &mut arena {
             row.0.iter().for_each(|&x| add(x));
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
@@ -345,7 +305,7 @@ fn bits_do_not_depend_on_earlier_bins() {
         let mut run = |chunk: &mut Chunk<3>, velocity: &[Row]| {
             let (mut arena, mut leavers) = (vec![Row::default(); arena_nodes(3)], Leavers::default());
             let place = Place::default();
-            scatter(&mut to_nodes, chunk, Select::All, &frame, &scheme, DT, &mut arena, None, place);
+            p2g::scatter(&mut to_nodes, chunk, Select::All, &frame, &scheme, DT, &mut arena, None, place);
             let fields = Fields { velocity, increment: None, moments: None };
             let all = Select::All;
             g2p::gather(&mut to_particles, chunk, all, &frame, &scheme, DT, &fields, &mut leavers, place);
@@ -365,124 +325,4 @@ fn bits_do_not_depend_on_earlier_bins() {
 #[test]
 fn bits_do_not_depend_on_the_build() {
     assert_eq!((checksum::<2>(), checksum::<3>()), (8_241_140_105_825_569_962, 16_903_189_557_884_718_380));
-}
-
-/// Velocities around a block some of whose neighbours are coarser: random on real nodes, interpolated on constrained ones,
-/// with the first moments of these.
-struct BesideCoarser {
-    is_hanging: Vec<bool>,
-    velocity: Vec<Row>,
-    /// By node and axis.
-    moments: Vec<[Row; 3]>,
-}
-
-impl BesideCoarser {
-    /// `coarse` has a bit for each of the `3^D` blocks of the arena.
-    fn new<const D: usize>(coarse: u32, seed: u64) -> Self {
-        let place = |node: usize, k: usize| node / ARENA_EDGE.pow(k as u32) % ARENA_EDGE;
-        // Where nodes of an arena lie in closed blocks: below, in and above the block in the middle.
-        let blocks = |at: usize| [at <= 1, (1..=5).contains(&at), at >= 5];
-        let is_in = |node: usize, block: usize| {
-            (0..D).all(|k| blocks(place(node, k))[block / 3usize.pow(k as u32) % 3])
-        };
-        let is_hanging: Vec<bool> = (0..arena_nodes(D))
-            .map(|node| (0..3usize.pow(D as u32)).any(|block| coarse >> block & 1 == 1 && is_in(node, block)))
-            .collect();
-        let random = |at: [i32; D]| {
-            let number =
-                at.iter().fold(seed, |number, &x| number.wrapping_mul(64).wrapping_add((x + 2) as u64));
-            let mut numbers = Numbers(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-            (0..8).for_each(|_| _ = numbers.next());
-            [numbers.next(), numbers.next(), numbers.next()]
-        };
-        let (mut velocity, mut moments) = (Vec::new(), Vec::new());
-        for node in 0..arena_nodes(D) {
-            let at: [i32; D] = std::array::from_fn(|k| place(node, k) as i32 - 1);
-            let odd: Vec<usize> = (0..D).filter(|&k| is_hanging[node] && at[k] % 2 != 0).collect();
-            let (mut mean, mut first) = (Row::default(), [Row::default(); 3]);
-            for corner in 0..1 << odd.len() {
-                let (mut parent, mut way) = (at, [0.0; 3]);
-                for (bit, &k) in odd.iter().enumerate() {
-                    let step = 2 * (corner >> bit & 1) - 1;
-                    parent[k] += step;
-                    way[k] = f64::from(step) * CELL;
-                }
-                let weight = 0.5f64.powi(odd.len() as i32);
-                for (i, value) in random(parent).into_iter().enumerate().take(D) {
-                    mean.0[i] += weight * value;
-                    (0..3).for_each(|k| first[k].0[i] += weight * value * way[k]);
-                }
-            }
-            velocity.push(mean);
-            moments.push(first);
-        }
-        Self { is_hanging, velocity, moments }
-    }
-}
-
-/// Hanging nodes with other factors and with first moments give the same: particles gather the same, and what they scatter
-/// does the same work in any motion of the real nodes.
-fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
-    let (materials, frame) = (materials(), frame::<D>());
-    let scheme = scheme(&materials, Transfer::Apic);
-    let BesideCoarser { is_hanging, velocity, moments } = BesideCoarser::new::<D>(coarse, seed);
-    let columns: Vec<(usize, usize)> = (0..arena_nodes(D))
-        .filter(|&node| is_hanging[node])
-        .flat_map(|node| (0..D).map(move |axis| (node, axis)))
-        .filter(|(node, axis)| (node / ARENA_EDGE.pow(*axis as u32) % ARENA_EDGE).is_multiple_of(2))
-        .collect();
-    let with_columns = ConstrainedNodes::new::<D>(
-        columns.iter().map(|&(node, axis)| Column { node, axis, second: CELL * CELL }),
-        HangingNodes::new::<D>(&vec![false; arena_nodes(D)]),
-    );
-    let hanging = ConstrainedNodes::new::<D>([], HangingNodes::new::<D>(&is_hanging));
-    let start = particles::<D>(61, seed, 1);
-    let first: Vec<Row> = columns.iter().map(|&(node, axis)| moments[node][axis]).collect();
-    let gathered = |moments: Moments| {
-        let mut chunk = start.clone();
-        let fields = Fields { velocity: &velocity, increment: None, moments: Some(moments) };
-        gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
-        chunk
-    };
-    let expected = gathered(Moments { nodes: &with_columns, first: &first });
-    let found = gathered(Moments { nodes: &hanging, first: &[] });
-    for column in 0..Layout::<D>::REALS {
-        for (a, b) in expected.column(column).iter().zip(found.column(column)) {
-            assert!((a - b).abs() <= 1e-13 * a.abs().max(1.0), "{coarse:b}, column {column}: {a} {b}");
-        }
-    }
-    let work = |nodes: &ConstrainedNodes, sums: &mut [Row]| {
-        let mut arena = vec![Row::default(); arena_nodes(D)];
-        let moments = MomentSums { nodes, sums: &mut *sums };
-        scatter(
-            &mut Default::default(),
-            &start,
-            Select::All,
-            &frame,
-            &scheme,
-            DT,
-            &mut arena,
-            Some(moments),
-            Place::default(),
-        );
-        let dot = |a: &Row, b: &Row| (0..3).map(|i| a.0[i] * b.0[i]).sum::<f64>();
-        let pairs = arena.iter().zip(&velocity).chain(sums.iter().zip(&first));
-        pairs.fold((0.0, 0.0), |(sum, size): (f64, f64), (a, v)| (sum + dot(a, v), size + dot(a, v).abs()))
-    };
-    let (expected, size) = work(&with_columns, &mut vec![Row::default(); columns.len()]);
-    let (found, _) = work(&hanging, &mut []);
-    assert!((found - expected).abs() <= 1e-14 * size, "{coarse:b}: {found} {expected}");
-}
-
-#[test]
-fn hanging_nodes_need_no_moments() {
-    let mut numbers = Numbers(77);
-    for seed in 1..40 {
-        hanging_nodes_replace_moments::<2>((512.0 * numbers.next()) as u32, seed);
-        // Few and many neighbours, those across a face, and all.
-        let (few, many) = ((512.0 * numbers.next()) as u32, (f64::from(1 << 27) * numbers.next()) as u32);
-        [few, many, 0x1ff << 18, (1 << 27) - 1]
-            .into_iter()
-            .for_each(|coarse| hanging_nodes_replace_moments::<3>(coarse, seed));
-    }
 }
