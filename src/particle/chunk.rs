@@ -216,7 +216,7 @@ impl<const D: usize> Chunk<D> {
         for column in 0..Self::COLUMNS {
             self.words_mut(column)[q] = source.words(column)[p];
         }
-        self.widest = Widest::UNKNOWN;
+        self.widest.add(source.column(Layout::<D>::HALF)[p]);
     }
 
     /// Appends `n` zeroed particles (id and tag zero) and returns the index of the first.
@@ -270,6 +270,17 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
+    /// Removes all particles but the listed ones (ascending), which keep their order.
+    pub fn keep(&mut self, stay: &[u32]) {
+        for column in 0..Self::COLUMNS {
+            let values = self.words_mut(column);
+            stay.iter().enumerate().for_each(|(to, &from)| values[to] = values[from as usize]);
+        }
+        self.len = stay.len();
+        self.widest = Widest::UNKNOWN;
+        self.give_back();
+    }
+
     /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the material has left.
     fn give_back(&mut self) {
         if self.len == 0 {
@@ -282,7 +293,7 @@ impl<const D: usize> Chunk<D> {
     /// A chunk whose particle `q` is particle `source[q]` of this one.
     pub fn gathered(&self, source: &[u32]) -> Self {
         let mut out = Self::with_capacity(source.len());
-        out.extend_zeroed(source.len());
+        (out.len, out.widest) = (source.len(), Widest::UNKNOWN);
         for column in 0..Self::COLUMNS {
             let from = self.words(column);
             out.words_mut(column).iter_mut().zip(source).for_each(|(value, &p)| *value = from[p as usize]);
@@ -359,6 +370,7 @@ mod tests {
         for id in 0..10 {
             let p = chunk.push_zeroed(id, Tag { material: id as u16, body: 0, level: 0 });
             chunk.column_mut(Layout::<2>::MASS)[p] = id as f64;
+            chunk.column_mut(Layout::<2>::HALF)[p] = id as f64;
         }
         chunk.remove(&[0, 2, 3, 7, 9]);
         let expected = [5, 1, 6, 8, 4];
@@ -367,7 +379,10 @@ mod tests {
         assert!(chunk.tags().iter().zip(expected).all(|(t, id)| u64::from(Tag::unpack(*t).material) == id));
         chunk.remove(&[]);
         assert_eq!(chunk.len(), 5);
-        chunk.remove(&[0, 1, 2, 3, 4]);
+        chunk.keep(&[1, 2, 4]);
+        assert_eq!((chunk.ids(), chunk.greatest_half()), (&[1, 6, 4][..], 6.0));
+        assert_eq!(chunk.column(Layout::<2>::MASS), [1.0, 6.0, 4.0]);
+        chunk.remove(&[0, 1, 2]);
         assert!(chunk.is_empty());
     }
 }

@@ -72,7 +72,10 @@ impl<const D: usize> BinLists<D> {
                 let bound = widths.bound(chunk);
                 // An empty leaf has nothing to list.
                 *sorted = !chunk.is_empty() && (given || bins.sides.is_some() || bound > 0.5 * cell);
-                if *sorted { bins.sort(plan, leaf, own, chunk, widths, scratch) } else { Ok(()) }
+                if *sorted {
+                    *sorted = bins.sort(plan, leaf, own, chunk, widths, scratch)?;
+                }
+                Ok(())
             });
         sorted.reduce(|| Ok(()), Result::and)
     }

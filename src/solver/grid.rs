@@ -4,8 +4,9 @@ use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
 
 use super::bins::BinLists;
+use super::depart::Departed;
 use super::increment::Increments;
-use super::migrate::{Departed, MigrateError, Migration, Moved};
+use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
 use super::resample::{Resampling, Splits};
 use super::transfer::extent;

@@ -43,14 +43,14 @@ const CUT: u32 = u32::MAX;
 /// Memory that a thread reuses from leaf to leaf.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// Per particle, its bin.
-    bins: Vec<u32>,
     /// Particles whose bin may be another than the leaf's own.
     undecided: Vec<u32>,
+    /// Those of them that are not whole in the leaf's own bin, with their bin.
+    elsewhere: Vec<(u32, u32)>,
 }
 
 impl Scratch {
-    /// Puts all particles of a chunk into the leaf's own bin; `undecided` gives the lanes that may belong elsewhere, of the
+    /// All particles of a chunk are in the leaf's own bin so far; `undecided` gives the lanes that may belong elsewhere, of the
     /// batch from some particle on.
     #[inline(always)]
     fn begin<const D: usize>(
@@ -59,9 +59,8 @@ impl Scratch {
         widths: &impl BoxWidths<D>,
         undecided: impl Fn(usize) -> u32,
     ) {
-        self.bins.clear();
-        self.bins.resize(chunk.len(), 0);
         self.undecided.clear();
+        self.elsewhere.clear();
         for first in (0..chunk.len()).step_by(LANES) {
             let lanes = LANES.min(chunk.len() - first);
             let mut left = undecided(first) & ((1 << lanes) - 1);
@@ -98,6 +97,8 @@ impl<const D: usize> LeafBins<D> {
         Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, around, sides }
     }
 
+    /// Sorts the particles of own leaf `leaf`. Returns whether there is anything to list: if not, all are whole in the
+    /// leaf's own bin.
     pub(super) fn sort(
         &mut self,
         plan: &GridPlan<D>,
@@ -106,7 +107,7 @@ impl<const D: usize> LeafBins<D> {
         chunk: &Chunk<D>,
         widths: &impl BoxWidths<D>,
         scratch: &mut Scratch,
-    ) -> Result<(), BinMissing> {
+    ) -> Result<bool, BinMissing> {
         if self.around.is_empty() {
             let (tree, edge) = (&plan.tree, plan.root_edge);
             let around = leaves_around(tree, tree.first_own() + leaf);
@@ -143,46 +144,47 @@ impl<const D: usize> LeafBins<D> {
                     Some(bin) => Ok(bin),
                     None => self.sort_one(plan, leaf, own, sides.as_ref(), p, centre, half, given),
                 };
-                match bin {
-                    // The window of a crowded leaf's own bin is known.
-                    Ok(bin) if bin == CUT || bin == 0 && crowded => scratch.bins[p as usize] = bin,
-                    Ok(bin) => {
-                        scratch.bins[p as usize] = bin;
-                        let cell = plan.cell(plan.bins[plan.leaf_bins(leaf)][bin as usize].block.level);
-                        self.members[bin as usize].include(cell, centre, half);
-                    }
-                    Err(()) => {
-                        scratch.bins[p as usize] = CUT;
-                        sorted = sorted.and(Err(BinMissing { id: chunk.ids()[p as usize] }));
-                    }
+                let bin = bin.unwrap_or_else(|()| {
+                    sorted = sorted.and(Err(BinMissing { id: chunk.ids()[p as usize] }));
+                    CUT
+                });
+                if bin != 0 {
+                    scratch.elsewhere.push((p, bin));
+                }
+                // The window of a crowded leaf's own bin is known.
+                if bin != CUT && !(bin == 0 && crowded) {
+                    let cell = plan.cell(plan.bins[plan.leaf_bins(leaf)][bin as usize].block.level);
+                    self.members[bin as usize].include(cell, centre, half);
                 }
             }
         }
-        self.list(&scratch.bins);
         if sides.is_some() {
             self.sides = sides;
         }
+        if crowded && scratch.elsewhere.is_empty() {
+            return Ok(false);
+        }
+        self.list(chunk.len() as u32, &scratch.elsewhere);
         for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
             members.close(plan, bin);
         }
         if crowded {
             self.members[0].window = Window::FULL;
         }
-        sorted
+        sorted.map(|()| true)
     }
 
-    /// Makes the lists of whole boxes from the bin of each particle.
-    fn list(&mut self, bins: &[u32]) {
-        for (batch, bins) in bins.chunks(LANES).enumerate() {
-            let first = (batch * LANES) as u32;
-            if bins.iter().all(|&bin| bin == 0) {
-                self.members[0].whole.extend(first..first + bins.len() as u32);
-                continue;
-            }
-            for (p, &bin) in (first..).zip(bins).filter(|(_, bin)| **bin != CUT) {
+    /// Makes the lists of whole boxes of a leaf with so many particles from those `elsewhere` (ascending).
+    fn list(&mut self, particles: u32, elsewhere: &[(u32, u32)]) {
+        let mut next = 0;
+        for &(p, bin) in elsewhere {
+            self.members[0].whole.extend(next..p);
+            next = p + 1;
+            if bin != CUT {
                 self.members[bin as usize].whole.push(p);
             }
         }
+        self.members[0].whole.extend(next..particles);
     }
 
     /// Finds the bin of one box that [`Sides::bins`] does not tell, or cuts it.

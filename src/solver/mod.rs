@@ -4,6 +4,7 @@
 pub mod bins;
 pub mod contact;
 pub mod cost;
+pub mod depart;
 pub mod given_boxes;
 pub mod grid;
 mod increment;

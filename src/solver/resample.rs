@@ -111,7 +111,7 @@ impl<'a, const D: usize> Resampling<'a, D> {
     }
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
-    fn split(&self, chunk: &mut Chunk<D>, which: &[u32], level: u8, done: &mut Splits) {
+    pub fn split(&self, chunk: &mut Chunk<D>, which: &[u32], level: u8, done: &mut Splits) {
         let cell = self.scheme.root_cell / f64::from(1u32 << level);
         let spreads: Vec<[f64; D]> = which
             .iter()
@@ -146,25 +146,9 @@ impl<'a, const D: usize> Resampling<'a, D> {
         width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
     }
 
-    /// Splits those among `leavers` (index, level of the leaf they enter) that enter a leaf finer than they were made
-    /// for. Returns whether there were any; indices are other ones then.
-    pub fn enter(
-        &self,
-        chunk: &mut Chunk<D>,
-        level: u8,
-        leavers: impl Iterator<Item = (u32, u8)>,
-        done: &mut Splits,
-    ) -> bool {
-        let is_coarse = |&(p, entered): &(u32, u8)| {
-            Tag::unpack(chunk.tags()[p as usize]).level < entered
-                && ids::generation(chunk.ids()[p as usize]) < ids::GENERATIONS
-        };
-        let which: Vec<u32> = leavers.filter(is_coarse).map(|(p, _)| p).collect();
-        if which.is_empty() {
-            return false;
-        }
-        self.split(chunk, &which, level, done);
-        true
+    /// Whether particle `p` is to be split where it enters a leaf of a level: it was made for a coarser one.
+    pub fn splits_in(&self, chunk: &Chunk<D>, p: usize, level: u8) -> bool {
+        Tag::unpack(chunk.tags()[p]).level < level && ids::generation(chunk.ids()[p]) < ids::GENERATIONS
     }
 }
 

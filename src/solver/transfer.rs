@@ -3,8 +3,8 @@ use rayon::prelude::*;
 
 use super::bins::{BinLists, BinMissing, BoxWidths};
 use super::contact::SUMS;
+use super::depart::Departed;
 use super::grid::Grid;
-use super::migrate::Departed;
 use super::phases::{Phase, Phases};
 use super::resample::Resampling;
 use super::survey::{Survey, Watch};

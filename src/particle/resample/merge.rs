@@ -138,7 +138,7 @@ fn replace<const D: usize>(
     done.sort_unstable();
     let source: Vec<u32> = (0..).zip(stays).filter(|(_, stays)| **stays).map(|(p, _)| p).collect();
     *unnamed = source.iter().map(|&p| unnamed[p as usize]).collect();
-    *chunk = chunk.gathered(&source);
+    chunk.keep(&source);
     let mut place = 0;
     for &(first, number) in done.iter() {
         place += source[place..].partition_point(|&p| p < first);

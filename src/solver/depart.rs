@@ -1,0 +1,241 @@
+//! Particles are taken out of leaves that they have left.
+//!
+//! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
+//! others: to make room for their children among these would copy the leaf.
+use super::leaf_bins::positions;
+use super::migrate::{MigrateError, leaf_box, position_key};
+use super::records::{push_record, record_words};
+use super::resample::{Resampling, Splits};
+use crate::boundary::Leaving;
+use crate::grid::{GridPlan, KnownTree};
+use crate::kernel::leavers;
+use crate::kernel::simd::LANES;
+use crate::particle::chunk::{Chunk, Layout};
+
+/// Where a particle goes.
+#[derive(Clone, Copy)]
+pub(super) enum Destination {
+    /// Nowhere: it is in the leaf.
+    Stay,
+    /// To a known leaf.
+    Leaf(u32),
+    /// Out of the domain, and is removed.
+    Gone,
+    /// Nowhere itself; its children have destinations of their own.
+    Split,
+}
+
+/// The boxes of the own leaves, and what happens to particles outside them.
+pub struct Borders<const D: usize> {
+    boxes: Vec<([f64; D], [f64; D])>,
+    leaving: Leaving,
+    root_edge: f64,
+}
+
+/// What has been taken out of one leaf.
+#[derive(Debug, Default)]
+pub(super) struct Departed {
+    /// Records of the particles that go to other leaves, in their order.
+    pub records: Vec<u64>,
+    /// Number of particles out of the domain.
+    pub deleted: u64,
+    /// Why nothing was taken out.
+    pub error: Option<MigrateError>,
+    /// Splits of those that enter finer leaves.
+    pub splits: Option<Splits>,
+}
+
+impl Departed {
+    /// Whether there is anything to tell.
+    pub fn is_any(&self) -> bool {
+        !self.records.is_empty() || self.deleted > 0 || self.error.is_some() || self.splits.is_some()
+    }
+
+    /// Takes particles, ascending, out of a chunk.
+    pub fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
+        let mut departed = Self::default();
+        if leavers.is_empty() {
+            return departed;
+        }
+        departed.records.reserve_exact(leavers.len() * record_words::<D>());
+        leavers.iter().for_each(|&(p, destination)| departed.note(chunk, p as usize, destination));
+        let gone: Vec<u32> = leavers.iter().map(|&(p, _)| p).collect();
+        chunk.remove(&gone);
+        departed
+    }
+
+    /// Notes a particle that goes somewhere.
+    fn note<const D: usize>(&mut self, chunk: &Chunk<D>, p: usize, destination: Destination) {
+        match destination {
+            Destination::Leaf(to) => push_record(&mut self.records, u64::from(to), chunk, p),
+            Destination::Gone => self.deleted += 1,
+            Destination::Stay | Destination::Split => {}
+        }
+    }
+}
+
+impl<const D: usize> Borders<D> {
+    /// Of the own leaves of a plan.
+    pub fn new(plan: &GridPlan<D>, leaving: Leaving) -> Self {
+        let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
+        let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
+        Self { boxes, leaving, root_edge: plan.root_edge }
+    }
+
+    /// Lower and upper corner of an own leaf, m.
+    pub(super) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
+        &self.boxes[leaf]
+    }
+
+    /// Where a position is, if it is in another leaf than own leaf `leaf`.
+    pub(super) fn elsewhere(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        position: [f64; D],
+    ) -> Option<Destination> {
+        let to = tree.locate(position_key(position, tree.brick().roots, self.root_edge))?;
+        (to != tree.first_own() + leaf).then_some(Destination::Leaf(to as u32))
+    }
+
+    /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to another or to
+    /// none. With `resampling`, particles that enter a leaf finer than they were made for become their children, which
+    /// go each their own way; those that stay come last in the leaf.
+    pub(super) fn depart(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        outside: &[u32],
+        resampling: Option<&Resampling<'_, D>>,
+    ) -> Departed {
+        if outside.is_empty() {
+            return Departed::default();
+        }
+        let departed = self.take_out(tree, tree.first_own() + leaf, chunk, outside, resampling);
+        departed.unwrap_or_else(|error| Departed { error: Some(error), ..Departed::default() })
+    }
+
+    /// [`Borders::depart`] for a known leaf.
+    fn take_out(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        outside: &[u32],
+        resampling: Option<&Resampling<'_, D>>,
+    ) -> Result<Departed, MigrateError> {
+        let mut leavers = self.destinations(tree, leaf, chunk, outside.iter().copied())?;
+        leavers.retain(|(_, destination)| !matches!(destination, Destination::Stay));
+        let Some(resampling) = resampling else { return Ok(Departed::take(chunk, &leavers)) };
+        let parents = too_coarse(tree, chunk, resampling, &mut leavers);
+        let mut children = chunk.gathered(&parents);
+        let mut departed = Departed::take(chunk, &leavers);
+        if parents.is_empty() {
+            return Ok(departed);
+        }
+        let mut splits = Splits::default();
+        let mut which: Vec<u32> = (0..children.len() as u32).collect();
+        let level = tree.leaves()[leaf].level;
+        while !which.is_empty() {
+            resampling.split(&mut children, &which, level, &mut splits);
+            let all = 0..children.len() as u32;
+            leavers = self.destinations(tree, leaf, &mut children, all)?;
+            which = too_coarse(tree, &children, resampling, &mut leavers);
+        }
+        for (p, destination) in leavers {
+            departed.note(&children, p as usize, destination);
+            if let Destination::Stay = destination {
+                chunk.push_from(&children, p as usize);
+            }
+        }
+        departed.splits = Some(splits);
+        Ok(departed)
+    }
+
+    /// Where the listed particles of a leaf go.
+    fn destinations(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        particles: impl Iterator<Item = u32>,
+    ) -> Result<Vec<(u32, Destination)>, MigrateError> {
+        particles.map(|p| Ok((p, self.destination(tree, leaf, chunk, p as usize)?))).collect()
+    }
+
+    fn destination(
+        &self,
+        tree: &KnownTree<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        p: usize,
+    ) -> Result<Destination, MigrateError> {
+        let mut position = chunk.position(p);
+        if position.iter().any(|x| !x.is_finite()) {
+            return Err(too_far(chunk, p));
+        }
+        let roots = tree.brick().roots;
+        let extent: [f64; D] = std::array::from_fn(|axis| f64::from(roots[axis]) * self.root_edge);
+        if (0..D).any(|axis| position[axis] < 0.0 || position[axis] >= extent[axis]) {
+            match self.leaving {
+                Leaving::Delete => return Ok(Destination::Gone),
+                Leaving::Error => {
+                    return Err(MigrateError::Left { id: chunk.ids()[p], position: position.to_vec() });
+                }
+                Leaving::Clamp => {
+                    for axis in 0..D {
+                        position[axis] = position[axis].clamp(0.0, extent[axis].next_down());
+                        chunk.column_mut(Layout::<D>::POSITION + axis)[p] = position[axis];
+                    }
+                }
+            }
+        }
+        let key = position_key(position, roots, self.root_edge);
+        match tree.locate(key) {
+            Some(to) if to == leaf => Ok(Destination::Stay),
+            Some(to) => Ok(Destination::Leaf(to as u32)),
+            None => Err(too_far(chunk, p)),
+        }
+    }
+}
+
+/// Those that enter a leaf finer than they were made for; their destination is [`Destination::Split`] then.
+fn too_coarse<const D: usize>(
+    tree: &KnownTree<D>,
+    chunk: &Chunk<D>,
+    resampling: &Resampling<'_, D>,
+    leavers: &mut [(u32, Destination)],
+) -> Vec<u32> {
+    let mut found = Vec::new();
+    for (p, destination) in leavers {
+        if let Destination::Leaf(to) = *destination
+            && resampling.splits_in(chunk, *p as usize, tree.leaves()[to as usize].level)
+        {
+            *destination = Destination::Split;
+            found.push(*p);
+        }
+    }
+    found
+}
+
+/// Particles that are not in a box, in order; one whose position is not a number is in none.
+pub(super) fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64; D])) -> Vec<u32> {
+    let mut leavers = leavers::Leavers::default();
+    leavers.begin(bounds);
+    let mut found = Vec::new();
+    for first in (0..chunk.len()).step_by(LANES) {
+        let inside = leavers.inside(&positions(chunk, first));
+        // Nearly all particles stay.
+        if !inside.all() {
+            let lanes = 0..LANES.min(chunk.len() - first);
+            let left = lanes.filter(|lane| inside.bits() >> lane & 1 == 0);
+            found.extend(left.map(|lane| (first + lane) as u32));
+        }
+    }
+    found
+}
+
+fn too_far<const D: usize>(chunk: &Chunk<D>, p: usize) -> MigrateError {
+    MigrateError::TooFar { id: chunk.ids()[p], position: chunk.position(p).to_vec() }
+}
