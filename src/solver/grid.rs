@@ -4,22 +4,25 @@ use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
 
 use super::bins::BinLists;
+use super::bins::BoxWidths;
 use super::depart::Departed;
 use super::increment::Increments;
 use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
 use super::resample::{Resampling, Splits};
 use super::transfer::extent;
-use super::widths::width_bound;
+use super::widths::Widths;
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::census::{Census, surface_bytes};
 use crate::grid::exchange::ReceivedSums;
 use crate::grid::known::Allowance;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
-use crate::kernel::Scheme;
 use crate::memory::Block;
-use crate::particle::Chunk;
+
+/// By how much boxes may widen until the tree changes next without a new grid in between. With reach every leaf has bins in
+/// those around it, so that a grid takes three times as long to make.
+const GROWTH: f64 = 1.1;
 
 /// Plan, arenas, fields and exchanges.
 pub struct Grid<const D: usize> {
@@ -39,7 +42,7 @@ impl<const D: usize> Grid<D> {
     /// Collective. The grid for the current tree and partition.
     ///
     /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
-    /// [`needed_reach`] gives it.
+    /// [`reach_of_width`] gives it.
     pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>, reach: u32) -> Self {
         let allowance = Allowance { reach, graded: physics.graded };
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
@@ -91,12 +94,6 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// Not collective. Half width of the widest box that the particles of a leaf can have, in cells of that leaf rounded
-/// up; 0 if all are at most a cell wide.
-pub(super) fn needed_reach<const D: usize>(scheme: &Scheme<'_>, chunk: &Chunk<D>, cell: f64) -> u32 {
-    reach_of_width(width_bound(chunk, scheme) / cell)
-}
-
 /// Reach that boxes of a half width need, which is given in cells.
 pub(super) fn reach_of_width(cells: f64) -> u32 {
     // Rounding must not make a box that is exactly one cell wide a wide one.
@@ -104,16 +101,41 @@ pub(super) fn reach_of_width(cells: f64) -> u32 {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. [`needed_reach`] of this rank's particles.
-    pub(super) fn local_reach(&self) -> u32 {
-        let scheme = self.physics.scheme();
+    /// Not collective. Reach that the boxes of this rank need if they become `growth` times as wide. Where a reach is `known`,
+    /// boxes are not looked at whose bounds do not ask for more.
+    fn local_reach(&self, growth: f64, known: u32) -> u32 {
+        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&self.grid.plan) };
         let root_edge = self.physics.root_edge;
         let leaves = self.forest.leaves().par_iter().zip(&self.chunks).with_min_len(32);
         let reaches = leaves.map(|(leaf, chunk)| {
             let cell = root_edge / f64::from(4u32 << leaf.level);
-            needed_reach(&scheme, chunk, cell)
+            let bound = widths.bound(chunk) / cell;
+            match reach_of_width(bound) {
+                reach if reach <= known => reach,
+                _ => reach_of_width(bound.min(growth * widths.greatest_of_wide(chunk, cell) / cell)),
+            }
         });
         reaches.max().unwrap_or(0)
+    }
+
+    /// Collective. Reach for a new grid: what the boxes of all ranks need, also when they have become a little wider, and once
+    /// particles that are due to merge have done so.
+    pub(super) fn agreed_reach(&self) -> u32 {
+        let mut reach = [u64::from(self.local_reach(GROWTH, 0).max(self.reach_of_merges()))];
+        self.comm.max_u64(&mut reach);
+        reach[0] as u32
+    }
+
+    /// Not collective. Reach that the boxes of this rank need now, exact where it is more than the grid has.
+    pub(super) fn reach_now(&self) -> u32 {
+        self.local_reach(1.0, self.grid.plan.tree.reach())
+    }
+
+    /// Collective. Makes the grid anew if the boxes of any rank need more reach than it has.
+    pub(super) fn provide_reach(&mut self, of_any_rank: u32) {
+        if of_any_rank > self.grid.plan.tree.reach() {
+            self.rebuild_grid(of_any_rank);
+        }
     }
 
     /// Messages and bytes that this rank has sent in steps so far.

@@ -214,9 +214,7 @@ impl<const D: usize> Solver<D> {
         };
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
-        if reach > 0 {
-            solver.rebuild_grid(reach);
-        }
+        solver.provide_reach(reach);
         if clock == Clock::default() {
             // A box without a bin stops the first step, which says so.
             let _ = solver.moments_from_affine();
@@ -247,7 +245,7 @@ impl<const D: usize> Solver<D> {
         let departed = self.gather(dt);
         self.costs.end_step();
         let moved = self.arrive(departed);
-        let reach = self.local_reach();
+        let reach = self.reach_now();
 
         self.clock.step += 1;
         self.clock.time = if dt < left { self.clock.time + dt } else { end };
@@ -281,13 +279,6 @@ impl<const D: usize> Solver<D> {
         self.grid.arenas = arenas;
     }
 
-    /// Collective. Reach that the boxes of all ranks need, also once particles that are due to merge have done so.
-    fn agreed_reach(&self) -> u32 {
-        let mut reach = [u64::from(self.local_reach().max(self.reach_of_merges()))];
-        self.comm.max_u64(&mut reach);
-        reach[0] as u32
-    }
-
     /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.
     fn close_step(
         &mut self,
@@ -316,9 +307,7 @@ impl<const D: usize> Solver<D> {
         let [bound, failed, stop, checkpoint, reach] = least;
         let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
         self.clock.bound = bound;
-        if -reach > f64::from(self.grid.plan.tree.reach()) {
-            self.rebuild_grid(-reach as u32);
-        }
+        self.provide_reach(-reach as u32);
         let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
         Ok(StepReport { moved, granted })
     }

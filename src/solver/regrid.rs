@@ -133,6 +133,12 @@ impl<const D: usize> Solver<D> {
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
         }
+        if is_other || merged {
+            // Who has moved may have a box that is wide in the leaf where it is now.
+            let mut reach = [u64::from(self.reach_now())];
+            self.comm.max_u64(&mut reach);
+            self.provide_reach(reach[0] as u32);
+        }
         self.parts.end(Part::Migrate);
         // One phase for all of it.
         self.phases = phases;

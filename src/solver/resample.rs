@@ -300,7 +300,7 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Reach that merges of this rank's particles may need (see [`super::grid::needed_reach`]): with that the grid needs
+    /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]): with that the grid needs
     /// not be made anew for them.
     pub(super) fn reach_of_merges(&self) -> u32 {
         let Some(adaptivity) = self.physics.adaptivity.as_ref().filter(|a| a.merge.is_some()) else {

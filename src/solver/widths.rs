@@ -1,7 +1,7 @@
 //! Widths of boxes, as sorting needs them.
 use super::bins::BoxWidths;
 use super::leaf_bins::values;
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{LANES, Lanes};
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
@@ -11,6 +11,26 @@ pub(super) struct Widths<'a, const D: usize> {
     pub scheme: Scheme<'a>,
     /// Upper corner of the domain, m.
     pub extent: [f64; D],
+}
+
+impl<const D: usize> Widths<'_, D> {
+    /// The greatest half width among boxes that may become wider than `cell`, m; 0 if none may.
+    pub fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
+        let limit = Lanes::splat(0.5 * cell);
+        let mut wide = Vec::new();
+        for first in (0..chunk.len()).step_by(LANES) {
+            let lanes = (!self.bounds(chunk, first).le(limit)).bits();
+            let members = (first..chunk.len().min(first + LANES)).map(|p| p as u32);
+            wide.extend(members.filter(|p| lanes >> (p % LANES as u32) & 1 == 1));
+        }
+        let mut greatest: f64 = 0.0;
+        for particles in wide.chunks(LANES) {
+            let half = self.of_batch(chunk, particles, cell).map(Lanes::to_array);
+            let all = half.iter().flat_map(|half| &half[..particles.len()]);
+            greatest = all.copied().fold(greatest, f64::max);
+        }
+        greatest
+    }
 }
 
 impl<const D: usize> BoxWidths<D> for Widths<'_, D> {

@@ -2,7 +2,7 @@
 use agimp::job::{AnyProblem, Problem};
 use partition::comm::Comm;
 
-use crate::state::{advance, count, extents, greatest_stress, on_ranks, one_body, solver};
+use crate::state::{advance, count, extents, greatest_stress, on_ranks, one_body, solver, too_coarse};
 
 const YOUNG: f64 = 1e3;
 /// Greatest stress over the modulus.
@@ -24,7 +24,8 @@ where
     let velocity: [f64; D] = std::array::from_fn(|a| totals.momentum[a] / totals.mass);
     let (mut most, mut stress) = (number, 0.0_f64);
     while velocity[0] * solver.clock.time < distance {
-        advance(&mut solver, 4);
+        advance(&mut solver, 1);
+        assert_eq!(too_coarse(&solver), 0, "particles coarser than their leaf at {} s", solver.clock.time);
         most = most.max(count(&solver));
         stress = stress.max(greatest_stress(&solver));
         assert!(stress <= TOLERANCE * YOUNG, "stress {stress:e} Pa at {} s", solver.clock.time);

@@ -95,6 +95,14 @@ pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
         .collect()
 }
 
+/// Number of own particles made for a level coarser than their leaf: those that enter it split on the way.
+pub fn too_coarse<const D: usize>(solver: &Solver<D>) -> usize {
+    let leaves = solver.forest.leaves().iter().zip(&solver.chunks);
+    let in_leaf =
+        |level: u8, tags: &[u64]| tags.iter().filter(|&&tag| Tag::unpack(tag).level < level).count();
+    leaves.map(|(leaf, chunk)| in_leaf(leaf.level, chunk.tags())).sum()
+}
+
 /// Greatest component of stress of any own particle, Pa.
 pub fn greatest_stress<const D: usize>(solver: &Solver<D>) -> f64 {
     let columns = (Layout::<D>::STRESS..Layout::<D>::MASS).collect::<Vec<_>>();
