@@ -1,4 +1,5 @@
 //! `agimp check`: the size and cost of a job, without running it.
+use super::message::{launched, together};
 use super::{Failure, bytes, grouped};
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::Motion;
@@ -27,21 +28,38 @@ pub struct Arguments {
 /// # Errors
 /// The job is wrong.
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    match job::load(&arguments.job)? {
-        AnyProblem::Two(problem) => report(arguments, &problem),
-        AnyProblem::Three(problem) => report(arguments, &problem),
+    let mut world = launched()?;
+    let problem = once(world.as_ref(), job::load(&arguments.job).map_err(Failure::from))?;
+    let report = match problem {
+        AnyProblem::Two(problem) => report(arguments, &problem, &mut world),
+        AnyProblem::Three(problem) => report(arguments, &problem, &mut world),
+    };
+    once(world.as_ref(), report)
+}
+
+/// What all ranks agree on, if there are several.
+fn once<T>(world: Option<&World>, result: Result<T, Failure>) -> Result<T, Failure> {
+    match world {
+        Some(world) => together(world.comm(), result),
+        None => result,
     }
 }
 
-fn report<const D: usize>(arguments: &Arguments, problem: &Problem<D>) -> Result<(), Failure> {
+fn report<const D: usize>(
+    arguments: &Arguments,
+    problem: &Problem<D>,
+    world: &mut Option<World>,
+) -> Result<(), Failure> {
     let estimate = estimate(problem)?;
     check_counts(problem, &estimate.particles)?;
     let is_refined = problem.adaptivity.is_some() && estimate.total_particles() <= MOST;
     let estimate = match is_refined {
-        true => refined(problem, estimate)?,
+        true => refined(problem, estimate, world)?,
         false => estimate,
     };
-    write(&mut std::io::stdout().lock(), arguments, problem, &estimate, is_refined)?;
+    if world.as_ref().is_none_or(|world| world.comm().rank() == 0) {
+        write(&mut std::io::stdout().lock(), arguments, problem, &estimate, is_refined)?;
+    }
     Ok(())
 }
 
@@ -49,8 +67,15 @@ fn report<const D: usize>(arguments: &Arguments, problem: &Problem<D>) -> Result
 const MOST: u64 = 2_000_000;
 
 /// The estimate for the tree that the criteria make at the start.
-fn refined<const D: usize>(problem: &Problem<D>, estimate: Estimate) -> Result<Estimate, Failure> {
-    let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
+fn refined<const D: usize>(
+    problem: &Problem<D>,
+    estimate: Estimate,
+    world: &mut Option<World>,
+) -> Result<Estimate, Failure> {
+    let world = match world {
+        Some(world) => world,
+        None => world.insert(World::init().map_err(|error| Failure::Run(error.to_string()))?),
+    };
     let comm = world.comm();
     let solver = setup::solver(comm, problem).map_err(|error| Failure::Run(error.to_string()))?;
     let mut bodies = vec![0; problem.bodies.len()];

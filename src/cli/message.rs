@@ -40,11 +40,16 @@ pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, 
     Err(Failure::Told(code[0] as u8))
 }
 
+/// Collective under `mpirun`: its ranks. A process that it has not started is alone, and need not be able to start MPI.
+pub(super) fn launched() -> Result<Option<World>, Failure> {
+    let is_launched = std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some();
+    is_launched.then(World::init).transpose().map_err(|error| Failure::Run(error.to_string()))
+}
+
 /// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the parser
 /// refuses, told once.
 pub fn unusable(error: clap::Error) -> Failure {
-    let is_launched = std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some();
-    let Some(world) = is_launched.then(World::init).and_then(Result::ok) else { return error.into() };
+    let Ok(Some(world)) = launched() else { return error.into() };
     match together(world.comm(), Err::<(), _>(error.into())) {
         Ok(()) => Failure::Told(0),
         Err(told) => told,

@@ -233,6 +233,28 @@ fn ranks_end_after_the_message_has_gone_out() {
     assert!(told.starts_with("agimp: missing.toml: cannot be read"), "{told}");
 }
 
+/// `check` tells what it has found once, with the criteria's tree and without, and so it does with faults.
+#[test]
+fn a_job_is_checked_once() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let checked = |path: &Path| {
+        let mut command = mpirun(home.path(), 2);
+        let output = Running::start(command.arg(env!("CARGO_BIN_EXE_agimp")).arg("check").arg(path));
+        let output = output.finish_within(SOON);
+        (output.status.code(), text(&output))
+    };
+    for name in ["few_leaves", "adaptive_2d"] {
+        let (code, shown) = checked(&job(name));
+        assert_eq!(code, Some(0), "{shown}");
+        assert_eq!(shown.matches("particles  ").count(), 1, "{shown}");
+        assert_eq!(shown.matches("checkpoints  ").count(), 1, "{shown}");
+    }
+    let (code, shown) = checked(Path::new("missing.toml"));
+    assert_eq!(code, Some(2), "{shown}");
+    assert_eq!(shown.matches("missing.toml: cannot be read").count(), 1, "{shown}");
+}
+
 /// A wrong command line is told once as well, and so is help.
 #[test]
 fn a_wrong_argument_is_told_once() {
