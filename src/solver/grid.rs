@@ -3,8 +3,7 @@ use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
 
-use super::bins::BinLists;
-use super::bins::BoxWidths;
+use super::bins::{BinLists, BoxWidths};
 use super::depart::Departed;
 use super::increment::Increments;
 use super::migrate::{MigrateError, Migration, Moved};
@@ -20,8 +19,8 @@ use crate::grid::known::Allowance;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::memory::Block;
 
-/// By how much boxes may widen until the tree changes next without a new grid in between. With reach every leaf has bins in
-/// those around it, so that a grid takes three times as long to make.
+/// By how much boxes may widen until the tree changes next without a new grid in between. A grid for boxes wider than a cell has
+/// bins of every leaf in those around it and takes three times as long to make.
 const GROWTH: f64 = 1.1;
 
 /// Plan, arenas, fields and exchanges.

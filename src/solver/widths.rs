@@ -70,3 +70,36 @@ pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>)
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::Transfer;
+    use crate::material::{self, parameters};
+
+    #[test]
+    fn only_boxes_that_may_be_wide_are_measured() {
+        let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
+        let materials = [material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)];
+        let boxes = BoxPolicy::Volume { min_stretch: 0.25, max_stretch: 2.0 };
+        let scheme = Scheme { boxes, root_cell: 1.0, transfer: Transfer::Apic, materials: &materials };
+        let widths = Widths { scheme, extent: [100.0; 2] };
+        let mut chunk = Chunk::<2>::new();
+        let mut push = |half: f64, stretch: f64| {
+            let p = chunk.push_zeroed(chunk.len() as u64, Tag { material: 0, body: 0, level: 0 });
+            let state = [50.0, 50.0, half, stretch * stretch, 1.0];
+            let (position, elastic) = (Layout::<2>::POSITION, Layout::<2>::LEFT_CAUCHY_GREEN);
+            let columns = [position, position + 1, Layout::<2>::HALF, elastic, elastic + 1];
+            columns.into_iter().zip(state).for_each(|(column, value)| chunk.column_mut(column)[p] = value);
+            (widths.bound(&chunk), widths.greatest_of_wide(&chunk, 1.0), widths.greatest_of_wide(&chunk, 0.5))
+        };
+        for _ in 0..LANES + 1 {
+            assert_eq!(push(0.25, 1.25), (0.5, 0.0, 0.3125));
+        }
+        // Twice 0.375 m may be wider than a cell of 1 m, but is not.
+        assert_eq!(push(0.375, 1.0), (0.75, 0.375, 0.375));
+        assert_eq!(push(0.375, 1.5), (0.75, 0.5625, 0.5625));
+        // No stretch makes a box wider than the bound.
+        assert_eq!(push(0.375, 3.0), (0.75, 0.75, 0.75));
+    }
+}
