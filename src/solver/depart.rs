@@ -2,14 +2,13 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
-use super::leaf_bins::positions;
+use super::leaf_bins::{list_lanes, positions};
 use super::migrate::{MigrateError, leaf_box, position_key};
 use super::records::{push_record, record_words};
 use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
-use crate::kernel::simd::LANES;
 use crate::particle::chunk::{Chunk, Layout};
 
 /// Where a particle goes.
@@ -224,15 +223,7 @@ pub(super) fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64
     let mut leavers = leavers::Leavers::default();
     leavers.begin(bounds);
     let mut found = Vec::new();
-    for first in (0..chunk.len()).step_by(LANES) {
-        let inside = leavers.inside(&positions(chunk, first));
-        // Nearly all particles stay.
-        if !inside.all() {
-            let lanes = 0..LANES.min(chunk.len() - first);
-            let left = lanes.filter(|lane| inside.bits() >> lane & 1 == 0);
-            found.extend(left.map(|lane| (first + lane) as u32));
-        }
-    }
+    list_lanes(chunk.len(), &mut found, |first| !leavers.inside(&positions(chunk, first)).bits());
     found
 }
 

@@ -61,17 +61,13 @@ impl Scratch {
     ) {
         self.undecided.clear();
         self.elsewhere.clear();
-        for first in (0..chunk.len()).step_by(LANES) {
-            let lanes = LANES.min(chunk.len() - first);
-            let mut left = undecided(first) & ((1 << lanes) - 1);
-            if left != 0 {
+        list_lanes(chunk.len(), &mut self.undecided, |first| {
+            let lanes = undecided(first);
+            if lanes != 0 {
                 widths.read_ahead(chunk, first);
             }
-            while left != 0 {
-                self.undecided.push(first as u32 + left.trailing_zeros());
-                left &= left - 1;
-            }
-        }
+            lanes
+        });
     }
 }
 
@@ -294,6 +290,20 @@ impl<const D: usize> LeafBins<D> {
                 find(std::array::from_fn(|axis| (scaled[axis] + f64::from(shift[axis]) * nudge) as u32))
             })
         })
+    }
+}
+
+/// Appends to a list those of so many particles whose bits are set in what `lanes` gives for the batch from some particle on;
+/// bits behind the last particle are of no use.
+#[inline(always)]
+pub(super) fn list_lanes(particles: usize, list: &mut Vec<u32>, lanes: impl Fn(usize) -> u32) {
+    for first in (0..particles).step_by(LANES) {
+        let members = LANES.min(particles - first);
+        let mut left = lanes(first) & ((1 << members) - 1);
+        while left != 0 {
+            list.push(first as u32 + left.trailing_zeros());
+            left &= left - 1;
+        }
     }
 }
 

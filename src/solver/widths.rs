@@ -1,6 +1,6 @@
 //! Widths of boxes, as sorting needs them.
 use super::bins::BoxWidths;
-use super::leaf_bins::values;
+use super::leaf_bins::{list_lanes, values};
 use crate::kernel::simd::{LANES, Lanes};
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
@@ -18,11 +18,7 @@ impl<const D: usize> Widths<'_, D> {
     pub fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let limit = Lanes::splat(0.5 * cell);
         let mut wide = Vec::new();
-        for first in (0..chunk.len()).step_by(LANES) {
-            let lanes = (!self.bounds(chunk, first).le(limit)).bits();
-            let members = (first..chunk.len().min(first + LANES)).map(|p| p as u32);
-            wide.extend(members.filter(|p| lanes >> (p % LANES as u32) & 1 == 1));
-        }
+        list_lanes(chunk.len(), &mut wide, |first| (!self.bounds(chunk, first).le(limit)).bits());
         let mut greatest: f64 = 0.0;
         for particles in wide.chunks(LANES) {
             let half = self.of_batch(chunk, particles, cell).map(Lanes::to_array);
@@ -55,18 +51,13 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
-        width_bound(chunk, &self.scheme)
-    }
-}
-
-/// A bound on the half widths of all boxes that the particles of a chunk can have, m.
-pub(super) fn width_bound<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme<'_>) -> f64 {
-    match scheme.boxes {
-        BoxPolicy::Fixed => chunk.greatest_half(),
-        BoxPolicy::Volume { max_stretch, .. } => max_stretch * chunk.greatest_half(),
-        BoxPolicy::Cell => {
-            let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
-            coarsest.map_or(0.0, |level| 0.5 * scheme.root_cell / f64::from(1u32 << level))
+        match self.scheme.boxes {
+            BoxPolicy::Fixed => chunk.greatest_half(),
+            BoxPolicy::Volume { max_stretch, .. } => max_stretch * chunk.greatest_half(),
+            BoxPolicy::Cell => {
+                let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
+                coarsest.map_or(0.0, |level| 0.5 * self.scheme.root_cell / f64::from(1u32 << level))
+            }
         }
     }
 }
