@@ -50,13 +50,16 @@ pub fn nodes_in_domain<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u
 /// Constrained nodes of a block: those that touch a leaf coarser than `level`. An unknown neighbourhood
 /// counts as not coarser; [`Closure::compute`] reports it as missing.
 pub fn constrained_nodes<const D: usize>(tree: &KnownTree<D>, level: u8, coord: [u32; D]) -> u64 {
+    if level == 0 {
+        return 0;
+    }
+    // Octants around the lower corner that have the same parent are covered by the same coarser leaf.
+    let even = parity(coord) ^ ((1 << D) - 1);
     let mut mask = 0;
-    for corner in 0..1usize << D {
+    for corner in (0..1usize << D).filter(|corner| corner & !even == 0) {
         let below: [bool; D] = std::array::from_fn(|axis| corner >> axis & 1 == 1);
         let Some(octant) = shifted(coord, below.map(|b| -i32::from(b))) else { continue };
-        if let Cover::Leaf(leaf) = tree.cover(level, octant)
-            && tree.leaves()[leaf].level < level
-        {
+        if let Cover::Leaf(_) = tree.cover(level - 1, octant.map(|c| c >> 1)) {
             mask |= lower_face::<D>(below);
         }
     }
@@ -70,7 +73,7 @@ struct Builder<'a, const D: usize> {
     parents: &'static ParentTable,
     containers: FxHashMap<(u8, [u32; D]), bool>,
     levels: Vec<FxHashMap<[u32; D], NodeSets>>,
-    received: FxHashMap<(u8, [u32; D]), u64>,
+    restricted: FxHashMap<(u8, [u32; D]), u64>,
 }
 
 impl<const D: usize> Closure<D> {
@@ -82,7 +85,7 @@ impl<const D: usize> Closure<D> {
             parents: ParentTable::of::<D>(),
             containers: FxHashMap::default(),
             levels: vec![FxHashMap::default(); usize::from(tree.deepest()) + 1],
-            received: FxHashMap::default(),
+            restricted: FxHashMap::default(),
         };
         let bins = own_bins(tree);
         builder.touch_own_bins(&bins);
@@ -169,9 +172,7 @@ impl<const D: usize> Builder<'_, D> {
                     if children == 0 {
                         continue;
                     }
-                    let children = children
-                        & constrained_nodes(self.tree, level + 1, fine)
-                        & self.receives(level + 1, fine);
+                    let children = children & self.restricted(level + 1, fine);
                     if children != 0 {
                         self.sets(level + 1, fine).sum |= children;
                     }
@@ -187,11 +188,21 @@ impl<const D: usize> Builder<'_, D> {
         *is_bin.or_insert_with(|| bin_container(tree, level, coord).is_some())
     }
 
-    /// Nodes of a block that can receive something: from bins of their level or by restriction.
-    fn receives(&mut self, level: u8, coord: [u32; D]) -> u64 {
-        if let Some(&mask) = self.received.get(&(level, coord)) {
+    /// Constrained nodes of a block that can receive something, which restriction hands to their parents.
+    fn restricted(&mut self, level: u8, coord: [u32; D]) -> u64 {
+        if let Some(&mask) = self.restricted.get(&(level, coord)) {
             return mask;
         }
+        let known = self.levels.get(usize::from(level)).and_then(|blocks| blocks.get(&coord));
+        let constrained = known.map(|sets| sets.constrained);
+        let constrained = constrained.unwrap_or_else(|| constrained_nodes(self.tree, level, coord));
+        let mask = if constrained == 0 { 0 } else { constrained & self.receives(level, coord) };
+        self.restricted.insert((level, coord), mask);
+        mask
+    }
+
+    /// Nodes of a block that can receive something: from bins of their level or by restriction.
+    fn receives(&mut self, level: u8, coord: [u32; D]) -> u64 {
         let mut mask = 0;
         for index in 0..offset_count(D) {
             if let Some(bin) = shifted(coord, offset::<D>(index))
@@ -203,13 +214,10 @@ impl<const D: usize> Builder<'_, D> {
         if self.tree.is_beside_finer(level, coord) {
             for index in 0..offset_count(D) {
                 let Some(fine) = shifted(coord.map(|c| 2 * c), offset::<D>(index)) else { continue };
-                let from = constrained_nodes(self.tree, level + 1, fine) & self.receives(level + 1, fine);
-                mask |= parents::<D>(index, from);
+                mask |= parents::<D>(index, self.restricted(level + 1, fine));
             }
         }
-        mask &= nodes_in_domain(self.tree, level, coord);
-        self.received.insert((level, coord), mask);
-        mask
+        mask & nodes_in_domain(self.tree, level, coord)
     }
 
     /// What must be known and is not.

@@ -68,6 +68,11 @@ impl<const D: usize> NodeFields<D> {
         size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }
 
+    /// Whether rows of a block may differ from zero.
+    pub fn may_hold(&self, block: usize) -> bool {
+        self.dirty[block]
+    }
+
     /// Not collective. Adds up the own arenas that reach each block of a wave. The first wave comes first.
     pub fn sum(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, wave: usize) {
         if wave == FIRST {

@@ -222,6 +222,11 @@ impl<const D: usize> KnownTree<D> {
         self.reach
     }
 
+    /// Whether neighbouring leaves differ by one level at most.
+    pub fn is_graded(&self) -> bool {
+        self.graded
+    }
+
     /// Whether all leaves that feed a bin lie within the block around it.
     pub fn sources_are_near(&self) -> bool {
         self.graded && self.reach <= 1

@@ -90,7 +90,12 @@ impl<const D: usize> GridPlan<D> {
             }
         }
         self.links.iter_mut().zip(pairs).for_each(|(links, pairs)| links.group(pairs));
-        self.find_columns();
+        // Where neighbouring leaves differ by one level at most, parents are real.
+        let is_graded = self.tree.is_graded();
+        if !is_graded || cfg!(debug_assertions) {
+            self.find_columns();
+        }
+        debug_assert!(!is_graded || self.columns == 0, "a parent hangs itself in a graded tree");
     }
 
     /// Finds which nodes have constrained parents, and which first moments these and their parents have.

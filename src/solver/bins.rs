@@ -1,7 +1,7 @@
 //! Lists of the particles in each bin of one rank; `leaf_bins.rs` finds those of one leaf.
 use rayon::prelude::*;
 
-use super::leaf_bins::{LeafBins, Scratch};
+use super::leaf_bins::{LeafBins, Scratch, Sorting, crowded};
 use super::sides::{NearLeaf, near_leaf};
 use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
@@ -68,16 +68,26 @@ impl<const D: usize> BinLists<D> {
         // All leaves, also after a failure: the others must not keep the lists of the step before.
         let sorted =
             leaves.with_min_len(8).map_init(Scratch::default, |scratch, (leaf, ((bins, sorted), own))| {
-                let (chunk, cell) = (&chunks[leaf], plan.cell(own.level));
-                let bound = widths.bound(chunk);
+                let chunk = &chunks[leaf];
                 // An empty leaf has nothing to list.
-                *sorted = !chunk.is_empty() && (given || bins.sides.is_some() || bound > 0.5 * cell);
+                *sorted = !chunk.is_empty() && (given || bins.may_need_lists(plan, own, chunk, widths));
                 if *sorted {
-                    *sorted = bins.sort(plan, leaf, own, chunk, widths, scratch)?;
+                    *sorted = bins.sort(chunk, &Sorting { plan, widths, leaf, own }, scratch)?;
                 }
                 Ok(())
             });
         sorted.reduce(|| Ok(()), Result::and)
+    }
+
+    /// The lists of each own leaf, for what advances its particles.
+    pub(super) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
+        let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds);
+        leaves.map(|((bins, &sorted), own)| OfLeaf { bins, sorted, own })
+    }
+
+    /// Not collective. To be called when particles have not only advanced or been appended since the last sort.
+    pub(super) fn forget(&mut self) {
+        self.leaves.iter_mut().for_each(LeafBins::forget);
     }
 
     /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
@@ -133,11 +143,47 @@ impl<const D: usize> BinLists<D> {
 
     /// The nodes that the members of a bin touch, of which it has some.
     pub fn window_of(&self, leaf: usize, bin: usize) -> Window<D> {
-        self.of_leaf(leaf).map_or(Window::FULL, |bins| bins.members[bin].window)
+        window_of(self.of_leaf(leaf), bin)
     }
 
     /// The bins of own leaf `leaf`, or `None` if all its particles are whole in its own bin.
     pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
         self.sorted[leaf].then_some(&self.leaves[leaf])
     }
+}
+
+/// The lists of one own leaf.
+pub(super) struct OfLeaf<'a, const D: usize> {
+    bins: &'a mut LeafBins<D>,
+    sorted: bool,
+    own: &'a NearLeaf<D>,
+}
+
+impl<const D: usize> OfLeaf<'_, D> {
+    /// As [`BinLists::of_leaf`].
+    pub fn lists(&self) -> Option<&LeafBins<D>> {
+        self.sorted.then_some(self.bins)
+    }
+
+    /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are gone: what it looks
+    /// at is still in the cache.
+    pub fn sort_ahead(
+        self,
+        plan: &GridPlan<D>,
+        leaf: usize,
+        chunk: &Chunk<D>,
+        widths: &impl BoxWidths<D>,
+        scratch: &mut Scratch,
+    ) {
+        let Self { bins, own, .. } = self;
+        bins.forget();
+        if chunk.len() >= crowded(D) && bins.may_need_lists(plan, own, chunk, widths) {
+            bins.sort_ahead(chunk, &Sorting { plan, widths, leaf, own }, scratch);
+        }
+    }
+}
+
+/// The nodes that the members of a bin touch.
+pub(super) fn window_of<const D: usize>(lists: Option<&LeafBins<D>>, bin: usize) -> Window<D> {
+    lists.map_or(Window::FULL, |lists| lists.members[bin].window)
 }

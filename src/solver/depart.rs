@@ -223,7 +223,7 @@ pub(super) fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64
     let mut leavers = leavers::Leavers::default();
     leavers.begin(bounds);
     let mut found = Vec::new();
-    list_lanes(chunk.len(), &mut found, |first| !leavers.inside(&positions(chunk, first)).bits());
+    list_lanes(0..chunk.len(), &mut found, |first| !leavers.inside(&positions(chunk, first)).bits());
     found
 }
 

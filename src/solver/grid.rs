@@ -192,14 +192,18 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Sum, || grid.fields.add_received(&grid.plan, &grid.arenas, &grid.received));
     }
 
-    /// Collective over neighbours. Moves particles to the leaves that contain them.
-    pub(super) fn migrate(&mut self) -> Result<Moved, MigrateError> {
+    /// Collective over neighbours. Moves particles to the leaves that contain them; those of other leaves than `may_stray` says
+    /// are in theirs.
+    pub(super) fn migrate(
+        &mut self,
+        may_stray: impl Fn(usize) -> bool + Sync,
+    ) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {
-            grid.migration.migrate(&grid.plan.tree, chunks, resampling.as_ref(), &mut splits)
+            grid.migration.migrate(&grid.plan.tree, chunks, resampling.as_ref(), may_stray, &mut splits)
         });
         self.book_migration(moved, &splits)
     }

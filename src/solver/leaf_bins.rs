@@ -6,6 +6,8 @@
 //! leaves around.
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
+use std::ops::Range;
+
 use super::bins::{BinMissing, BoxWidths};
 use super::members::Members;
 use super::sides::{NearLeaf, Side, Sides, near_leaf};
@@ -18,7 +20,7 @@ use crate::particle::chunk::{Chunk, Layout};
 
 /// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
 /// more than it saves.
-const fn crowded(d: usize) -> usize {
+pub(super) const fn crowded(d: usize) -> usize {
     if d == 2 { 32 } else { 128 }
 }
 
@@ -35,6 +37,10 @@ pub struct LeafBins<const D: usize> {
     around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
     pub(super) sides: Option<Sides<D>>,
+    /// Particles that are not whole in the leaf's own bin, with their bin; they ascend.
+    elsewhere: Vec<(u32, u32)>,
+    /// So many of the first particles were held against the leaves around when they had advanced, and are not again.
+    ahead: usize,
 }
 
 /// In place of a bin: the box is in none as a whole.
@@ -45,30 +51,15 @@ const CUT: u32 = u32::MAX;
 pub(super) struct Scratch {
     /// Particles whose bin may be another than the leaf's own.
     undecided: Vec<u32>,
-    /// Those of them that are not whole in the leaf's own bin, with their bin.
-    elsewhere: Vec<(u32, u32)>,
 }
 
-impl Scratch {
-    /// All particles of a chunk are in the leaf's own bin so far; `undecided` gives the lanes that may belong elsewhere, of the
-    /// batch from some particle on.
-    #[inline(always)]
-    fn begin<const D: usize>(
-        &mut self,
-        chunk: &Chunk<D>,
-        widths: &impl BoxWidths<D>,
-        undecided: impl Fn(usize) -> u32,
-    ) {
-        self.undecided.clear();
-        self.elsewhere.clear();
-        list_lanes(chunk.len(), &mut self.undecided, |first| {
-            let lanes = undecided(first);
-            if lanes != 0 {
-                widths.read_ahead(chunk, first);
-            }
-            lanes
-        });
-    }
+/// What sorting needs to know beside the particles.
+pub(super) struct Sorting<'a, const D: usize, W> {
+    pub plan: &'a GridPlan<D>,
+    pub widths: &'a W,
+    /// Own leaf.
+    pub leaf: usize,
+    pub own: &'a NearLeaf<D>,
 }
 
 impl<const D: usize> LeafBins<D> {
@@ -90,34 +81,109 @@ impl<const D: usize> LeafBins<D> {
             let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
             Sides::new(own, here, cell, &finer, bins)
         });
-        Self { members: vec![Members::default(); bins], cut: Vec::new(), finer, around, sides }
+        let members = vec![Members::default(); bins];
+        Self { members, cut: Vec::new(), finer, around, sides, elsewhere: Vec::new(), ahead: 0 }
     }
 
-    /// Sorts the particles of own leaf `leaf`. Returns whether there is anything to list: if not, all are whole in the
-    /// leaf's own bin.
-    pub(super) fn sort(
-        &mut self,
+    /// Whether particles of the leaf may belong elsewhere than whole in its own bin.
+    pub(super) fn may_need_lists(
+        &self,
         plan: &GridPlan<D>,
-        leaf: usize,
         own: &NearLeaf<D>,
         chunk: &Chunk<D>,
         widths: &impl BoxWidths<D>,
+    ) -> bool {
+        self.sides.is_some() || widths.bound(chunk) > 0.5 * plan.cell(own.level)
+    }
+
+    /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
+    pub(super) fn sort(
+        &mut self,
+        chunk: &Chunk<D>,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) -> Result<bool, BinMissing> {
+        let known = std::mem::take(&mut self.ahead);
+        if known == 0 {
+            self.begin();
+        }
+        self.look(chunk, known, sorting, scratch)?;
+        debug_assert!(
+            known == 0 || self.are_as_new(chunk, sorting),
+            "particles have changed since they were sorted"
+        );
+        let crowded = chunk.len() >= crowded(D);
+        if crowded && self.elsewhere.is_empty() {
+            return Ok(false);
+        }
+        self.list(chunk.len() as u32);
+        let &Sorting { plan, leaf, .. } = sorting;
+        for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+            members.close(plan, bin);
+        }
+        if crowded {
+            self.members[0].window = Window::FULL;
+        }
+        Ok(true)
+    }
+
+    /// Does what of [`LeafBins::sort`] has to look at particles, as long as these are in the cache. Until then others may only
+    /// be appended to the leaf, or [`LeafBins::forget`] is called.
+    pub(super) fn sort_ahead(
+        &mut self,
+        chunk: &Chunk<D>,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
+        scratch: &mut Scratch,
+    ) {
+        self.begin();
+        self.ahead = match self.look(chunk, 0, sorting, scratch) {
+            Ok(()) => chunk.len(),
+            // Found again, and told, when it matters.
+            Err(_) => 0,
+        };
+    }
+
+    /// Has the next [`LeafBins::sort`] look at all particles.
+    pub(super) fn forget(&mut self) {
+        self.ahead = 0;
+    }
+
+    /// Whether a sort from the beginning leads to the same.
+    fn are_as_new(&self, chunk: &Chunk<D>, sorting: &Sorting<'_, D, impl BoxWidths<D>>) -> bool {
+        let mut new = self.clone();
+        new.begin();
+        let looked = new.look(chunk, 0, sorting, &mut Scratch::default());
+        looked.is_ok() && new.elsewhere == self.elsewhere && new.cut == self.cut
+    }
+
+    fn begin(&mut self) {
+        self.cut.clear();
+        self.elsewhere.clear();
+        self.members.iter_mut().for_each(Members::clear);
+    }
+
+    /// Finds the bins of the particles from the one numbered `from` on.
+    fn look(
+        &mut self,
+        chunk: &Chunk<D>,
+        from: usize,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
+        scratch: &mut Scratch,
+    ) -> Result<(), BinMissing> {
+        let &Sorting { plan, widths, leaf, own } = sorting;
         if self.around.is_empty() {
             let (tree, edge) = (&plan.tree, plan.root_edge);
             let around = leaves_around(tree, tree.first_own() + leaf);
             self.around = around.into_iter().map(|leaf| near_leaf(tree, leaf, edge)).collect();
         }
-        self.cut.clear();
-        self.members.iter_mut().for_each(Members::clear);
         let crowded = chunk.len() >= crowded(D);
         let own_cell = plan.cell(own.level);
         let given = !widths.are_known_to_kernels();
         let sides = if given { None } else { self.sides.take() };
         // Of most boxes it is known without their half widths that they are whole and stay inside.
         let limit = Lanes::splat(narrow_limit(own_cell));
-        scratch.begin(chunk, widths, |first| {
+        scratch.undecided.clear();
+        list_lanes(from..chunk.len(), &mut scratch.undecided, |first| {
             if given || !crowded {
                 return !0;
             }
@@ -125,7 +191,11 @@ impl<const D: usize> LeafBins<D> {
             let elsewhere = sides.as_ref().map_or(0, |sides| {
                 sides.undecided(half, |axis| values(chunk, Layout::<D>::POSITION + axis, first))
             });
-            elsewhere | (!half.le(limit)).bits()
+            let lanes = elsewhere | (!half.le(limit)).bits();
+            if lanes != 0 {
+                widths.read_ahead(chunk, first);
+            }
+            lanes
         });
         let mut sorted = Ok(());
         let limits = [own_cell, plan.cell(own.level + 1)].map(narrow_limit);
@@ -145,7 +215,7 @@ impl<const D: usize> LeafBins<D> {
                     CUT
                 });
                 if bin != 0 {
-                    scratch.elsewhere.push((p, bin));
+                    self.elsewhere.push((p, bin));
                 }
                 // The window of a crowded leaf's own bin is known.
                 if bin != CUT && !(bin == 0 && crowded) {
@@ -157,23 +227,13 @@ impl<const D: usize> LeafBins<D> {
         if sides.is_some() {
             self.sides = sides;
         }
-        if crowded && scratch.elsewhere.is_empty() {
-            return Ok(false);
-        }
-        self.list(chunk.len() as u32, &scratch.elsewhere);
-        for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
-            members.close(plan, bin);
-        }
-        if crowded {
-            self.members[0].window = Window::FULL;
-        }
-        sorted.map(|()| true)
+        sorted
     }
 
-    /// Makes the lists of whole boxes of a leaf with so many particles from those `elsewhere` (ascending).
-    fn list(&mut self, particles: u32, elsewhere: &[(u32, u32)]) {
+    /// Makes the lists of whole boxes of a leaf with so many particles.
+    fn list(&mut self, particles: u32) {
         let mut next = 0;
-        for &(p, bin) in elsewhere {
+        for &(p, bin) in &self.elsewhere {
             self.members[0].whole.extend(next..p);
             next = p + 1;
             if bin != CUT {
@@ -293,12 +353,12 @@ impl<const D: usize> LeafBins<D> {
     }
 }
 
-/// Appends to a list those of so many particles whose bits are set in what `lanes` gives for the batch from some particle on;
+/// Appends to a list those of some particles whose bits are set in what `lanes` gives for the batch from some particle on;
 /// bits behind the last particle are of no use.
 #[inline(always)]
-pub(super) fn list_lanes(particles: usize, list: &mut Vec<u32>, lanes: impl Fn(usize) -> u32) {
-    for first in (0..particles).step_by(LANES) {
-        let members = LANES.min(particles - first);
+pub(super) fn list_lanes(particles: Range<usize>, list: &mut Vec<u32>, lanes: impl Fn(usize) -> u32) {
+    for first in particles.clone().step_by(LANES) {
+        let members = LANES.min(particles.end - first);
         let mut left = lanes(first) & ((1 << members) - 1);
         while left != 0 {
             list.push(first as u32 + left.trailing_zeros());

@@ -69,7 +69,7 @@ impl<const D: usize> Migration<D> {
     }
 
     /// Collective over neighbours. Moves every particle into the leaf that contains it; see [`Borders::depart`] and
-    /// [`Migration::arrive`].
+    /// [`Migration::arrive`]. Particles of other leaves than `may_stray` says must be in theirs.
     ///
     /// # Errors
     /// As those of [`Migration::arrive`].
@@ -78,11 +78,12 @@ impl<const D: usize> Migration<D> {
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],
         resampling: Option<&Resampling<'_, D>>,
+        may_stray: impl Fn(usize) -> bool + Sync,
         splits: &mut Vec<Splits>,
     ) -> Result<Moved, MigrateError> {
         let borders = &self.borders;
         let leaves = chunks.par_iter_mut().enumerate().with_min_len(4);
-        let departed = leaves.map(|(leaf, chunk)| {
+        let departed = leaves.filter(|(leaf, _)| may_stray(*leaf)).map(|(leaf, chunk)| {
             let outside = outside(chunk, borders.of_leaf(leaf));
             borders.depart(tree, leaf, chunk, &outside, resampling)
         });

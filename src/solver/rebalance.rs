@@ -125,15 +125,17 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
-    /// grid where tree or partition have changed. Changes no bit of the state.
-    pub fn rebalance(&mut self) {
+    /// grid where tree or partition have changed. Changes no bit of the state. Returns whether leaves have moved.
+    pub fn rebalance(&mut self) -> bool {
         let cuts = self.plan_partition();
-        self.move_leaves(cuts);
+        self.move_leaves(cuts)
     }
 
     /// Collective. Where new cuts would lie by current costs.
     fn plan_partition(&self) -> Cuts {
-        self.forest.plan_partition(&self.comm, &self.leaf_costs(), cut_at(self.physics.adaptivity.as_ref()))
+        // A rank that is alone has all leaves, whatever they cost.
+        let costs = if self.comm.size() > 1 { self.leaf_costs() } else { vec![1; self.chunks.len()] };
+        self.forest.plan_partition(&self.comm, &costs, cut_at(self.physics.adaptivity.as_ref()))
     }
 
     fn move_leaves(&mut self, cuts: Cuts) -> bool {

@@ -94,18 +94,21 @@ impl<const D: usize> Solver<D> {
         let levels_before = self.steps_between_trees().and_then(|steps| self.change_tree(steps));
         let is_new = levels_before.is_some();
         let mut looks = self.look_at_levels();
-        let split = self.split_particles(&looks, levels_before.as_deref());
+        let mut split = self.split_particles(&looks, levels_before.as_deref());
+        let is_split = split.contains(&true);
         self.parts.end(Part::Split);
         if is_new {
-            self.rebalance();
+            if self.rebalance() {
+                split = vec![true; self.chunks.len()];
+            }
             self.surveys.clear();
         }
-        if is_new || split {
+        if is_new || is_split {
             looks = self.look_at_levels();
         }
         let is_due = self.physics.adaptivity.as_ref().is_some_and(|adaptivity| adaptivity.merge.is_some())
             && looks.iter().any(|look| look.due || look.stale);
-        let mut flags = [u64::from(is_new || split), u64::from(is_due)];
+        let mut flags = [u64::from(is_new || is_split), u64::from(is_due)];
         self.comm.max_u64(&mut flags);
         let [is_other, is_due] = flags.map(|flag| flag > 0);
         let reports = if is_due { self.merge_particles(&looks) } else { Vec::new() };
@@ -114,9 +117,11 @@ impl<const D: usize> Solver<D> {
         if is_other || merged {
             // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of merged ones
             // do not, but for rounding.
+            let is_merged = |leaf: usize| reports.get(leaf).is_some_and(|report| report.merged > 0);
+            let may_stray = |leaf: usize| split.get(leaf) == Some(&true) || is_merged(leaf);
             let moved: Result<Moved, StepError> = match is_other {
-                true => self.migrate().map_err(|error: MigrateError| error.into()),
-                false => self.send_home(|leaf| reports[leaf].merged > 0),
+                true => self.migrate(may_stray).map_err(|error: MigrateError| error.into()),
+                false => self.send_home(is_merged),
             };
             self.comm.agree(moved)?;
         }
@@ -132,6 +137,9 @@ impl<const D: usize> Solver<D> {
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
+        }
+        if is_other || is_due {
+            self.grid.lists.forget();
         }
         if is_other || merged {
             // Who has moved may have a box that is wide in the leaf where it is now.

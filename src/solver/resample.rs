@@ -206,26 +206,26 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the cells that
-    /// the affine state in leaf i comes from, if the tree has changed. Returns whether any was split.
-    pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> bool {
+    /// the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any was split.
+    pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> Vec<bool> {
         let scheme = self.physics.scheme();
         let extent = super::transfer::extent(&self.grid.plan);
         let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
-            return false;
+            return Vec::new();
         };
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.surveys).enumerate();
-        let done = leaves.with_min_len(64).filter_map(|(number, ((chunk, leaf), survey))| {
+        let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), survey))| {
             let too_wide = |stretch| resampling.may_exceed(survey.width, leaf.level, stretch);
             let is_wanted = looks[number].coarser || resampling.stretch.is_some_and(too_wide);
             let from = from.map_or(leaf.level, |from| from[number]);
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
         });
-        let done: Vec<Splits> = done.collect();
+        let done: Vec<Option<Splits>> = done.collect();
         let books = &mut self.books;
         // A refusal is told again at each regrid, so the count is that of now.
         books.refused = 0;
-        done.iter().for_each(|done| books.book_split(done));
-        done.iter().any(|done| done.split > 0)
+        done.iter().flatten().for_each(|done| books.book_split(done));
+        done.iter().map(|done| done.as_ref().is_some_and(|done| done.split > 0)).collect()
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next

@@ -2,11 +2,13 @@
 //!
 //! Along each axis a box stays within its leaf, or crosses the lower or the upper face, or both: at most `4^D` cases,
 //! each with its answer in a table.
+use std::cmp::Ordering;
+
 use partition::Octant;
 
 use super::migrate::leaf_box;
 use crate::grid::KnownTree;
-use crate::grid::mask::{offset, offset_count};
+use crate::grid::mask::{offset, offset_count, offset_index};
 use crate::grid::plan::Bin;
 use crate::kernel::simd::{LANES, Lanes};
 
@@ -68,32 +70,38 @@ impl<const D: usize> Sides<D> {
         // Finest level in each direction, among the leaves that touch this one. A box at most a cell wide reaches
         // half a cell beyond, less than the depth of a leaf one level finer.
         let mut towards = [Side::Own; 27];
-        for (index, side) in towards.iter_mut().enumerate().take(offset_count(D)) {
-            let direction = offset::<D>(index);
-            let touching = near.iter().filter(|other| {
-                (0..D).all(|axis| match direction[axis] {
-                    -1 => other.upper[axis] == leaf.lower[axis],
-                    0 => other.lower[axis] < leaf.upper[axis] && other.upper[axis] > leaf.lower[axis],
-                    _ => other.lower[axis] == leaf.upper[axis],
-                })
+        for other in near {
+            let along: [Option<i32>; D] = std::array::from_fn(|axis| {
+                let (above_lower, below_upper) =
+                    (other.upper[axis] - leaf.lower[axis], leaf.upper[axis] - other.lower[axis]);
+                match (above_lower, below_upper) {
+                    (0.0, _) => Some(-1),
+                    (_, 0.0) => Some(1),
+                    _ => (above_lower > 0.0 && below_upper > 0.0).then_some(0),
+                }
             });
-            *side = match touching.map(|other| other.level).max() {
-                Some(level) if level == leaf.level + 1 => Side::Finer,
-                Some(level) if level > leaf.level => Side::Other,
-                _ => Side::Own,
-            };
+            if along.contains(&None) {
+                continue;
+            }
+            let side = &mut towards[offset_index(along.map(Option::unwrap_or_default))];
+            *side = (*side).max(match other.level.cmp(&(leaf.level + 1)) {
+                Ordering::Less => Side::Own,
+                Ordering::Equal => Side::Finer,
+                Ordering::Greater => Side::Other,
+            });
         }
-        let sides = std::array::from_fn(|faces| {
-            let crossed = (0..offset_count(D)).filter(|&index| {
-                let direction = offset::<D>(index);
-                (0..D).all(|axis| match direction[axis] {
-                    -1 => faces >> (2 * axis) & 1 == 1,
-                    0 => true,
-                    _ => faces >> (2 * axis + 1) & 1 == 1,
-                })
-            });
-            crossed.map(|index| towards[index]).max().unwrap_or(Side::Own)
-        });
+        let mut sides = [Side::Own; 64];
+        for (index, &side) in towards.iter().enumerate().take(offset_count(D)) {
+            let along = offset::<D>(index).map(|direction| [0b01, 0b00, 0b10][(direction + 1) as usize]);
+            let faces = (0..D).fold(0, |faces, axis| faces | along[axis] << (2 * axis));
+            sides[faces] = side;
+        }
+        // Whoever crosses several faces reaches what lies across any of them.
+        for face in 0..2 * D {
+            for faces in (0..1 << (2 * D)).filter(|faces| faces >> face & 1 == 1) {
+                sides[faces] = sides[faces].max(sides[faces & !(1 << face)]);
+            }
+        }
         let children = std::array::from_fn(|child| {
             let child = (child < Octant::<D>::CHILDREN).then(|| here.child(child))?;
             bins.iter().position(|bin| bin.block == child).map(|bin| bin as u32)

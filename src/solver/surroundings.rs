@@ -180,6 +180,10 @@ impl MassRange {
     }
 
     fn of<const D: usize>(fields: &NodeFields<D>, block: u32, nodes: u64) -> Self {
+        if !fields.may_hold(block as usize) {
+            // To read rows that were never written would make the system find pages for them.
+            return if nodes == 0 { Self::NONE } else { Self { least: 0.0, greatest: 0.0 } };
+        }
         let rows = &fields.rows[block as usize * block_nodes(D)..][..block_nodes(D)];
         bits(nodes).fold(Self::NONE, |range, bit| {
             let mass = rows[bit as usize].0[3];

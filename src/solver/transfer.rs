@@ -1,10 +1,11 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinLists, BinMissing, BoxWidths};
+use super::bins::{BinMissing, BoxWidths, window_of};
 use super::contact::SUMS;
 use super::depart::Departed;
 use super::grid::Grid;
+use super::leaf_bins::{self, LeafBins};
 use super::phases::{Phase, Phases};
 use super::resample::Resampling;
 use super::survey::{Survey, Watch};
@@ -48,6 +49,7 @@ struct Scratch<const D: usize> {
     increments: Vec<Row>,
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
+    sort: leaf_bins::Scratch,
 }
 
 impl<const D: usize> Default for Scratch<D> {
@@ -58,6 +60,7 @@ impl<const D: usize> Default for Scratch<D> {
             increments: vec![Row::default(); arena_nodes(D)],
             gathered: Vec::new(),
             leavers: Leavers::default(),
+            sort: leaf_bins::Scratch::default(),
         }
     }
 }
@@ -90,9 +93,9 @@ struct Selected<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Selected<'a, D> {
-    /// Members of bin number `number` of leaf `leaf`.
-    fn of(lists: &'a BinLists<D>, leaf: usize, number: usize, chunk: &Chunk<D>) -> Self {
-        let Some(bins) = lists.of_leaf(leaf) else {
+    /// Members of bin number `number` of a leaf.
+    fn of(lists: Option<&'a LeafBins<D>>, number: usize, chunk: &Chunk<D>) -> Self {
+        let Some(bins) = lists else {
             let whole = (number == 0 && !chunk.is_empty()).then_some(Select::All);
             return Self { whole, parts: &[] };
         };
@@ -151,8 +154,9 @@ impl<const D: usize> Solver<D> {
                 let bin = &plan.bins[arena.bin];
                 let leaf = bin.leaf as usize;
                 let chunk = &chunks[leaf];
-                let selected = Selected::of(lists, leaf, arena.bin - plan.leaf_bins(leaf).start, chunk);
-                arena.clear(&lists.window_of(leaf, arena.bin - plan.leaf_bins(leaf).start));
+                let (lists, number) = (lists.of_leaf(leaf), arena.bin - plan.leaf_bins(leaf).start);
+                let selected = Selected::of(lists, number, chunk);
+                arena.clear(&window_of(lists, number));
                 read_ahead(arena.next);
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
                 let nodes = constrained(plan, bin);
@@ -193,7 +197,7 @@ impl<const D: usize> Solver<D> {
         self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
             let mut spreads = vec![[0.0; D]; chunk.len()];
             for (number, bin) in plan.leaf_bins(leaf).enumerate() {
-                let selected = Selected::of(lists, leaf, number, chunk);
+                let selected = Selected::of(lists.of_leaf(leaf), number, chunk);
                 let bin = &plan.bins[bin];
                 if let Some(whole) = selected.whole {
                     let (frame, nodes) = (frame(plan, bin), constrained(plan, bin));
@@ -249,11 +253,13 @@ impl<const D: usize> Solver<D> {
     /// leaves, in their order, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
     pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
+        let extent = extent(&self.grid.plan);
+        let resampling = Resampling::new(&self.physics, &scheme, extent);
         let resampling = resampling.as_ref();
+        let widths = Widths { scheme: self.physics.scheme(), extent };
         let borders = &self.grid.migration.borders;
-        let (plan, fields, lists, arenas) =
-            (&self.grid.plan, &self.grid.fields, &self.grid.lists, &self.grid.arenas);
+        let (plan, fields, arenas) = (&self.grid.plan, &self.grid.fields, &self.grid.arenas);
+        let lists = &mut self.grid.lists;
         let changes = scheme.transfer.has_increments().then_some(&self.grid.increments.rows);
         let (chunks, signal, costs) = (&mut self.chunks, &mut self.signal, &self.costs);
         let adaptivity = self.physics.adaptivity.as_ref();
@@ -266,59 +272,63 @@ impl<const D: usize> Solver<D> {
         self.places.extend(chunks.iter().map(Chunk::place));
         let places = &self.places;
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().zip(surveys).zip(signal).enumerate();
-            let gather_leaf = |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>| {
-                let Scratch { kernel, arena, increments, gathered, leavers } = scratch;
-                leavers.begin(borders.of_leaf(leaf));
-                if chunk.is_empty() {
-                    return 0.0;
-                }
-                let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
-                gathered.clear();
-                gathered.resize(cut.len(), Gathered::default());
-                let mut signal: f64 = 0.0;
-                for (number, bin) in plan.leaf_bins(leaf).enumerate() {
-                    let selected = Selected::of(lists, leaf, number, chunk);
-                    if selected.is_empty() {
-                        continue;
+            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(surveys).zip(signal).enumerate();
+            let gather_leaf =
+                |scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, lists: Option<&LeafBins<D>>| {
+                    let Scratch { kernel, arena, increments, gathered, leavers, .. } = scratch;
+                    leavers.begin(borders.of_leaf(leaf));
+                    if chunk.is_empty() {
+                        return 0.0;
                     }
-                    let window = lists.window_of(leaf, number);
-                    fields.load(plan, bin, &window, arena);
-                    let next = arenas.after(bin).map_or(Place::default(), |(next, window)| {
-                        fields.read_ahead(plan, next, &window);
-                        places[plan.bins[next].leaf as usize]
-                    });
-                    if let Some(changes) = changes {
-                        load_rows(plan, bin, &window, changes, increments);
+                    let cut = lists.map_or(&[][..], |bins| &bins.cut);
+                    gathered.clear();
+                    gathered.resize(cut.len(), Gathered::default());
+                    let mut signal: f64 = 0.0;
+                    for (number, bin) in plan.leaf_bins(leaf).enumerate() {
+                        let selected = Selected::of(lists, number, chunk);
+                        if selected.is_empty() {
+                            continue;
+                        }
+                        let window = window_of(lists, number);
+                        fields.load(plan, bin, &window, arena);
+                        let next = arenas.after(bin).map_or(Place::default(), |(next, window)| {
+                            fields.read_ahead(plan, next, &window);
+                            places[plan.bins[next].leaf as usize]
+                        });
+                        if let Some(changes) = changes {
+                            load_rows(plan, bin, &window, changes, increments);
+                        }
+                        let bin = &plan.bins[bin];
+                        let frame = frame(plan, bin);
+                        let moments =
+                            constrained(plan, bin).map(|nodes| Moments { nodes, first: &arena.moments });
+                        let increment = changes.map(|_| &increments[..]);
+                        let nodes = Fields { velocity: &arena.rows, increment, moments };
+                        g2p::gather_sub_boxes(kernel, chunk, selected.parts, &frame, &nodes, gathered);
+                        if let Some(whole) = selected.whole {
+                            let fastest =
+                                g2p::gather(kernel, chunk, whole, &frame, &scheme, dt, &nodes, leavers, next);
+                            signal = signal.max(fastest);
+                        }
                     }
-                    let bin = &plan.bins[bin];
-                    let frame = frame(plan, bin);
-                    let moments =
-                        constrained(plan, bin).map(|nodes| Moments { nodes, first: &arena.moments });
-                    let increment = changes.map(|_| &increments[..]);
-                    let nodes = Fields { velocity: &arena.rows, increment, moments };
-                    g2p::gather_sub_boxes(kernel, chunk, selected.parts, &frame, &nodes, gathered);
-                    if let Some(whole) = selected.whole {
-                        let fastest =
-                            g2p::gather(kernel, chunk, whole, &frame, &scheme, dt, &nodes, leavers, next);
-                        signal = signal.max(fastest);
-                    }
-                }
-                let fastest = g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, leavers);
-                // Bins take them in turn.
-                leavers.found.sort_unstable();
-                signal.max(fastest)
-            };
+                    let fastest = g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, leavers);
+                    // Bins take them in turn.
+                    leavers.found.sort_unstable();
+                    signal.max(fastest)
+                };
             let departed = leaves.map_init(
                 Default::default,
-                |scratch: &mut Scratch<D>, (leaf, ((chunk, survey), signal))| {
+                |scratch: &mut Scratch<D>, (leaf, (((chunk, lists), survey), signal))| {
                     // Of empty leaves there may be very many, and to take the time costs more than they do.
                     let is_empty = chunk.is_empty();
-                    let mut work = || {
+                    let work = || {
                         watch.before(chunk, survey);
-                        *signal = gather_leaf(scratch, leaf, chunk);
+                        *signal = gather_leaf(scratch, leaf, chunk, lists.lists());
                         watch.after(chunk, dt, survey);
-                        borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling)
+                        let departed =
+                            borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling);
+                        lists.sort_ahead(plan, leaf, chunk, &widths, &mut scratch.sort);
+                        departed
                     };
                     if is_empty { work() } else { costs.time(leaf, work) }
                 },
@@ -336,16 +346,17 @@ impl<const D: usize> Solver<D> {
             let leaves = chunks.par_iter().enumerate();
             let all = leaves.map_init(Default::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
                 let Scratch { kernel, increments: arena, gathered, .. } = scratch;
-                let cut = lists.of_leaf(leaf).map_or(&[][..], |bins| &bins.cut);
+                let lists = lists.of_leaf(leaf);
+                let cut = lists.map_or(&[][..], |bins| &bins.cut);
                 gathered.clear();
                 gathered.resize(cut.len(), Gathered::default());
                 let mut velocities = vec![[0.0; D]; chunk.len()];
                 for (number, bin) in plan.leaf_bins(leaf).enumerate() {
-                    let selected = Selected::of(lists, leaf, number, chunk);
+                    let selected = Selected::of(lists, number, chunk);
                     if selected.is_empty() {
                         continue;
                     }
-                    load_rows(plan, bin, &lists.window_of(leaf, number), rows, arena);
+                    load_rows(plan, bin, &window_of(lists, number), rows, arena);
                     let frame = frame(plan, &plan.bins[bin]);
                     let nodes = Fields { velocity: arena, increment: None, moments: None };
                     g2p::gather_sub_boxes(kernel, chunk, selected.parts, &frame, &nodes, gathered);

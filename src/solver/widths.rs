@@ -18,7 +18,7 @@ impl<const D: usize> Widths<'_, D> {
     pub fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let limit = Lanes::splat(0.5 * cell);
         let mut wide = Vec::new();
-        list_lanes(chunk.len(), &mut wide, |first| (!self.bounds(chunk, first).le(limit)).bits());
+        list_lanes(0..chunk.len(), &mut wide, |first| (!self.bounds(chunk, first).le(limit)).bits());
         let mut greatest: f64 = 0.0;
         for particles in wide.chunks(LANES) {
             let half = self.of_batch(chunk, particles, cell).map(Lanes::to_array);

@@ -149,6 +149,11 @@ impl Levels {
 pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Look {
     let own = u64::from(level) << 32;
     let mut look = Look::default();
+    // Most leaves have particles of their own level only, without counts.
+    let differs = chunk.tags().iter().fold(0, |differs, tag| differs | (tag ^ own));
+    if differs & (LEVEL | BITS) == 0 {
+        return look;
+    }
     for &tag in chunk.tags() {
         let is_finer = tag & LEVEL > own;
         look.coarser |= tag & LEVEL < own;
