@@ -129,7 +129,7 @@ impl<const D: usize> BinLists<D> {
             let bins = self.of_leaf(leaf);
             let is_occupied = move |number: usize| bins.is_none_or(|bins| !bins.members[number].is_empty());
             let numbers = (0..bins.map_or(1, |bins| bins.members.len())).filter(move |&n| is_occupied(n));
-            numbers.map(move |number| (first + number, self.window_of(leaf, number)))
+            numbers.map(move |number| (first + number, window_of(bins, number)))
         })
     }
 
@@ -139,11 +139,6 @@ impl<const D: usize> BinLists<D> {
             .finer
             .iter()
             .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
-    }
-
-    /// The nodes that the members of a bin touch, of which it has some.
-    pub fn window_of(&self, leaf: usize, bin: usize) -> Window<D> {
-        window_of(self.of_leaf(leaf), bin)
     }
 
     /// The bins of own leaf `leaf`, or `None` if all its particles are whole in its own bin.

@@ -176,7 +176,7 @@ fn per_particle(units: u64, particles: u64) -> Option<u64> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// How the boxes of an own leaf were transferred last.
+    /// How the boxes of an own leaf were transferred last, or will be next where that is known.
     fn kind(&self, leaf: usize) -> Kind {
         let grid = &self.grid;
         if grid.plan.revision != self.forest.revision() {

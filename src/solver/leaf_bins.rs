@@ -107,9 +107,9 @@ impl<const D: usize> LeafBins<D> {
         if known == 0 {
             self.begin();
         }
-        self.look(chunk, known, sorting, scratch)?;
+        let looked = self.look(chunk, known, sorting, scratch);
         debug_assert!(
-            known == 0 || self.are_as_new(chunk, sorting),
+            known == 0 || looked.is_err() || self.are_as_new(chunk, sorting),
             "particles have changed since they were sorted"
         );
         let crowded = chunk.len() >= crowded(D);
@@ -124,7 +124,7 @@ impl<const D: usize> LeafBins<D> {
         if crowded {
             self.members[0].window = Window::FULL;
         }
-        Ok(true)
+        looked.map(|()| true)
     }
 
     /// Does what of [`LeafBins::sort`] has to look at particles, as long as these are in the cache. Until then others may only

@@ -94,12 +94,13 @@ impl<const D: usize> Solver<D> {
         let levels_before = self.steps_between_trees().and_then(|steps| self.change_tree(steps));
         let is_new = levels_before.is_some();
         let mut looks = self.look_at_levels();
-        let mut split = self.split_particles(&looks, levels_before.as_deref());
-        let is_split = split.contains(&true);
+        let mut split_in = self.split_particles(&looks, levels_before.as_deref());
+        let is_split = split_in.contains(&true);
         self.parts.end(Part::Split);
         if is_new {
             if self.rebalance() {
-                split = vec![true; self.chunks.len()];
+                // Children may have come with leaves of other ranks.
+                split_in = vec![true; self.chunks.len()];
             }
             self.surveys.clear();
         }
@@ -118,7 +119,7 @@ impl<const D: usize> Solver<D> {
             // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of merged ones
             // do not, but for rounding.
             let is_merged = |leaf: usize| reports.get(leaf).is_some_and(|report| report.merged > 0);
-            let may_stray = |leaf: usize| split.get(leaf) == Some(&true) || is_merged(leaf);
+            let may_stray = |leaf: usize| split_in.get(leaf) == Some(&true) || is_merged(leaf);
             let moved: Result<Moved, StepError> = match is_other {
                 true => self.migrate(may_stray).map_err(|error: MigrateError| error.into()),
                 false => self.send_home(is_merged),

@@ -327,7 +327,9 @@ impl<const D: usize> Solver<D> {
                         watch.after(chunk, dt, survey);
                         let departed =
                             borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling);
-                        lists.sort_ahead(plan, leaf, chunk, &widths, &mut scratch.sort);
+                        if !is_empty {
+                            lists.sort_ahead(plan, leaf, chunk, &widths, &mut scratch.sort);
+                        }
                         departed
                     };
                     if is_empty { work() } else { costs.time(leaf, work) }
