@@ -189,3 +189,63 @@ impl<const D: usize> Sides<D> {
         self.sides[faces]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use partition::Brick;
+
+    use super::*;
+    use crate::grid::reach::leaves_around;
+
+    /// Leaves of two levels, some of the coarser ones alone among finer ones.
+    fn tree<const D: usize>() -> KnownTree<D> {
+        let coarse = (0..4u32.pow(D as u32)).map(|number| {
+            let coord = std::array::from_fn(|axis| number / 4u32.pow(axis as u32) % 4);
+            Octant { level: 1, coord }
+        });
+        let split = |octant: &Octant<D>| octant.coord.iter().fold(7, |sum, c| 5 * sum + c) % 3 == 0;
+        let leaves = coarse.flat_map(|octant| match split(&octant) {
+            true => (0..Octant::<D>::CHILDREN).map(|child| octant.child(child)).collect(),
+            false => vec![octant],
+        });
+        KnownTree::whole(Brick { roots: [2; D] }, leaves.collect())
+    }
+
+    /// Small boxes on all faces, edges and corners of all coarse leaves are on the level of the finest leaf that they overlap.
+    fn sides_are_those_of_the_leaves<const D: usize>() {
+        let tree = tree::<D>();
+        let all: Vec<NearLeaf<D>> =
+            (0..tree.leaves().len()).map(|known| near_leaf(&tree, known, 1.0)).collect();
+        let cell = 0.125;
+        let mut found = [0; 2];
+        for (known, leaf) in all.iter().enumerate().filter(|(_, leaf)| leaf.level == 1) {
+            let around = leaves_around(&tree, known).into_iter().map(|other| all[other]);
+            let finer: Vec<NearLeaf<D>> = around.filter(|other| other.level > 1).collect();
+            let sides = Sides::new(*leaf, tree.leaves()[known], cell, &finer, &[]);
+            for index in 0..offset_count(D) {
+                let direction = offset::<D>(index);
+                let centre: [f64; D] =
+                    std::array::from_fn(|a| leaf.lower[a] + 0.25 + 0.25 * f64::from(direction[a]));
+                let half = [0.25 * cell; D];
+                let overlaps = |other: &&NearLeaf<D>| {
+                    (0..D)
+                        .all(|a| other.lower[a] < centre[a] + half[a] && other.upper[a] > centre[a] - half[a])
+                };
+                let finest = all.iter().filter(overlaps).map(|other| other.level).max();
+                let side = sides.side(sides.faces(&centre, &half));
+                assert_eq!(
+                    (side, finest),
+                    if finest == Some(1) { (Side::Own, finest) } else { (Side::Finer, Some(2)) }
+                );
+                found[usize::from(side == Side::Finer)] += 1;
+            }
+        }
+        assert!(found.iter().all(|&number| number > 20), "{found:?}");
+    }
+
+    #[test]
+    fn sides_are_those_of_the_leaves_in_the_plane_and_in_space() {
+        sides_are_those_of_the_leaves::<2>();
+        sides_are_those_of_the_leaves::<3>();
+    }
+}

@@ -2,7 +2,6 @@
 use rayon::prelude::*;
 
 use super::{Physics, Solver};
-use crate::kernel::simd::{LANES, Lanes};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// Limits on the time step.
@@ -50,55 +49,19 @@ impl<const D: usize> Solver<D> {
 
 impl<const D: usize> Physics<D> {
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
-        let material = |tag: u64| usize::from(Tag::unpack(tag).material);
+        let velocity: [&[f64]; D] = std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis));
+        let material = |p: usize| usize::from(Tag::unpack(chunk.tags()[p]).material);
         let (mut signal, mut first) = (0.0, 0);
         // One root for each run of particles of one material.
-        while let Some(&tag) = chunk.tags().get(first) {
-            let own = material(tag);
-            let rest = &chunk.tags()[first..];
-            // Mostly all, which is seen without a branch for each.
-            let run = match rest.iter().fold(true, |all, &tag| all & (material(tag) == own)) {
-                true => rest.len(),
-                false => rest.iter().take_while(|&&tag| material(tag) == own).count(),
-            };
-            let end = first + run;
-            let greatest = greatest_square::<D>(std::array::from_fn(|axis| {
-                &chunk.column(Layout::<D>::VELOCITY + axis)[first..end]
-            }));
+        while first < chunk.len() {
+            let (own, mut p, mut greatest) = (material(first), first, 0.0);
+            while p < chunk.len() && material(p) == own {
+                greatest = f64::max(greatest, velocity.iter().fold(0.0, |sum, v| v[p].mul_add(v[p], sum)));
+                p += 1;
+            }
             signal = f64::max(signal, self.materials[own].wave_speed() + greatest.sqrt());
-            first = end;
+            first = p;
         }
         signal
-    }
-}
-
-/// Greatest square of some vectors, whose components come axis by axis.
-fn greatest_square<const D: usize>(vectors: [&[f64]; D]) -> f64 {
-    let columns = vectors.map(|column| column.as_chunks::<LANES>());
-    let mut most = Lanes::splat(0.0);
-    for batch in 0..columns[0].0.len() {
-        let square = columns.iter().fold(Lanes::splat(0.0), |sum, (batches, _)| {
-            let along = Lanes::load(&batches[batch]);
-            along.mul_add(along, sum)
-        });
-        most = square.max(most);
-    }
-    let rest = (0..columns[0].1.len())
-        .map(|p| columns.iter().fold(0.0, |sum, (_, rest)| f64::mul_add(rest[p], rest[p], sum)));
-    most.to_array().into_iter().chain(rest).fold(0.0, f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn greatest_squares_of_any_number() {
-        for count in 0..40 {
-            let along = |factor: usize| (0..count).map(|i| ((i * factor + 3) % 40) as f64 - 20.0).collect();
-            let [x, y]: [Vec<f64>; 2] = [7, 11].map(along);
-            let squares = x.iter().zip(&y).map(|(x, y)| x * x + y * y);
-            assert_eq!(greatest_square([&x, &y]), squares.fold(0.0, f64::max));
-        }
     }
 }
