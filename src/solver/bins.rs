@@ -1,7 +1,7 @@
 //! Lists of the particles in each bin of one rank; `leaf_bins.rs` finds those of one leaf.
 use rayon::prelude::*;
 
-use super::leaf_bins::{LeafBins, Scratch, Sorting, crowded};
+use super::leaf_bins::{LeafBins, Scratch, Sorting};
 use super::sides::{NearLeaf, near_leaf};
 use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
@@ -64,15 +64,15 @@ impl<const D: usize> BinLists<D> {
         widths: &impl BoxWidths<D>,
     ) -> Result<(), BinMissing> {
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
-        let given = !widths.are_known_to_kernels();
         // All leaves, also after a failure: the others must not keep the lists of the step before.
         let sorted =
             leaves.with_min_len(8).map_init(Scratch::default, |scratch, (leaf, ((bins, sorted), own))| {
                 let chunk = &chunks[leaf];
                 // An empty leaf has nothing to list.
-                *sorted = !chunk.is_empty() && (given || bins.may_need_lists(plan, own, chunk, widths));
+                let sorting = Sorting { plan, widths, leaf, own };
+                *sorted = !chunk.is_empty() && bins.may_need_lists(chunk, &sorting);
                 if *sorted {
-                    *sorted = bins.sort(chunk, &Sorting { plan, widths, leaf, own }, scratch)?;
+                    *sorted = bins.sort(chunk, &sorting, scratch)?;
                 }
                 Ok(())
             });
@@ -171,10 +171,7 @@ impl<const D: usize> OfLeaf<'_, D> {
         scratch: &mut Scratch,
     ) {
         let Self { bins, own, .. } = self;
-        bins.forget();
-        if chunk.len() >= crowded(D) && bins.may_need_lists(plan, own, chunk, widths) {
-            bins.sort_ahead(chunk, &Sorting { plan, widths, leaf, own }, scratch);
-        }
+        bins.sort_ahead(chunk, &Sorting { plan, widths, leaf, own }, scratch);
     }
 }
 

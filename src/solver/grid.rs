@@ -10,7 +10,6 @@ use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
 use super::resample::{Resampling, Splits};
 use super::transfer::extent;
-use super::widths::Widths;
 use super::{Physics, Solver};
 use crate::grid::arena::Arenas;
 use crate::grid::census::{Census, surface_bytes};
@@ -103,7 +102,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Reach that the boxes of this rank need if they become `growth` times as wide. Where a reach is `known`,
     /// boxes are not looked at whose bounds do not ask for more.
     fn local_reach(&self, growth: f64, known: u32) -> u32 {
-        let widths = Widths { scheme: self.physics.scheme(), extent: extent(&self.grid.plan) };
+        let widths = self.physics.widths(&self.grid.plan);
         let root_edge = self.physics.root_edge;
         let leaves = self.forest.leaves().par_iter().zip(&self.chunks).with_min_len(32);
         let reaches = leaves.map(|(leaf, chunk)| {

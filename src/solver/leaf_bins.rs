@@ -20,7 +20,7 @@ use crate::particle::chunk::{Chunk, Layout};
 
 /// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
 /// more than it saves.
-pub(super) const fn crowded(d: usize) -> usize {
+const fn crowded(d: usize) -> usize {
     if d == 2 { 32 } else { 128 }
 }
 
@@ -88,12 +88,12 @@ impl<const D: usize> LeafBins<D> {
     /// Whether particles of the leaf may belong elsewhere than whole in its own bin.
     pub(super) fn may_need_lists(
         &self,
-        plan: &GridPlan<D>,
-        own: &NearLeaf<D>,
         chunk: &Chunk<D>,
-        widths: &impl BoxWidths<D>,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
     ) -> bool {
-        self.sides.is_some() || widths.bound(chunk) > 0.5 * plan.cell(own.level)
+        let &Sorting { plan, widths, own, .. } = sorting;
+        let given = !widths.are_known_to_kernels();
+        given || self.sides.is_some() || widths.bound(chunk) > 0.5 * plan.cell(own.level)
     }
 
     /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
@@ -135,6 +135,10 @@ impl<const D: usize> LeafBins<D> {
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) {
+        self.forget();
+        if chunk.len() < crowded(D) || !self.may_need_lists(chunk, sorting) {
+            return;
+        }
         self.begin();
         self.ahead = match self.look(chunk, 0, sorting, scratch) {
             Ok(()) => chunk.len(),

@@ -10,7 +10,6 @@ use super::phases::{Phase, Phases};
 use super::resample::Resampling;
 use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
-use super::widths::Widths;
 use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
@@ -133,13 +132,8 @@ pub(super) fn sort_with<const D: usize>(
 impl<const D: usize> Solver<D> {
     /// Lists the particles of each bin in leaves beside finer leaves.
     pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let extent = extent(&self.grid.plan);
-        sort_with(
-            &mut self.grid,
-            &self.chunks,
-            &mut self.phases,
-            &Widths { scheme: self.physics.scheme(), extent },
-        )
+        let widths = self.physics.widths(&self.grid.plan);
+        sort_with(&mut self.grid, &self.chunks, &mut self.phases, &widths)
     }
 
     /// P2G: scatters mass, affine momentum and the impulse of stress of the bins of a wave into their
@@ -253,10 +247,9 @@ impl<const D: usize> Solver<D> {
     /// leaves, in their order, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
     pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
-        let extent = extent(&self.grid.plan);
-        let resampling = Resampling::new(&self.physics, &scheme, extent);
+        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let resampling = resampling.as_ref();
-        let widths = Widths { scheme: self.physics.scheme(), extent };
+        let widths = self.physics.widths(&self.grid.plan);
         let borders = &self.grid.migration.borders;
         let (plan, fields, arenas) = (&self.grid.plan, &self.grid.fields, &self.grid.arenas);
         let lists = &mut self.grid.lists;

@@ -1,6 +1,9 @@
 //! Widths of boxes, as sorting needs them.
+use super::Physics;
 use super::bins::BoxWidths;
 use super::leaf_bins::{list_lanes, values};
+use super::transfer::extent;
+use crate::grid::GridPlan;
 use crate::kernel::simd::{LANES, Lanes};
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
@@ -11,6 +14,13 @@ pub(super) struct Widths<'a, const D: usize> {
     pub scheme: Scheme<'a>,
     /// Upper corner of the domain, m.
     pub extent: [f64; D],
+}
+
+impl<const D: usize> Physics<D> {
+    /// Half widths of boxes in the domain of a plan.
+    pub(super) fn widths(&self, plan: &GridPlan<D>) -> Widths<'_, D> {
+        Widths { scheme: self.scheme(), extent: extent(plan) }
+    }
 }
 
 impl<const D: usize> Widths<'_, D> {

@@ -98,6 +98,11 @@ pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Vec<u32> 
     each.filter(|(_, tag)| **tag & LEVEL == level && turn.has(**tag)).map(|(p, _)| p).collect()
 }
 
+/// Whether all tags are of a level, as in a tag, and without counts: those of most leaves are.
+fn are_plain(tags: &[u64], level: u64) -> bool {
+    tags.iter().fold(0, |differs, tag| differs | (tag ^ level)) & (LEVEL | BITS) == 0
+}
+
 /// What the tags of a chunk say, without the level of its leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Levels {
@@ -116,9 +121,7 @@ impl Levels {
     pub fn of(tags: &[u64]) -> Self {
         let coarsest = tags.iter().fold(LEVEL, |least, tag| least.min(tag & LEVEL));
         let mut levels = Self { coarsest, of_coarsest: 0, of_finer: 0, tried: false };
-        let differs = tags.iter().fold(0, |differs, tag| differs | (tag ^ coarsest));
-        // Most leaves have particles of one level only, without counts.
-        if differs & (LEVEL | BITS) == 0 {
+        if are_plain(tags, coarsest) {
             levels.of_coarsest = u32::from(!tags.is_empty());
             return levels;
         }
@@ -149,9 +152,7 @@ impl Levels {
 pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Look {
     let own = u64::from(level) << 32;
     let mut look = Look::default();
-    // Most leaves have particles of their own level only, without counts.
-    let differs = chunk.tags().iter().fold(0, |differs, tag| differs | (tag ^ own));
-    if differs & (LEVEL | BITS) == 0 {
+    if are_plain(chunk.tags(), own) {
         return look;
     }
     for &tag in chunk.tags() {
