@@ -88,12 +88,7 @@ impl<const D: usize> Setting<D> {
     }
 
     fn scheme(&self) -> Scheme<'_> {
-        Scheme {
-            boxes: BoxPolicy::default(),
-            root_cell: CELL,
-            transfer: Transfer::Apic,
-            materials: &self.materials,
-        }
+        Scheme::new(BoxPolicy::default(), CELL, Transfer::Apic, &self.materials)
     }
 }
 

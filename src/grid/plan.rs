@@ -16,6 +16,7 @@ use super::links::Links;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use super::sources::{Part, Piece};
 use crate::kernel::ARENA_EDGE;
+use crate::kernel::simd::prefetch;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;
@@ -102,6 +103,12 @@ impl<const D: usize> Bin<D> {
 }
 
 impl<const D: usize> GridPlan<D> {
+    /// Asks for what the plan has of a bin.
+    pub fn read_ahead(&self, bin: usize) {
+        let first = self.bins.as_ptr().wrapping_add(bin).addr();
+        (0..size_of::<Bin<D>>()).step_by(64).for_each(|byte| prefetch(first + byte));
+    }
+
     /// Collective. Builds the ghost layer and the grid of each rank.
     pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);

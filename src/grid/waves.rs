@@ -3,9 +3,6 @@
 //! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have scattered, and an
 //! arena whose blocks are all summed up serves a bin of a later wave. The first wave are the bins that other ranks need, so that
 //! their exchange can start. No sum depends on any of this: what a block adds up, and in which order, the plan says.
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use super::plan::GridPlan;
 use crate::kernel::{Row, arena_nodes};
 
@@ -51,7 +48,7 @@ pub struct Waves {
     wave_of_block: Vec<u32>,
     /// Memory for making plans.
     wave_of_bin: Vec<u32>,
-    free: BinaryHeap<Reverse<u32>>,
+    free: FreeSlots,
 }
 
 /// No wave.
@@ -115,12 +112,11 @@ impl Waves {
         let mut next = 0;
         for wave in 0..waves {
             for &bin in self.bins.of(wave) {
-                let slot = self.free.pop().map_or(next, |Reverse(slot)| slot);
+                let slot = self.free.take_least().unwrap_or(next);
                 next = next.max(slot + 1);
                 self.slots[bin as usize] = slot;
             }
-            let slots = &self.slots;
-            self.free.extend(self.freed.of(wave).iter().map(|&bin| Reverse(slots[bin as usize])));
+            self.freed.of(wave).iter().for_each(|&bin| self.free.add(self.slots[bin as usize]));
         }
         self.most = next as usize;
     }
@@ -153,6 +149,40 @@ impl Waves {
     /// Arenas that are needed.
     pub fn arenas(&self) -> usize {
         self.most
+    }
+}
+
+/// Arenas that are free, a bit each.
+#[derive(Clone, Debug, Default)]
+struct FreeSlots {
+    words: Vec<u64>,
+    /// Words before this one are zero.
+    first: usize,
+}
+
+impl FreeSlots {
+    fn clear(&mut self) {
+        self.words.clear();
+        self.first = 0;
+    }
+
+    fn add(&mut self, slot: u32) {
+        let word = slot as usize / 64;
+        if word >= self.words.len() {
+            self.words.resize(word + 1, 0);
+        }
+        self.words[word] |= 1 << (slot % 64);
+        self.first = self.first.min(word);
+    }
+
+    /// The first that is free is so no longer.
+    fn take_least(&mut self) -> Option<u32> {
+        let skipped = self.words[self.first..].iter().take_while(|word| **word == 0).count();
+        self.first += skipped;
+        let word = self.words.get_mut(self.first)?;
+        let bit = word.trailing_zeros();
+        *word &= *word - 1;
+        Some(64 * self.first as u32 + bit)
     }
 }
 

@@ -130,7 +130,7 @@ fn stretches<const D: usize>(
     batch: &Batch,
     scheme: &Scheme,
 ) -> [Lanes; D] {
-    let plastic = plastic_lanes(&batch.materials(tags), scheme);
+    let plastic = if scheme.is_plastic { plastic_lanes(&batch.materials(tags), scheme) } else { 0 };
     let mut elastic = [Lanes::splat(0.0); 6];
     let mut stretch = [Lanes::splat(0.0); D];
     for axis in 0..D {

@@ -144,6 +144,21 @@ pub struct Scheme<'a> {
     pub transfer: Transfer,
     /// Materials by index (see [`crate::particle::chunk::Tag`]).
     pub materials: &'a [Box<dyn Material>],
+    /// Whether any of them flows. If not, no particle is asked.
+    pub is_plastic: bool,
+}
+
+impl<'a> Scheme<'a> {
+    /// For these materials; `root_cell` is the edge of a cell of level 0, m.
+    pub fn new(
+        boxes: BoxPolicy,
+        root_cell: f64,
+        transfer: Transfer,
+        materials: &'a [Box<dyn Material>],
+    ) -> Self {
+        let is_plastic = materials.iter().any(|material| material.is_plastic());
+        Self { boxes, root_cell, transfer, materials, is_plastic }
+    }
 }
 
 /// Part of a particle's box, for boxes wider than a cell: the weight of a box is the mean of the

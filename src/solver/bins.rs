@@ -12,7 +12,8 @@ use crate::particle::Chunk;
 /// Particle lists of the bins of one rank.
 #[derive(Clone, Debug, Default)]
 pub struct BinLists<const D: usize> {
-    leaves: Vec<LeafBins<D>>,
+    /// Of leaves beside finer ones, and of others that have needed lists. For the rest nothing is read or kept.
+    leaves: Vec<Option<Box<LeafBins<D>>>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
 }
@@ -48,7 +49,7 @@ impl<const D: usize> BinLists<D> {
     pub fn new(plan: &GridPlan<D>) -> Self {
         let own = plan.leaf_start.len() - 1;
         let first = plan.tree.first_own();
-        let leaves = (0..own).map(|leaf| LeafBins::new(plan, first + leaf, plan.leaf_bins(leaf).len()));
+        let leaves = (0..own).map(|leaf| LeafBins::beside_finer(plan, first + leaf));
         let bounds = (0..own).map(|leaf| near_leaf(&plan.tree, first + leaf, plan.root_edge));
         Self { leaves: leaves.collect(), sorted: vec![false; own], bounds: bounds.collect() }
     }
@@ -70,8 +71,9 @@ impl<const D: usize> BinLists<D> {
                 let chunk = &chunks[leaf];
                 // An empty leaf has nothing to list.
                 let sorting = Sorting { plan, widths, leaf, own };
-                *sorted = !chunk.is_empty() && bins.may_need_lists(chunk, &sorting);
+                *sorted = !chunk.is_empty() && may_need_lists(bins.as_deref(), chunk, &sorting);
                 if *sorted {
+                    let bins = bins.get_or_insert_with(|| Box::new(LeafBins::beside_others(plan, leaf)));
                     *sorted = bins.sort(chunk, &sorting, scratch)?;
                 }
                 Ok(())
@@ -82,12 +84,12 @@ impl<const D: usize> BinLists<D> {
     /// The lists of each own leaf, for what advances its particles.
     pub(super) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds);
-        leaves.map(|((bins, &sorted), own)| OfLeaf { bins, sorted, own })
+        leaves.map(|((bins, &sorted), own)| OfLeaf { bins: bins.as_deref_mut(), sorted, own })
     }
 
     /// Not collective. To be called when particles have not only advanced or been appended since the last sort.
     pub(super) fn forget(&mut self) {
-        self.leaves.iter_mut().for_each(LeafBins::forget);
+        self.leaves.iter_mut().flatten().for_each(|bins| bins.forget());
     }
 
     /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
@@ -99,22 +101,24 @@ impl<const D: usize> BinLists<D> {
         of_parts: impl Fn(&Bin<D>, &Chunk<D>, &[SubBox<D>], &mut dyn FnMut(usize, [f64; D])) + Sync,
     ) {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).enumerate().with_min_len(8);
-        leaves.filter(|(_, (bins, sorted))| **sorted && !bins.cut.is_empty()).for_each(
-            |(leaf, (bins, _))| {
-                let mut totals = vec![[0.0; D]; bins.cut.len()];
-                for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
-                    of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
-                        let part = &members.parts[part];
-                        let total = &mut totals[part.slot as usize];
-                        for axis in 0..D {
-                            total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
-                        }
-                    });
-                }
-                let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
-                parts.for_each(|part| part.spread = totals[part.slot as usize]);
-            },
-        );
+        let lists = leaves.filter_map(|(leaf, (bins, &sorted))| {
+            let bins = bins.as_deref_mut().filter(|bins| sorted && !bins.cut.is_empty())?;
+            Some((leaf, bins))
+        });
+        lists.for_each(|(leaf, bins)| {
+            let mut totals = vec![[0.0; D]; bins.cut.len()];
+            for (members, bin) in bins.members.iter().zip(&plan.bins[plan.leaf_bins(leaf)]) {
+                of_parts(bin, &chunks[leaf], &members.parts, &mut |part, spread| {
+                    let part = &members.parts[part];
+                    let total = &mut totals[part.slot as usize];
+                    for axis in 0..D {
+                        total[axis] = part.fraction.mul_add(spread[axis], total[axis]);
+                    }
+                });
+            }
+            let parts = bins.members.iter_mut().flat_map(|members| &mut members.parts);
+            parts.for_each(|part| part.spread = totals[part.slot as usize]);
+        });
     }
 
     /// The bins that have members, in order, with the nodes that these touch.
@@ -135,21 +139,21 @@ impl<const D: usize> BinLists<D> {
 
     /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
     pub fn is_finer_within(&self, leaf: usize, x: &[f64; D], distance: f64) -> bool {
-        self.leaves[leaf]
-            .finer
-            .iter()
-            .any(|near| (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance))
+        let is_near = |near: &NearLeaf<D>| {
+            (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance)
+        };
+        self.leaves[leaf].as_deref().is_some_and(|bins| bins.finer.iter().any(is_near))
     }
 
     /// The bins of own leaf `leaf`, or `None` if all its particles are whole in its own bin.
     pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
-        self.sorted[leaf].then_some(&self.leaves[leaf])
+        self.leaves[leaf].as_deref().filter(|_| self.sorted[leaf])
     }
 }
 
 /// The lists of one own leaf.
 pub(super) struct OfLeaf<'a, const D: usize> {
-    bins: &'a mut LeafBins<D>,
+    bins: Option<&'a mut LeafBins<D>>,
     sorted: bool,
     own: &'a NearLeaf<D>,
 }
@@ -157,7 +161,7 @@ pub(super) struct OfLeaf<'a, const D: usize> {
 impl<const D: usize> OfLeaf<'_, D> {
     /// As [`BinLists::of_leaf`].
     pub fn lists(&self) -> Option<&LeafBins<D>> {
-        self.sorted.then_some(self.bins)
+        self.bins.as_deref().filter(|_| self.sorted)
     }
 
     /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are gone: what it looks
@@ -171,8 +175,25 @@ impl<const D: usize> OfLeaf<'_, D> {
         scratch: &mut Scratch,
     ) {
         let Self { bins, own, .. } = self;
-        bins.sort_ahead(chunk, &Sorting { plan, widths, leaf, own }, scratch);
+        let sorting = Sorting { plan, widths, leaf, own };
+        if let Some(bins) = bins {
+            bins.forget();
+            if may_need_lists(Some(bins), chunk, &sorting) {
+                bins.sort_ahead(chunk, &sorting, scratch);
+            }
+        }
     }
+}
+
+/// Whether particles of a leaf may belong elsewhere than whole in its own bin. `bins` are those of the leaf, if it has any.
+fn may_need_lists<const D: usize>(
+    bins: Option<&LeafBins<D>>,
+    chunk: &Chunk<D>,
+    sorting: &Sorting<'_, D, impl BoxWidths<D>>,
+) -> bool {
+    let &Sorting { plan, widths, own, .. } = sorting;
+    let given = !widths.are_known_to_kernels();
+    given || bins.is_some_and(LeafBins::is_beside_finer) || widths.bound(chunk) > 0.5 * plan.cell(own.level)
 }
 
 /// The nodes that the members of a bin touch.

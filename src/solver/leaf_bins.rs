@@ -63,37 +63,35 @@ pub(super) struct Sorting<'a, const D: usize, W> {
 }
 
 impl<const D: usize> LeafBins<D> {
-    pub(super) fn new(plan: &GridPlan<D>, known: usize, bins: usize) -> Self {
+    /// Of a known leaf, if leaves around it are finer.
+    pub(super) fn beside_finer(plan: &GridPlan<D>, known: usize) -> Option<Box<Self>> {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
         let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
         // Around most leaves nothing is finer.
         let is_far = tree.reach_in_leaves() > 1;
         let looks = is_far || tree.is_beside_finer(here.level, here.coord);
-        let mut around = if looks { leaves_around(tree, known) } else { Vec::new() };
+        let around = if looks { leaves_around(tree, known) } else { Vec::new() };
         if around.iter().all(|&leaf| tree.leaves()[leaf].level <= here.level) {
-            around.clear();
+            return None;
         }
         let around: Vec<NearLeaf<D>> = around.into_iter().map(near).collect();
         let finer: Vec<NearLeaf<D>> = around.iter().filter(|leaf| leaf.level > here.level).cloned().collect();
-        let sides = (!finer.is_empty()).then(|| {
-            let bins = &plan.bins[plan.leaf_bins(known - tree.first_own())];
-            let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
-            Sides::new(own, here, cell, &finer, bins)
-        });
-        let members = vec![Members::default(); bins];
-        Self { members, cut: Vec::new(), finer, around, sides, elsewhere: Vec::new(), ahead: 0 }
+        let leaf = known - tree.first_own();
+        let bins = &plan.bins[plan.leaf_bins(leaf)];
+        let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
+        let sides = Some(Sides::new(own, here, cell, &finer, bins));
+        Some(Box::new(Self { finer, around, sides, ..Self::beside_others(plan, leaf) }))
     }
 
-    /// Whether particles of the leaf may belong elsewhere than whole in its own bin.
-    pub(super) fn may_need_lists(
-        &self,
-        chunk: &Chunk<D>,
-        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
-    ) -> bool {
-        let &Sorting { plan, widths, own, .. } = sorting;
-        let given = !widths.are_known_to_kernels();
-        given || self.sides.is_some() || widths.bound(chunk) > 0.5 * plan.cell(own.level)
+    /// Of an own leaf beside leaves of its level and coarser ones.
+    pub(super) fn beside_others(plan: &GridPlan<D>, leaf: usize) -> Self {
+        Self { members: vec![Members::default(); plan.leaf_bins(leaf).len()], ..Self::default() }
+    }
+
+    /// Whether leaves around are finer.
+    pub(super) fn is_beside_finer(&self) -> bool {
+        self.sides.is_some()
     }
 
     /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
@@ -135,8 +133,7 @@ impl<const D: usize> LeafBins<D> {
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) {
-        self.forget();
-        if chunk.len() < crowded(D) || !self.may_need_lists(chunk, sorting) {
+        if chunk.len() < crowded(D) {
             return;
         }
         self.begin();

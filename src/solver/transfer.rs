@@ -32,12 +32,7 @@ const READ_AHEAD: usize = 25;
 impl<const D: usize> Physics<D> {
     /// What the kernels need to know.
     pub(super) fn scheme(&self) -> Scheme<'_> {
-        Scheme {
-            boxes: self.boxes,
-            root_cell: self.root_edge / 4.0,
-            transfer: self.transfer,
-            materials: &self.materials,
-        }
+        Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)
     }
 }
 
@@ -152,6 +147,7 @@ impl<const D: usize> Solver<D> {
                 let selected = Selected::of(lists, number, chunk);
                 arena.clear(&window_of(lists, number));
                 read_ahead(arena.next);
+                plan.read_ahead(arena.next_but_one);
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
                 let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
@@ -284,10 +280,14 @@ impl<const D: usize> Solver<D> {
                         }
                         let window = window_of(lists, number);
                         fields.load(plan, bin, &window, arena);
-                        let next = arenas.after(bin).map_or(Place::default(), |(next, window)| {
+                        let mut after = arenas.after(bin);
+                        let next = after.next().map_or(Place::default(), |(next, window)| {
                             fields.read_ahead(plan, next, &window);
                             places[plan.bins[next].leaf as usize]
                         });
+                        if let Some((next_but_one, _)) = after.next() {
+                            plan.read_ahead(next_but_one);
+                        }
                         if let Some(changes) = changes {
                             load_rows(plan, bin, &window, changes, increments);
                         }

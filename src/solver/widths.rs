@@ -83,7 +83,7 @@ mod tests {
         let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
         let materials = [material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)];
         let boxes = BoxPolicy::Volume { min_stretch: 0.25, max_stretch: 2.0 };
-        let scheme = Scheme { boxes, root_cell: 1.0, transfer: Transfer::Apic, materials: &materials };
+        let scheme = Scheme::new(boxes, 1.0, Transfer::Apic, &materials);
         let widths = Widths { scheme, extent: [100.0; 2] };
         let mut chunk = Chunk::<2>::new();
         let mut push = |half: f64, stretch: f64| {

@@ -93,7 +93,7 @@ fn frame<const D: usize>() -> Frame<D> {
 }
 
 fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
-    Scheme { boxes: BoxPolicy::default(), root_cell: CELL, transfer, materials }
+    Scheme::new(BoxPolicy::default(), CELL, transfer, materials)
 }
 
 /// `n` particles at random in the block with random velocity, B, b and stress; materials in turn.

@@ -207,7 +207,7 @@ fn boxes_stay_in_the_domain_and_follow_the_policy() {
     chunk.column_mut(Layout::<3>::POSITION)[0] = 0.01 * CELL;
     let mut half = Vec::new();
     for boxes in [BoxPolicy::default(), BoxPolicy::Fixed, BoxPolicy::Cell] {
-        let scheme = Scheme { boxes, root_cell: CELL, transfer: Transfer::Apic, materials: &materials };
+        let scheme = Scheme::new(boxes, CELL, Transfer::Apic, &materials);
         domain::half_widths(&chunk, Select::All, CELL, &extent, &scheme, &mut half);
         assert_eq!(half[0][0], 0.01 * CELL);
         for p in 0..chunk.len() {

@@ -34,7 +34,7 @@ fn materials() -> Vec<Box<dyn Material>> {
 }
 
 fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
-    Scheme { boxes: BoxPolicy::default(), root_cell: CELL, transfer, materials }
+    Scheme::new(BoxPolicy::default(), CELL, transfer, materials)
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
