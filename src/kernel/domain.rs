@@ -130,7 +130,7 @@ fn stretches<const D: usize>(
     batch: &Batch,
     scheme: &Scheme,
 ) -> [Lanes; D] {
-    let plastic = if scheme.is_plastic { plastic_lanes(&batch.materials(tags), scheme) } else { 0 };
+    let plastic = plastic_lanes(|| batch.materials(tags), scheme);
     let mut elastic = [Lanes::splat(0.0); 6];
     let mut stretch = [Lanes::splat(0.0); D];
     for axis in 0..D {
@@ -156,9 +156,13 @@ fn stretches<const D: usize>(
     stretch
 }
 
-/// Bit i tells whether lane i is of a plastic material.
+/// Bit i tells whether lane i is of a plastic material. `index` gives the materials, and is called only if some are plastic.
 #[inline(always)]
-pub(super) fn plastic_lanes(index: &[u16; LANES], scheme: &Scheme) -> u32 {
+pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -> u32 {
+    if !scheme.is_plastic {
+        return 0;
+    }
+    let index = index();
     let is_plastic = |lane: usize| scheme.materials[usize::from(index[lane])].is_plastic();
     if index.iter().all(|&i| i == index[0]) {
         return if is_plastic(0) { (1 << LANES) - 1 } else { 0 };

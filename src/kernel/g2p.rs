@@ -225,7 +225,7 @@ fn advance<const D: usize>(
         }
     }
     let index = batch.materials(tags);
-    let plastic = scheme.is_plastic && domain::plastic_lanes(&index, scheme) != 0;
+    let plastic = domain::plastic_lanes(|| index, scheme) != 0;
     let mut elastic = [zero; 6];
     for c in 0..Layout::<D>::SYMMETRIC {
         elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
