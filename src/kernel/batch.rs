@@ -1,6 +1,6 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
-use super::simd::{LANES, Lanes, Mask, prefetch};
+use super::simd::{LANES, Vector, VectorMask, prefetch};
 use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// How far ahead columns are asked for, in particles, in the next chunk where this one ends: a batch at a time is too
@@ -161,14 +161,14 @@ impl Batch {
 
     /// `values` of members, 0 elsewhere.
     #[inline(always)]
-    pub fn of_members(&self, values: Lanes) -> Lanes {
-        self.merged(values, Lanes::splat(0.0))
+    pub fn of_members<V: Vector>(&self, values: V) -> V {
+        self.merged(values, V::splat(0.0))
     }
 
     /// `values` of members, `others` elsewhere.
     #[inline(always)]
-    fn merged(&self, values: Lanes, others: Lanes) -> Lanes {
-        if self.lanes == ALL { values } else { Mask::from_bits(self.lanes).select(values, others) }
+    fn merged<V: Vector>(&self, values: V, others: V) -> V {
+        if self.lanes == ALL { values } else { V::Mask::from_bits(self.lanes).select(values, others) }
     }
 
     /// Particle of a lane.
@@ -185,41 +185,40 @@ impl Batch {
 
     /// Reads a column.
     #[inline(always)]
-    pub fn load(&self, reals: &[f64], stride: usize, column: usize) -> Lanes {
+    pub fn load<V: Vector>(&self, reals: &[f64], stride: usize, column: usize) -> V {
         if self.contiguous {
             let start = column * stride + self.particle(0);
             self.read_ahead(column);
             match reals[start..start + LANES].first_chunk() {
-                Some(values) => Lanes::load(values),
-                None => Lanes::splat(0.0),
+                Some(values) => V::load(values),
+                None => V::splat(0.0),
             }
         } else {
-            self.load_scattered(reals, column * stride)
+            V::load(&self.load_scattered(reals, column * stride))
         }
     }
 
     #[inline(never)]
-    fn load_scattered(&self, reals: &[f64], column: usize) -> Lanes {
-        Lanes::new(std::array::from_fn(|lane| reals[column + self.particle(lane)]))
+    fn load_scattered(&self, reals: &[f64], column: usize) -> [f64; LANES] {
+        std::array::from_fn(|lane| reals[column + self.particle(lane)])
     }
 
     /// Writes a column.
     #[inline(always)]
-    pub fn store(&self, reals: &mut [f64], stride: usize, column: usize, values: Lanes) {
+    pub fn store<V: Vector>(&self, reals: &mut [f64], stride: usize, column: usize, values: V) {
         if self.contiguous {
             let start = column * stride + self.particle(0);
             self.read_ahead(column);
             if let Some(to) = reals[start..start + LANES].first_chunk_mut() {
-                self.merged(values, Lanes::load(to)).store(to);
+                self.merged(values, V::load(to)).store(to);
             }
         } else {
-            self.store_scattered(reals, column * stride, values);
+            self.store_scattered(reals, column * stride, &values.to_array());
         }
     }
 
     #[inline(never)]
-    fn store_scattered(&self, reals: &mut [f64], column: usize, values: Lanes) {
-        let values = values.to_array();
+    fn store_scattered(&self, reals: &mut [f64], column: usize, values: &[f64; LANES]) {
         for lane in self.members() {
             reals[column + self.particle(lane)] = values[lane];
         }
@@ -227,8 +226,8 @@ impl Batch {
 
     /// Positions.
     #[inline(always)]
-    pub fn positions<const D: usize>(&self, reals: &[f64], stride: usize) -> [Lanes; D] {
-        let mut position = [Lanes::splat(0.0); D];
+    pub fn positions<V: Vector, const D: usize>(&self, reals: &[f64], stride: usize) -> [V; D] {
+        let mut position = [V::splat(0.0); D];
         for axis in 0..D {
             position[axis] = self.load(reals, stride, Layout::<D>::POSITION + axis);
         }

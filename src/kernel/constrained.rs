@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use super::batch::{Batch, lanes_in};
 use super::hanging::HangingNodes;
-use super::simd::{LANES, Lanes};
+use super::simd::LANES;
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, stencil_bases};
 
@@ -160,19 +160,17 @@ impl ConstrainedNodes {
         weights: &Weights<D>,
         nodes: &NodeWeights,
         touched: u32,
-        spread: &mut [Lanes; D],
+        spread: &mut [[f64; LANES]; D],
     ) {
-        let mut values: [[f64; LANES]; D] = spread.map(Lanes::to_array);
         for lane in lanes_in(touched) {
             let mut sums = [0.0; D];
             self.for_each(weights, nodes, lane, |column, axis, weight| {
                 sums[axis] = weight.mul_add(self.second[column], sums[axis]);
             });
             for axis in 0..D {
-                values[axis][lane] += sums[axis];
+                spread[axis][lane] += sums[axis];
             }
         }
-        *spread = values.map(Lanes::new);
     }
 }
 

@@ -4,7 +4,7 @@
 //! the block of a particle call the same code and get the same bits.
 use super::batch::{Batch, Batches};
 use super::math::{exp, ln};
-use super::simd::{LANES, Lanes, Mask, prefetch};
+use super::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
@@ -78,24 +78,24 @@ fn collect<const D: usize>(
     for batch in Batches::new(select, chunk, Place::default()) {
         let position = batch.positions(reals, stride);
         let half = of_batch(reals, stride, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
-        let half = half.map(Lanes::to_array);
+        let half: [[f64; LANES]; D] = half.map(Lanes::to_array);
         out.extend(batch.members().map(|lane| std::array::from_fn(|axis| half[axis][lane])));
     }
 }
 
 /// Half widths of a batch.
 #[inline(always)]
-pub(super) fn of_batch<const D: usize>(
+pub(super) fn of_batch<V: Vector, const D: usize>(
     reals: &[f64],
     stride: usize,
     tags: &[u64],
     batch: &Batch,
-    position: &[Lanes; D],
+    position: &[V; D],
     cell: f64,
     greatest: f64,
     extent: &[f64; D],
     scheme: &Scheme,
-) -> [Lanes; D] {
+) -> [V; D] {
     let mut half = match scheme.boxes {
         BoxPolicy::Fixed => [batch.load(reals, stride, Layout::<D>::HALF); D],
         BoxPolicy::Cell => {
@@ -103,36 +103,36 @@ pub(super) fn of_batch<const D: usize>(
                 let level = Tag::unpack(tags[batch.particle(lane)]).level;
                 0.5 * scheme.root_cell / f64::from(1u32 << level.min(31))
             });
-            [Lanes::new(half); D]
+            [V::new(half); D]
         }
         BoxPolicy::Volume { min_stretch, max_stretch } => {
-            let original = batch.load(reals, stride, Layout::<D>::HALF);
-            let mut half = stretches(reals, stride, tags, batch, scheme);
+            let original: V = batch.load(reals, stride, Layout::<D>::HALF);
+            let mut half: [V; D] = stretches(reals, stride, tags, batch, scheme);
             for half in &mut half {
-                *half = original * half.max(Lanes::splat(min_stretch)).min(Lanes::splat(max_stretch));
+                *half = original * half.max(V::splat(min_stretch)).min(V::splat(max_stretch));
             }
             half
         }
     };
     for axis in 0..D {
-        let wall = position[axis].min(Lanes::splat(extent[axis]) - position[axis]);
-        half[axis] = half[axis].min(Lanes::splat(greatest)).min(wall).max(Lanes::splat(LEAST_SHARE * cell));
+        let wall = position[axis].min(V::splat(extent[axis]) - position[axis]);
+        half[axis] = half[axis].min(V::splat(greatest)).min(wall).max(V::splat(LEAST_SHARE * cell));
     }
     half
 }
 
 /// Ratio of the half widths to the undeformed ones that keeps the volume.
 #[inline(always)]
-fn stretches<const D: usize>(
+fn stretches<V: Vector, const D: usize>(
     reals: &[f64],
     stride: usize,
     tags: &[u64],
     batch: &Batch,
     scheme: &Scheme,
-) -> [Lanes; D] {
+) -> [V; D] {
     let plastic = plastic_lanes(|| batch.materials(tags), scheme);
-    let mut elastic = [Lanes::splat(0.0); 6];
-    let mut stretch = [Lanes::splat(0.0); D];
+    let mut elastic = [V::splat(0.0); 6];
+    let mut stretch = [V::splat(0.0); D];
     for axis in 0..D {
         elastic[axis] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + axis);
         stretch[axis] = elastic[axis].sqrt();
@@ -144,12 +144,12 @@ fn stretches<const D: usize>(
         elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
     }
     let gain = batch.load(reals, stride, Layout::<D>::HISTORY + 1);
-    let volume_log = ln(determinant(&elastic)).mul_add(Lanes::splat(0.5), gain);
+    let volume_log = ln(determinant(&elastic)).mul_add(V::splat(0.5), gain);
     let isotropic = exp(volume_log * (1.0 / D as f64));
     if plastic == (1 << LANES) - 1 {
         return [isotropic; D];
     }
-    let mask = Mask::from_bits(plastic);
+    let mask = V::Mask::from_bits(plastic);
     for stretch in &mut stretch {
         *stretch = mask.select(isotropic, *stretch);
     }

@@ -11,7 +11,7 @@ use super::batch::{Batch, Batches};
 pub use super::gathered::{Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
-use super::simd::{Kernel, LANES, Lanes, widest};
+use super::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
@@ -64,28 +64,19 @@ impl<const D: usize> Kernel for Gather<'_, D> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<V: Vector>(self) -> f64 {
         let Self { scratch, chunk, select, frame, scheme, dt, fields, leavers, next } = self;
         let batches = Batches::new(select, chunk, next);
         let (reals, stride, tags) = chunk.reals_mut_and_tags();
-        let cell = frame.cell;
+        let (cell, extent) = (frame.cell, &frame.extent);
         let Scratch { weights, nodes, sums } = scratch;
-        let mut greatest = Lanes::splat(0.0);
+        let mut greatest = V::splat(0.0);
         for batch in batches {
-            let position = batch.positions(reals, stride);
-            let half = domain::of_batch(
-                reals,
-                stride,
-                tags,
-                &batch,
-                &position,
-                cell,
-                0.5 * cell,
-                &frame.extent,
-                scheme,
-            );
+            let position: [V; D] = batch.positions(reals, stride);
+            let half =
+                domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, extent, scheme);
             weights.fill(frame, &position, &position, &half);
-            sums.gather(weights, nodes, &batch, frame.cell, fields);
+            sums.gather(weights, nodes, &batch, cell, fields);
             greatest =
                 advance(reals, stride, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
         }
@@ -107,7 +98,7 @@ pub fn gather_sub_boxes<const D: usize>(
     let Scratch { weights, nodes, sums } = scratch;
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let position = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
         sums.gather(weights, nodes, &batch, frame.cell, fields);
@@ -132,7 +123,7 @@ pub fn advance_gathered<const D: usize>(
     let mut greatest = Lanes::splat(0.0);
     for (particles, gathered) in particles.chunks(LANES).zip(gathered.chunks(LANES)) {
         let batch = Batch::from_indices(particles, |&p| p);
-        let position = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(reals, stride);
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
@@ -156,7 +147,7 @@ pub fn interpolate<const D: usize>(
     let (tags, cell) = (chunk.tags(), frame.cell);
     let Scratch { weights, .. } = scratch;
     for batch in Batches::new(select, chunk, Place::default()) {
-        let position = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
@@ -168,35 +159,35 @@ pub fn interpolate<const D: usize>(
     }
 }
 
-fn largest(lanes: Lanes) -> f64 {
+fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }
 
 /// New state of a batch; returns wave speed plus particle speed.
 #[inline(always)]
-fn advance<const D: usize>(
+fn advance<V: Vector, const D: usize>(
     reals: &mut [f64],
     stride: usize,
     tags: &[u64],
     batch: &Batch,
-    position: &[Lanes; D],
+    position: &[V; D],
     sums: &Sums<D>,
     scheme: &Scheme,
     dt: f64,
     leavers: &mut Leavers<D>,
-) -> Lanes {
-    let zero = Lanes::splat(0.0);
-    let step = Lanes::splat(dt);
-    let velocity = Lanes::columns(sums.velocity);
+) -> V {
+    let zero = V::splat(0.0);
+    let step = V::splat(dt);
+    let velocity = V::columns(&sums.velocity);
     let mut square = zero;
     let mut gradient = [[zero; D]; D];
     for k in 0..D {
-        let column = Lanes::columns(sums.gradient[k]);
+        let column = V::columns(&sums.gradient[k]);
         for i in 0..D {
             gradient[i][k] = column[i];
         }
     }
-    let increment = if scheme.transfer.has_increments() { Lanes::columns(sums.increment) } else { [zero; 4] };
+    let increment = if scheme.transfer.has_increments() { V::columns(&sums.increment) } else { [zero; 4] };
     let mut moved = *position;
     for i in 0..D {
         moved[i] = velocity[i].mul_add(step, position[i]);
@@ -204,8 +195,8 @@ fn advance<const D: usize>(
         let new = match scheme.transfer {
             Transfer::Apic | Transfer::Tpic => velocity[i],
             Transfer::Flip { blend } => {
-                let flip = batch.load(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
-                (flip - velocity[i]).mul_add(Lanes::splat(blend), velocity[i])
+                let flip = batch.load::<V>(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
+                (flip - velocity[i]).mul_add(V::splat(blend), velocity[i])
             }
             Transfer::Xpic { .. } => increment[i],
         };
@@ -214,7 +205,7 @@ fn advance<const D: usize>(
     }
     leavers.look(batch, &moved);
     for k in 0..D {
-        let affine = Lanes::columns(sums.affine[k]);
+        let affine = V::columns(&sums.affine[k]);
         for i in 0..D {
             let value = match scheme.transfer {
                 Transfer::Apic => affine[i],
@@ -224,47 +215,54 @@ fn advance<const D: usize>(
             batch.store(reals, stride, Layout::<D>::AFFINE + D * i + k, value);
         }
     }
-    let index = batch.materials(tags);
+    // Jobs with one material need not read tags.
+    let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
     let plastic = domain::plastic_lanes(|| index, scheme) != 0;
     let mut elastic = [zero; 6];
     for c in 0..Layout::<D>::SYMMETRIC {
         elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
     }
-    let mut state = State::new(strained(&elastic, &gradient, step));
+    let trial = strained(&elastic, &gradient, step);
+    let mut state = State::new([Lanes::splat(0.0); 6]);
+    for c in 0..6 {
+        trial[c].store(state.elastic[c].as_array_mut());
+    }
     if plastic {
         for h in 0..material::HISTORIES {
-            state.history[h] = batch.load(reals, stride, Layout::<D>::HISTORY + h);
+            let history: V = batch.load(reals, stride, Layout::<D>::HISTORY + h);
+            history.store(state.history[h].as_array_mut());
         }
     }
     material::update(scheme.materials, &index, &mut state, D == 2);
+    let result = |lanes: &Lanes| V::load(lanes.as_array());
     for c in 0..Layout::<D>::SYMMETRIC {
-        batch.store(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c, state.elastic[c]);
-        batch.store(reals, stride, Layout::<D>::STRESS + c, state.stress[c]);
+        batch.store(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
+        batch.store(reals, stride, Layout::<D>::STRESS + c, result(&state.stress[c]));
     }
     if plastic {
         for h in 0..material::HISTORIES {
-            batch.store(reals, stride, Layout::<D>::HISTORY + h, state.history[h]);
+            batch.store(reals, stride, Layout::<D>::HISTORY + h, result(&state.history[h]));
         }
-        let work = batch.load(reals, stride, Layout::<D>::WORK) + state.work;
+        let work = batch.load::<V>(reals, stride, Layout::<D>::WORK) + result(&state.work);
         batch.store(reals, stride, Layout::<D>::WORK, work);
     }
-    let speed = state.wave_speed + square.sqrt();
-    batch.of_members(speed.le(Lanes::splat(f64::MAX)).select(speed, Lanes::splat(f64::INFINITY)))
+    let speed = result(&state.wave_speed) + square.sqrt();
+    batch.of_members(speed.le(V::splat(f64::MAX)).select(speed, V::splat(f64::INFINITY)))
 }
 
 /// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.
 #[inline(always)]
-fn strained<const D: usize>(b: &[Lanes; 6], gradient: &[[Lanes; D]; D], step: Lanes) -> [Lanes; 6] {
+fn strained<V: Vector, const D: usize>(b: &[V; 6], gradient: &[[V; D]; D], step: V) -> [V; 6] {
     let mut a = *gradient;
     for i in 0..D {
         for k in 0..D {
-            let unit = Lanes::splat(if i == k { 1.0 } else { 0.0 });
+            let unit = V::splat(if i == k { 1.0 } else { 0.0 });
             a[i][k] = gradient[i][k].mul_add(step, unit);
         }
     }
     let mut out = *b;
     for i in 0..D {
-        let mut ab = [Lanes::splat(0.0); D];
+        let mut ab = [V::splat(0.0); D];
         for j in 0..D {
             ab[j] = a[i][0] * b[super::symmetric_index::<D>(0, j)];
             for k in 1..D {

@@ -69,6 +69,7 @@ impl<const D: usize> Gathered<D> {
 
 /// [`Gathered`] of a batch, one row per lane. Made once and filled for batch after batch; lanes that
 /// a batch does not fill keep what they had, which is valid.
+#[repr(align(64))]
 pub(super) struct Sums<const D: usize> {
     pub velocity: [F64x4; LANES],
     pub gradient: [[F64x4; LANES]; D],

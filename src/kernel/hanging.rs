@@ -12,7 +12,7 @@
 //! The hanging nodes of a stencil are those of a few boxes of nodes; beside a plane face they are one. Within a box the
 //! factors are those of each axis.
 use super::batch::{Batch, lanes_in};
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{F64x4, LANES, Lanes, Vector};
 use super::weights::{Weights, add_products, dot, pencils};
 use super::{ARENA_EDGE, BASES, Row, stencil_bases};
 
@@ -135,9 +135,8 @@ impl HangingNodes {
         weights: &Weights<D>,
         touched: u32,
         cell: f64,
-        spread: &mut [Lanes; D],
+        spread: &mut [[f64; LANES]; D],
     ) {
-        let mut values = spread.map(Lanes::to_array);
         for lane in lanes_in(touched) {
             for nodes in self.of_lane(weights, lane) {
                 let (mut inside, mut odd) = ([0.0; D], [0.0; D]);
@@ -151,11 +150,10 @@ impl HangingNodes {
                 }
                 for k in 0..D {
                     let others = (0..D).filter(|other| *other != k).map(|other| inside[other]);
-                    values[k][lane] += cell * cell * odd[k] * others.product::<f64>();
+                    spread[k][lane] += cell * cell * odd[k] * others.product::<f64>();
                 }
             }
         }
-        *spread = values.map(Lanes::new);
     }
 
     /// Adds the affine momentum `C e_k m h` of a lane that goes with other factors to the nodes from the first of its stencil on.

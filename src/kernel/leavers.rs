@@ -1,6 +1,6 @@
 //! Particles that leave the box of their leaf, found by G2P while their new positions are in registers.
 use super::batch::Batch;
-use super::simd::{LANES, Lanes, Mask};
+use super::simd::{LANES, Vector, VectorMask};
 
 /// Finds particles that are no longer in a box once they have moved.
 #[derive(Clone, Debug)]
@@ -27,10 +27,10 @@ impl<const D: usize> Leavers<D> {
 
     /// Lanes of positions in the box; one that is not a number is not.
     #[inline(always)]
-    pub fn inside(&self, position: &[Lanes; D]) -> Mask {
-        let mut inside = !Mask::from_bits(0);
+    pub fn inside<V: Vector>(&self, position: &[V; D]) -> V::Mask {
+        let mut inside = !V::Mask::from_bits(0);
         for axis in 0..D {
-            let (lower, upper) = (Lanes::splat(self.lower[axis]), Lanes::splat(self.upper[axis]));
+            let (lower, upper) = (V::splat(self.lower[axis]), V::splat(self.upper[axis]));
             inside = inside & lower.le(position[axis]) & position[axis].lt(upper);
         }
         inside
@@ -38,7 +38,7 @@ impl<const D: usize> Leavers<D> {
 
     /// Notes the members of a batch that moved out.
     #[inline(always)]
-    pub(super) fn look(&mut self, batch: &Batch, moved: &[Lanes; D]) {
+    pub(super) fn look<V: Vector>(&mut self, batch: &Batch, moved: &[V; D]) {
         let left = batch.members_among(!self.inside(moved).bits());
         // Nearly all particles stay.
         if left != 0 {

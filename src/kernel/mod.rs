@@ -5,7 +5,7 @@
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
 
-use self::simd::{F64x4, Lanes};
+use self::simd::{F64x4, Lanes, Vector};
 use crate::material::Material;
 
 mod batch;

@@ -17,7 +17,7 @@
 use super::batch::{Batch, Batches, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
-use super::simd::{F64x4, Kernel, LANES, Lanes, widest};
+use super::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 use super::weights::{NodeWeights, Weights, add_products};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
@@ -79,12 +79,12 @@ impl<const D: usize> Kernel for Scatter<'_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<V: Vector>(self) {
         let Self { scratch, chunk, select, frame, scheme, dt, arena, moments, next } = self;
         // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
         match moments {
-            None => scatter_all(scratch, chunk, select, frame, scheme, dt, arena, None, next),
-            moments => scatter_all(scratch, chunk, select, frame, scheme, dt, arena, moments, next),
+            None => scatter_all::<V, D>(scratch, chunk, select, frame, scheme, dt, arena, None, next),
+            moments => scatter_all::<V, D>(scratch, chunk, select, frame, scheme, dt, arena, moments, next),
         }
     }
 }
@@ -106,8 +106,8 @@ pub fn scatter_sub_boxes<const D: usize>(
         let batch = Batch::from_indices(parts, |part| part.particle);
         let position = batch.positions(reals, stride);
         prepared.fill_parts(frame, &position, parts);
-        let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]));
-        prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
+        let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
+        prepared.load::<Lanes>(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
         prepared.add(&batch, arena);
         if let Some(moments) = &mut moments {
@@ -120,7 +120,7 @@ pub fn scatter_sub_boxes<const D: usize>(
 }
 
 #[inline(always)]
-fn scatter_all<const D: usize>(
+fn scatter_all<V: Vector, const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     select: Select,
@@ -135,7 +135,7 @@ fn scatter_all<const D: usize>(
     let (tags, cell) = (chunk.tags(), frame.cell);
     let Scratch { prepared, nodes } = scratch;
     for batch in Batches::new(select, chunk, next) {
-        let position = batch.positions(reals, stride);
+        let position: [V; D] = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
@@ -151,7 +151,7 @@ fn scatter_all<const D: usize>(
                 moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
             }
         }
-        prepared.load(reals, stride, &batch, dt, scheme.transfer, &spread);
+        prepared.load::<V>(reals, stride, &batch, dt, scheme.transfer, &spread);
         prepared.add(&batch, arena);
         if let Some(moments) = &mut moments {
             prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
@@ -161,6 +161,7 @@ fn scatter_all<const D: usize>(
 }
 
 /// A batch ready to be added to nodes: factors by lane, rows by particle.
+#[repr(align(64))]
 struct Prepared<const D: usize> {
     weights: Weights<D>,
     /// `m (v, 1)`.
@@ -184,46 +185,46 @@ impl<const D: usize> Prepared<D> {
 
     /// Reads the particles' state; `spread` is D of [`Transfer::Apic`].
     #[inline(always)]
-    fn load(
+    fn load<V: Vector>(
         &mut self,
         reals: &[f64],
         stride: usize,
         batch: &Batch,
         dt: f64,
         transfer: Transfer,
-        spread: &[Lanes; D],
+        spread: &[[f64; LANES]; D],
     ) {
-        let zero = Lanes::splat(0.0);
-        let mass = batch.load(reals, stride, Layout::<D>::MASS);
-        let width = batch.load(reals, stride, Layout::<D>::HALF) * 2.0;
-        let mut volume = Lanes::splat(-dt);
+        let zero = V::splat(0.0);
+        let mass: V = batch.load(reals, stride, Layout::<D>::MASS);
+        let width = batch.load::<V>(reals, stride, Layout::<D>::HALF) * 2.0;
+        let mut volume = V::splat(-dt);
         for _ in 0..D {
             volume = volume * width;
         }
         let mut column = [zero, zero, zero, mass];
         for i in 0..D {
-            column[i] = batch.load(reals, stride, Layout::<D>::VELOCITY + i) * mass;
+            column[i] = batch.load::<V>(reals, stride, Layout::<D>::VELOCITY + i) * mass;
         }
-        self.momentum = Lanes::rows(column);
+        V::write_rows(column, &mut self.momentum);
         column[3] = zero;
         for k in 0..D {
-            let factor = if transfer == Transfer::Apic { mass / spread[k] } else { mass };
+            let factor = if transfer == Transfer::Apic { mass / V::load(&spread[k]) } else { mass };
             for i in 0..D {
-                column[i] = batch.load(reals, stride, Layout::<D>::AFFINE + D * i + k) * factor;
+                column[i] = batch.load::<V>(reals, stride, Layout::<D>::AFFINE + D * i + k) * factor;
             }
-            self.affine[k] = Lanes::rows(column);
+            V::write_rows(column, &mut self.affine[k]);
         }
         let mut stress = [zero; 6];
         for c in 0..Layout::<D>::SYMMETRIC {
             if D == 3 || c != 2 {
-                stress[c] = batch.load(reals, stride, Layout::<D>::STRESS + c) * volume;
+                stress[c] = batch.load::<V>(reals, stride, Layout::<D>::STRESS + c) * volume;
             }
         }
         for k in 0..D {
             for i in 0..D {
                 column[i] = stress[super::symmetric_index::<D>(i, k)];
             }
-            self.impulse[k] = Lanes::rows(column);
+            V::write_rows(column, &mut self.impulse[k]);
         }
     }
 

@@ -23,7 +23,7 @@ pub fn of_particles<const D: usize>(
     let (tags, cell) = (chunk.tags(), frame.cell);
     let mut weights = Weights::new();
     for batch in Batches::new(select, chunk, Place::default()) {
-        let position = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(reals, stride);
         let half =
             domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
@@ -46,7 +46,7 @@ pub fn of_parts<const D: usize>(
     let mut weights = Weights::new();
     for (first, parts) in (0..).step_by(LANES).zip(parts.chunks(LANES)) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let position = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(reals, stride);
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
         let spread = complete(&mut weights, &batch, frame.cell, constraints);
@@ -70,5 +70,5 @@ fn complete<const D: usize>(
         let touched = constraints.prepare(weights, &mut nodes, batch);
         constraints.add_spread(weights, &nodes, touched, &mut spread);
     }
-    spread.map(Lanes::to_array)
+    spread
 }

@@ -10,32 +10,32 @@
 //! ```
 //! with `m = min(hi, 1)`, `a = m - lo`, `b = max(hi - 1, 0)`, `V = a + b`.
 use super::BLOCK;
-use super::simd::Lanes;
+use super::simd::Vector;
 
 /// Three nodes of one axis for a batch of boxes.
 #[derive(Clone, Copy, Debug)]
-pub struct Axis {
+pub struct Axis<V> {
     /// Lowest node of the stencil, counted from the corner of the block: an integer in -1..=3.
-    pub base: Lanes,
+    pub base: V,
     /// Weights.
-    pub weight: [Lanes; 3],
+    pub weight: [V; 3],
     /// Derivatives of the weights, 1/m.
-    pub slope: [Lanes; 3],
+    pub slope: [V; 3],
 }
 
-impl Axis {
+impl<V: Vector> Axis<V> {
     /// Weights of boxes centred at `centre` with half width `half`, both in cells and relative to the
     /// corner of the block. `half` is at most 1/2 and the centre lies in the block. `inverse_cell` is
     /// 1 / cell edge, 1/m.
     #[inline(always)]
-    pub fn new(centre: Lanes, half: Lanes, inverse_cell: f64) -> Self {
-        let zero = Lanes::splat(0.0);
-        let one = Lanes::splat(1.0);
+    pub fn new(centre: V, half: V, inverse_cell: f64) -> Self {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
         let lower = centre - half;
         // The bounds matter only for centres that round to the upper face of the block.
-        let base = lower.floor().max(Lanes::splat(-1.0)).min(Lanes::splat(BLOCK as f64 - 1.0));
+        let base = lower.floor().max(V::splat(-1.0)).min(V::splat(BLOCK as f64 - 1.0));
         let low = lower - base;
-        let high = half.mul_add(Lanes::splat(2.0), low);
+        let high = half.mul_add(V::splat(2.0), low);
         let middle = high.min(one);
         let a = (middle - low).max(zero);
         let b = (high - one).max(zero);
@@ -52,16 +52,17 @@ impl Axis {
 
     /// Node minus particle, m, for a particle at `position` cells from the corner of the block.
     #[inline(always)]
-    pub fn offsets(&self, position: Lanes, cell: f64) -> [Lanes; 3] {
+    pub fn offsets(&self, position: V, cell: f64) -> [V; 3] {
         let first = self.base - position;
-        std::array::from_fn(|i| (first + Lanes::splat(i as f64)) * cell)
+        let at = |i: f64| (first + V::splat(i)) * cell;
+        [at(0.0), at(1.0), at(2.0)]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::simd::LANES;
+    use crate::kernel::simd::{LANES, Lanes};
 
     /// Centres over a block and half widths from tiny to half a cell, aligned ones among them.
     fn boxes() -> Vec<(f64, f64)> {

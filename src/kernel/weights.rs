@@ -1,5 +1,5 @@
 //! Tensor-product stencils of a batch of boxes.
-use super::simd::{F64x4, LANES, Lanes};
+use super::simd::{F64x4, LANES, Lanes, Vector};
 use super::stencil::Axis;
 use super::{ARENA_EDGE, BASES, Frame, Row};
 
@@ -13,7 +13,8 @@ pub(super) struct Factors {
     pub slope: [[f64; LANES]; 3],
 }
 
-/// Stencils of a batch. Made once and filled for batch after batch.
+/// Stencils of a batch. Made once and filled for batch after batch. Begins with a line of the cache, so that lanes do.
+#[repr(align(64))]
 pub(super) struct Weights<const D: usize> {
     /// Index of the lowest node in the arena; an integer plus 2^52.
     first: [f64; LANES],
@@ -23,7 +24,7 @@ pub(super) struct Weights<const D: usize> {
     /// Products of y and z weights, `[b][c]`.
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
-    pub spread: [Lanes; D],
+    pub spread: [[f64; LANES]; D],
 }
 
 /// Weights of a batch node by node, `a + 3 b (+ 9 c)`, which only batches with constrained nodes need. Padded, so that
@@ -41,24 +42,24 @@ impl<const D: usize> Weights<D> {
             base: [TWO_52; LANES],
             axis: [Factors { weight: none, arm: none, slope: none }; D],
             product: [none; 3],
-            spread: [Lanes::splat(0.0); D],
+            spread: [[0.0; LANES]; D],
         }
     }
 
     /// Boxes around `centre`, arms relative to `position`.
     #[inline(always)]
-    pub fn fill(&mut self, frame: &Frame<D>, position: &[Lanes; D], centre: &[Lanes; D], half: &[Lanes; D]) {
+    pub fn fill<V: Vector>(&mut self, frame: &Frame<D>, position: &[V; D], centre: &[V; D], half: &[V; D]) {
         let inverse = 1.0 / frame.cell;
-        let mut first = Lanes::splat(0.0);
+        let mut first = V::splat(0.0);
         let mut base = first;
         for k in (0..D).rev() {
-            let corner = Lanes::splat(frame.corner[k]);
+            let corner = V::splat(frame.corner[k]);
             let axis = Axis::new((centre[k] - corner) * inverse, half[k] * inverse, inverse);
             let offset = axis.offsets((position[k] - corner) * inverse, frame.cell);
-            let place = axis.base + Lanes::splat(1.0);
-            first = first.mul_add(Lanes::splat(ARENA_EDGE as f64), place);
-            base = base.mul_add(Lanes::splat(BASES as f64), place);
-            let mut spread = Lanes::splat(0.0);
+            let place = axis.base + V::splat(1.0);
+            first = first.mul_add(V::splat(ARENA_EDGE as f64), place);
+            base = base.mul_add(V::splat(BASES as f64), place);
+            let mut spread = V::splat(0.0);
             let to = &mut self.axis[k];
             for i in 0..3 {
                 let arm = axis.weight[i] * offset[i];
@@ -67,18 +68,18 @@ impl<const D: usize> Weights<D> {
                 arm.store(&mut to.arm[i]);
                 axis.slope[i].store(&mut to.slope[i]);
             }
-            self.spread[k] = spread;
+            spread.store(&mut self.spread[k]);
         }
         if D == 3 {
             let (y, z) = (&self.axis[1].weight, &self.axis[D - 1].weight);
             for b in 0..3 {
                 for c in 0..3 {
-                    (Lanes::load(&y[b]) * Lanes::load(&z[c])).store(&mut self.product[b][c]);
+                    (V::load(&y[b]) * V::load(&z[c])).store(&mut self.product[b][c]);
                 }
             }
         }
-        (first + Lanes::splat(TWO_52)).store(&mut self.first);
-        (base + Lanes::splat(TWO_52)).store(&mut self.base);
+        (first + V::splat(TWO_52)).store(&mut self.first);
+        (base + V::splat(TWO_52)).store(&mut self.base);
     }
 
     /// Index of the lowest node in the arena.

@@ -13,7 +13,7 @@ use super::hencky::Hencky;
 use super::parameters::FrictionMatch;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
-use crate::kernel::simd::{Lanes, widest};
+use crate::kernel::simd::{Lanes, Vector, VectorMask, widest};
 
 /// Drucker-Prager granular material.
 #[derive(Clone, Copy, Debug)]
@@ -42,15 +42,15 @@ impl DruckerPrager {
 
 impl Law for DruckerPrager {
     #[inline(always)]
-    fn respond(&self, state: &mut State, plane: bool) {
-        let zero = Lanes::splat(0.0);
-        let one = Lanes::splat(1.0);
+    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool) {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
         let [shear, gain] = state.history;
         let trial = Strain::of(&state.elastic, plane);
         let booked = gain * self.correction;
         let trace = trial.trace + booked;
         let norm = trial.norm;
-        let excess = trace.mul_add(Lanes::splat(self.slope), norm);
+        let excess = trace.mul_add(V::splat(self.slope), norm);
         // An unstrained particle is elastic, so that it keeps its bits.
         let apart = zero.lt(trace) | (zero.le(trace) & zero.lt(norm));
         let flows = !apart & zero.lt(excess);

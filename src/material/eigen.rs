@@ -1,18 +1,18 @@
 //! Symmetric 3×3 matrices over lanes: products of small matrices and eigen decomposition.
 //!
 //! Components in the order `xx, yy, zz, xy, xz, yz`.
-use crate::kernel::simd::{Lanes, Mask, each};
+use crate::kernel::simd::{Lanes, Vector, VectorMask, each};
 
 /// A symmetric matrix for each lane.
-pub type Symmetric = [Lanes; 6];
+pub type Symmetric<V = Lanes> = [V; 6];
 
 /// Eigenvalues and eigenvectors for each lane: `A = Σ value[k] vector[k] ⊗ vector[k]`, in no order.
 #[derive(Clone, Copy, Debug)]
-pub struct Eigen {
+pub struct Eigen<V = Lanes> {
     /// Eigenvalues.
-    pub value: [Lanes; 3],
+    pub value: [V; 3],
     /// Unit eigenvectors, `vector[k][axis]`.
-    pub vector: [[Lanes; 3]; 3],
+    pub vector: [[V; 3]; 3],
 }
 
 /// Sweeps over the three off-diagonal components; 4 are enough as a rule.
@@ -27,9 +27,9 @@ const NEGLIGIBLE: f64 = 3.081_487_911_019_577_4e-33;
 /// With `plane` the components xz and yz are taken as zero and one rotation is exact. A lane stops
 /// changing when it has converged, so its bits do not depend on the lanes beside it.
 #[inline(always)]
-pub fn decompose(matrix: &Symmetric, plane: bool) -> Eigen {
-    let zero = Lanes::splat(0.0);
-    let one = Lanes::splat(1.0);
+pub fn decompose<V: Vector>(matrix: &Symmetric<V>, plane: bool) -> Eigen<V> {
+    let zero = V::splat(0.0);
+    let one = V::splat(1.0);
     let [mut xx, mut yy, mut zz, mut xy, mut xz, mut yz] = *matrix;
     let mut vector = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
     if plane {
@@ -58,22 +58,22 @@ pub fn decompose(matrix: &Symmetric, plane: bool) -> Eigen {
 
 /// Whether an off-diagonal component counts as zero beside its diagonal components.
 #[inline(always)]
-fn negligible(off: Lanes, p: Lanes, q: Lanes) -> Mask {
+fn negligible<V: Vector>(off: V, p: V, q: V) -> V::Mask {
     (off * off).le(p * q * NEGLIGIBLE)
 }
 
-struct Rotation {
-    cos: Lanes,
-    sin: Lanes,
+struct Rotation<V> {
+    cos: V,
+    sin: V,
 }
 
-impl Rotation {
+impl<V: Vector> Rotation<V> {
     /// The rotation that zeroes `off`, applied to the 2×2 block; none where it counts as zero.
     #[inline(always)]
-    fn new(p: &mut Lanes, q: &mut Lanes, off: &mut Lanes) -> Self {
+    fn new(p: &mut V, q: &mut V, off: &mut V) -> Self {
         let skip = negligible(*off, *p, *q);
-        let zero = Lanes::splat(0.0);
-        let one = Lanes::splat(1.0);
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
         let difference = *q - *p;
         let twice = *off + *off;
         let root = difference.mul_add(difference, twice * twice).sqrt();
@@ -87,14 +87,14 @@ impl Rotation {
     }
 
     #[inline(always)]
-    fn apply(&self, p: &mut Lanes, q: &mut Lanes) {
+    fn apply(&self, p: &mut V, q: &mut V) {
         let (old_p, old_q) = (*p, *q);
         *p = self.sin.neg_mul_add(old_q, self.cos * old_p);
         *q = self.sin.mul_add(old_p, self.cos * old_q);
     }
 
     #[inline(always)]
-    fn apply_vectors(&self, vector: &mut [[Lanes; 3]; 3], p: usize, q: usize) {
+    fn apply_vectors(&self, vector: &mut [[V; 3]; 3], p: usize, q: usize) {
         for axis in 0..3 {
             let (mut a, mut b) = (vector[p][axis], vector[q][axis]);
             self.apply(&mut a, &mut b);
@@ -103,18 +103,19 @@ impl Rotation {
     }
 }
 
-impl Eigen {
+impl<V: Vector> Eigen<V> {
     /// The matrix with the same eigenvectors and these eigenvalues.
     #[inline(always)]
-    pub fn compose(&self, value: &[Lanes; 3], plane: bool) -> Symmetric {
+    pub fn compose(&self, value: &[V; 3], plane: bool) -> Symmetric<V> {
         let v = &self.vector;
         if plane {
-            let zero = Lanes::splat(0.0);
+            let zero = V::splat(0.0);
             let entry =
                 |i: usize, j: usize| (value[0] * v[0][i]).mul_add(v[0][j], value[1] * v[1][i] * v[1][j]);
             return [entry(0, 0), entry(1, 1), value[2], entry(0, 1), zero, zero];
         }
-        let scaled: [[Lanes; 3]; 3] = std::array::from_fn(|k| each(v[k], |component| value[k] * component));
+        let scale = |k: usize| each(v[k], |component| value[k] * component);
+        let scaled = [scale(0), scale(1), scale(2)];
         let entry = |i: usize, j: usize| {
             scaled[0][i].mul_add(v[0][j], scaled[1][i].mul_add(v[1][j], scaled[2][i] * v[2][j]))
         };
@@ -124,7 +125,7 @@ impl Eigen {
 
 /// Determinant.
 #[inline(always)]
-pub fn determinant(matrix: &Symmetric) -> Lanes {
+pub fn determinant<V: Vector>(matrix: &Symmetric<V>) -> V {
     let [xx, yy, zz, xy, xz, yz] = *matrix;
     let minor_x = yz.neg_mul_add(yz, yy * zz);
     let minor_y = yz.neg_mul_add(xz, xy * zz);
@@ -134,7 +135,7 @@ pub fn determinant(matrix: &Symmetric) -> Lanes {
 
 /// Upper bound of the eigenvalues (Gershgorin).
 #[inline(always)]
-pub fn greatest_bound(matrix: &Symmetric) -> Lanes {
+pub fn greatest_bound<V: Vector>(matrix: &Symmetric<V>) -> V {
     let [xx, yy, zz, xy, xz, yz] = *matrix;
     let (xy, xz, yz) = (xy.abs(), xz.abs(), yz.abs());
     (xx + (xy + xz)).max(yy + (xy + yz)).max(zz + (xz + yz))

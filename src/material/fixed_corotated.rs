@@ -2,7 +2,7 @@
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::eigen::{decompose, greatest_bound};
 use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::kernel::simd::{Lanes, each, widest};
+use crate::kernel::simd::{Lanes, Vector, each, widest};
 
 /// Fixed corotated solid.
 #[derive(Clone, Copy, Debug)]
@@ -21,18 +21,18 @@ impl FixedCorotated {
 impl Law for FixedCorotated {
     /// Along a principal direction, `ρ₀ c² = s² ∂P/∂F = 2μ s² + λ J²`.
     #[inline(always)]
-    fn respond(&self, state: &mut State, plane: bool) {
+    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool) {
         let Lame { lambda, mu } = self.lame;
-        let one = Lanes::splat(1.0);
+        let one = V::splat(1.0);
         let eigen = decompose(&state.elastic, plane);
-        let stretch = each(eigen.value, Lanes::sqrt);
+        let stretch = each(eigen.value, V::sqrt);
         let volume = stretch[0] * stretch[1] * stretch[2];
         let pressure = (volume - one) * volume * lambda;
-        let principal = each(stretch, |s| (s * (s - one)).mul_add(Lanes::splat(2.0 * mu), pressure));
+        let principal = each(stretch, |s| (s * (s - one)).mul_add(V::splat(2.0 * mu), pressure));
         state.stress = eigen.compose(&principal, plane);
         let modulus = greatest_bound(&state.elastic) * (2.0 * mu) + volume * volume * lambda;
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
-        state.work = Lanes::splat(0.0);
+        state.work = V::splat(0.0);
     }
 }
 

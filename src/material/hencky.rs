@@ -3,7 +3,7 @@
 use super::eigen::greatest_bound;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::kernel::simd::{Lanes, each, widest};
+use crate::kernel::simd::{Lanes, Vector, each, widest};
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ impl Hencky {
 
     /// Writes Kirchhoff stress and wave speed of a strain with this trace and this deviator.
     #[inline(always)]
-    pub(super) fn load(&self, state: &mut State, trace: Lanes, deviator: &Symmetric) {
+    pub(super) fn load<V: Vector>(&self, state: &mut State<V>, trace: V, deviator: &Symmetric<V>) {
         let pressure = trace * (self.lame.lambda + 2.0 / 3.0 * self.lame.mu);
         state.stress = each(*deviator, |component| component * (2.0 * self.lame.mu));
         for normal in &mut state.stress[..3] {
@@ -39,18 +39,18 @@ impl Hencky {
     /// Bound of the wave speeds: along a principal direction `ρ₀ c² = s² ∂P/∂F = λ + 2μ - τ`, greatest
     /// where the stress is most compressive.
     #[inline(always)]
-    fn wave_speed_under(&self, stress: &Symmetric) -> Lanes {
-        let compression = greatest_bound(&each(*stress, |s| -s)).max(Lanes::splat(0.0));
-        ((compression + Lanes::splat(self.lame.pressure_wave())) * (1.0 / self.density)).sqrt()
+    fn wave_speed_under<V: Vector>(&self, stress: &Symmetric<V>) -> V {
+        let compression = greatest_bound(&each(*stress, |s| -s)).max(V::splat(0.0));
+        ((compression + V::splat(self.lame.pressure_wave())) * (1.0 / self.density)).sqrt()
     }
 }
 
 impl Law for Hencky {
     #[inline(always)]
-    fn respond(&self, state: &mut State, plane: bool) {
+    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool) {
         let strain = Strain::of(&state.elastic, plane);
         self.load(state, strain.trace, &strain.deviator);
-        state.work = Lanes::splat(0.0);
+        state.work = V::splat(0.0);
     }
 }
 

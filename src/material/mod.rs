@@ -2,7 +2,7 @@
 //!
 //! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
 //! elastic state. Plastic models map a trial `b` back to their yield surface in Hencky strains.
-use crate::kernel::simd::{Kernel, LANES, Lanes, Mask};
+use crate::kernel::simd::{Kernel, LANES, Lanes, Mask, Vector, VectorMask};
 
 pub mod driver;
 pub mod drucker_prager;
@@ -23,32 +23,64 @@ pub const HISTORIES: usize = 2;
 
 /// State of a batch of particles. Symmetric tensors have components `xx, yy, zz, xy, xz, yz`.
 #[derive(Clone, Copy, Debug)]
-pub struct State {
+pub struct State<V = Lanes> {
     /// Elastic left Cauchy-Green tensor: the trial value before, the final one after an update.
-    pub elastic: Symmetric,
+    pub elastic: Symmetric<V>,
     /// Kirchhoff stress after an update, Pa.
-    pub stress: Symmetric,
+    pub stress: Symmetric<V>,
     /// History variables (see [`Material::history_names`]); the second is the logarithm of the
     /// plastic volume ratio, or zero.
-    pub history: [Lanes; HISTORIES],
+    pub history: [V; HISTORIES],
     /// Plastic work of the update per reference volume, J/m³; not negative.
-    pub work: Lanes,
+    pub work: V,
     /// Upper bound of the wave speeds after an update, m/s.
-    pub wave_speed: Lanes,
+    pub wave_speed: V,
+}
+
+impl<V: Vector> State<V> {
+    /// A batch at rest with `elastic` as trial value and no history.
+    pub fn new(elastic: Symmetric<V>) -> Self {
+        let zero = V::splat(0.0);
+        Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+    }
 }
 
 impl State {
-    /// A batch at rest with `elastic` as trial value and no history.
-    pub fn new(elastic: Symmetric) -> Self {
-        let zero = Lanes::splat(0.0);
-        Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+    /// In the registers of a kernel.
+    #[inline(always)]
+    fn read<V: Vector>(&self) -> State<V> {
+        let mut state = State::new([V::splat(0.0); 6]);
+        for c in 0..6 {
+            state.elastic[c] = V::load(self.elastic[c].as_array());
+            state.stress[c] = V::load(self.stress[c].as_array());
+        }
+        for h in 0..HISTORIES {
+            state.history[h] = V::load(self.history[h].as_array());
+        }
+        state.work = V::load(self.work.as_array());
+        state.wave_speed = V::load(self.wave_speed.as_array());
+        state
+    }
+
+    /// Takes over what is in the registers of a kernel.
+    #[inline(always)]
+    fn write<V: Vector>(&mut self, state: &State<V>) {
+        for c in 0..6 {
+            state.elastic[c].store(self.elastic[c].as_array_mut());
+            state.stress[c].store(self.stress[c].as_array_mut());
+        }
+        for h in 0..HISTORIES {
+            state.history[h].store(self.history[h].as_array_mut());
+        }
+        state.work.store(self.work.as_array_mut());
+        state.wave_speed.store(self.wave_speed.as_array_mut());
     }
 }
 
 /// What [`Material::update`] of a model does, to be compiled for several instruction sets.
 trait Law {
     /// See there. To be marked `inline(always)`.
-    fn respond(&self, state: &mut State, plane: bool);
+    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool);
 }
 
 /// A [`Law`] with its arguments.
@@ -58,8 +90,11 @@ impl<L: Law> Kernel for Response<'_, L> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        self.0.respond(self.1, self.2);
+    fn run<V: Vector>(self) {
+        let Self(law, state, plane) = self;
+        let mut own = state.read::<V>();
+        law.respond(&mut own, plane);
+        state.write(&own);
     }
 }
 

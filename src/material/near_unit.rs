@@ -5,7 +5,7 @@
 //! takes two multiply-adds for the whole tensor.
 use super::Symmetric;
 use super::eigen::determinant;
-use crate::kernel::simd::{Lanes, Mask, each};
+use crate::kernel::simd::{Vector, each};
 
 /// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most 0.82 times as
 /// large, and what the series leave out is below 2e-18.
@@ -34,21 +34,21 @@ const EXP: [f64; 13] = {
 };
 
 /// A symmetric tensor without trace, with its square.
-pub(super) struct TraceFree {
-    tensor: Symmetric,
-    square: Symmetric,
+pub(super) struct TraceFree<V> {
+    tensor: Symmetric<V>,
+    square: Symmetric<V>,
     /// `tr(Y²)/2`.
-    q: Lanes,
+    q: V,
     /// `det Y`.
-    d: Lanes,
+    d: V,
 }
 
-impl TraceFree {
+impl<V: Vector> TraceFree<V> {
     /// A third of the trace of b, and Y where `b = tr(b)/3 (I + Y)`.
     #[inline(always)]
-    pub fn beside_unit(b: &Symmetric) -> (Lanes, Self) {
+    pub fn beside_unit(b: &Symmetric<V>) -> (V, Self) {
         let mean = (b[0] + b[1] + b[2]) * (1.0 / 3.0);
-        let scale = Lanes::splat(1.0) / mean;
+        let scale = V::splat(1.0) / mean;
         let mut tensor = each(*b, |component| component * scale);
         for c in 0..3 {
             tensor[c] = (b[c] - mean) * scale;
@@ -58,7 +58,7 @@ impl TraceFree {
 
     /// From its components.
     #[inline(always)]
-    pub fn new(tensor: Symmetric) -> Self {
+    pub fn new(tensor: Symmetric<V>) -> Self {
         let [xx, yy, zz, xy, xz, yz] = tensor;
         let square = [
             xx.mul_add(xx, xy.mul_add(xy, xz * xz)),
@@ -73,13 +73,13 @@ impl TraceFree {
 
     /// Where the series hold.
     #[inline(always)]
-    pub fn is_small(&self) -> Mask {
-        self.q.le(Lanes::splat(0.5 * LIMIT * LIMIT))
+    pub fn is_small(&self) -> V::Mask {
+        self.q.le(V::splat(0.5 * LIMIT * LIMIT))
     }
 
     /// `ln(I + Y)`: its trace and its deviator.
     #[inline(always)]
-    pub fn ln_of_one_plus(&self) -> (Lanes, Symmetric) {
+    pub fn ln_of_one_plus(&self) -> (V, Symmetric<V>) {
         let [unit, first, second] = self.series(&LN);
         // Neither Y nor what is added to the diagonal has a trace.
         let two_thirds = self.q * (2.0 / 3.0);
@@ -88,12 +88,12 @@ impl TraceFree {
             let square = if c < 3 { self.square[c] - two_thirds } else { self.square[c] };
             deviator[c] = first.mul_add(self.tensor[c], second * square);
         }
-        (unit.mul_add(Lanes::splat(3.0), second * (self.q + self.q)), deviator)
+        (unit.mul_add(V::splat(3.0), second * (self.q + self.q)), deviator)
     }
 
     /// `exp Y`.
     #[inline(always)]
-    pub fn exp(&self) -> Symmetric {
+    pub fn exp(&self) -> Symmetric<V> {
         let [unit, first, second] = self.series(&EXP);
         let mut sum = self.tensor;
         for c in 0..6 {
@@ -107,10 +107,11 @@ impl TraceFree {
 
     /// Factors of I, Y and Y² in a power series.
     #[inline(always)]
-    fn series<const N: usize>(&self, series: &[f64; N]) -> [Lanes; 3] {
-        let [mut unit, mut first, mut second] = [N - 3, N - 2, N - 1].map(|n| Lanes::splat(series[n]));
+    fn series<const N: usize>(&self, series: &[f64; N]) -> [V; 3] {
+        let mut unit = V::splat(series[N - 3]);
+        let (mut first, mut second) = (V::splat(series[N - 2]), V::splat(series[N - 1]));
         for n in (0..N - 3).rev() {
-            let next = second.mul_add(self.d, Lanes::splat(series[n]));
+            let next = second.mul_add(self.d, V::splat(series[n]));
             (unit, first, second) = (next, second.mul_add(self.q, unit), first);
         }
         [unit, first, second]

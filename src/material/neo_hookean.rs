@@ -3,7 +3,7 @@
 use super::eigen::{determinant, greatest_bound};
 use super::{Lame, Law, Material, Response, State, Symmetric};
 use crate::kernel::math::ln;
-use crate::kernel::simd::{Lanes, widest};
+use crate::kernel::simd::{Lanes, Vector, widest};
 
 /// Compressible neo-Hookean solid.
 #[derive(Clone, Copy, Debug)]
@@ -22,21 +22,21 @@ impl NeoHookean {
 impl Law for NeoHookean {
     /// Along a principal direction of stretch s, `ρ₀ c² = s² ∂P/∂F = μ (s² + 1) + λ (1 - ln J)`.
     #[inline(always)]
-    fn respond(&self, state: &mut State, _plane: bool) {
+    fn respond<V: Vector>(&self, state: &mut State<V>, _plane: bool) {
         let Lame { lambda, mu } = self.lame;
-        let one = Lanes::splat(1.0);
+        let one = V::splat(1.0);
         let b = &state.elastic;
         let volume_log = ln(determinant(b)) * 0.5;
         let pressure = volume_log * lambda;
         for i in 0..3 {
-            state.stress[i] = (b[i] - one).mul_add(Lanes::splat(mu), pressure);
+            state.stress[i] = (b[i] - one).mul_add(V::splat(mu), pressure);
         }
         for i in 3..6 {
             state.stress[i] = b[i] * mu;
         }
         let modulus = (greatest_bound(b) + one) * mu + (one - volume_log).max(one) * lambda;
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
-        state.work = Lanes::splat(0.0);
+        state.work = V::splat(0.0);
     }
 }
 

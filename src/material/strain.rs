@@ -7,21 +7,21 @@ use super::hencky::Hencky;
 use super::near_unit::TraceFree;
 use super::{State, Symmetric};
 use crate::kernel::math::{exp, ln};
-use crate::kernel::simd::{Lanes, Mask, each};
+use crate::kernel::simd::{Lanes, Mask, Vector, VectorMask, each};
 
 /// The logarithmic strain `½ ln b` of a trial tensor.
-pub(super) struct Strain {
+pub(super) struct Strain<V = Lanes> {
     /// Trace.
-    pub trace: Lanes,
+    pub trace: V,
     /// Deviator.
-    pub deviator: Symmetric,
+    pub deviator: Symmetric<V>,
     /// Norm of the deviator.
-    pub norm: Lanes,
+    pub norm: V,
     /// Lanes that are not near a multiple of the unit tensor, if there are any.
     far: Option<Far>,
 }
 
-/// Lanes that were decomposed.
+/// Lanes that were decomposed. They are rare, and a function of their own has not the registers that a kernel may have.
 struct Far {
     lanes: Mask,
     eigen: Eigen,
@@ -29,14 +29,14 @@ struct Far {
     deviator: [Lanes; 3],
 }
 
-impl Strain {
+impl<V: Vector> Strain<V> {
     /// Strain of a tensor.
     #[inline(always)]
-    pub fn of(b: &Symmetric, plane: bool) -> Self {
+    pub fn of(b: &Symmetric<V>, plane: bool) -> Self {
         let (mean, beside) = TraceFree::beside_unit(b);
-        let near = beside.is_small() & Lanes::splat(0.0).lt(mean);
+        let near = beside.is_small() & V::splat(0.0).lt(mean);
         let (trace, deviator) = beside.ln_of_one_plus();
-        let mut trace = ln(mean).mul_add(Lanes::splat(1.5), trace * 0.5);
+        let mut trace = ln(mean).mul_add(V::splat(1.5), trace * 0.5);
         let mut deviator = each(deviator, |component| component * 0.5);
         let far = (!near.all()).then(|| Far::of(b, !near, plane, &mut trace, &mut deviator));
         let [xx, yy, zz, xy, xz, yz] = deviator;
@@ -47,7 +47,7 @@ impl Strain {
 
     /// The elastic tensor with another trace of the strain and `kept` times its deviator, from 0 to 1.
     #[inline(always)]
-    fn elastic(&self, trace: Lanes, kept: Lanes, plane: bool) -> Symmetric {
+    fn elastic(&self, trace: V, kept: V, plane: bool) -> Symmetric<V> {
         let twice_kept = kept + kept;
         let volumetric = exp(trace * (2.0 / 3.0));
         let deviatoric = TraceFree::new(each(self.deviator, |component| component * twice_kept)).exp();
@@ -65,19 +65,19 @@ impl Strain {
     pub fn finish(
         &self,
         solid: &Hencky,
-        state: &mut State,
-        [trace, kept]: [Lanes; 2],
-        changed: Mask,
-        unstrained: Mask,
+        state: &mut State<V>,
+        [trace, kept]: [V; 2],
+        changed: V::Mask,
+        unstrained: V::Mask,
         plane: bool,
     ) {
         if !changed.any() {
             return solid.load(state, self.trace, &self.deviator);
         }
         let elastic = self.elastic(trace, kept, plane);
-        let kept = changed.select(kept, Lanes::splat(1.0));
+        let kept = changed.select(kept, V::splat(1.0));
         for c in 0..6 {
-            let unit = Lanes::splat(if c < 3 { 1.0 } else { 0.0 });
+            let unit = V::splat(if c < 3 { 1.0 } else { 0.0 });
             let returned = unstrained.select(unit, elastic[c]);
             state.elastic[c] = changed.select(returned, state.elastic[c]);
         }
@@ -88,9 +88,24 @@ impl Strain {
 
 impl Far {
     /// Decomposes some lanes, and takes trace and deviator of their strains from that.
+    #[inline(always)]
+    fn of<V: Vector>(
+        b: &Symmetric<V>,
+        lanes: V::Mask,
+        plane: bool,
+        trace: &mut V,
+        tensor: &mut Symmetric<V>,
+    ) -> Self {
+        let (mut own_trace, mut own_tensor) = (Lanes::new(trace.to_array()), cast(tensor));
+        let lanes = Mask::from_bits(lanes.bits());
+        let far = Self::decompose(&cast(b), lanes, plane, &mut own_trace, &mut own_tensor);
+        (*trace, *tensor) = (V::new(own_trace.to_array()), cast(&own_tensor));
+        far
+    }
+
     #[cold]
     #[inline(never)]
-    fn of(b: &Symmetric, lanes: Mask, plane: bool, trace: &mut Lanes, tensor: &mut Symmetric) -> Self {
+    fn decompose(b: &Symmetric, lanes: Mask, plane: bool, trace: &mut Lanes, tensor: &mut Symmetric) -> Self {
         let eigen = decompose(b, plane);
         let strain = each(eigen.value, |value| ln(value) * 0.5);
         let sum = strain[0] + strain[1] + strain[2];
@@ -104,9 +119,17 @@ impl Far {
     }
 
     /// Takes these lanes of [`Strain::elastic`] from the eigenvectors.
+    #[inline(always)]
+    fn replace<V: Vector>(&self, elastic: &mut Symmetric<V>, trace: V, twice_kept: V, plane: bool) {
+        let mut own = cast(elastic);
+        let (trace, twice_kept) = (Lanes::new(trace.to_array()), Lanes::new(twice_kept.to_array()));
+        self.compose(&mut own, trace, twice_kept, plane);
+        *elastic = cast(&own);
+    }
+
     #[cold]
     #[inline(never)]
-    fn replace(&self, elastic: &mut Symmetric, trace: Lanes, twice_kept: Lanes, plane: bool) {
+    fn compose(&self, elastic: &mut Symmetric, trace: Lanes, twice_kept: Lanes, plane: bool) {
         let twice_mean = trace * (2.0 / 3.0);
         let value = each(self.deviator, |e| exp(e.mul_add(twice_kept, twice_mean)));
         let tensor = self.eigen.compose(&value, plane);
@@ -114,6 +137,16 @@ impl Far {
             elastic[c] = self.lanes.select(tensor[c], elastic[c]);
         }
     }
+}
+
+/// A tensor in other registers.
+#[inline(always)]
+fn cast<V: Vector, W: Vector>(tensor: &Symmetric<V>) -> Symmetric<W> {
+    let mut other = [W::splat(0.0); 6];
+    for c in 0..6 {
+        other[c] = W::new(tensor[c].to_array());
+    }
+    other
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 use super::hencky::Hencky;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
-use crate::kernel::simd::{Lanes, Mask, widest};
+use crate::kernel::simd::{Lanes, Vector, VectorMask, widest};
 
 /// Von Mises solid.
 #[derive(Clone, Copy, Debug)]
@@ -25,27 +25,26 @@ impl VonMises {
 
 impl Law for VonMises {
     #[inline(always)]
-    fn respond(&self, state: &mut State, plane: bool) {
-        let zero = Lanes::splat(0.0);
-        let one = Lanes::splat(1.0);
+    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool) {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
         let root = (2.0_f64 / 3.0).sqrt();
         let mu = self.solid.shear_modulus();
         let trial = Strain::of(&state.elastic, plane);
-        let radius = |kappa: Lanes| {
-            kappa.mul_add(Lanes::splat(root * self.hardening), Lanes::splat(root * self.yield_stress))
-        };
-        let excess = trial.norm.mul_add(Lanes::splat(2.0 * mu), -radius(state.history[0]));
+        let radius =
+            |kappa: V| kappa.mul_add(V::splat(root * self.hardening), V::splat(root * self.yield_stress));
+        let excess = trial.norm.mul_add(V::splat(2.0 * mu), -radius(state.history[0]));
         let flows = zero.lt(excess);
         let mut kept = one;
         state.work = zero;
         if flows.any() {
             let flow = excess * (1.0 / (2.0 * mu + 2.0 / 3.0 * self.hardening));
             kept = flows.select(one - flow / trial.norm, one);
-            let kappa = flow.mul_add(Lanes::splat(root), state.history[0]);
+            let kappa = flow.mul_add(V::splat(root), state.history[0]);
             state.history[0] = flows.select(kappa, state.history[0]);
             state.work = flows.select(radius(kappa) * flow, zero);
         }
-        trial.finish(&self.solid, state, [trial.trace, kept], flows, Mask::from_bits(0), plane);
+        trial.finish(&self.solid, state, [trial.trace, kept], flows, V::Mask::from_bits(0), plane);
     }
 }
 

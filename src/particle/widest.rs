@@ -1,5 +1,5 @@
 //! The greatest undeformed half width in a chunk, kept while particles come and go.
-use crate::kernel::simd::{LANES, Lanes};
+use crate::kernel::simd::{LANES, Lanes, Vector};
 
 /// The greatest half width (0 without particles) and how many particles have it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -9,6 +9,7 @@ use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
+use crate::kernel::simd::VectorMask;
 use crate::particle::chunk::{Chunk, Layout};
 
 /// Where a particle goes.

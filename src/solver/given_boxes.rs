@@ -15,7 +15,7 @@ use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::simd::Lanes;
+use crate::kernel::simd::{Lanes, Vector};
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};

@@ -3,7 +3,7 @@
 //! changes nothing.
 use super::Solver;
 use crate::adaptivity::{Adaptivity, Kind};
-use crate::kernel::simd::{LANES, Lanes};
+use crate::kernel::simd::{LANES, Lanes, Vector};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::resample::patience::Levels;
 

@@ -9,7 +9,7 @@ use super::phases::Phase;
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::simd::{LANES, Lanes, Mask};
+use crate::kernel::simd::{LANES, Lanes, Mask, Vector, VectorMask};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// Components of a torque or angular momentum, for both dimensions.

@@ -5,7 +5,7 @@ use core::arch::x86_64::*;
 /// Four doubles in one register.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub struct F64x4(__m256d);
+pub struct F64x4(pub(super) __m256d);
 
 /// Four truth values; a lane is all ones or all zeros.
 #[derive(Clone, Copy, Debug)]

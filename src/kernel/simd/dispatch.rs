@@ -1,27 +1,30 @@
-//! The widest instruction set of the processor, chosen when the program runs.
+//! The widest registers of the processor, chosen when the program runs.
 //!
-//! The whole program is compiled for AVX2 and FMA. What is most of a step is compiled once more for AVX-512, of which
-//! it uses the 32 registers and the masks, still four numbers at a time: batches need more than 16 registers. Each operation
-//! is rounded as before, so results do not depend on the choice.
-#[cfg(target_arch = "x86_64")]
-use std::sync::LazyLock;
+//! The whole program is compiled for AVX2 and FMA. What is most of a step is compiled once more for AVX-512: a
+//! [`Vector`] is then one register instead of two, and there are 32 of them, which batches need. Each operation is
+//! rounded as before, so results do not depend on the choice.
+use super::Vector;
+#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
+use super::avx512::Wide;
+use super::lanes::Lanes;
 
 /// Work that is worth being compiled for several instruction sets.
 pub trait Kernel {
     /// What it gives.
     type Output;
 
-    /// Does the work. To be marked `inline(always)`, and so is what it calls: functions of their own are compiled once.
-    fn run(self) -> Self::Output;
+    /// Does the work. To be marked `inline(always)`, and so is all that it calls with vectors: functions of their own, as those
+    /// that map arrays can become, are compiled without AVX-512, and then call one for each operation.
+    fn run<V: Vector>(self) -> Self::Output;
 }
 
-/// Runs a kernel with the widest instruction set that the processor has.
+/// Runs a kernel with the widest registers that the processor has.
 #[inline(always)]
 pub fn widest<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
     {
         /// Whether the processor has all that [`wide`] is compiled for.
-        static HAS_AVX512: LazyLock<bool> = LazyLock::new(|| {
+        static HAS_AVX512: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| {
             is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512vl")
                 && is_x86_feature_detected!("avx512dq")
@@ -33,11 +36,20 @@ pub fn widest<K: Kernel>(kernel: K) -> K::Output {
             return unsafe { wide(kernel) };
         }
     }
-    kernel.run()
+    kernel.run::<Lanes>()
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512cd")]
 fn wide<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
+    // Something with this alignment on the stack has the compiler align what it puts there itself. Registers of 512 bits
+    // would otherwise lie across two lines of the cache (a fourteenth of the time of G2P in 2D).
+    let mut line = CacheLine(0);
+    std::hint::black_box(&mut line);
+    kernel.run::<Wide>()
 }
+
+/// A byte, aligned with a line of the cache.
+#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
+#[repr(align(64))]
+struct CacheLine(#[expect(dead_code)] u8);

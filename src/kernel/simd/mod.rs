@@ -1,9 +1,9 @@
 //! Explicit vectors of `f64`: the only module of this crate with CPU intrinsics.
 //!
 //! [`F64x4`] is one AVX register where the build has AVX2 and FMA and an array of four numbers
-//! elsewhere. Both do the same IEEE 754 operations, each correctly rounded, so a result never depends
-//! on which of them was compiled. [`Lanes`] is what the kernels compute with: [`LANES`] particles at
-//! a time, wide enough to keep independent chains of operations in flight.
+//! elsewhere. It holds a row of a node. [`LANES`] particles at a time make a [`Vector`]: two of them ([`Lanes`]), or one
+//! register of 512 bits where the processor has AVX-512 (see [`widest`]). All do the same IEEE 754 operations, each
+//! correctly rounded, so a result never depends on which of them was at work.
 
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -16,6 +16,7 @@ pub use avx::{F64x4, Mask4};
 pub use portable::{F64x4, Mask4};
 
 pub use dispatch::{Kernel, widest};
+pub use lanes::{Lanes, Mask};
 
 /// 2^52 + 1023: adding it to a small integer leaves that integer, biased as an exponent, in the low bits.
 const EXPONENT_MAGIC: f64 = 4_503_599_627_370_496.0 + 1023.0;
@@ -28,7 +29,10 @@ const ONE_BITS: u64 = 0x3ff0_0000_0000_0000;
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 mod avx;
+#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
+mod avx512;
 mod dispatch;
+mod lanes;
 #[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
 mod portable;
 
@@ -45,228 +49,98 @@ pub fn prefetch(address: usize) {
     let _ = address;
 }
 
-/// One number for each of [`LANES`] particles.
-#[derive(Clone, Copy, Debug)]
-pub struct Lanes(pub(crate) [F64x4; 2]);
+/// One number for each of [`LANES`] particles, in whatever registers a kernel is compiled for.
+pub trait Vector:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+{
+    /// One truth value for each particle.
+    type Mask: VectorMask<Self>;
 
-/// One truth value for each of [`LANES`] particles.
-#[derive(Clone, Copy, Debug)]
-pub struct Mask([Mask4; 2]);
-
-impl Lanes {
     /// All lanes equal to `value`.
-    #[inline(always)]
-    pub fn splat(value: f64) -> Self {
-        Self([F64x4::splat(value); 2])
-    }
+    fn splat(value: f64) -> Self;
+    /// Reads from an array.
+    fn load(from: &[f64; LANES]) -> Self;
+    /// Writes to an array.
+    fn store(self, to: &mut [f64; LANES]);
+    /// `self * a + b`, rounded once.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `b - self * a`, rounded once.
+    fn neg_mul_add(self, a: Self, b: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Largest integer not above.
+    fn floor(self) -> Self;
+    /// Nearest integer, ties to even.
+    fn round(self) -> Self;
+    /// The smaller; `other` if they are equal or either is NaN.
+    fn min(self, other: Self) -> Self;
+    /// The larger; `other` if they are equal or either is NaN.
+    fn max(self, other: Self) -> Self;
+    /// `self` with the sign of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+    /// `self < other`.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `self <= other`.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Exponent `k` and significand in `[1, 2)` of positive normal numbers: `self = m · 2^k`.
+    fn split(self) -> (Self, Self);
+    /// `2^self` of integers in `-1022..=1023`.
+    fn power_of_two(self) -> Self;
+    /// Four numbers for each particle become one row of four per particle.
+    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]);
+    /// Inverse of [`Vector::write_rows`].
+    fn columns(rows: &[F64x4; LANES]) -> [Self; 4];
+
     /// From an array.
     #[inline(always)]
-    pub fn new(values: [f64; LANES]) -> Self {
-        let [a, b, c, d, e, f, g, h] = values;
-        Self([F64x4::new([a, b, c, d]), F64x4::new([e, f, g, h])])
-    }
-    /// Reads from an array.
-    #[inline(always)]
-    pub fn load(from: &[f64; LANES]) -> Self {
-        let (low, high) = from.split_at(4);
-        let mut parts = [[0.0; 4]; 2];
-        parts[0].copy_from_slice(low);
-        parts[1].copy_from_slice(high);
-        Self([F64x4::new(parts[0]), F64x4::new(parts[1])])
-    }
-    /// Writes to an array.
-    #[inline(always)]
-    pub fn store(self, to: &mut [f64; LANES]) {
-        to[..4].copy_from_slice(&self.0[0].to_array());
-        to[4..].copy_from_slice(&self.0[1].to_array());
+    fn new(values: [f64; LANES]) -> Self {
+        Self::load(&values)
     }
     /// To an array.
     #[inline(always)]
-    pub fn to_array(self) -> [f64; LANES] {
-        let ([a, b, c, d], [e, f, g, h]) = (self.0[0].to_array(), self.0[1].to_array());
-        [a, b, c, d, e, f, g, h]
+    fn to_array(self) -> [f64; LANES] {
+        let mut values = [0.0; LANES];
+        self.store(&mut values);
+        values
     }
+}
+
+/// One truth value for each of [`LANES`] particles.
+pub trait VectorMask<V>: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
+    /// `a` where true, `b` where false.
+    fn select(self, a: V, b: V) -> V;
+    /// Bit `i` is lane `i`.
+    fn bits(self) -> u32;
+    /// Lane `i` is bit `i`.
+    fn from_bits(bits: u32) -> Self;
+    /// True if any lane is.
     #[inline(always)]
-    fn each(self, f: impl Fn(F64x4) -> F64x4) -> Self {
-        Self([f(self.0[0]), f(self.0[1])])
+    fn any(self) -> bool {
+        self.bits() != 0
     }
+    /// True if all lanes are.
     #[inline(always)]
-    fn pair(self, other: Self, f: impl Fn(F64x4, F64x4) -> F64x4) -> Self {
-        Self([f(self.0[0], other.0[0]), f(self.0[1], other.0[1])])
-    }
-    /// `self * a + b`, rounded once.
-    #[inline(always)]
-    pub fn mul_add(self, a: Self, b: Self) -> Self {
-        Self([self.0[0].mul_add(a.0[0], b.0[0]), self.0[1].mul_add(a.0[1], b.0[1])])
-    }
-    /// `b - self * a`, rounded once.
-    #[inline(always)]
-    pub fn neg_mul_add(self, a: Self, b: Self) -> Self {
-        Self([self.0[0].neg_mul_add(a.0[0], b.0[0]), self.0[1].neg_mul_add(a.0[1], b.0[1])])
-    }
-    /// Square root.
-    #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        self.each(F64x4::sqrt)
-    }
-    /// Absolute value.
-    #[inline(always)]
-    pub fn abs(self) -> Self {
-        self.each(F64x4::abs)
-    }
-    /// Largest integer not above.
-    #[inline(always)]
-    pub fn floor(self) -> Self {
-        self.each(F64x4::floor)
-    }
-    /// Nearest integer, ties to even.
-    #[inline(always)]
-    pub fn round(self) -> Self {
-        self.each(F64x4::round)
-    }
-    /// The smaller; `other` if they are equal or either is NaN.
-    #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
-        self.pair(other, F64x4::min)
-    }
-    /// The larger; `other` if they are equal or either is NaN.
-    #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
-        self.pair(other, F64x4::max)
-    }
-    /// `self` with the sign of `sign`.
-    #[inline(always)]
-    pub fn copysign(self, sign: Self) -> Self {
-        self.pair(sign, F64x4::copysign)
-    }
-    /// `self < other`.
-    #[inline(always)]
-    pub fn lt(self, other: Self) -> Mask {
-        Mask([self.0[0].lt(other.0[0]), self.0[1].lt(other.0[1])])
-    }
-    /// `self <= other`.
-    #[inline(always)]
-    pub fn le(self, other: Self) -> Mask {
-        Mask([self.0[0].le(other.0[0]), self.0[1].le(other.0[1])])
-    }
-    /// Exponent `k` and significand in `[1, 2)` of positive normal numbers: `self = m · 2^k`.
-    #[inline(always)]
-    pub fn split(self) -> (Self, Self) {
-        let ((k0, m0), (k1, m1)) = (self.0[0].split(), self.0[1].split());
-        (Self([k0, k1]), Self([m0, m1]))
-    }
-    /// `2^self` of integers in `-1022..=1023`.
-    #[inline(always)]
-    pub fn power_of_two(self) -> Self {
-        self.each(F64x4::power_of_two)
-    }
-    /// Four numbers for each particle become one row of four per particle.
-    #[inline(always)]
-    pub fn rows(columns: [Self; 4]) -> [F64x4; LANES] {
-        let [x, y, z, w] = columns;
-        let [a, b, c, d] = F64x4::transpose([x.0[0], y.0[0], z.0[0], w.0[0]]);
-        let [e, f, g, h] = F64x4::transpose([x.0[1], y.0[1], z.0[1], w.0[1]]);
-        [a, b, c, d, e, f, g, h]
-    }
-    /// Inverse of [`Lanes::rows`].
-    #[inline(always)]
-    pub fn columns(rows: [F64x4; LANES]) -> [Self; 4] {
-        let [a, b, c, d, e, f, g, h] = rows;
-        let [x0, y0, z0, w0] = F64x4::transpose([a, b, c, d]);
-        let [x1, y1, z1, w1] = F64x4::transpose([e, f, g, h]);
-        [Self([x0, x1]), Self([y0, y1]), Self([z0, z1]), Self([w0, w1])]
+    fn all(self) -> bool {
+        self.bits() == (1 << LANES) - 1
     }
 }
 
 /// `map` of an array, which the compiler may not move out of line as it does with that of the standard library.
 #[inline(always)]
-pub fn each<const N: usize>(mut values: [Lanes; N], f: impl Fn(Lanes) -> Lanes) -> [Lanes; N] {
+pub fn each<V: Vector, const N: usize>(mut values: [V; N], f: impl Fn(V) -> V) -> [V; N] {
     for value in &mut values {
         *value = f(*value);
     }
     values
-}
-
-impl Mask {
-    /// `a` where true, `b` where false.
-    #[inline(always)]
-    pub fn select(self, a: Lanes, b: Lanes) -> Lanes {
-        Lanes([self.0[0].select(a.0[0], b.0[0]), self.0[1].select(a.0[1], b.0[1])])
-    }
-    /// Bit `i` is lane `i`.
-    #[inline(always)]
-    pub fn bits(self) -> u32 {
-        self.0[0].bits() | self.0[1].bits() << 4
-    }
-    /// Lanes that are set, as the lowest bit of each byte.
-    #[inline(always)]
-    pub fn bytes(self) -> u64 {
-        // Byte i gets bit i of eight, from where carries bring it to the highest bit of the byte.
-        let bits = u64::from(self.bits()).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
-        (bits.wrapping_add(0x0040_6070_787c_7e7f) >> 7) & 0x0101_0101_0101_0101
-    }
-
-    /// Lane `i` is bit `i`.
-    #[inline(always)]
-    pub fn from_bits(bits: u32) -> Self {
-        Self([Mask4::from_bits(bits & 15), Mask4::from_bits(bits >> 4)])
-    }
-    /// True if any lane is.
-    #[inline(always)]
-    pub fn any(self) -> bool {
-        self.bits() != 0
-    }
-    /// True if all lanes are.
-    #[inline(always)]
-    pub fn all(self) -> bool {
-        self.bits() == (1 << LANES) - 1
-    }
-}
-
-macro_rules! lane_operator {
-    ($type:ty, $trait:ident, $method:ident) => {
-        impl $trait for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                Self([self.0[0].$method(other.0[0]), self.0[1].$method(other.0[1])])
-            }
-        }
-    };
-}
-lane_operator!(Lanes, Add, add);
-lane_operator!(Lanes, Sub, sub);
-lane_operator!(Lanes, Mul, mul);
-lane_operator!(Lanes, Div, div);
-lane_operator!(Mask, BitAnd, bitand);
-lane_operator!(Mask, BitOr, bitor);
-
-impl Neg for Lanes {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        self.each(|x| -x)
-    }
-}
-impl Not for Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Self([!self.0[0], !self.0[1]])
-    }
-}
-impl AddAssign for Lanes {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-impl Mul<f64> for Lanes {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, factor: f64) -> Self {
-        self * Self::splat(factor)
-    }
 }
 
 #[cfg(test)]

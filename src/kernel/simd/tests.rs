@@ -1,4 +1,4 @@
-//! The two implementations against each other.
+//! The implementations against each other.
 use super::*;
 
 /// Values with all kinds of signs, sizes and special cases.
@@ -70,19 +70,69 @@ fn both_implementations_give_the_same_bits() {
     }
 }
 
+/// Rows from columns, and columns from these.
+struct RowsAndBack([[f64; LANES]; 4]);
+
+impl Kernel for RowsAndBack {
+    type Output = ([[f64; 4]; LANES], [[f64; LANES]; 4]);
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Self::Output {
+        let mut rows = [F64x4::splat(0.0); LANES];
+        V::write_rows(self.0.map(V::new), &mut rows);
+        (rows.map(F64x4::to_array), V::columns(&rows).map(V::to_array))
+    }
+}
+
 #[test]
 fn rows_and_columns_are_inverse() {
-    let columns: [Lanes; 4] =
-        std::array::from_fn(|c| Lanes::new(std::array::from_fn(|lane| (10 * c + lane) as f64)));
-    let rows = Lanes::rows(columns);
-    for (lane, row) in rows.iter().enumerate() {
-        assert_eq!(row.to_array(), std::array::from_fn(|c| (10 * c + lane) as f64));
+    let columns = std::array::from_fn(|c| std::array::from_fn(|lane| (10 * c + lane) as f64));
+    for (rows, back) in [RowsAndBack(columns).run::<Lanes>(), widest(RowsAndBack(columns))] {
+        for (lane, row) in rows.into_iter().enumerate() {
+            assert_eq!(row, std::array::from_fn(|c| (10 * c + lane) as f64));
+        }
+        assert_eq!(back, columns);
     }
-    let back = Lanes::columns(rows);
-    for c in 0..4 {
-        assert_eq!(back[c].to_array(), columns[c].to_array());
+}
+
+/// Every operation of vectors on three of them, one of which is positive where that is asked for.
+struct Everything([[f64; LANES]; 3]);
+
+impl Kernel for Everything {
+    type Output = (Vec<[u64; LANES]>, Vec<u32>);
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Self::Output {
+        let [a, b, c] = self.0.map(V::new);
+        let positive = a.abs().max(V::splat(f64::MIN_POSITIVE));
+        let (k, m) = positive.split();
+        let mut sum = a;
+        sum += b;
+        let masks = [a.lt(b), a.le(b), a.lt(b) & a.le(c), a.lt(b) | a.le(c), !a.lt(b)];
+        let chosen = V::Mask::from_bits(0b1010_0110);
+        let values = [
+            [a + b, a - b, a * b, a / b, -a, sum, a * 0.3],
+            [a.mul_add(b, c), a.neg_mul_add(b, c), positive.sqrt(), a.abs(), a.floor(), a.round(), a.min(b)],
+            [a.max(b), a.copysign(b), k, m, k.power_of_two(), masks[0].select(a, b), chosen.select(a, b)],
+        ];
+        let masks = masks.iter().chain([&chosen]);
+        let bits = |value: V| value.to_array().map(f64::to_bits);
+        (values.into_iter().flatten().map(bits).collect(), masks.map(|mask| mask.bits()).collect())
     }
-    assert_eq!(Mask::from_bits(0b1010_0110).bits(), 0b1010_0110);
+}
+
+/// On processors with AVX-512; elsewhere both are the same.
+#[test]
+fn the_widest_registers_give_the_same_bits() {
+    let mut samples = samples();
+    samples.push([f64::INFINITY, f64::NEG_INFINITY, f64::MIN_POSITIVE / 4.0, -0.0]);
+    let eight = |i: usize| -> [f64; LANES] {
+        std::array::from_fn(|lane| samples[(i + lane / 4 * 13) % samples.len()][lane % 4])
+    };
+    for i in 0..samples.len() {
+        let three = [eight(i), eight(i + 7), eight(i + 31)];
+        assert_eq!(Everything(three).run::<Lanes>(), widest(Everything(three)), "{three:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use rustc_hash::FxHashSet;
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::{Limits, Setting, read, read_matrix, volume, write, write_matrix};
 use crate::kernel::math::{exp, ln};
-use crate::kernel::simd::{LANES, Lanes};
+use crate::kernel::simd::{LANES, Lanes, Vector};
 use crate::kernel::{Select, Transfer};
 use crate::material::{self, HISTORIES, State, Symmetric, eigen};
 

@@ -1,7 +1,8 @@
 //! Tests of splitting and merging: what they share.
 use super::family::{Bounds, separated};
 use super::*;
-use crate::kernel::{Transfer, simd::Lanes};
+use crate::kernel::Transfer;
+use crate::kernel::simd::{Lanes, Vector};
 use crate::material::{self, Material, Parameters, State, parameters};
 use proptest::prelude::*;
 
