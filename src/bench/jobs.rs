@@ -1,6 +1,6 @@
 //! The built-in jobs, as job files.
 //!
-//! All have bodies of eight particles per cell (four in 2D), in motion and deforming from the first step, in a
+//! All have bodies of eight particles per cell (in 2D also four, as is usual there), in motion and deforming from the first step, in a
 //! domain that is little larger. Sizes follow from the number of particles.
 
 /// A built-in job.
@@ -19,7 +19,7 @@ pub struct BenchJob {
 enum Kind {
     Block(&'static str),
     Column { adaptive: bool },
-    Sheet,
+    Sheet { per_cell: f64 },
 }
 
 const NEO_HOOKEAN: &str = r#"model = "neo_hookean""#;
@@ -28,7 +28,7 @@ const VON_MISES: &str = "model = \"von_mises\"\nyield_stress = 1e-2\nhardening =
 const SAND: &str = "model = \"drucker_prager\"\nfriction_angle = 29.5\nmatch = \"plane_strain\"";
 
 /// All built-in jobs.
-pub const JOBS: [BenchJob; 5] = [
+pub const JOBS: [BenchJob; 6] = [
     BenchJob {
         name: "neo_hookean",
         title: "spinning neo-Hookean block, 3D, uniform tree",
@@ -55,21 +55,27 @@ pub const JOBS: [BenchJob; 5] = [
     },
     BenchJob {
         name: "sheet",
-        title: "spinning neo-Hookean sheet, 2D plane strain, uniform tree",
+        title: "spinning neo-Hookean sheet, 2D plane strain, uniform tree, four particles per cell",
         warm_up: 40,
-        kind: Kind::Sheet,
+        kind: Kind::Sheet { per_cell: 4.0 },
+    },
+    BenchJob {
+        name: "sheet_8",
+        title: "spinning neo-Hookean sheet, 2D plane strain, uniform tree, eight particles per cell",
+        warm_up: 40,
+        kind: Kind::Sheet { per_cell: 8.0 },
     },
 ];
 
 impl BenchJob {
     /// 2 or 3.
     pub fn dimension(&self) -> usize {
-        if self.kind == Kind::Sheet { 2 } else { 3 }
+        if matches!(self.kind, Kind::Sheet { .. }) { 2 } else { 3 }
     }
 
     /// Whether the material flows.
     pub fn is_plastic(&self) -> bool {
-        !matches!(self.kind, Kind::Sheet | Kind::Block(NEO_HOOKEAN))
+        !matches!(self.kind, Kind::Sheet { .. } | Kind::Block(NEO_HOOKEAN))
     }
 
     /// The job file for about `particles` particles, with a record of telemetry every `steps` steps and a row of the
@@ -78,7 +84,7 @@ impl BenchJob {
         let body = match self.kind {
             Kind::Block(model) => block(particles as f64, model),
             Kind::Column { adaptive } => column(particles as f64, adaptive),
-            Kind::Sheet => sheet(particles as f64),
+            Kind::Sheet { per_cell } => sheet(particles as f64, per_cell),
         };
         format!(
             "version = 1\ntitle = \"{}\"\n{body}\n[time]\nend = 1e3\n[output]\ndirectory = {directory:?}\n\
@@ -111,14 +117,16 @@ fn block(particles: f64, model: &str) -> String {
     )
 }
 
-fn sheet(particles: f64) -> String {
-    let edge = particles.sqrt().round() * SPACING;
+fn sheet(particles: f64, per_cell: f64) -> String {
+    let along_axis = per_cell.sqrt();
+    let edge = particles.sqrt().round() * (2.0 * SPACING / along_axis);
     let domain = ((edge + 2.0 * MARGIN) / ROOT).ceil() * ROOT;
     let end = MARGIN + edge;
     format!(
         "dimension = 2\n[domain]\nsize = [{domain}, {domain}]\nroot_edge = {ROOT}\n\
          [tree]\nbase_level = 2\n[[materials]]\nname = \"solid\"\ndensity = 1000\nyoung = 1e6\npoisson = 0.3\n{NEO_HOOKEAN}\n\
          [[bodies]]\nname = \"sheet\"\nmaterial = \"solid\"\nvelocity = [0.5, 0.3]\nangular_velocity = {}\n\
+         particles_per_cell = {along_axis}\n\
          shape = {{ kind = \"box\", min = [{MARGIN}, {MARGIN}], max = [{end}, {end}] }}\n",
         1.0 / edge
     )
