@@ -100,12 +100,8 @@ impl Vector for Wide {
         Self(intrinsic!(_mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(biased.0)))))
     }
     #[inline(always)]
-    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
-        let [x, y, z, w] = columns;
-        let [(x0, x1), (y0, y1), (z0, z1), (w0, w1)] = [x.halves(), y.halves(), z.halves(), w.halves()];
-        let [a, b, c, d] = F64x4::transpose([x0, y0, z0, w0]);
-        let [e, f, g, h] = F64x4::transpose([x1, y1, z1, w1]);
-        *rows = [a, b, c, d, e, f, g, h];
+    fn halves(self) -> [F64x4; 2] {
+        intrinsic!([F64x4(_mm512_castpd512_pd256(self.0)), F64x4(_mm512_extractf64x4_pd::<1>(self.0))])
     }
     /// Reads row by row, as they were written: a load of two would wait until both have left the store queue.
     #[inline(always)]
@@ -132,12 +128,7 @@ impl Vector for Wide {
 }
 
 impl Wide {
-    /// The lower and the upper four lanes.
-    #[inline(always)]
-    fn halves(self) -> (F64x4, F64x4) {
-        intrinsic!((F64x4(_mm512_castpd512_pd256(self.0)), F64x4(_mm512_extractf64x4_pd::<1>(self.0))))
-    }
-    /// Inverse of [`Wide::halves`].
+    /// Inverse of [`Vector::halves`].
     #[inline(always)]
     fn join(low: F64x4, high: F64x4) -> Self {
         Self(intrinsic!(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low.0), high.0)))

@@ -106,11 +106,8 @@ impl Vector for Lanes {
         self.each(F64x4::power_of_two)
     }
     #[inline(always)]
-    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
-        let [x, y, z, w] = columns;
-        let [a, b, c, d] = F64x4::transpose([x.0[0], y.0[0], z.0[0], w.0[0]]);
-        let [e, f, g, h] = F64x4::transpose([x.0[1], y.0[1], z.0[1], w.0[1]]);
-        *rows = [a, b, c, d, e, f, g, h];
+    fn halves(self) -> [F64x4; 2] {
+        self.0
     }
     #[inline(always)]
     fn columns(rows: &[F64x4; LANES]) -> [Self; 4] {

@@ -95,10 +95,21 @@ pub trait Vector:
     fn split(self) -> (Self, Self);
     /// `2^self` of integers in `-1022..=1023`.
     fn power_of_two(self) -> Self;
-    /// Four numbers for each particle become one row of four per particle.
-    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]);
+    /// The lower and the upper four lanes.
+    fn halves(self) -> [F64x4; 2];
     /// Inverse of [`Vector::write_rows`].
     fn columns(rows: &[F64x4; LANES]) -> [Self; 4];
+
+    /// Four numbers for each particle become one row of four per particle. Writes row by row, as they are read: what is
+    /// stored and loaded in different pieces waits in the store queue.
+    #[inline(always)]
+    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
+        let [x, y, z, w] = columns;
+        let ([x0, x1], [y0, y1], [z0, z1], [w0, w1]) = (x.halves(), y.halves(), z.halves(), w.halves());
+        let [a, b, c, d] = F64x4::transpose([x0, y0, z0, w0]);
+        let [e, f, g, h] = F64x4::transpose([x1, y1, z1, w1]);
+        *rows = [a, b, c, d, e, f, g, h];
+    }
 
     /// From an array.
     #[inline(always)]

@@ -93,6 +93,7 @@ fn rows_and_columns_are_inverse() {
         }
         assert_eq!(back, columns);
     }
+    assert_eq!(Mask::from_bits(0b1010_0110).bits(), 0b1010_0110);
 }
 
 /// Every operation of vectors on three of them, one of which is positive where that is asked for.
