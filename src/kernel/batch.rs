@@ -1,20 +1,20 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
 use super::simd::{LANES, Vector, VectorMask, prefetch};
-use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::particle::chunk::{Chunk, Layout, Place, TILE};
 
-/// How far ahead columns are asked for, in particles, in the next chunk where this one ends: a batch at a time is too
-/// many streams for the processor to foresee, and in 2D a column is over after a few lines.
-const AHEAD: usize = 2 * LANES;
+/// How far ahead tiles are asked for, in particles, in the next chunk where this one ends.
+const AHEAD: usize = 2 * TILE;
 
 /// Up to [`LANES`] particles. Lanes that are no members compute something that is never stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Batch {
+    /// Those of lanes that are no members are of use for their material.
     index: [u32; LANES],
     /// Bit i tells whether lane i is a member.
     lanes: u32,
-    /// Lane i is particle `index[0] + i`, member or not.
-    contiguous: bool,
+    /// The tile whose lanes are those of the batch; brought together from several otherwise.
+    tile: Option<u32>,
     /// What a later batch will read.
     ahead: Place,
 }
@@ -22,50 +22,62 @@ pub(super) struct Batch {
 /// All lanes are members.
 const ALL: u32 = (1 << LANES) - 1;
 
+/// The most components that particles have.
+const MOST: usize = Layout::<3>::REALS;
+
+/// Memory for particles brought together from several tiles.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct Tile([[f64; LANES]; MOST]);
+
+impl Tile {
+    pub fn new() -> Self {
+        Self([[0.0; LANES]; MOST])
+    }
+}
+
 /// The batches of a selection, in order.
-pub(super) struct Batches<'a> {
+pub(super) struct Batches<'a, const D: usize> {
     select: Select<'a>,
     /// Particles of the chunk.
     len: usize,
-    /// Room of its columns.
-    stride: usize,
     /// Members taken so far.
     taken: usize,
     place: Place,
     next: Place,
 }
 
-impl<'a> Batches<'a> {
+impl<'a, const D: usize> Batches<'a, D> {
     /// Batches of a selection from a chunk. `next` is the place of the chunk to be read after it.
-    pub fn new<const D: usize>(select: Select<'a>, chunk: &Chunk<D>, next: Place) -> Self {
-        let place = chunk.place();
-        Self { select, len: chunk.len(), stride: chunk.capacity(), taken: 0, place, next }
+    pub fn new(select: Select<'a>, chunk: &Chunk<D>, next: Place) -> Self {
+        Self { select, len: chunk.len(), taken: 0, place: chunk.place(), next }
     }
 
-    /// The next particles of the chunk. Columns have room for whole batches.
+    /// The next particles of the chunk.
     #[inline(always)]
     fn whole(&self) -> Batch {
         let first = self.taken;
         let count = (self.len - first).min(LANES);
         let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
-        Batch { index, lanes: ALL >> (LANES - count), contiguous: true, ahead: self.ahead(first) }
+        let tile = Some((first / TILE) as u32);
+        Batch { index, lanes: ALL >> (LANES - count), tile, ahead: self.ahead(first) }
     }
 
     /// Where to read ahead while the particles from `first` on are at work.
     #[inline(always)]
     fn ahead(&self, first: usize) -> Place {
-        let rows = self.len.next_multiple_of(LANES);
+        let rows = self.len.next_multiple_of(TILE);
         let (place, particle) = match first + AHEAD {
             particle if particle < rows => (self.place, particle),
-            particle if self.next.columns != 0 => (self.next, particle - rows),
+            particle if self.next.tiles != 0 => (self.next, particle - rows),
             _ => (self.place, first),
         };
-        let bytes = particle * size_of::<f64>();
-        Place { columns: place.columns + bytes, stride: place.stride, tags: place.tags + bytes }
+        let tile = particle / TILE * Layout::<D>::REALS * size_of::<[f64; TILE]>();
+        Place { tiles: place.tiles + tile, tags: place.tags + particle * size_of::<u64>() }
     }
 }
 
-impl Iterator for Batches<'_> {
+impl<const D: usize> Iterator for Batches<'_, D> {
     type Item = Batch;
 
     #[inline(always)]
@@ -85,7 +97,7 @@ impl Iterator for Batches<'_> {
                 if rest.is_empty() {
                     return None;
                 }
-                let (batch, count) = Batch::of_list(rest, self.stride);
+                let (batch, count) = Batch::of_list(rest);
                 self.taken += count;
                 Some(Batch { ahead: self.ahead(rest[0] as usize), ..batch })
             }
@@ -98,43 +110,44 @@ impl Batch {
     #[inline(always)]
     pub fn of_particles(list: &[u32]) -> Self {
         match list.first_chunk() {
-            Some(next) if is_run(next) => {
-                Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() }
-            }
+            Some(next) if is_tile(next) => Self::whole_tile(next),
             _ => Self::from_indices(list, |&p| p),
         }
     }
 
-    /// The first particles of a list, and their number. Where at least a quarter of the next [`LANES`] particles of the chunk
-    /// are on the list, as is usual beside level jumps, these are read as they stand; elsewhere they are picked.
+    /// All particles of a tile.
     #[inline(always)]
-    fn of_list(list: &[u32], stride: usize) -> (Self, usize) {
-        if let Some(next) = list.first_chunk::<LANES>()
-            && is_run(next)
-        {
-            let batch = Self { index: *next, lanes: ALL, contiguous: true, ahead: Place::default() };
-            return (batch, LANES);
+    fn whole_tile(index: &[u32; LANES]) -> Self {
+        Self { index: *index, lanes: ALL, tile: Some(index[0] / TILE as u32), ahead: Place::default() }
+    }
+
+    /// The first particles of a list, and their number. Where at least a quarter of a tile is on the list, as is usual
+    /// beside level jumps, it is read as it stands; elsewhere particles are picked.
+    #[inline(always)]
+    fn of_list(list: &[u32]) -> (Self, usize) {
+        match list.first_chunk() {
+            Some(next) if is_tile(next) => (Self::whole_tile(next), LANES),
+            _ => Self::of_gaps(list),
         }
-        Self::of_gaps(list, stride)
     }
 
     /// As [`Batch::of_list`], for lists with gaps.
     #[inline(never)]
-    fn of_gaps(list: &[u32], stride: usize) -> (Self, usize) {
-        let first = list[0];
-        let end = first + LANES as u32;
-        let (mut index, mut lanes, mut count, mut least) = ([first; LANES], 0, 0, first);
+    fn of_gaps(list: &[u32]) -> (Self, usize) {
+        let tile = list[0] / TILE as u32;
+        let (mut index, mut lanes, mut count, mut least) = ([list[0]; LANES], 0, 0, 0);
         for &p in list.iter().take(LANES) {
-            if p < least || p >= end {
+            if p < least || p / TILE as u32 != tile {
                 break;
             }
-            index[(p - first) as usize] = p;
-            lanes |= 1 << (p - first);
+            let lane = p % TILE as u32;
+            index[lane as usize] = p;
+            lanes |= 1 << lane;
             count += 1;
             least = p + 1;
         }
-        if (count >= LANES / 4 || count == list.len()) && end as usize <= stride {
-            return (Self { index, lanes, contiguous: true, ahead: Place::default() }, count);
+        if count >= LANES / 4 || count == list.len() {
+            return (Self { index, lanes, tile: Some(tile), ahead: Place::default() }, count);
         }
         (Self::from_indices(list, |&p| p), list.len().min(LANES))
     }
@@ -144,7 +157,66 @@ impl Batch {
     pub fn from_indices<T>(list: &[T], particle: impl Fn(&T) -> u32) -> Self {
         let count = list.len().min(LANES);
         let index: [u32; LANES] = std::array::from_fn(|lane| particle(&list[lane.min(count - 1)]));
-        Self { index, lanes: ALL >> (LANES - count), contiguous: false, ahead: Place::default() }
+        Self { index, lanes: ALL >> (LANES - count), tile: None, ahead: Place::default() }
+    }
+
+    /// The particles' tile; `columns` are those that will be read where it has to be brought together in `spare`.
+    #[inline(always)]
+    pub fn tile<'a, const D: usize>(
+        &self,
+        tiles: &'a [[f64; LANES]],
+        columns: impl Iterator<Item = usize>,
+        spare: &'a mut Tile,
+    ) -> &'a [[f64; LANES]] {
+        let Some(tile) = self.tile else {
+            self.bring_together::<D>(tiles, columns, spare);
+            return &spare.0[..Layout::<D>::REALS];
+        };
+        &tiles[tile as usize * Layout::<D>::REALS..][..Layout::<D>::REALS]
+    }
+
+    /// The particles' tile, all columns, to be changed. What was brought together has to be put back.
+    #[inline(always)]
+    pub fn tile_mut<'a, const D: usize>(
+        &self,
+        tiles: &'a mut [[f64; LANES]],
+        spare: &'a mut Tile,
+    ) -> &'a mut [[f64; LANES]] {
+        let Some(tile) = self.tile else {
+            self.bring_together::<D>(tiles, 0..Layout::<D>::REALS, spare);
+            return &mut spare.0[..Layout::<D>::REALS];
+        };
+        &mut tiles[tile as usize * Layout::<D>::REALS..][..Layout::<D>::REALS]
+    }
+
+    #[inline(never)]
+    fn bring_together<const D: usize>(
+        &self,
+        tiles: &[[f64; LANES]],
+        columns: impl Iterator<Item = usize>,
+        spare: &mut Tile,
+    ) {
+        let place = self.index.map(|p| (p as usize / TILE * Layout::<D>::REALS, p as usize % TILE));
+        for column in columns {
+            spare.0[column] = place.map(|(line, lane)| tiles[line + column][lane]);
+        }
+    }
+
+    /// Writes members back that were brought together in `spare`.
+    #[inline(always)]
+    pub fn put_back<const D: usize>(&self, tiles: &mut [[f64; LANES]], spare: &Tile) {
+        if self.tile.is_none() {
+            self.scatter_back::<D>(tiles, spare);
+        }
+    }
+
+    #[inline(never)]
+    fn scatter_back<const D: usize>(&self, tiles: &mut [[f64; LANES]], spare: &Tile) {
+        for lane in self.members() {
+            let p = self.particle(lane);
+            let own = &mut tiles[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
+            own.iter_mut().zip(&spare.0).for_each(|(line, from)| line[p % TILE] = from[lane]);
+        }
     }
 
     /// Lanes that are members, in order.
@@ -180,56 +252,30 @@ impl Batch {
     /// Asks for what a later batch will read of a column.
     #[inline(always)]
     fn read_ahead(&self, column: usize) {
-        prefetch(self.ahead.columns.wrapping_add(column * self.ahead.stride));
+        prefetch(self.ahead.tiles.wrapping_add(column * size_of::<[f64; TILE]>()));
     }
 
-    /// Reads a column.
+    /// Reads a column of the particles' tile.
     #[inline(always)]
-    pub fn load<V: Vector>(&self, reals: &[f64], stride: usize, column: usize) -> V {
-        if self.contiguous {
-            let start = column * stride + self.particle(0);
-            self.read_ahead(column);
-            match reals[start..start + LANES].first_chunk() {
-                Some(values) => V::load(values),
-                None => V::splat(0.0),
-            }
-        } else {
-            V::load(&self.load_scattered(reals, column * stride))
-        }
+    pub fn load<V: Vector>(&self, tile: &[[f64; LANES]], column: usize) -> V {
+        self.read_ahead(column);
+        V::load(&tile[column])
     }
 
-    #[inline(never)]
-    fn load_scattered(&self, reals: &[f64], column: usize) -> [f64; LANES] {
-        std::array::from_fn(|lane| reals[column + self.particle(lane)])
-    }
-
-    /// Writes a column.
+    /// Writes a column of members in the particles' tile.
     #[inline(always)]
-    pub fn store<V: Vector>(&self, reals: &mut [f64], stride: usize, column: usize, values: V) {
-        if self.contiguous {
-            let start = column * stride + self.particle(0);
-            self.read_ahead(column);
-            if let Some(to) = reals[start..start + LANES].first_chunk_mut() {
-                self.merged(values, V::load(to)).store(to);
-            }
-        } else {
-            self.store_scattered(reals, column * stride, &values.to_array());
-        }
-    }
-
-    #[inline(never)]
-    fn store_scattered(&self, reals: &mut [f64], column: usize, values: &[f64; LANES]) {
-        for lane in self.members() {
-            reals[column + self.particle(lane)] = values[lane];
-        }
+    pub fn store<V: Vector>(&self, tile: &mut [[f64; LANES]], column: usize, values: V) {
+        self.read_ahead(column);
+        let line = &mut tile[column];
+        self.merged(values, V::load(line)).store(line);
     }
 
     /// Positions.
     #[inline(always)]
-    pub fn positions<V: Vector, const D: usize>(&self, reals: &[f64], stride: usize) -> [V; D] {
+    pub fn positions<V: Vector, const D: usize>(&self, tile: &[[f64; LANES]]) -> [V; D] {
         let mut position = [V::splat(0.0); D];
         for axis in 0..D {
-            position[axis] = self.load(reals, stride, Layout::<D>::POSITION + axis);
+            position[axis] = self.load(tile, Layout::<D>::POSITION + axis);
         }
         position
     }
@@ -243,10 +289,11 @@ impl Batch {
     }
 }
 
-/// Whether particles follow each other in the chunk. All are looked at: members of a family come in any order.
+/// Whether particles are those of a tile in order. All are looked at: members of a family come in any order.
 #[inline(always)]
-fn is_run(list: &[u32; LANES]) -> bool {
-    (0..LANES).fold(true, |is_run, lane| is_run & (list[lane] == list[0].wrapping_add(lane as u32)))
+fn is_tile(list: &[u32; LANES]) -> bool {
+    let begins = list[0].is_multiple_of(TILE as u32);
+    (0..LANES).fold(begins, |is_run, lane| is_run & (list[lane] == list[0].wrapping_add(lane as u32)))
 }
 
 /// The lanes of a set that has a bit for each.

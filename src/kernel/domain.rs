@@ -2,7 +2,7 @@
 //!
 //! A pure function of particle state, cell size and domain size: scatter, gather and the search for
 //! the block of a particle call the same code and get the same bits.
-use super::batch::{Batch, Batches};
+use super::batch::{Batch, Batches, Tile};
 use super::math::{exp, ln};
 use super::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 use super::{BoxPolicy, Scheme, Select};
@@ -48,20 +48,24 @@ pub fn full_half_widths_of<const D: usize>(
     extent: &[f64; D],
     scheme: &Scheme,
 ) -> [Lanes; D] {
-    let (reals, stride) = chunk.reals();
+    let mut spare = Tile::new();
     let batch = Batch::of_particles(particles);
-    let position = batch.positions(reals, stride);
-    of_batch(reals, stride, chunk.tags(), &batch, &position, cell, f64::INFINITY, extent, scheme)
+    let tile = batch.tile::<D>(chunk.tiles(), columns::<D>(), &mut spare);
+    of_batch(tile, chunk.tags(), &batch, &batch.positions(tile), cell, f64::INFINITY, extent, scheme)
 }
 
 /// Asks for what [`full_half_widths_of`] will read of the batch of particles from `first` on.
 pub fn read_ahead<const D: usize>(place: Place, first: usize) {
-    let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
-    let state = elastic.chain([Layout::<D>::HISTORY + 1]);
-    for column in (Layout::<D>::POSITION..Layout::<D>::POSITION + D).chain(state) {
-        prefetch(place.columns + column * place.stride + first * size_of::<f64>());
-    }
+    let tile = place.tiles + first / LANES * Layout::<D>::REALS * size_of::<[f64; LANES]>();
+    columns::<D>().for_each(|column| prefetch(tile + column * size_of::<[f64; LANES]>()));
     prefetch(place.tags + first * size_of::<u64>());
+}
+
+/// Columns that [`of_batch`] may read, positions among them.
+fn columns<const D: usize>() -> impl Iterator<Item = usize> {
+    let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
+    let position = Layout::<D>::POSITION..Layout::<D>::POSITION + D;
+    position.chain(elastic).chain([Layout::<D>::HALF, Layout::<D>::HISTORY + 1])
 }
 
 fn collect<const D: usize>(
@@ -74,10 +78,11 @@ fn collect<const D: usize>(
     out: &mut Vec<[f64; D]>,
 ) {
     out.clear();
-    let (reals, stride) = chunk.reals();
+    let mut spare = Tile::new();
     for batch in Batches::new(select, chunk, Place::default()) {
-        let position = batch.positions(reals, stride);
-        let half = of_batch(reals, stride, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
+        let tile = batch.tile::<D>(chunk.tiles(), columns::<D>(), &mut spare);
+        let position = batch.positions(tile);
+        let half = of_batch(tile, chunk.tags(), &batch, &position, cell, greatest, extent, scheme);
         let half: [[f64; LANES]; D] = half.map(Lanes::to_array);
         out.extend(batch.members().map(|lane| std::array::from_fn(|axis| half[axis][lane])));
     }
@@ -86,8 +91,7 @@ fn collect<const D: usize>(
 /// Half widths of a batch.
 #[inline(always)]
 pub(super) fn of_batch<V: Vector, const D: usize>(
-    reals: &[f64],
-    stride: usize,
+    tile: &[[f64; LANES]],
     tags: &[u64],
     batch: &Batch,
     position: &[V; D],
@@ -97,7 +101,7 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
     scheme: &Scheme,
 ) -> [V; D] {
     let mut half = match scheme.boxes {
-        BoxPolicy::Fixed => [batch.load(reals, stride, Layout::<D>::HALF); D],
+        BoxPolicy::Fixed => [batch.load(tile, Layout::<D>::HALF); D],
         BoxPolicy::Cell => {
             let half = std::array::from_fn(|lane| {
                 let level = Tag::unpack(tags[batch.particle(lane)]).level;
@@ -106,8 +110,8 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
             [V::new(half); D]
         }
         BoxPolicy::Volume { min_stretch, max_stretch } => {
-            let original: V = batch.load(reals, stride, Layout::<D>::HALF);
-            let mut half: [V; D] = stretches(reals, stride, tags, batch, scheme);
+            let original: V = batch.load(tile, Layout::<D>::HALF);
+            let mut half: [V; D] = stretches(tile, tags, batch, scheme);
             for half in &mut half {
                 *half = original * half.max(V::splat(min_stretch)).min(V::splat(max_stretch));
             }
@@ -124,8 +128,7 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
 /// Ratio of the half widths to the undeformed ones that keeps the volume.
 #[inline(always)]
 fn stretches<V: Vector, const D: usize>(
-    reals: &[f64],
-    stride: usize,
+    tile: &[[f64; LANES]],
     tags: &[u64],
     batch: &Batch,
     scheme: &Scheme,
@@ -134,16 +137,16 @@ fn stretches<V: Vector, const D: usize>(
     let mut elastic = [V::splat(0.0); 6];
     let mut stretch = [V::splat(0.0); D];
     for axis in 0..D {
-        elastic[axis] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + axis);
+        elastic[axis] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + axis);
         stretch[axis] = elastic[axis].sqrt();
     }
     if plastic == 0 {
         return stretch;
     }
     for c in D..Layout::<D>::SYMMETRIC {
-        elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+        elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
     }
-    let gain = batch.load(reals, stride, Layout::<D>::HISTORY + 1);
+    let gain = batch.load(tile, Layout::<D>::HISTORY + 1);
     let volume_log = ln(determinant(&elastic)).mul_add(V::splat(0.5), gain);
     let isotropic = exp(volume_log * (1.0 / D as f64));
     if plastic == (1 << LANES) - 1 {

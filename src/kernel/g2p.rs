@@ -7,7 +7,7 @@
 //! where V and S are the first and second moments that constrained nodes inherit (see [`super::hanging`]; zero
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
-use super::batch::{Batch, Batches};
+use super::batch::{Batch, Batches, Tile};
 pub use super::gathered::{Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
@@ -22,11 +22,12 @@ pub struct Scratch<const D: usize> {
     weights: Weights<D>,
     nodes: NodeWeights,
     sums: Sums<D>,
+    spare: Tile,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        Self { weights: Weights::new(), nodes: NodeWeights::new(), sums: Sums::new() }
+        Self { weights: Weights::new(), nodes: NodeWeights::new(), sums: Sums::new(), spare: Tile::new() }
     }
 }
 
@@ -67,18 +68,18 @@ impl<const D: usize> Kernel for Gather<'_, D> {
     fn run<V: Vector>(self) -> f64 {
         let Self { scratch, chunk, select, frame, scheme, dt, fields, leavers, next } = self;
         let batches = Batches::new(select, chunk, next);
-        let (reals, stride, tags) = chunk.reals_mut_and_tags();
+        let (tiles, tags) = chunk.tiles_mut_and_tags();
         let (cell, extent) = (frame.cell, &frame.extent);
-        let Scratch { weights, nodes, sums } = scratch;
+        let Scratch { weights, nodes, sums, spare } = scratch;
         let mut greatest = V::splat(0.0);
         for batch in batches {
-            let position: [V; D] = batch.positions(reals, stride);
-            let half =
-                domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, extent, scheme);
+            let tile = batch.tile_mut::<D>(tiles, spare);
+            let position: [V; D] = batch.positions(tile);
+            let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, extent, scheme);
             weights.fill(frame, &position, &position, &half);
-            sums.gather(weights, nodes, &batch, cell, fields);
-            greatest =
-                advance(reals, stride, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+            sums.gather::<V>(weights, nodes, &batch, cell, fields);
+            greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+            batch.put_back::<D>(tiles, spare);
         }
         largest(greatest)
     }
@@ -94,14 +95,17 @@ pub fn gather_sub_boxes<const D: usize>(
     fields: &Fields,
     gathered: &mut [Gathered<D>],
 ) {
-    let (reals, stride) = chunk.reals();
-    let Scratch { weights, nodes, sums } = scratch;
+    let Scratch { weights, nodes, sums, spare } = scratch;
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let position: [Lanes; D] = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(batch.tile::<D>(
+            chunk.tiles(),
+            Layout::<D>::POSITION..Layout::<D>::POSITION + D,
+            spare,
+        ));
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
-        sums.gather(weights, nodes, &batch, frame.cell, fields);
+        sums.gather::<Lanes>(weights, nodes, &batch, frame.cell, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
         }
@@ -118,16 +122,18 @@ pub fn advance_gathered<const D: usize>(
     dt: f64,
     leavers: &mut Leavers<D>,
 ) -> f64 {
-    let (reals, stride, tags) = chunk.reals_mut_and_tags();
-    let Scratch { sums, .. } = scratch;
+    let (tiles, tags) = chunk.tiles_mut_and_tags();
+    let Scratch { sums, spare, .. } = scratch;
     let mut greatest = Lanes::splat(0.0);
     for (particles, gathered) in particles.chunks(LANES).zip(gathered.chunks(LANES)) {
         let batch = Batch::from_indices(particles, |&p| p);
-        let position: [Lanes; D] = batch.positions(reals, stride);
+        let tile = batch.tile_mut::<D>(tiles, spare);
+        let position: [Lanes; D] = batch.positions(tile);
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        greatest = advance(reals, stride, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+        greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+        batch.put_back::<D>(tiles, spare);
     }
     largest(greatest)
 }
@@ -143,13 +149,12 @@ pub fn interpolate<const D: usize>(
     velocity: &[Row],
     mut each: impl FnMut(usize, [f64; D]),
 ) {
-    let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
-    let Scratch { weights, .. } = scratch;
+    let Scratch { weights, spare, .. } = scratch;
     for batch in Batches::new(select, chunk, Place::default()) {
-        let position: [Lanes; D] = batch.positions(reals, stride);
-        let half =
-            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+        let position: [Lanes; D] = batch.positions(tile);
+        let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
         for lane in batch.members() {
             let first = weights.first(lane);
@@ -166,8 +171,7 @@ fn largest<V: Vector>(lanes: V) -> f64 {
 /// New state of a batch; returns wave speed plus particle speed.
 #[inline(always)]
 fn advance<V: Vector, const D: usize>(
-    reals: &mut [f64],
-    stride: usize,
+    tile: &mut [[f64; LANES]],
     tags: &[u64],
     batch: &Batch,
     position: &[V; D],
@@ -191,16 +195,16 @@ fn advance<V: Vector, const D: usize>(
     let mut moved = *position;
     for i in 0..D {
         moved[i] = velocity[i].mul_add(step, position[i]);
-        batch.store(reals, stride, Layout::<D>::POSITION + i, moved[i]);
+        batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
         let new = match scheme.transfer {
             Transfer::Apic | Transfer::Tpic => velocity[i],
             Transfer::Flip { blend } => {
-                let flip = batch.load::<V>(reals, stride, Layout::<D>::VELOCITY + i) + increment[i];
+                let flip = batch.load::<V>(tile, Layout::<D>::VELOCITY + i) + increment[i];
                 (flip - velocity[i]).mul_add(V::splat(blend), velocity[i])
             }
             Transfer::Xpic { .. } => increment[i],
         };
-        batch.store(reals, stride, Layout::<D>::VELOCITY + i, new);
+        batch.store(tile, Layout::<D>::VELOCITY + i, new);
         square = new.mul_add(new, square);
     }
     leavers.look(batch, &moved);
@@ -212,7 +216,7 @@ fn advance<V: Vector, const D: usize>(
                 Transfer::Tpic => gradient[i][k],
                 Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
             };
-            batch.store(reals, stride, Layout::<D>::AFFINE + D * i + k, value);
+            batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
         }
     }
     // Jobs with one material need not read tags.
@@ -220,7 +224,7 @@ fn advance<V: Vector, const D: usize>(
     let plastic = domain::plastic_lanes(|| index, scheme) != 0;
     let mut elastic = [zero; 6];
     for c in 0..Layout::<D>::SYMMETRIC {
-        elastic[c] = batch.load(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+        elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
     }
     let trial = strained(&elastic, &gradient, step);
     let mut state = State::new([Lanes::splat(0.0); 6]);
@@ -229,22 +233,22 @@ fn advance<V: Vector, const D: usize>(
     }
     if plastic {
         for h in 0..material::HISTORIES {
-            let history: V = batch.load(reals, stride, Layout::<D>::HISTORY + h);
+            let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
             history.store(state.history[h].as_array_mut());
         }
     }
     material::update(scheme.materials, &index, &mut state, D == 2);
     let result = |lanes: &Lanes| V::load(lanes.as_array());
     for c in 0..Layout::<D>::SYMMETRIC {
-        batch.store(reals, stride, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
-        batch.store(reals, stride, Layout::<D>::STRESS + c, result(&state.stress[c]));
+        batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
+        batch.store(tile, Layout::<D>::STRESS + c, result(&state.stress[c]));
     }
     if plastic {
         for h in 0..material::HISTORIES {
-            batch.store(reals, stride, Layout::<D>::HISTORY + h, result(&state.history[h]));
+            batch.store(tile, Layout::<D>::HISTORY + h, result(&state.history[h]));
         }
-        let work = batch.load::<V>(reals, stride, Layout::<D>::WORK) + result(&state.work);
-        batch.store(reals, stride, Layout::<D>::WORK, work);
+        let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
+        batch.store(tile, Layout::<D>::WORK, work);
     }
     let speed = result(&state.wave_speed) + square.sqrt();
     batch.of_members(speed.le(V::splat(f64::MAX)).select(speed, V::splat(f64::INFINITY)))

@@ -3,7 +3,7 @@ use super::Row;
 use super::batch::{Batch, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
-use super::simd::{F64x4, LANES};
+use super::simd::{F64x4, LANES, Vector};
 use super::weights::{NodeWeights, Weights, dot, pencils};
 
 /// Constrained nodes of an arena, and first moments of those that have them.
@@ -104,7 +104,7 @@ impl<const D: usize> Sums<D> {
     /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes` is of use where they
     /// have moments.
     #[inline(always)]
-    pub fn gather(
+    pub fn gather<V: Vector>(
         &mut self,
         weights: &Weights<D>,
         nodes: &mut NodeWeights,
@@ -115,7 +115,7 @@ impl<const D: usize> Sums<D> {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = weights.first(lane);
-            self.contract(weights, lane, &fields.velocity[first..first + span]);
+            self.contract::<V>(weights, lane, &fields.velocity[first..first + span]);
         }
         if let Some(increment) = fields.increment {
             for lane in batch.members() {
@@ -171,11 +171,11 @@ impl<const D: usize> Sums<D> {
     ///
     /// Each needs the nodes averaged over all axes but one; see [`pencils`].
     #[inline(always)]
-    fn contract(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
+    fn contract<V: Vector>(&mut self, weights: &Weights<D>, lane: usize, nodes: &[Row]) {
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let all = |factors: &[[f64; LANES]; 3]| [of(&factors[0]), of(&factors[1]), of(&factors[2])];
         let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
-        let pencil = pencils::<D>(
+        let pencil = pencils::<V, D>(
             nodes,
             &all(&x.weight),
             |b| of(&y.weight[b]),

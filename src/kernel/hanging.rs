@@ -237,14 +237,14 @@ impl<const D: usize> BoxFactors<D> {
             along[k] = along[k].map(|arm| arm * affine[k]);
         }
         let (x, y, z) = (&self.weight[0], &self.weight[1], &self.weight[D - 1]);
-        add_products(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c], &along);
+        add_products::<Lanes, D>(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c], &along);
     }
 
     /// Adds the sums of nodes times weight and arm, as G2P forms B with the usual factors.
     #[inline(always)]
     fn gather(&self, nodes: &[Row], sums: &mut [F64x4; D]) {
         let (x, y, z) = (&self.weight[0], &self.weight[1], &self.weight[D - 1]);
-        let pencil = pencils::<D>(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c]);
+        let pencil = pencils::<Lanes, D>(nodes, x, |b| y[b], |c| z[c], |b, c| y[b] * z[c]);
         for k in 0..D {
             sums[k] = sums[k] + dot(&self.arm[k], &pencil[k]);
         }

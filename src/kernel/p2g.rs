@@ -14,7 +14,7 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
-use super::batch::{Batch, Batches, lanes_in};
+use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
@@ -34,11 +34,12 @@ pub struct MomentSums<'a> {
 pub struct Scratch<const D: usize> {
     prepared: Prepared<D>,
     nodes: NodeWeights,
+    spare: Tile,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        Self { prepared: Prepared::new(), nodes: NodeWeights::new() }
+        Self { prepared: Prepared::new(), nodes: NodeWeights::new(), spare: Tile::new() }
     }
 }
 
@@ -100,16 +101,15 @@ pub fn scatter_sub_boxes<const D: usize>(
     arena: &mut [Row],
     mut moments: Option<MomentSums>,
 ) {
-    let (reals, stride) = chunk.reals();
-    let Scratch { prepared, nodes } = scratch;
+    let Scratch { prepared, nodes, spare } = scratch;
     for parts in parts.chunks(LANES) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let position = batch.positions(reals, stride);
-        prepared.fill_parts(frame, &position, parts);
+        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+        prepared.fill_parts(frame, &batch.positions(tile), parts);
         let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
-        prepared.load::<Lanes>(reals, stride, &batch, dt, scheme.transfer, &spread);
+        prepared.load::<Lanes>(tile, &batch, dt, scheme.transfer, &spread);
         prepared.share(parts);
-        prepared.add(&batch, arena);
+        prepared.add::<Lanes>(&batch, arena);
         if let Some(moments) = &mut moments {
             let hanging = &moments.nodes.hanging;
             prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
@@ -131,13 +131,12 @@ fn scatter_all<V: Vector, const D: usize>(
     mut moments: Option<MomentSums>,
     next: Place,
 ) {
-    let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
-    let Scratch { prepared, nodes } = scratch;
+    let Scratch { prepared, nodes, spare } = scratch;
     for batch in Batches::new(select, chunk, next) {
-        let position: [V; D] = batch.positions(reals, stride);
-        let half =
-            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+        let position: [V; D] = batch.positions(tile);
+        let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         prepared.weights.fill(frame, &position, &position, &half);
         let mut spread = prepared.weights.spread;
         let (mut touched, mut hanging) = (0, 0);
@@ -151,8 +150,8 @@ fn scatter_all<V: Vector, const D: usize>(
                 moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
             }
         }
-        prepared.load::<V>(reals, stride, &batch, dt, scheme.transfer, &spread);
-        prepared.add(&batch, arena);
+        prepared.load::<V>(tile, &batch, dt, scheme.transfer, &spread);
+        prepared.add::<V>(&batch, arena);
         if let Some(moments) = &mut moments {
             prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
             prepared.add_moments(nodes, touched, moments);
@@ -187,37 +186,36 @@ impl<const D: usize> Prepared<D> {
     #[inline(always)]
     fn load<V: Vector>(
         &mut self,
-        reals: &[f64],
-        stride: usize,
+        tile: &[[f64; LANES]],
         batch: &Batch,
         dt: f64,
         transfer: Transfer,
         spread: &[[f64; LANES]; D],
     ) {
         let zero = V::splat(0.0);
-        let mass: V = batch.load(reals, stride, Layout::<D>::MASS);
-        let width = batch.load::<V>(reals, stride, Layout::<D>::HALF) * 2.0;
+        let mass: V = batch.load(tile, Layout::<D>::MASS);
+        let width = batch.load::<V>(tile, Layout::<D>::HALF) * 2.0;
         let mut volume = V::splat(-dt);
         for _ in 0..D {
             volume = volume * width;
         }
         let mut column = [zero, zero, zero, mass];
         for i in 0..D {
-            column[i] = batch.load::<V>(reals, stride, Layout::<D>::VELOCITY + i) * mass;
+            column[i] = batch.load::<V>(tile, Layout::<D>::VELOCITY + i) * mass;
         }
         V::write_rows(column, &mut self.momentum);
         column[3] = zero;
         for k in 0..D {
             let factor = if transfer == Transfer::Apic { mass / V::load(&spread[k]) } else { mass };
             for i in 0..D {
-                column[i] = batch.load::<V>(reals, stride, Layout::<D>::AFFINE + D * i + k) * factor;
+                column[i] = batch.load::<V>(tile, Layout::<D>::AFFINE + D * i + k) * factor;
             }
             V::write_rows(column, &mut self.affine[k]);
         }
         let mut stress = [zero; 6];
         for c in 0..Layout::<D>::SYMMETRIC {
             if D == 3 || c != 2 {
-                stress[c] = batch.load::<V>(reals, stride, Layout::<D>::STRESS + c) * volume;
+                stress[c] = batch.load::<V>(tile, Layout::<D>::STRESS + c) * volume;
             }
         }
         for k in 0..D {
@@ -242,16 +240,17 @@ impl<const D: usize> Prepared<D> {
 
     /// Adds the members of a batch in order.
     #[inline(always)]
-    fn add(&self, batch: &Batch, arena: &mut [Row]) {
+    fn add<V: Vector>(&self, batch: &Batch, arena: &mut [Row]) {
         let span = super::stencil_span(D);
         for lane in batch.members() {
             let first = self.weights.first(lane);
-            self.add_one(lane, &mut arena[first..first + span]);
+            self.add_one::<V>(lane, &mut arena[first..first + span]);
         }
     }
 
     #[inline(always)]
-    fn add_one(&self, lane: usize, nodes: &mut [Row]) {
+    fn add_one<V: Vector>(&self, lane: usize, nodes: &mut [Row]) {
+        V::keep_wide();
         let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let mut along = [[zero; 3]; D];
@@ -269,7 +268,7 @@ impl<const D: usize> Prepared<D> {
         }
         let (y, z) = (&self.weights.axis[1].weight, &self.weights.axis[D - 1].weight);
         let product = |b: usize, c: usize| of(&self.weights.product[b][c]);
-        add_products(nodes, &weight_x, |b| of(&y[b]), |c| of(&z[c]), product, &along);
+        add_products::<V, D>(nodes, &weight_x, |b| of(&y[b]), |c| of(&z[c]), product, &along);
     }
 
     /// Adds what hanging nodes of the lanes in `touched` have in place of first moments.

@@ -3,12 +3,12 @@
 //! `D_k = Σ_j w ((x_j - x_p)_k² + S_j,k)` is diagonal for axis-aligned boxes on any tree, but not constant: it
 //! depends on where the box lies in its cells. S_j are the second moments that constrained nodes inherit from their
 //! parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
-use super::batch::{Batch, Batches};
+use super::batch::{Batch, Batches, Tile};
 use super::constrained::ConstrainedNodes;
 use super::simd::{LANES, Lanes};
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Scheme, Select, SubBox, domain};
-use crate::particle::chunk::{Chunk, Place};
+use crate::particle::chunk::{Chunk, Layout, Place};
 
 /// D of the selected particles, whose boxes are whole, in the order of the selection.
 pub fn of_particles<const D: usize>(
@@ -19,13 +19,12 @@ pub fn of_particles<const D: usize>(
     constraints: Option<&ConstrainedNodes>,
     mut each: impl FnMut(usize, [f64; D]),
 ) {
-    let (reals, stride) = chunk.reals();
     let (tags, cell) = (chunk.tags(), frame.cell);
-    let mut weights = Weights::new();
+    let (mut weights, mut spare) = (Weights::new(), Tile::new());
     for batch in Batches::new(select, chunk, Place::default()) {
-        let position: [Lanes; D] = batch.positions(reals, stride);
-        let half =
-            domain::of_batch(reals, stride, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, &mut spare);
+        let position: [Lanes; D] = batch.positions(tile);
+        let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
         weights.fill(frame, &position, &position, &half);
         let spread = complete(&mut weights, &batch, frame.cell, constraints);
         for lane in batch.members() {
@@ -42,11 +41,14 @@ pub fn of_parts<const D: usize>(
     constraints: Option<&ConstrainedNodes>,
     mut each: impl FnMut(usize, [f64; D]),
 ) {
-    let (reals, stride) = chunk.reals();
-    let mut weights = Weights::new();
+    let (mut weights, mut spare) = (Weights::new(), Tile::new());
     for (first, parts) in (0..).step_by(LANES).zip(parts.chunks(LANES)) {
         let batch = Batch::from_indices(parts, |part| part.particle);
-        let position: [Lanes; D] = batch.positions(reals, stride);
+        let position: [Lanes; D] = batch.positions(batch.tile::<D>(
+            chunk.tiles(),
+            Layout::<D>::POSITION..Layout::<D>::POSITION + D,
+            &mut spare,
+        ));
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
         let spread = complete(&mut weights, &batch, frame.cell, constraints);

@@ -114,7 +114,7 @@ impl<const D: usize> Weights<D> {
 /// Adds to the nodes of a stencil a sum of products of factors of the axes: `product X_a + x_a (z_c Y_b + y_b Z_c)`, where X, Y
 /// and Z are `along` the axes and `product` is `y_b z_c`. In 2D there is no z.
 #[inline(always)]
-pub(super) fn add_products<const D: usize>(
+pub(super) fn add_products<V: Vector, const D: usize>(
     nodes: &mut [Row],
     x: &[F64x4; 3],
     y: impl Fn(usize) -> F64x4,
@@ -124,6 +124,7 @@ pub(super) fn add_products<const D: usize>(
 ) {
     let nodes = &mut nodes[..super::stencil_span(D)];
     for c in 0..if D == 3 { 3 } else { 1 } {
+        V::keep_wide();
         for b in 0..3 {
             let (product, other) = if D == 3 {
                 (product(b, c), z(c).mul_add(along[1][b], y(b) * along[D - 1][c]))
@@ -142,7 +143,7 @@ pub(super) fn add_products<const D: usize>(
 /// The nodes of a stencil averaged over all axes but one, for each axis: along x it is `X_a = Σ_bc y_b z_c v_abc`, and so on.
 /// All come from one pass over the nodes.
 #[inline(always)]
-pub(super) fn pencils<const D: usize>(
+pub(super) fn pencils<V: Vector, const D: usize>(
     nodes: &[Row],
     x: &[F64x4; 3],
     y: impl Fn(usize) -> F64x4,
@@ -153,6 +154,7 @@ pub(super) fn pencils<const D: usize>(
     let zero = F64x4::splat(0.0);
     let mut pencil = [[zero; 3]; D];
     for c in 0..if D == 3 { 3 } else { 1 } {
+        V::keep_wide();
         for b in 0..3 {
             let product = if D == 3 { product(b, c) } else { y(b) };
             let mut across = zero;

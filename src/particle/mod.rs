@@ -1,5 +1,6 @@
-//! Particles: structure-of-arrays chunks, one per leaf, in a canonical order.
+//! Particles: chunks of tiles (arrays of structures of arrays), one per leaf, in a canonical order.
 pub mod chunk;
+mod column;
 mod layout;
 pub mod resample;
 pub mod seed;

@@ -67,8 +67,7 @@ pub fn fill_leaf<const D: usize>(
         chunk.reserve_exact(chunk.len() + points.len());
         for x in points {
             let p = chunk.push_zeroed(0, tag);
-            let (reals, stride) = chunk.reals_mut();
-            let mut set = |column: usize, value: f64| reals[column * stride + p] = value;
+            let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
             for i in 0..D {
                 let turning: f64 = (0..D).map(|j| affine[i][j] * (x[j] - body.centre[j])).sum();
                 set(Layout::<D>::POSITION + i, x[i]);

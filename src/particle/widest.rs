@@ -1,5 +1,5 @@
 //! The greatest undeformed half width in a chunk, kept while particles come and go.
-use crate::kernel::simd::{LANES, Lanes, Vector};
+use super::column::Column;
 
 /// The greatest half width (0 without particles) and how many particles have it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,8 +14,8 @@ impl Widest {
     pub const UNKNOWN: Self = Self { half: f64::NAN, count: 0 };
 
     /// Looks at all half widths.
-    pub fn of(halves: &[f64]) -> Self {
-        let half = greatest(halves);
+    pub fn of(halves: Column) -> Self {
+        let half = halves.greatest();
         Self { half, count: halves.iter().filter(|&&h| h == half).count() as u32 }
     }
 
@@ -44,17 +44,15 @@ impl Widest {
     }
 }
 
-/// Greatest of the values, 0 among them.
-pub(super) fn greatest(values: &[f64]) -> f64 {
-    let (batches, rest) = values.as_chunks::<LANES>();
-    let most = batches.iter().fold(Lanes::splat(0.0), |most, batch| Lanes::load(batch).max(most));
-    most.to_array().iter().chain(rest).copied().fold(0.0, f64::max)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::column::tests::lines;
     use super::*;
     use proptest::prelude::*;
+
+    fn of(halves: &[f64]) -> Widest {
+        Widest::of(Column::new(&lines(halves), 1, halves.len()))
+    }
 
     proptest! {
         #[test]
@@ -71,9 +69,9 @@ mod tests {
                 }
                 if let Some(half) = widest.known() {
                     prop_assert_eq!(half, halves.iter().copied().fold(0.0, f64::max));
-                    prop_assert_eq!(Widest::of(&halves).known(), Some(half));
+                    prop_assert_eq!(of(&halves).known(), Some(half));
                 } else {
-                    widest = Widest::of(&halves);
+                    widest = of(&halves);
                 }
             }
         }

@@ -106,7 +106,7 @@ impl<const D: usize> Solver<D> {
         let swap = |(chunk, other): (&mut Chunk<D>, &mut Vec<[f64; D]>)| {
             for axis in 0..D {
                 let column = chunk.column_mut(Layout::<D>::VELOCITY + axis);
-                column.iter_mut().zip(other.iter_mut()).for_each(|(v, o)| std::mem::swap(v, &mut o[axis]));
+                column.into_iter().zip(other.iter_mut()).for_each(|(v, o)| std::mem::swap(v, &mut o[axis]));
             }
         };
         self.chunks.par_iter_mut().zip(other).with_min_len(8).for_each(swap);

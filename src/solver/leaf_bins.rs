@@ -381,8 +381,7 @@ fn positions_of<const D: usize>(chunk: &Chunk<D>, particles: &[u32]) -> [Lanes; 
 /// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
 #[inline(always)]
 pub(super) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
-    let (reals, stride) = chunk.reals();
-    reals[column * stride + first..].first_chunk().map_or(Lanes::splat(f64::NAN), Lanes::load)
+    Lanes::new(chunk.values(column, first))
 }
 
 /// Positions, as [`values`] gives them.

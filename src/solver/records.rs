@@ -1,7 +1,7 @@
 //! Particles on their way between leaves: one record of 64-bit words each.
 use rayon::prelude::*;
 
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
 pub const fn record_words<const D: usize>() -> usize {
@@ -11,8 +11,8 @@ pub const fn record_words<const D: usize>() -> usize {
 /// Appends the record of particle `p`.
 pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
     records.push(way);
-    let (reals, stride) = chunk.reals();
-    records.extend((0..Layout::<D>::REALS).map(|column| reals[column * stride + p].to_bits()));
+    let tile = &chunk.tiles()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
+    records.extend(tile.iter().map(|line| line[p % TILE].to_bits()));
     records.extend([chunk.ids()[p], chunk.tags()[p]]);
 }
 

@@ -3,7 +3,6 @@
 //! changes nothing.
 use super::Solver;
 use crate::adaptivity::{Adaptivity, Kind};
-use crate::kernel::simd::{LANES, Lanes, Vector};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::resample::patience::Levels;
 
@@ -69,14 +68,14 @@ impl Watch {
     /// To be called before the leaf's particles advance.
     pub fn before<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
         if self.rate {
-            survey.plastic_rate = sum(chunk.column(Layout::<D>::HISTORY));
+            survey.plastic_rate = chunk.column(Layout::<D>::HISTORY).sum();
         }
     }
 
     /// To be called after the leaf's particles have advanced by `dt` (s).
     pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, survey: &mut Survey<D>) {
         if self.rate {
-            let gain = sum(chunk.column(Layout::<D>::HISTORY)) - survey.plastic_rate;
+            let gain = chunk.column(Layout::<D>::HISTORY).sum() - survey.plastic_rate;
             survey.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
         }
         self.look(chunk, survey);
@@ -86,23 +85,23 @@ impl Watch {
     fn look<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
         if self.velocity {
             let ranges: [[f64; 2]; D] =
-                std::array::from_fn(|axis| range(chunk.column(Layout::<D>::VELOCITY + axis)));
+                std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis).range());
             survey.velocity = std::array::from_fn(|side| ranges.map(|range| range[side]));
             survey.levels = Some(Levels::of(chunk.tags()));
         }
         if self.strain {
-            survey.plastic_strain = greatest(chunk.column(Layout::<D>::HISTORY));
+            survey.plastic_strain = chunk.column(Layout::<D>::HISTORY).greatest();
         }
         if self.width {
             survey.stretch = greatest_stretch(chunk);
-            survey.width = survey.stretch * greatest(chunk.column(Layout::<D>::HALF));
+            survey.width = survey.stretch * chunk.column(Layout::<D>::HALF).greatest();
         }
     }
 }
 
 /// A bound on the half widths of a chunk's boxes, m.
 pub(super) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    greatest_stretch(chunk) * greatest(chunk.column(Layout::<D>::HALF))
+    greatest_stretch(chunk) * chunk.column(Layout::<D>::HALF).greatest()
 }
 
 /// A bound on the widths of a chunk's boxes over their undeformed widths.
@@ -111,39 +110,10 @@ fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
     // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
     // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
     // where a model has one.
-    let elastic = (first..first + 3).map(|column| greatest(chunk.column(column))).fold(0.0, f64::max);
-    let plastic = greatest(chunk.column(Layout::<D>::HISTORY + 1));
+    let elastic = (first..first + 3).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
+    let plastic = chunk.column(Layout::<D>::HISTORY + 1).greatest();
     let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
     elastic.sqrt().max(isotropic)
-}
-
-/// Least and greatest of the values, 0 among them.
-fn range(values: &[f64]) -> [f64; 2] {
-    let (batches, rest) = values.as_chunks::<LANES>();
-    let mut range = [Lanes::splat(0.0); 2];
-    for batch in batches {
-        let values = Lanes::load(batch);
-        range = [values.min(range[0]), values.max(range[1])];
-    }
-    let [least, greatest] = range.map(Lanes::to_array);
-    [
-        least.iter().chain(rest).copied().fold(0.0, f64::min),
-        greatest.iter().chain(rest).copied().fold(0.0, f64::max),
-    ]
-}
-
-/// Greatest of the values, 0 among them.
-fn greatest(values: &[f64]) -> f64 {
-    let (batches, rest) = values.as_chunks::<LANES>();
-    let most = batches.iter().fold(Lanes::splat(0.0), |most, batch| Lanes::load(batch).max(most));
-    most.to_array().iter().chain(rest).copied().fold(0.0, f64::max)
-}
-
-/// Sum in an order that follows from the number of values.
-fn sum(values: &[f64]) -> f64 {
-    let (batches, rest) = values.as_chunks::<LANES>();
-    let sums = batches.iter().fold(Lanes::splat(0.0), |sum, batch| Lanes::load(batch) + sum);
-    sums.to_array().iter().chain(rest).sum()
 }
 
 impl<const D: usize> Solver<D> {
@@ -153,22 +123,5 @@ impl<const D: usize> Solver<D> {
         let watch = Watch::after_step(adaptivity, 0);
         self.surveys.resize(self.chunks.len(), Survey::default());
         self.surveys.iter_mut().zip(&self.chunks).for_each(|(survey, chunk)| watch.look(chunk, survey));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn of_any_number_of_values() {
-        for len in 0..40 {
-            let values: Vec<f64> = (0..len).map(|i| f64::from((i * 7 + 3) % 40 - 20)).collect();
-            let least = values.iter().copied().fold(0.0, f64::min);
-            let most = values.iter().copied().fold(0.0, f64::max);
-            assert_eq!(range(&values), [least, most]);
-            assert_eq!(greatest(&values), most);
-            assert_eq!(sum(&values), values.iter().sum::<f64>());
-        }
     }
 }

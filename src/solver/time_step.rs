@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::{Physics, Solver};
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Column, Layout, Tag};
 
 /// Limits on the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl<const D: usize> Solver<D> {
 
 impl<const D: usize> Physics<D> {
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
-        let velocity: [&[f64]; D] = std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis));
+        let velocity: [Column; D] = std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis));
         let material = |p: usize| usize::from(Tag::unpack(chunk.tags()[p]).material);
         let (mut signal, mut first) = (0.0, 0);
         // One root for each run of particles of one material.

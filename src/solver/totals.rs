@@ -247,9 +247,9 @@ impl DoubledLanes {
 
 /// Mass of the particles of one leaf, added up as by [`leaf_totals`].
 fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> Doubled {
-    let (batches, rest) = chunk.column(Layout::<D>::MASS).as_chunks::<LANES>();
+    let (lines, rest) = chunk.column(Layout::<D>::MASS).lines();
     let mut sum = DoubledLanes::new();
-    batches.iter().for_each(|batch| sum.add(Lanes::load(batch)));
+    lines.for_each(|line| sum.add(Lanes::load(line)));
     let rest = std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0));
     sum.add(Lanes::new(rest));
     sum.total()
@@ -258,13 +258,9 @@ fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> Doubled {
 /// Sums over the particles of one leaf, in their order.
 fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubled; SUMS] {
     let mut sums = [DoubledLanes::new(); SUMS];
-    let (reals, stride) = chunk.reals();
     for first in (0..chunk.len()).step_by(LANES) {
         let members = Mask::from_bits((1 << LANES.min(chunk.len() - first)) - 1);
-        // Columns have room for whole batches.
-        let load = |column: usize| reals[column * stride + first..].first_chunk().map(Lanes::load);
-        let load =
-            |column: usize| members.select(load(column).unwrap_or(Lanes::splat(0.0)), Lanes::splat(0.0));
+        let load = |column: usize| members.select(Lanes::new(chunk.values(column, first)), Lanes::splat(0.0));
         let (mass, width) = (load(Layout::<D>::MASS), load(Layout::<D>::HALF) * 2.0);
         let volume = (0..D).fold(Lanes::splat(1.0), |volume, _| volume * width);
         let (mut speed_squared, mut height) = (Lanes::splat(0.0), Lanes::splat(0.0));
@@ -286,11 +282,9 @@ fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubl
 
 /// Elastic energy of the particles from `first` on per reference volume, J/m³.
 fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first: usize) -> Lanes {
-    let (reals, stride) = chunk.reals();
     let mut elastic = [Lanes::splat(0.0); 6];
     for (c, elastic) in elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
-        let column = &reals[(Layout::<D>::LEFT_CAUCHY_GREEN + c) * stride + first..];
-        *elastic = column.first_chunk().map_or(*elastic, Lanes::load);
+        *elastic = Lanes::new(chunk.values(Layout::<D>::LEFT_CAUCHY_GREEN + c, first));
     }
     let tags = &chunk.tags()[first..chunk.len().min(first + LANES)];
     let material = |lane: usize| Tag::unpack(tags[lane]).material;

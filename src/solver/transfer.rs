@@ -200,7 +200,7 @@ impl<const D: usize> Solver<D> {
             for i in 0..D {
                 for k in 0..D {
                     let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
-                    column.iter_mut().zip(&spreads).for_each(|(value, spread)| *value *= spread[k]);
+                    column.into_iter().zip(&spreads).for_each(|(value, spread)| *value *= spread[k]);
                 }
             }
         });

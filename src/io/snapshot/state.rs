@@ -77,9 +77,8 @@ pub(super) fn write<const D: usize>(
         let Columns { name, first, count } = set;
         let mut values = Vec::with_capacity(particles.count as usize * count);
         for chunk in view.chunks {
-            let (reals, stride) = chunk.reals();
             for p in 0..chunk.len() {
-                values.extend((first..first + count).map(|column| reals[column * stride + p]));
+                values.extend((first..first + count).map(|column| chunk.column(column)[p]));
             }
         }
         checked.write(&path("particles", name), particles, set.components(), &values)?;
@@ -130,9 +129,8 @@ pub(super) fn read<const D: usize>(
         let mut rows = values.chunks_exact(count);
         for chunk in &mut chunks {
             let len = chunk.len();
-            let (reals, stride) = chunk.reals_mut();
             for (p, row) in rows.by_ref().take(len).enumerate() {
-                row.iter().enumerate().for_each(|(i, &value)| reals[(first + i) * stride + p] = value);
+                chunk.write(first, p, row);
             }
         }
     }

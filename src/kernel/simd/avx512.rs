@@ -100,8 +100,32 @@ impl Vector for Wide {
         Self(intrinsic!(_mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(biased.0)))))
     }
     #[inline(always)]
+    fn keep_wide() {
+        // SAFETY: AVX-512 as above; a register becomes what it is.
+        unsafe { core::arch::asm!("vpord zmm31, zmm31, zmm31", options(nomem, nostack, preserves_flags)) }
+    }
+    #[inline(always)]
     fn halves(self) -> [F64x4; 2] {
         intrinsic!([F64x4(_mm512_castpd512_pd256(self.0)), F64x4(_mm512_extractf64x4_pd::<1>(self.0))])
+    }
+    /// As [`Vector::write_rows`] in general, with eight shuffles and no more.
+    #[inline(always)]
+    fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
+        let [Self(x), Self(y), Self(z), Self(w)] = columns;
+        let [ae, bf, cg, dh] = intrinsic!({
+            let (xy_even, xy_odd) = (_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y));
+            let (zw_even, zw_odd) = (_mm512_unpacklo_pd(z, w), _mm512_unpackhi_pd(z, w));
+            let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+            let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+            [
+                Self(_mm512_permutex2var_pd(xy_even, low, zw_even)),
+                Self(_mm512_permutex2var_pd(xy_odd, low, zw_odd)),
+                Self(_mm512_permutex2var_pd(xy_even, high, zw_even)),
+                Self(_mm512_permutex2var_pd(xy_odd, high, zw_odd)),
+            ]
+        });
+        let ([a, e], [b, f], [c, g], [d, h]) = (ae.halves(), bf.halves(), cg.halves(), dh.halves());
+        *rows = [a, b, c, d, e, f, g, h];
     }
     /// Reads row by row, as they were written: a load of two would wait until both have left the store queue.
     #[inline(always)]

@@ -95,6 +95,11 @@ pub trait Vector:
     fn split(self) -> (Self, Self);
     /// `2^self` of integers in `-1022..=1023`.
     fn power_of_two(self) -> Self;
+    /// To be called every fifty instructions or so where a kernel works on rows ([`F64x4`]) for long: processors that narrow
+    /// their units after some hundred instructions without registers of 512 bits wait when such registers come again
+    /// (see `docs/performance.md`). A hint without effect on results.
+    #[inline(always)]
+    fn keep_wide() {}
     /// The lower and the upper four lanes.
     fn halves(self) -> [F64x4; 2];
     /// Inverse of [`Vector::write_rows`].

@@ -142,11 +142,7 @@ fn replace<const D: usize>(
     let mut place = 0;
     for &(first, number) in done.iter() {
         place += source[place..].partition_point(|&p| p < first);
-        for column in 0..Layout::<D>::REALS {
-            chunk.column_mut(column)[place] = merged.column(column)[number];
-        }
-        chunk.ids_mut()[place] = merged.ids()[number];
-        chunk.tags_mut()[place] = merged.tags()[number];
+        chunk.replace(place, merged, number);
     }
 }
 

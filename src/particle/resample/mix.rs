@@ -2,7 +2,7 @@
 use rustc_hash::FxHashSet;
 
 use super::super::chunk::{Chunk, Layout, Tag};
-use super::{Limits, Setting, read, read_matrix, volume, write, write_matrix};
+use super::{Limits, Setting, read_matrix, volume, write_matrix};
 use crate::kernel::math::{exp, ln};
 use crate::kernel::simd::{LANES, Lanes, Vector};
 use crate::kernel::{Select, Transfer};
@@ -216,7 +216,7 @@ fn mix_motion<const D: usize>(
         group.members.iter().map(|&p| chunk.column(Layout::<D>::MASS)[p as usize]).collect();
     let (shares, mass) = shares(masses);
     let x = mean(&shares, |i| chunk.position(member(i)));
-    let v: [f64; D] = mean(&shares, |i| read(chunk, Layout::<D>::VELOCITY, member(i)));
+    let v: [f64; D] = mean(&shares, |i| chunk.read(Layout::<D>::VELOCITY, member(i)));
 
     // Sums of u ⊗ r, of r ⊗ r with the second moments s of boxes, and of the members' own affine matrices.
     let (mut turning, mut metric, mut own, mut boxed) =
@@ -226,7 +226,7 @@ fn mix_motion<const D: usize>(
     let mut relative = Vec::with_capacity(shares.len());
     for (i, &share) in shares.iter().enumerate() {
         let (position, p) = (chunk.position(member(i)), member(i));
-        let velocity: [f64; D] = read(chunk, Layout::<D>::VELOCITY, p);
+        let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let affine = read_matrix(chunk, p);
         let r: [f64; D] = std::array::from_fn(|a| position[a] - x[a]);
         let u: [f64; D] = std::array::from_fn(|a| velocity[a] - v[a]);
@@ -259,9 +259,9 @@ fn mix_motion<const D: usize>(
         Transfer::Tpic => divide(add(boxed, turning), metric),
         Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
     };
-    write(out, Layout::<D>::POSITION, number, &x);
-    write(out, Layout::<D>::VELOCITY, number, &v);
-    write(out, Layout::<D>::MASS, number, &[mass]);
+    out.write(Layout::<D>::POSITION, number, &x);
+    out.write(Layout::<D>::VELOCITY, number, &v);
+    out.write(Layout::<D>::MASS, number, &[mass]);
     write_matrix(out, number, &affine);
     Motion { energy: 0.5 * mass * energy, difference: difference.fold(0.0, f64::max), reach }
 }
@@ -319,7 +319,7 @@ fn mix_matter<const D: usize>(
         (2, _) => 0.5 * total.sqrt(),
         _ => 0.5 * libm::cbrt(total),
     };
-    let history = |i: usize| -> [f64; HISTORIES] { read(chunk, Layout::<D>::HISTORY, member(i)) };
+    let history = |i: usize| -> [f64; HISTORIES] { chunk.read(Layout::<D>::HISTORY, member(i)) };
     let mean_history = mean(&shares, history);
     let mut strain = mean(&shares, |i| strains[i]);
     let mut difference = Difference { strain: 0.0, volume: 0.0, history: 0.0 };
@@ -344,10 +344,10 @@ fn mix_matter<const D: usize>(
     let missing = libm::log1p(excess) / D as f64;
     strain.iter_mut().take(D).for_each(|strain| *strain += missing);
 
-    write(out, Layout::<D>::HALF, number, &[width]);
-    write(out, Layout::<D>::HISTORY, number, &mean_history);
-    let work = mean(&shares, |i| read::<D, 1>(chunk, Layout::<D>::WORK, member(i)));
-    write(out, Layout::<D>::WORK, number, &work);
+    out.write(Layout::<D>::HALF, number, &[width]);
+    out.write(Layout::<D>::HISTORY, number, &mean_history);
+    let work = mean(&shares, |i| chunk.read::<1>(Layout::<D>::WORK, member(i)));
+    out.write(Layout::<D>::WORK, number, &work);
     (strain, difference)
 }
 
@@ -359,8 +359,8 @@ fn tensors(count: usize, tensor: impl Fn(usize) -> [f64; 6]) -> Symmetric {
 
 /// Symmetric columns from `first`, in the order of [`Symmetric`].
 fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
-    let (reals, stride) = chunk.reals();
-    std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { reals[(first + c) * stride + p] } else { 0.0 })
+    let column = |c: usize| chunk.column(first + c)[p];
+    std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { column(c) } else { 0.0 })
 }
 
 /// Elastic Hencky strains `½ ln b` of the listed particles.
@@ -394,9 +394,9 @@ fn restore<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, strains: 
         for lane in 0..count {
             let p = first + lane;
             let of = |tensor: &[[f64; LANES]; 6]| tensor.map(|component| component[lane]);
-            write(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&elastic)[..Layout::<D>::SYMMETRIC]);
-            write(chunk, Layout::<D>::STRESS, p, &of(&stress)[..Layout::<D>::SYMMETRIC]);
-            write(chunk, Layout::<D>::HISTORY, p, &history.map(|variable| variable[lane]));
+            chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&elastic)[..Layout::<D>::SYMMETRIC]);
+            chunk.write(Layout::<D>::STRESS, p, &of(&stress)[..Layout::<D>::SYMMETRIC]);
+            chunk.write(Layout::<D>::HISTORY, p, &history.map(|variable| variable[lane]));
             chunk.column_mut(Layout::<D>::WORK)[p] += work[lane];
         }
     }

@@ -101,26 +101,14 @@ fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     (1..D).fold(edge, |volume, _| volume * edge)
 }
 
-/// Columns `first..first + N` of particle `p`.
-fn read<const D: usize, const N: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; N] {
-    let (reals, stride) = chunk.reals();
-    std::array::from_fn(|i| reals[(first + i) * stride + p])
-}
-
-/// Writes what [`read`] reads.
-fn write<const D: usize>(chunk: &mut Chunk<D>, first: usize, p: usize, values: &[f64]) {
-    let (reals, stride) = chunk.reals_mut();
-    values.iter().enumerate().for_each(|(i, &value)| reals[(first + i) * stride + p] = value);
-}
-
 /// The affine columns of particle `p` as a matrix.
 fn read_matrix<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
-    std::array::from_fn(|i| read(chunk, Layout::<D>::AFFINE + D * i, p))
+    std::array::from_fn(|i| chunk.read(Layout::<D>::AFFINE + D * i, p))
 }
 
 /// Writes what [`read_matrix`] reads.
 fn write_matrix<const D: usize>(chunk: &mut Chunk<D>, p: usize, matrix: &[[f64; D]; D]) {
     for (i, row) in matrix.iter().enumerate() {
-        write(chunk, Layout::<D>::AFFINE + D * i, p, row);
+        chunk.write(Layout::<D>::AFFINE + D * i, p, row);
     }
 }

@@ -1,6 +1,6 @@
 //! One particle becomes `2^D`.
 use super::super::chunk::{Chunk, Layout, Tag};
-use super::{Setting, ids, read, read_matrix, write, write_matrix};
+use super::{Setting, ids, read_matrix, write_matrix};
 use crate::kernel::{Select, Transfer};
 
 /// What [`split`] did.
@@ -65,9 +65,9 @@ fn divide<const D: usize>(
 ) -> f64 {
     let number = 1 << D;
     let x = chunk.position(first);
-    let v: [f64; D] = read(chunk, Layout::<D>::VELOCITY, first);
-    let [mass] = read(chunk, Layout::<D>::MASS, first);
-    let [width] = read(chunk, Layout::<D>::HALF, first);
+    let v: [f64; D] = chunk.read(Layout::<D>::VELOCITY, first);
+    let [mass] = chunk.read(Layout::<D>::MASS, first);
+    let [width] = chunk.read(Layout::<D>::HALF, first);
     let share = 1.0 / number as f64;
 
     let places: [(f64, f64); D] =
@@ -106,10 +106,10 @@ fn divide<const D: usize>(
             let p = first + child;
             let position: [f64; D] =
                 std::array::from_fn(|a| if child >> a & 1 == 1 { places[a].1 } else { places[a].0 });
-            write(chunk, Layout::<D>::POSITION, p, &position);
-            write(chunk, Layout::<D>::VELOCITY, p, &velocity);
-            write(chunk, Layout::<D>::MASS, p, &[mass * share]);
-            write(chunk, Layout::<D>::HALF, p, &[0.5 * width]);
+            chunk.write(Layout::<D>::POSITION, p, &position);
+            chunk.write(Layout::<D>::VELOCITY, p, &velocity);
+            chunk.write(Layout::<D>::MASS, p, &[mass * share]);
+            chunk.write(Layout::<D>::HALF, p, &[0.5 * width]);
             write_matrix(chunk, p, &kept);
             let parent = chunk.ids()[p];
             chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);

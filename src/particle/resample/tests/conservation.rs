@@ -16,9 +16,9 @@ fn splitting_conserves<const D: usize>(seed: u64) {
         let family = p << D..(p + 1) << D;
         let mass = original.column(Layout::<D>::MASS)[p];
         let is_share = |part: &f64| part * f64::from(1 << D) == mass;
-        assert!(chunk.column(Layout::<D>::MASS)[family.clone()].iter().all(is_share));
+        assert!(family.clone().all(|p| is_share(&chunk.column(Layout::<D>::MASS)[p])));
         for axis in 0..D {
-            let x = &chunk.column(Layout::<D>::POSITION + axis)[family.clone()];
+            let x: Vec<f64> = family.clone().map(|p| chunk.column(Layout::<D>::POSITION + axis)[p]).collect();
             let opposite = 0.5 * x[0] + 0.5 * x[(1 << D) - 1];
             assert_eq!(opposite, original.position(p)[axis]);
         }
@@ -95,7 +95,7 @@ fn merging_strangers_conserves<const D: usize>(seed: u64) {
 /// An update without increment changes nothing but by round-off, and the stored stress is that of the state.
 fn assert_admissible<const D: usize>(chunk: &Chunk<D>, p: usize) {
     let mut again = chunk.clone();
-    set_matter(&mut again, p, elastic(chunk, p), read(chunk, Layout::<D>::HISTORY, p));
+    set_matter(&mut again, p, elastic(chunk, p), chunk.read(Layout::<D>::HISTORY, p));
     for column in Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::MASS {
         let scale = if column < Layout::<D>::STRESS { 1.0 } else { 1e6 };
         let (a, b) = (chunk.column(column)[p], again.column(column)[p]);

@@ -11,7 +11,7 @@ fn undeformed_particles_stay_undeformed_to_the_last_bit() {
     merge_all(&mut chunk, &setting(&scheme, 1), &OPEN);
     for p in 0..chunk.len() {
         assert_eq!(elastic(&chunk, p), [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-        assert_eq!(read::<3, 6>(&chunk, Layout::<3>::STRESS, p), [0.0; 6]);
+        assert_eq!(chunk.read::<6>(Layout::<3>::STRESS, p), [0.0; 6]);
     }
 }
 

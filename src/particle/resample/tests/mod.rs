@@ -70,19 +70,14 @@ fn particles<const D: usize>(seed: u64, level: u8, per_edge: usize, kind: Option
         let cell: [usize; D] =
             std::array::from_fn(|a| id / (2 * per_edge).pow(a as u32) % (2 * per_edge) + 9);
         let x = cell.map(|c| (c as f64 + 0.5 + 0.1 * numbers.next()) * spacing);
-        write(&mut chunk, Layout::<D>::POSITION, p, &x);
+        chunk.write(Layout::<D>::POSITION, p, &x);
         let v: [f64; D] = std::array::from_fn(|_| numbers.next());
-        write(&mut chunk, Layout::<D>::VELOCITY, p, &v);
+        chunk.write(Layout::<D>::VELOCITY, p, &v);
         let b: [[f64; D]; D] = std::array::from_fn(|_| std::array::from_fn(|_| half * numbers.next()));
         write_matrix(&mut chunk, p, &b);
-        write(&mut chunk, Layout::<D>::MASS, p, &[1.0 + 0.5 * numbers.next()]);
-        write(
-            &mut chunk,
-            Layout::<D>::HALF,
-            p,
-            &[half / per_edge as f64 * (1.0 - 0.02 * numbers.next().abs())],
-        );
-        write(&mut chunk, Layout::<D>::WORK, p, &[1e3 * (1.0 + numbers.next())]);
+        chunk.write(Layout::<D>::MASS, p, &[1.0 + 0.5 * numbers.next()]);
+        chunk.write(Layout::<D>::HALF, p, &[half / per_edge as f64 * (1.0 - 0.02 * numbers.next().abs())]);
+        chunk.write(Layout::<D>::WORK, p, &[1e3 * (1.0 + numbers.next())]);
         let elastic: [f64; 6] = std::array::from_fn(|c| match c {
             2 if D == 2 => 1.0,
             0..=2 => 1.0 + 0.05 * numbers.next(),
@@ -101,9 +96,9 @@ fn set_matter<const D: usize>(chunk: &mut Chunk<D>, p: usize, elastic: [f64; 6],
     state.history = history.map(Lanes::splat);
     materials()[usize::from(Tag::unpack(chunk.tags()[p]).material)].update(&mut state, D == 2);
     let of = |tensor: &[Lanes; 6]| tensor.map(|component| component.to_array()[0]);
-    write(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&state.elastic)[..Layout::<D>::SYMMETRIC]);
-    write(chunk, Layout::<D>::STRESS, p, &of(&state.stress)[..Layout::<D>::SYMMETRIC]);
-    write(chunk, Layout::<D>::HISTORY, p, &state.history.map(|variable| variable.to_array()[0]));
+    chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&state.elastic)[..Layout::<D>::SYMMETRIC]);
+    chunk.write(Layout::<D>::STRESS, p, &of(&state.stress)[..Layout::<D>::SYMMETRIC]);
+    chunk.write(Layout::<D>::HISTORY, p, &state.history.map(|variable| variable.to_array()[0]));
 }
 
 fn elastic<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
@@ -129,8 +124,8 @@ fn totals<const D: usize>(chunk: &Chunk<D>) -> Totals {
         totals.sums[i].1 += value.abs();
     };
     for p in 0..chunk.len() {
-        let (x, [m]) = (chunk.position(p), read(chunk, Layout::<D>::MASS, p));
-        let v: [f64; D] = read(chunk, Layout::<D>::VELOCITY, p);
+        let (x, [m]) = (chunk.position(p), chunk.read(Layout::<D>::MASS, p));
+        let v: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let b = read_matrix(chunk, p);
         totals.mass += m;
         for a in 0..D {
@@ -145,8 +140,8 @@ fn totals<const D: usize>(chunk: &Chunk<D>) -> Totals {
                 }
             }
         }
-        let [gain] = read(chunk, Layout::<D>::HISTORY + 1, p);
-        let [work] = read(chunk, Layout::<D>::WORK, p);
+        let [gain] = chunk.read(Layout::<D>::HISTORY + 1, p);
+        let [work] = chunk.read(Layout::<D>::WORK, p);
         let determinant = material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0];
         add(2 * D + 3, volume(chunk, p));
         add(2 * D + 4, volume(chunk, p) * determinant.sqrt() * gain.exp());
