@@ -180,13 +180,13 @@ fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
     // Reals, identifier and tag of a particle.
     let state = 8.0 * (Layout::<D>::REALS + 2) as f64;
     // What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
-    // plan, filled ones node fields, arenas and slack of columns; where levels meet there are more blocks and bins, lists of
+    // plan, filled ones node fields and arenas; where levels meet there are more blocks and bins, lists of
     // constrained nodes, and moments.
     let levels = estimate.levels.iter().map(|level| {
         let count = [level.leaves, level.filled, level.jumps, level.filled_jumps];
         count
             .into_iter()
-            .zip([3.0, 52.0, 38.0, 122.0])
+            .zip([3.0, 40.0, 38.0, 122.0])
             .map(|(count, bytes)| count as f64 * bytes)
             .sum::<f64>()
     });
