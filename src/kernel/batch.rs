@@ -72,8 +72,7 @@ impl<'a, const D: usize> Batches<'a, D> {
             particle if self.next.tiles != 0 => (self.next, particle - rows),
             _ => (self.place, first),
         };
-        let tile = particle / TILE * Layout::<D>::REALS * size_of::<[f64; TILE]>();
-        Place { tiles: place.tiles + tile, tags: place.tags + particle * size_of::<u64>() }
+        place.of_particle::<D>(particle)
     }
 }
 

@@ -56,9 +56,9 @@ pub fn full_half_widths_of<const D: usize>(
 
 /// Asks for what [`full_half_widths_of`] will read of the batch of particles from `first` on.
 pub fn read_ahead<const D: usize>(place: Place, first: usize) {
-    let tile = place.tiles + first / LANES * Layout::<D>::REALS * size_of::<[f64; LANES]>();
-    columns::<D>().for_each(|column| prefetch(tile + column * size_of::<[f64; LANES]>()));
-    prefetch(place.tags + first * size_of::<u64>());
+    let place = place.of_particle::<D>(first);
+    columns::<D>().for_each(|column| prefetch(place.tiles + column * size_of::<[f64; LANES]>()));
+    prefetch(place.tags);
 }
 
 /// Columns that [`of_batch`] may read, positions among them.

@@ -47,6 +47,15 @@ pub struct Place {
     pub tags: usize,
 }
 
+impl Place {
+    /// Where the tile of particle `p` lies, and its tag.
+    #[inline(always)]
+    pub fn of_particle<const D: usize>(self, p: usize) -> Self {
+        let tile = p / TILE * Layout::<D>::REALS * size_of::<[f64; TILE]>();
+        Self { tiles: self.tiles + tile, tags: self.tags + p * size_of::<u64>() }
+    }
+}
+
 impl<const D: usize> Chunk<D> {
     /// Where the identifiers begin, in words per particle that there is room for.
     const IDS: usize = Layout::<D>::REALS;
@@ -121,6 +130,15 @@ impl<const D: usize> Chunk<D> {
         cast_slice(&self.block[..self.capacity / TILE * Layout::<D>::REALS])
     }
 
+    /// The tile of particle `p`, which has place `p % TILE` in each of its lines.
+    pub fn tile_of(&self, p: usize) -> &[[f64; TILE]] {
+        &self.tiles()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS]
+    }
+
+    fn tile_of_mut(&mut self, p: usize) -> &mut [[f64; TILE]] {
+        &mut self.lines_mut()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS]
+    }
+
     /// All tiles and tags at once, for kernels that write the former, undeformed half widths excepted, and read the
     /// latter.
     pub fn tiles_mut_and_tags(&mut self) -> (&mut [[f64; TILE]], &[u64]) {
@@ -131,8 +149,8 @@ impl<const D: usize> Chunk<D> {
 
     /// Columns `first..first + N` of particle `p`.
     pub fn read<const N: usize>(&self, first: usize, p: usize) -> [f64; N] {
-        let lines = &self.tiles()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
-        std::array::from_fn(|i| lines[first + i][p % TILE])
+        let tile = self.tile_of(p);
+        std::array::from_fn(|i| tile[first + i][p % TILE])
     }
 
     /// Writes columns of particle `p` from `first` on.
@@ -140,8 +158,7 @@ impl<const D: usize> Chunk<D> {
         if (first..first + values.len()).contains(&Layout::<D>::HALF) {
             self.widest = Widest::UNKNOWN;
         }
-        let lines = &mut self.lines_mut()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
-        for (line, &value) in lines[first..].iter_mut().zip(values) {
+        for (line, &value) in self.tile_of_mut(p)[first..].iter_mut().zip(values) {
             line[p % TILE] = value;
         }
     }
@@ -278,8 +295,7 @@ impl<const D: usize> Chunk<D> {
         let first = self.len;
         self.len += n;
         for p in first..self.len {
-            let own = &mut self.lines_mut()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
-            own.iter_mut().for_each(|line| line[p % TILE] = 0.0);
+            self.tile_of_mut(p).iter_mut().for_each(|line| line[p % TILE] = 0.0);
         }
         [Self::IDS, Self::TAGS].into_iter().for_each(|column| self.words_mut(column)[first..].fill(0));
         self.widest = Widest::UNKNOWN;

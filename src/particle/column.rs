@@ -90,6 +90,13 @@ impl ColumnMut<'_> {
     }
 }
 
+/// Line and lane of particle `p` of `len`.
+#[inline]
+fn place(p: usize, step: usize, len: usize) -> (usize, usize) {
+    assert!(p < len, "particle {p} of {len}");
+    (p / TILE * step, p % TILE)
+}
+
 /// # Panics
 /// There is no such particle.
 impl Index<usize> for Column<'_> {
@@ -97,8 +104,8 @@ impl Index<usize> for Column<'_> {
 
     #[inline]
     fn index(&self, p: usize) -> &f64 {
-        assert!(p < self.len, "particle {p} of {}", self.len);
-        &self.lines[p / TILE * self.step][p % TILE]
+        let (line, lane) = place(p, self.step, self.len);
+        &self.lines[line][lane]
     }
 }
 
@@ -109,16 +116,16 @@ impl Index<usize> for ColumnMut<'_> {
 
     #[inline]
     fn index(&self, p: usize) -> &f64 {
-        assert!(p < self.len, "particle {p} of {}", self.len);
-        &self.lines[p / TILE * self.step][p % TILE]
+        let (line, lane) = place(p, self.step, self.len);
+        &self.lines[line][lane]
     }
 }
 
 impl IndexMut<usize> for ColumnMut<'_> {
     #[inline]
     fn index_mut(&mut self, p: usize) -> &mut f64 {
-        assert!(p < self.len, "particle {p} of {}", self.len);
-        &mut self.lines[p / TILE * self.step][p % TILE]
+        let (line, lane) = place(p, self.step, self.len);
+        &mut self.lines[line][lane]
     }
 }
 

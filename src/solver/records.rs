@@ -11,8 +11,7 @@ pub const fn record_words<const D: usize>() -> usize {
 /// Appends the record of particle `p`.
 pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
     records.push(way);
-    let tile = &chunk.tiles()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS];
-    records.extend(tile.iter().map(|line| line[p % TILE].to_bits()));
+    records.extend(chunk.tile_of(p).iter().map(|line| line[p % TILE].to_bits()));
     records.extend([chunk.ids()[p], chunk.tags()[p]]);
 }
 

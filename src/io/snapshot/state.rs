@@ -7,7 +7,7 @@ use super::checked::{Checked, Rows};
 use super::header::{GROUP, Header};
 use super::{Restored, View};
 use crate::io::hdf5_file::{FileError, ParallelFile};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// One data set of particle columns.
 pub(super) struct Columns {
@@ -78,7 +78,7 @@ pub(super) fn write<const D: usize>(
         let mut values = Vec::with_capacity(particles.count as usize * count);
         for chunk in view.chunks {
             for p in 0..chunk.len() {
-                values.extend((first..first + count).map(|column| chunk.column(column)[p]));
+                values.extend(chunk.tile_of(p)[first..first + count].iter().map(|line| line[p % TILE]));
             }
         }
         checked.write(&path("particles", name), particles, set.components(), &values)?;

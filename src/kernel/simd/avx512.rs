@@ -111,10 +111,29 @@ impl Vector for Wide {
     /// As [`Vector::write_rows`] in general, with eight shuffles and no more.
     #[inline(always)]
     fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
-        let [Self(x), Self(y), Self(z), Self(w)] = columns;
-        let [ae, bf, cg, dh] = intrinsic!({
-            let (xy_even, xy_odd) = (_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y));
-            let (zw_even, zw_odd) = (_mm512_unpacklo_pd(z, w), _mm512_unpackhi_pd(z, w));
+        let [ae, bf, cg, dh] = Self::transpose(columns);
+        let ([a, e], [b, f], [c, g], [d, h]) = (ae.halves(), bf.halves(), cg.halves(), dh.halves());
+        *rows = [a, b, c, d, e, f, g, h];
+    }
+    /// Reads row by row, as they were written: a load of two would wait until both have left the store queue.
+    #[inline(always)]
+    fn columns(rows: &[F64x4; LANES]) -> [Self; 4] {
+        Self::transpose([
+            Self::join(rows[0], rows[4]),
+            Self::join(rows[1], rows[5]),
+            Self::join(rows[2], rows[6]),
+            Self::join(rows[3], rows[7]),
+        ])
+    }
+}
+
+impl Wide {
+    /// Transposes the lower four lanes of all and the upper four, each as a matrix; its own inverse.
+    #[inline(always)]
+    fn transpose([x, y, z, w]: [Self; 4]) -> [Self; 4] {
+        intrinsic!({
+            let (xy_even, xy_odd) = (_mm512_unpacklo_pd(x.0, y.0), _mm512_unpackhi_pd(x.0, y.0));
+            let (zw_even, zw_odd) = (_mm512_unpacklo_pd(z.0, w.0), _mm512_unpackhi_pd(z.0, w.0));
             let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
             let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
             [
@@ -123,35 +142,9 @@ impl Vector for Wide {
                 Self(_mm512_permutex2var_pd(xy_even, high, zw_even)),
                 Self(_mm512_permutex2var_pd(xy_odd, high, zw_odd)),
             ]
-        });
-        let ([a, e], [b, f], [c, g], [d, h]) = (ae.halves(), bf.halves(), cg.halves(), dh.halves());
-        *rows = [a, b, c, d, e, f, g, h];
-    }
-    /// Reads row by row, as they were written: a load of two would wait until both have left the store queue.
-    #[inline(always)]
-    fn columns(rows: &[F64x4; LANES]) -> [Self; 4] {
-        let [ae, bf, cg, dh] = [
-            Self::join(rows[0], rows[4]),
-            Self::join(rows[1], rows[5]),
-            Self::join(rows[2], rows[6]),
-            Self::join(rows[3], rows[7]),
-        ];
-        intrinsic!({
-            let (ab_even, ab_odd) = (_mm512_unpacklo_pd(ae.0, bf.0), _mm512_unpackhi_pd(ae.0, bf.0));
-            let (cd_even, cd_odd) = (_mm512_unpacklo_pd(cg.0, dh.0), _mm512_unpackhi_pd(cg.0, dh.0));
-            let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
-            let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-            [
-                Self(_mm512_permutex2var_pd(ab_even, low, cd_even)),
-                Self(_mm512_permutex2var_pd(ab_odd, low, cd_odd)),
-                Self(_mm512_permutex2var_pd(ab_even, high, cd_even)),
-                Self(_mm512_permutex2var_pd(ab_odd, high, cd_odd)),
-            ]
         })
     }
-}
 
-impl Wide {
     /// Inverse of [`Vector::halves`].
     #[inline(always)]
     fn join(low: F64x4, high: F64x4) -> Self {

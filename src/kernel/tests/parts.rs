@@ -316,8 +316,7 @@ fn bits_do_not_depend_on_earlier_bins() {
         }
         let mut chunk = start.clone();
         let arena = run(&mut chunk, &velocity);
-        let columns = (0..Layout::<3>::REALS)
-            .flat_map(|column| chunk.column(column).into_iter().copied().collect::<Vec<_>>());
+        let columns = (0..Layout::<3>::REALS).flat_map(|column| chunk.column(column)).copied();
         columns.chain(arena.into_iter().flat_map(|row| row.0)).map(f64::to_bits).collect::<Vec<_>>()
     };
     assert_eq!(step(false), step(true));
