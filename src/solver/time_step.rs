@@ -2,7 +2,8 @@
 use rayon::prelude::*;
 
 use super::{Physics, Solver};
-use crate::particle::chunk::{Chunk, Column, Layout, Tag};
+use crate::kernel::simd::{Lanes, Vector};
+use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 
 /// Limits on the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,19 +50,27 @@ impl<const D: usize> Solver<D> {
 
 impl<const D: usize> Physics<D> {
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
-        let velocity: [Column; D] = std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis));
-        let material = |p: usize| usize::from(Tag::unpack(chunk.tags()[p]).material);
-        let (mut signal, mut first) = (0.0, 0);
-        // One root for each run of particles of one material.
-        while first < chunk.len() {
-            let (own, mut p, mut greatest) = (material(first), first, 0.0);
-            while p < chunk.len() && material(p) == own {
-                greatest = f64::max(greatest, velocity.iter().fold(0.0, |sum, v| v[p].mul_add(v[p], sum)));
-                p += 1;
+        let signal = |(material, square): (u16, f64)| {
+            self.materials[usize::from(material)].wave_speed() + square.sqrt()
+        };
+        let (mut fastest, mut run) = (0.0, None);
+        let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS);
+        for (tile, tags) in tiles.zip(chunk.tags().chunks(TILE)) {
+            let velocity = tile[Layout::<D>::VELOCITY..].iter().take(D).map(Lanes::load);
+            let squares = velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum)).to_array();
+            for (&tag, square) in tags.iter().zip(squares) {
+                let own = Tag::unpack(tag).material;
+                // One root for each run of particles of one material.
+                let greatest = match run {
+                    Some((material, greatest)) if material == own => greatest,
+                    _ => {
+                        fastest = run.map_or(fastest, |run| f64::max(fastest, signal(run)));
+                        0.0
+                    }
+                };
+                run = Some((own, f64::max(greatest, square)));
             }
-            signal = f64::max(signal, self.materials[own].wave_speed() + greatest.sqrt());
-            first = p;
         }
-        signal
+        run.map_or(fastest, |run| f64::max(fastest, signal(run)))
     }
 }
