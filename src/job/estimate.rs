@@ -32,7 +32,7 @@ pub struct Estimate {
 }
 
 /// Bytes that each rank takes with next to no particles: the program itself and its libraries.
-const PROGRAM: f64 = 33e6;
+const PROGRAM: f64 = 37e6;
 
 /// Leaves of one level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -42,9 +42,7 @@ pub struct LevelCount {
     pub leaves: u64,
     /// Leaves with particles.
     pub filled: u64,
-    /// Leaves that touch one of another level.
-    pub jumps: u64,
-    /// Those of them with particles.
+    /// Those of them that touch a leaf of another level.
     pub filled_jumps: u64,
     /// Particles.
     pub particles: u64,
@@ -63,12 +61,11 @@ impl LevelCount {
         for (leaf, &particles) in leaves.iter().zip(particles) {
             let mut around =
                 (0..offset_count(D)).filter_map(|index| leaf.neighbour(offset(index), &problem.brick));
+            let is_jump = particles > 0 && around.any(|neighbour| !all.contains(&neighbour));
             let level = &mut levels[usize::from(leaf.level)];
             level.leaves += 1;
             level.filled += u64::from(particles > 0);
-            let is_jump = around.any(|neighbour| !all.contains(&neighbour));
-            level.jumps += u64::from(is_jump);
-            level.filled_jumps += u64::from(is_jump && particles > 0);
+            level.filled_jumps += u64::from(is_jump);
             level.particles += particles;
         }
         levels
@@ -180,15 +177,10 @@ fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
     // Reals, identifier and tag of a particle.
     let state = 8.0 * (Layout::<D>::REALS + 2) as f64;
     // What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
-    // plan, filled ones node fields and arenas; where levels meet there are more blocks and bins, lists of
-    // constrained nodes, and moments.
+    // plan, filled ones node fields, arenas and half a page of particles; where levels meet there are more blocks and
+    // bins, and moments of constrained nodes.
     let levels = estimate.levels.iter().map(|level| {
-        let count = [level.leaves, level.filled, level.jumps, level.filled_jumps];
-        count
-            .into_iter()
-            .zip([3.0, 40.0, 38.0, 122.0])
-            .map(|(count, bytes)| count as f64 * bytes)
-            .sum::<f64>()
+        1.6 * level.leaves as f64 + 52.0 * level.filled as f64 + 105.0 * level.filled_jumps as f64
     });
     let rows = 7_f64.powi(D as i32);
     estimate.memory = particles * state + rows * levels.sum::<f64>();
