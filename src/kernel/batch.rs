@@ -1,10 +1,16 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
-use super::simd::{LANES, Vector, VectorMask, prefetch};
+use super::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level};
 use crate::particle::chunk::{Chunk, Layout, Place, TILE};
 
 /// How far ahead tiles are asked for, in particles, in the next chunk where this one ends.
 const AHEAD: usize = 2 * TILE;
+
+/// How many tiles have their pages looked up at a time, as many tiles before they are used.
+const GROUP: usize = 16;
+
+/// Bytes of a page; larger ones are looked up more often than needed.
+const PAGE: usize = 4096;
 
 /// Up to [`LANES`] particles. Lanes that are no members compute something that is never stored.
 #[derive(Clone, Copy, Debug)]
@@ -60,14 +66,28 @@ impl<'a, const D: usize> Batches<'a, D> {
         let count = (self.len - first).min(LANES);
         let index = std::array::from_fn(|lane| (first + lane.min(count - 1)) as u32);
         let tile = Some((first / TILE) as u32);
-        Batch { index, lanes: ALL >> (LANES - count), tile, ahead: self.ahead(first) }
+        Batch { index, lanes: ALL >> (LANES - count), tile, ahead: self.ahead(first, AHEAD) }
     }
 
-    /// Where to read ahead while the particles from `first` on are at work.
+    /// To be called after each batch was taken. Tiles run through a page after every few of them. The processor finds
+    /// several pages at the same time, but waits for each that a single line is asked for on. In line: with a call
+    /// between batches, constants would not stay in registers.
     #[inline(always)]
-    fn ahead(&self, first: usize) -> Place {
+    pub fn look_up_pages(&self) {
+        let is_due = self.taken % (GROUP * TILE) == TILE && self.len > GROUP * TILE;
+        if is_due && matches!(self.select, Select::All) {
+            let tiles = (GROUP..2 * GROUP).step_by(PAGE / (Layout::<D>::REALS * size_of::<[f64; TILE]>()));
+            tiles.for_each(|tile| {
+                prefetch_to_second_level(self.ahead(self.taken - TILE, tile * TILE).tiles);
+            });
+        }
+    }
+
+    /// Where to read ahead by so many particles while those from `first` on are at work.
+    #[inline(always)]
+    fn ahead(&self, first: usize, by: usize) -> Place {
         let rows = self.len.next_multiple_of(TILE);
-        let (place, particle) = match first + AHEAD {
+        let (place, particle) = match first + by {
             particle if particle < rows => (self.place, particle),
             particle if self.next.tiles != 0 => (self.next, particle - rows),
             _ => (self.place, first),
@@ -98,7 +118,7 @@ impl<const D: usize> Iterator for Batches<'_, D> {
                 }
                 let (batch, count) = Batch::of_list(rest);
                 self.taken += count;
-                Some(Batch { ahead: self.ahead(rest[0] as usize), ..batch })
+                Some(Batch { ahead: self.ahead(rest[0] as usize, AHEAD), ..batch })
             }
         }
     }

@@ -133,7 +133,9 @@ fn scatter_all<V: Vector, const D: usize>(
 ) {
     let (tags, cell) = (chunk.tags(), frame.cell);
     let Scratch { prepared, nodes, spare } = scratch;
-    for batch in Batches::new(select, chunk, next) {
+    let mut batches = Batches::new(select, chunk, next);
+    while let Some(batch) = batches.next() {
+        batches.look_up_pages();
         let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
         let position: [V; D] = batch.positions(tile);
         let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);

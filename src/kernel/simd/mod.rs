@@ -49,6 +49,20 @@ pub fn prefetch(address: usize) {
     let _ = address;
 }
 
+/// As [`prefetch`], but past the first level of the cache, where lines at the same place of their pages push each other
+/// out.
+#[inline(always)]
+pub fn prefetch_to_second_level(address: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+        // SAFETY: as for `prefetch`.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(core::ptr::without_provenance(address)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = address;
+}
+
 /// One number for each of [`LANES`] particles, in whatever registers a kernel is compiled for.
 pub trait Vector:
     Copy
