@@ -13,4 +13,5 @@ pub mod material;
 pub mod memory;
 pub mod particle;
 pub mod run;
+pub mod simd;
 pub mod solver;

@@ -2,7 +2,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use crate::kernel::simd::{LANES, Lanes, Vector};
+use crate::simd::{LANES, Lanes, Vector};
 
 /// Limits of one core.
 #[derive(Clone, Copy, Debug, serde::Serialize)]

@@ -10,7 +10,7 @@ use super::mask::{bits, block_nodes, offset};
 use super::parents::{ParentNode, ParentTable, parity, weight_of};
 use super::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
-use crate::kernel::simd::F64x4;
+use crate::simd::F64x4;
 
 /// One block of the fields, mutable.
 struct BlockMut<'a> {

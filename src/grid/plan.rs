@@ -16,7 +16,7 @@ use super::links::Links;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use super::sources::{Part, Piece};
 use crate::kernel::ARENA_EDGE;
-use crate::kernel::simd::prefetch;
+use crate::simd::prefetch;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;

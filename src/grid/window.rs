@@ -3,8 +3,8 @@
 //! Bins beside level jumps often hold a few particles along one face. Clearing, summing, sending and loading
 //! only the nodes that these reach keeps their cost in proportion.
 use super::mask::{offset, product};
-use crate::kernel::simd::prefetch;
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
+use crate::simd::prefetch;
 
 /// A box of arena nodes, `lower..upper` per axis; what lies outside holds no values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Batches of particles of a chunk and their columns as lanes.
 use super::Select;
-use super::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level};
 use crate::particle::chunk::{Chunk, Layout, Place, TILE};
+use crate::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level};
 
 /// How far ahead tiles are asked for, in particles, in the next chunk where this one ends.
 const AHEAD: usize = 2 * TILE;

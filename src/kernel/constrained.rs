@@ -7,9 +7,9 @@ use std::sync::LazyLock;
 
 use super::batch::{Batch, lanes_in};
 use super::hanging::HangingNodes;
-use super::simd::LANES;
 use super::weights::{NodeWeights, Weights};
 use super::{ARENA_EDGE, stencil_bases};
+use crate::simd::LANES;
 
 /// Nodes of a stencil in 3D.
 const STENCIL: usize = 27;

@@ -3,11 +3,11 @@
 //! A pure function of particle state, cell size and domain size: scatter, gather and the search for
 //! the block of a particle call the same code and get the same bits.
 use super::batch::{Batch, Batches, Tile};
-use super::math::{exp, ln};
-use super::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
+use crate::simd::math::{exp, ln};
+use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 
 /// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small that
 /// what a box then has outside the domain is below round-off.

@@ -11,11 +11,11 @@ use super::batch::{Batch, Batches, Tile};
 pub use super::gathered::{Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
-use super::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State};
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
 /// Memory that is used from bin to bin, as it takes a while to set it up.
 pub struct Scratch<const D: usize> {

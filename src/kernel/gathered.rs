@@ -3,8 +3,8 @@ use super::Row;
 use super::batch::{Batch, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
-use super::simd::{F64x4, LANES, Vector};
 use super::weights::{NodeWeights, Weights, dot, pencils};
+use crate::simd::{F64x4, LANES, Vector};
 
 /// Constrained nodes of an arena, and first moments of those that have them.
 #[derive(Clone, Copy)]

@@ -12,9 +12,9 @@
 //! The hanging nodes of a stencil are those of a few boxes of nodes; beside a plane face they are one. Within a box the
 //! factors are those of each axis.
 use super::batch::{Batch, lanes_in};
-use super::simd::{F64x4, LANES, Lanes, Vector};
 use super::weights::{Weights, add_products, dot, pencils};
 use super::{ARENA_EDGE, BASES, Row, stencil_bases};
+use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 /// A box of hanging nodes in a stencil: by axis an index of [`ALONG`].
 type NodeBox = [u8; 3];

@@ -1,6 +1,6 @@
 //! Particles that leave the box of their leaf, found by G2P while their new positions are in registers.
 use super::batch::Batch;
-use super::simd::{LANES, Vector, VectorMask};
+use crate::simd::{LANES, Vector, VectorMask};
 
 /// Finds particles that are no longer in a box once they have moved.
 #[derive(Clone, Debug)]

@@ -5,8 +5,8 @@
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
 
-use self::simd::{F64x4, Lanes, Vector};
 use crate::material::Material;
+use crate::simd::{F64x4, Lanes, Vector};
 
 mod batch;
 pub mod constrained;
@@ -15,9 +15,7 @@ pub mod g2p;
 mod gathered;
 pub mod hanging;
 pub mod leavers;
-pub mod math;
 pub mod p2g;
-pub mod simd;
 pub mod spread;
 pub mod stencil;
 #[cfg(test)]

@@ -17,10 +17,10 @@
 use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained::ConstrainedNodes;
 use super::hanging::HangingNodes;
-use super::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 use super::weights::{NodeWeights, Weights, add_products};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 
 /// Constrained nodes of an arena, and first moments `A = Σ w m C` of those that have them.
 pub struct MomentSums<'a> {

@@ -5,10 +5,10 @@
 //! parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
 use super::batch::{Batch, Batches, Tile};
 use super::constrained::ConstrainedNodes;
-use super::simd::{LANES, Lanes};
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::simd::{LANES, Lanes};
 
 /// D of the selected particles, whose boxes are whole, in the order of the selection.
 pub fn of_particles<const D: usize>(

@@ -10,7 +10,7 @@
 //! ```
 //! with `m = min(hi, 1)`, `a = m - lo`, `b = max(hi - 1, 0)`, `V = a + b`.
 use super::BLOCK;
-use super::simd::Vector;
+use crate::simd::Vector;
 
 /// Three nodes of one axis for a batch of boxes.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +62,7 @@ impl<V: Vector> Axis<V> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::simd::{LANES, Lanes};
+    use crate::simd::{LANES, Lanes};
 
     /// Centres over a block and half widths from tiny to half a cell, aligned ones among them.
     fn boxes() -> Vec<(f64, f64)> {

@@ -1,7 +1,7 @@
 //! Tensor-product stencils of a batch of boxes.
-use super::simd::{F64x4, LANES, Lanes, Vector};
 use super::stencil::Axis;
 use super::{ARENA_EDGE, BASES, Frame, Row};
+use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 /// Factors of one axis, node by node and lane by lane.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! A material point driven along a prescribed path of deformation.
 use super::{HISTORIES, Material, State};
-use crate::kernel::simd::{Lanes, Vector};
+use crate::simd::{Lanes, Vector};
 
 /// A 3×3 matrix, `m[i][j]` in row i and column j.
 pub type Matrix = [[f64; 3]; 3];

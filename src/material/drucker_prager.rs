@@ -13,7 +13,7 @@ use super::hencky::Hencky;
 use super::parameters::FrictionMatch;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
-use crate::kernel::simd::{Lanes, Vector, VectorMask, widest};
+use crate::simd::{Lanes, Vector, VectorMask, widest};
 
 /// Drucker-Prager granular material.
 #[derive(Clone, Copy, Debug)]

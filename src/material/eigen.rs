@@ -1,7 +1,7 @@
 //! Symmetric 3×3 matrices over lanes: products of small matrices and eigen decomposition.
 //!
 //! Components in the order `xx, yy, zz, xy, xz, yz`.
-use crate::kernel::simd::{Lanes, Vector, VectorMask, each};
+use crate::simd::{Lanes, Vector, VectorMask, each};
 
 /// A symmetric matrix for each lane.
 pub type Symmetric<V = Lanes> = [V; 6];
@@ -144,7 +144,7 @@ pub fn greatest_bound<V: Vector>(matrix: &Symmetric<V>) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::simd::LANES;
+    use crate::simd::LANES;
 
     /// Random rotation from a unit quaternion.
     fn rotation(seed: u64) -> [[f64; 3]; 3] {

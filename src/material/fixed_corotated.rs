@@ -2,7 +2,7 @@
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::eigen::{decompose, greatest_bound};
 use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::kernel::simd::{Lanes, Vector, each, widest};
+use crate::simd::{Lanes, Vector, each, widest};
 
 /// Fixed corotated solid.
 #[derive(Clone, Copy, Debug)]

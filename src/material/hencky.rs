@@ -3,7 +3,7 @@
 use super::eigen::greatest_bound;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::kernel::simd::{Lanes, Vector, each, widest};
+use crate::simd::{Lanes, Vector, each, widest};
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
 //! elastic state. Plastic models map a trial `b` back to their yield surface in Hencky strains.
-use crate::kernel::simd::{Kernel, LANES, Lanes, Mask, Vector, VectorMask};
+use crate::simd::{Kernel, LANES, Lanes, Mask, Vector, VectorMask};
 
 pub mod driver;
 pub mod drucker_prager;

@@ -5,7 +5,7 @@
 //! takes two multiply-adds for the whole tensor.
 use super::Symmetric;
 use super::eigen::determinant;
-use crate::kernel::simd::{Vector, each};
+use crate::simd::{Vector, each};
 
 /// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most 0.82 times as
 /// large, and what the series leave out is below 2e-18.

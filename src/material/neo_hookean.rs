@@ -2,8 +2,8 @@
 //! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
 use super::eigen::{determinant, greatest_bound};
 use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::kernel::math::ln;
-use crate::kernel::simd::{Lanes, Vector, widest};
+use crate::simd::math::ln;
+use crate::simd::{Lanes, Vector, widest};
 
 /// Compressible neo-Hookean solid.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,8 @@ use super::eigen::{Eigen, decompose};
 use super::hencky::Hencky;
 use super::near_unit::TraceFree;
 use super::{State, Symmetric};
-use crate::kernel::math::{exp, ln};
-use crate::kernel::simd::{Lanes, Mask, Vector, VectorMask, each};
+use crate::simd::math::{exp, ln};
+use crate::simd::{Lanes, Mask, Vector, VectorMask, each};
 
 /// The logarithmic strain `½ ln b` of a trial tensor.
 pub(super) struct Strain<V = Lanes> {
@@ -154,7 +154,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernel::simd::LANES;
+    use crate::simd::LANES;
 
     /// Strains of tensors on both sides of the limit of the series, from eigenvalues as well.
     fn agrees_with_eigenvalues(b: &Symmetric, plane: bool, tolerance: f64) -> Result<(), TestCaseError> {

@@ -5,7 +5,7 @@
 use super::hencky::Hencky;
 use super::strain::Strain;
 use super::{Lame, Law, Material, Response, State, Symmetric, parameters};
-use crate::kernel::simd::{Lanes, Vector, VectorMask, widest};
+use crate::simd::{Lanes, Vector, VectorMask, widest};
 
 /// Von Mises solid.
 #[derive(Clone, Copy, Debug)]

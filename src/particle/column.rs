@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 use std::slice;
 
 use super::chunk::TILE;
-use crate::kernel::simd::{LANES, Lanes, Vector};
+use crate::simd::{LANES, Lanes, Vector};
 
 const _: () = assert!(LANES == TILE, "a batch of a kernel is a tile");
 

@@ -6,8 +6,8 @@ use super::sides::{NearLeaf, near_leaf};
 use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
-use crate::kernel::simd::Lanes;
 use crate::particle::Chunk;
+use crate::simd::Lanes;
 
 /// Particle lists of the bins of one rank.
 #[derive(Clone, Debug, Default)]

@@ -9,8 +9,8 @@ use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
-use crate::kernel::simd::VectorMask;
 use crate::particle::chunk::{Chunk, Layout};
+use crate::simd::VectorMask;
 
 /// Where a particle goes.
 #[derive(Clone, Copy)]

@@ -15,10 +15,10 @@ use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::simd::{Lanes, Vector};
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::simd::{Lanes, Vector};
 
 /// A particle with its box. Lengths in m, relative to the domain's lower corner.
 #[derive(Clone, Copy, Debug)]

@@ -15,8 +15,8 @@ use crate::grid::mask::{offset, offset_count};
 use crate::grid::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
-use crate::kernel::simd::{LANES, Lanes, Vector, VectorMask};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
 /// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
 /// more than it saves.

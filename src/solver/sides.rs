@@ -10,7 +10,7 @@ use super::migrate::leaf_box;
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count, offset_index};
 use crate::grid::plan::Bin;
-use crate::kernel::simd::{LANES, Lanes, Vector, VectorMask};
+use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]

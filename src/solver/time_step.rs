@@ -2,8 +2,8 @@
 use rayon::prelude::*;
 
 use super::{Physics, Solver};
-use crate::kernel::simd::{Lanes, Vector};
 use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
+use crate::simd::{Lanes, Vector};
 
 /// Limits on the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]

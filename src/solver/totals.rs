@@ -9,8 +9,8 @@ use super::phases::Phase;
 use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::simd::{LANES, Lanes, Mask, Vector, VectorMask};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::simd::{LANES, Lanes, Mask, Vector, VectorMask};
 
 /// Components of a torque or angular momentum, for both dimensions.
 const AXES: [(usize, usize); 3] = [(1, 2), (2, 0), (0, 1)];

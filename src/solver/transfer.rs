@@ -21,10 +21,10 @@ use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::simd::prefetch;
 use crate::kernel::{Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, g2p, p2g, spread};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place};
+use crate::simd::prefetch;
 
 /// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
 const READ_AHEAD: usize = 25;

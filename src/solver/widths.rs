@@ -4,10 +4,10 @@ use super::bins::BoxWidths;
 use super::leaf_bins::{list_lanes, values};
 use super::transfer::extent;
 use crate::grid::GridPlan;
-use crate::kernel::simd::{LANES, Lanes, Vector, VectorMask};
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
+use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
 /// Half widths as the kernels compute them.
 pub(super) struct Widths<'a, const D: usize> {

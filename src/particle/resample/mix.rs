@@ -3,10 +3,10 @@ use rustc_hash::FxHashSet;
 
 use super::super::chunk::{Chunk, Layout, Tag};
 use super::{Limits, Setting, read_matrix, volume, write_matrix};
-use crate::kernel::math::{exp, ln};
-use crate::kernel::simd::{LANES, Lanes, Vector};
 use crate::kernel::{Select, Transfer};
 use crate::material::{self, HISTORIES, State, Symmetric, eigen};
+use crate::simd::math::{exp, ln};
+use crate::simd::{LANES, Lanes, Vector};
 
 /// Particles that might become one.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 use super::family::{Bounds, separated};
 use super::*;
 use crate::kernel::Transfer;
-use crate::kernel::simd::{Lanes, Vector};
 use crate::material::{self, Material, Parameters, State, parameters};
+use crate::simd::{Lanes, Vector};
 use proptest::prelude::*;
 
 mod conservation;

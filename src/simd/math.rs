@@ -2,7 +2,7 @@
 //!
 //! Made of correctly rounded operations only. Errors are below 1.5 units in the last place (tested
 //! against `libm`).
-use super::simd::{Vector, VectorMask};
+use super::{Vector, VectorMask};
 
 /// Upper part of ln 2 whose products with exponents are exact.
 const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
@@ -75,7 +75,7 @@ pub fn exp<V: Vector>(x: V) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::simd::Lanes;
+    use crate::simd::Lanes;
 
     fn ulps(a: f64, b: f64) -> f64 {
         (a - b).abs() / (b.abs() * f64::EPSILON * 0.5).max(f64::MIN_POSITIVE)

@@ -173,5 +173,6 @@ pub fn each<V: Vector, const N: usize>(mut values: [V; N], f: impl Fn(V) -> V) -
     values
 }
 
+pub mod math;
 #[cfg(test)]
 mod tests;
