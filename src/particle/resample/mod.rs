@@ -2,8 +2,8 @@
 //!
 //! Pure functions on the chunk of one leaf: they know neither tree nor ranks, and the result depends on the content of
 //! the chunk alone. After either, particles may lie in another leaf (children do where a box crosses a face), so the
-//! caller sorts them into leaves afterwards. What is conserved, and why, is said in `docs/theory.md`, "Splitting and
-//! merging".
+//! caller sorts them into leaves afterwards. What is conserved, and why, is derived in
+//! `docs/design/resampling.md`.
 use super::chunk::{Chunk, Layout, Tag};
 use crate::kernel::{BoxPolicy, Scheme, Select, domain};
 
