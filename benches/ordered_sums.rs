@@ -13,7 +13,7 @@ use agimp::grid::plan::NO_BLOCK;
 use agimp::grid::waves;
 use agimp::grid::{GridPlan, NodeFields};
 use agimp::job::{self, AnyProblem};
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::Requests;
 use partition::comm::World;
 use rayon::prelude::*;

@@ -13,5 +13,6 @@ pub mod material;
 pub mod memory;
 pub mod particle;
 pub mod run;
+pub mod setup;
 pub mod simd;
 pub mod solver;

@@ -9,7 +9,7 @@ use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::kernel::Transfer;
 use agimp::particle::chunk::{Chunk, Layout};
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::Comm;
 use relaunch::{ran_if_launched, relaunch};

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::Layout;
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use common::launch::{Scenario, agrees_for, report, work};
 use partition::Comm;

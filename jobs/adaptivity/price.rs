@@ -9,7 +9,7 @@ use std::time::Instant;
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::Chunk;
 use agimp::run::restart::{self, From};
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::parts::Part;
 use agimp::solver::{Requests, Solver};
 use partition::comm::{Comm, World};

@@ -2,7 +2,7 @@
 use std::path::Path;
 
 use agimp::job::{self, AnyProblem};
-use agimp::run::setup;
+use agimp::setup;
 use partition::comm::World;
 use serde_json::Value;
 

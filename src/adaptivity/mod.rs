@@ -4,9 +4,11 @@
 //! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any criterion
 //! wants that, and coarsened when none objects. The solver finds the values and changes the tree
 //! (`solver/regrid.rs`); nothing here knows of trees and ranks.
+use self::resample::Limits;
+
+pub mod resample;
 use crate::boundary::motion::Motion;
 use crate::geometry::{Aabb, Shape, Side};
-use crate::particle::resample::Limits;
 
 /// Dynamic refinement as a job asks for it.
 #[derive(Clone, Debug)]

@@ -181,8 +181,8 @@ fn column(particles: f64, adaptive: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::estimate::estimate;
     use crate::job::{AnyProblem, parse};
+    use crate::setup::estimate::estimate;
 
     #[test]
     fn jobs_are_valid_and_of_the_size_asked_for() {

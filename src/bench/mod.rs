@@ -12,7 +12,8 @@ use crate::io::telemetry::Record;
 use crate::job::{AnyProblem, Problem, parse};
 use crate::particle::chunk::Layout;
 use crate::run::record::Recorder;
-use crate::run::{Options, RunError, setup};
+use crate::run::{Options, RunError};
+use crate::setup;
 use crate::solver::{Requests, phases::Phase};
 
 /// How much to measure.

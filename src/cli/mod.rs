@@ -1,6 +1,6 @@
 //! Command line: one file per subcommand. The only part of the library that prints.
 use crate::job::JobError;
-use crate::particle::seed::SeedError;
+use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};
 
 pub mod bench;

@@ -5,9 +5,9 @@ use super::file::JobFile;
 use super::file_adaptivity::{Criterion as Written, Way};
 use super::problem::{Body, BoxPolicy, TreeSetup};
 use super::source::Path;
+use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::{Knot, Motion};
-use crate::particle::resample::Limits;
 
 /// What the conversion needs of the rest of the job.
 pub(super) struct Context<'a, const D: usize> {

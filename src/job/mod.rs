@@ -7,7 +7,6 @@ mod adaptivity;
 mod colliders;
 mod convert;
 pub mod error;
-pub mod estimate;
 pub mod file;
 pub mod file_adaptivity;
 pub mod file_colliders;

@@ -2,8 +2,6 @@
 pub mod chunk;
 mod column;
 mod layout;
-pub mod resample;
-pub mod seed;
 mod widest;
 
 pub use chunk::{Chunk, Layout};

@@ -4,7 +4,6 @@ pub mod record;
 pub mod report;
 pub mod restart;
 pub mod schedule;
-pub mod setup;
 pub mod stop;
 
 use std::path::PathBuf;
@@ -21,6 +20,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
+use crate::setup;
 use crate::solver::phases::Phase;
 use crate::solver::{Clock, Requests, Solver};
 

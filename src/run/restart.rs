@@ -4,13 +4,14 @@ use std::path::PathBuf;
 use partition::Forest;
 use partition::comm::Comm;
 
-use super::{RunError, setup};
+use super::RunError;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::{self, Scalars, directory};
 use crate::job::Problem;
 use crate::particle::Chunk;
+use crate::setup;
 use crate::solver::rebalance::{cut_at, leaf_weight};
 use crate::solver::{Clock, Solver};
 

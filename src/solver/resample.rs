@@ -8,12 +8,12 @@ use super::grid::reach_of_width;
 use super::migrate::leaf_box;
 use super::survey::widest;
 use super::{Physics, Solver};
+use crate::adaptivity::resample::patience::{self, Look, Turn};
+use crate::adaptivity::resample::{Merged, Setting, ids, merge, needs_split, split};
 use crate::exact_sum::ExactSum;
 use crate::kernel::{BoxPolicy, Scheme};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
-use crate::particle::resample::patience::{self, Look, Turn};
-use crate::particle::resample::{Merged, Setting, ids, merge, needs_split, split};
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
 #[derive(Clone, Debug, Default)]

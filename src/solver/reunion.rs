@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::migrate::{Moved, leaf_box};
 use super::resample::Resampling;
 use super::{Solver, StepError};
+use crate::adaptivity::resample::family::separated;
+use crate::adaptivity::resample::patience::{self, Look};
 use crate::particle::Chunk;
-use crate::particle::resample::family::separated;
-use crate::particle::resample::patience::{self, Look};
 
 impl<const D: usize> Solver<D> {
     /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go

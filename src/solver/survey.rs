@@ -2,9 +2,9 @@
 //! criteria and splitting will ask for. Looking at them again later would cost more than all the rest of a regrid that
 //! changes nothing.
 use super::Solver;
+use crate::adaptivity::resample::patience::Levels;
 use crate::adaptivity::{Adaptivity, Kind};
 use crate::particle::chunk::{Chunk, Layout};
-use crate::particle::resample::patience::Levels;
 
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.

@@ -1,7 +1,7 @@
 //! Jobs of the tests through the library, to look at leaves and particles.
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::{Layout, Tag};
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 

@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 
 use agimp::job::Problem;
 use agimp::particle::chunk::Layout;
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 

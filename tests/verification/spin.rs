@@ -2,7 +2,7 @@
 use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem};
 use agimp::particle::chunk::Layout;
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 

@@ -5,7 +5,7 @@
 //! time steps, has been reflected: all is linear, so the difference is free of what dispersion and the start do.
 use agimp::job::Problem;
 use agimp::particle::chunk::Layout;
-use agimp::run::setup;
+use agimp::setup;
 use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::Comm;
 

@@ -1,7 +1,7 @@
 //! One particle becomes `2^D`.
-use super::super::chunk::{Chunk, Layout, Tag};
 use super::{Setting, ids, read_matrix, write_matrix};
 use crate::kernel::{Select, Transfer};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// What [`split`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! What a job will cost, found without running it.
-use super::problem::{Field, Problem};
+use super::seed::{SeedError, count_leaf};
 use crate::grid::mask::{offset, offset_count};
+use crate::job::problem::{Field, Problem};
 use crate::material;
 use crate::particle::Layout;
-use crate::particle::seed::{SeedError, count_leaf};
 use bytemuck::{Pod, Zeroable};
 use partition::Octant;
 use rayon::prelude::*;

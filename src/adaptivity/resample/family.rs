@@ -9,11 +9,11 @@
 //! A family that a face cuts in two is in two leaves, so neither can merge it. [`separated`] says which particles have
 //! to cross to the leaf on the lower side for a while. It cannot know which faces cut a family that is near several, so
 //! the caller tries the combinations of axes in turn.
-use super::super::chunk::Chunk;
 use super::merge::{Limits, of_level};
 use super::numbered::Numbered;
 use super::sieve::Sieve;
 use super::{Setting, ids, patience};
+use crate::particle::chunk::Chunk;
 use crate::particle::chunk::Tag;
 
 /// Lower and upper corner of a leaf, m.

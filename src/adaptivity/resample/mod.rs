@@ -4,8 +4,8 @@
 //! the chunk alone. After either, particles may lie in another leaf (children do where a box crosses a face), so the
 //! caller sorts them into leaves afterwards. What is conserved, and why, is derived in
 //! `docs/design/resampling.md`.
-use super::chunk::{Chunk, Layout, Tag};
 use crate::kernel::{BoxPolicy, Scheme, Select, domain};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 
 pub mod family;
 pub mod ids;

@@ -3,13 +3,16 @@ use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::solver::rebalance::{cut_at, leaf_cost};
 use crate::solver::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
+
+pub mod estimate;
+pub mod seed;
 
 /// The constant part of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {

@@ -3,9 +3,9 @@
 //! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per
 //! cell, anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its
 //! own points, on whichever rank it is, and no point is made twice.
-use super::chunk::{Chunk, Layout, Tag};
 use crate::geometry::{Aabb, Side};
 use crate::job::problem::{Body, Problem};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 use partition::Octant;
 
 /// A particle cannot be made.

@@ -1,11 +1,11 @@
 //! Several particles become one.
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::super::chunk::{Chunk, Layout, Tag};
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
 use super::numbered::Numbered;
 use super::{Setting, patience, volume};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// How different particles may be that become one.
 #[derive(Clone, Copy, Debug, PartialEq)]

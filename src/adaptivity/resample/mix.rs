@@ -1,10 +1,10 @@
 //! The particle that stands for a group.
 use rustc_hash::FxHashSet;
 
-use super::super::chunk::{Chunk, Layout, Tag};
 use super::{Limits, Setting, read_matrix, volume, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::material::{self, HISTORIES, State, Symmetric, eigen};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector};
 
