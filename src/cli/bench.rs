@@ -1,11 +1,12 @@
 //! `agimp bench`: speed of whole steps on built-in jobs.
+use std::ffi::OsString;
 use std::io::Write;
 
 use partition::comm::{Comm, World};
 
 use super::message::together;
 use super::run::start_threads;
-use super::{Failure, grouped};
+use super::{Failure, grouped, ranks};
 use crate::bench::jobs::{BenchJob, JOBS};
 use crate::bench::machine::Machine;
 use crate::bench::{Extent, Figures, measure};
@@ -59,6 +60,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     }
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
+    let words: Vec<OsString> = std::env::args_os().skip(1).collect();
+    ranks::same_command(comm, &words.iter().map(OsString::as_os_str).collect::<Vec<_>>())?;
     together(comm, start_threads(comm, Some(arguments.threads)))?;
     let directory = std::env::temp_dir().join(format!("agimp-bench-{}", std::process::id()));
     let made = if comm.rank() == 0 { std::fs::create_dir_all(&directory) } else { Ok(()) };

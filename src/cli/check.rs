@@ -1,6 +1,6 @@
 //! `agimp check`: the size and cost of a job, without running it.
 use super::message::{launched, together};
-use super::{Failure, bytes, grouped};
+use super::{Failure, bytes, grouped, ranks};
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::Motion;
 use crate::job::{self, AnyProblem, Problem};
@@ -10,6 +10,7 @@ use crate::setup::estimate::{Estimate, LevelCount, estimate};
 use crate::setup::seed::check_counts;
 use partition::MAX_LEVEL;
 use partition::comm::World;
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -29,7 +30,13 @@ pub struct Arguments {
 /// The job is wrong.
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut world = launched()?;
-    let problem = once(world.as_ref(), job::load(&arguments.job).map_err(Failure::from))?;
+    let problem = match &world {
+        Some(world) => {
+            ranks::same_command(world.comm(), &[OsStr::new("check"), arguments.job.as_os_str()])?;
+            ranks::load(world.comm(), &arguments.job)?
+        }
+        None => job::load(&arguments.job)?,
+    };
     let report = match problem {
         AnyProblem::Two(problem) => report(arguments, &problem, &mut world),
         AnyProblem::Three(problem) => report(arguments, &problem, &mut world),

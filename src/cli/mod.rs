@@ -13,6 +13,7 @@ mod message;
 pub use message::unusable;
 pub mod new;
 pub mod plot;
+mod ranks;
 pub mod run;
 pub mod schema;
 pub mod weights;

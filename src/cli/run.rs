@@ -1,11 +1,12 @@
 //! `agimp run`: runs a job, alone or on the ranks of `mpirun`.
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::PathBuf;
 
 use partition::comm::{Comm, World};
 
-use super::Failure;
 use super::message::together;
+use super::{Failure, ranks};
 use crate::job::problem::AnyProblem;
 use crate::run::stop::StopRequest;
 use crate::run::{self, Options, Outcome, RunError, Summary, restart};
@@ -26,6 +27,17 @@ pub struct Arguments {
     pub quiet: bool,
 }
 
+impl Arguments {
+    /// The words that decide what a run does. Threads and messages are each rank's own affair.
+    fn words(&self) -> Vec<&OsStr> {
+        let mut words = vec![OsStr::new("run"), self.job.as_os_str()];
+        if let Some(from) = &self.restart {
+            words.extend([OsStr::new("--restart"), OsStr::new(from)]);
+        }
+        words
+    }
+}
+
 /// Carries out `agimp run`.
 ///
 /// # Errors
@@ -34,7 +46,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    let problem = together(comm, crate::job::load(&arguments.job).map_err(Failure::from))?;
+    ranks::same_command(comm, &arguments.words())?;
+    let problem = ranks::load(comm, &arguments.job)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from {

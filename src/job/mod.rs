@@ -33,8 +33,22 @@ use std::path::Path;
 /// The file cannot be read, or its content is not a valid job; all faults that were found, with their
 /// places.
 pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+    from_bytes(read(path)?, path)
+}
+
+/// The bytes of a job file. Not collective.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn read(path: &Path) -> Result<Vec<u8>, JobError> {
+    std::fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })
+}
+
+/// Checks the bytes of a job file. Nothing is read from `path`: its stem becomes the name of the job.
+///
+/// # Errors
+/// The content is not a valid job; all faults that were found, with their places.
+pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();

@@ -182,16 +182,6 @@ fn a_bad_job_is_told_once() {
         assert!(shown.contains("root_edge"), "{shown}");
         assert!(!directory.join("out").exists());
     }
-
-    // Only the second rank cannot read its job, as if a node lacked the file system.
-    let mut command = mpirun(directory, 1);
-    command.arg(env!("CARGO_BIN_EXE_agimp")).arg("run").arg(job("few_leaves"));
-    command.args([":", "-n", "1", env!("CARGO_BIN_EXE_agimp"), "run", "missing.toml"]);
-    let output = Running::start(&mut command).finish_within(SOON);
-    let shown = text(&output);
-    assert_eq!(output.status.code(), Some(2), "{shown}");
-    assert_eq!(shown.matches("missing.toml: cannot be read").count(), 1, "{shown}");
-    assert!(!directory.join("out").exists());
 }
 
 /// The results cannot be written: only rank 0 notices, all ranks end.

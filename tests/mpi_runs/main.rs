@@ -1,5 +1,6 @@
 //! The whole program under `mpirun`: same bits on any ranks and threads, restarts, signals, and the end of all
 //! ranks when one fails.
+mod differing_ranks;
 mod faults;
 mod launch;
 mod ranks;

@@ -1,0 +1,42 @@
+//! One command on many ranks: the same command line, and the job that rank 0 has read.
+//!
+//! Each rank is a process of its own: it may have been started with other arguments, and it may see another text of
+//! the job, when the file is edited while a batch system starts the ranks or when a network file system holds an old
+//! copy. Ranks that ran different jobs would wait for each other for ever, or compute what nobody has asked for.
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt as _;
+use std::path::Path;
+
+use partition::comm::Comm;
+
+use super::Failure;
+use super::message::together;
+use crate::job::{self, AnyProblem};
+
+/// Collective. Refuses ranks whose command differs from that of rank 0. `words` are the words of the command that decide
+/// what it does.
+pub(super) fn same_command(comm: &Comm, words: &[&OsStr]) -> Result<(), Failure> {
+    // Ranks whose command line cannot be used at all say so here.
+    together(comm, Ok(()))?;
+    let own = words.join(OsStr::new(" "));
+    let mut first = own.as_bytes().to_vec();
+    comm.broadcast_bytes(0, &mut first);
+    let same = if own.as_bytes() == first { Ok(()) } else { Err(differs(comm.rank(), &own, &first)) };
+    together(comm, same)
+}
+
+fn differs(rank: usize, own: &OsStr, first: &[u8]) -> Failure {
+    Failure::Usage(format!(
+        "rank {rank} was started with `{}`, rank 0 with `{}`; expected the same on all ranks",
+        own.display(),
+        OsStr::from_bytes(first).display()
+    ))
+}
+
+/// Collective. The job as rank 0 reads it, on all ranks.
+pub(super) fn load(comm: &Comm, path: &Path) -> Result<AnyProblem, Failure> {
+    let read = if comm.rank() == 0 { job::read(path) } else { Ok(Vec::new()) };
+    let mut bytes = together(comm, read.map_err(Failure::from))?;
+    comm.broadcast_bytes(0, &mut bytes);
+    together(comm, job::from_bytes(bytes, path).map_err(Failure::from))
+}
