@@ -12,6 +12,7 @@ pub mod kernel;
 pub mod material;
 pub mod memory;
 pub mod particle;
+pub mod quantity;
 pub mod run;
 pub mod setup;
 pub mod simd;
