@@ -7,10 +7,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use agimp::grid::arena::Arenas;
+use agimp::grid::arenas::Arenas;
+use agimp::grid::arenas::waves;
 use agimp::grid::mask::{block_nodes, offset_count};
 use agimp::grid::plan::NO_BLOCK;
-use agimp::grid::waves;
 use agimp::grid::{GridPlan, NodeFields};
 use agimp::job::{self, AnyProblem};
 use agimp::setup;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Failure;
 use super::message::together;
 use crate::grid::direct;
-use crate::grid::known::KnownTree;
+use crate::grid::plan::known::KnownTree;
 use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 
 /// Arguments of `agimp weights`.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use partition::{MAX_LEVEL, Octant};
 
-use super::known::KnownTree;
+use super::plan::known::KnownTree;
 use crate::kernel::BLOCK;
 
 /// Weight of one real node.

@@ -3,35 +3,27 @@
 //!
 //! The grid of one rank is described by a [`GridPlan`], which depends on tree and partition only, and
 //! filled each time step in a [`NodeFields`]. See `ARCHITECTURE.md`, "Node sums".
-pub mod arena;
-pub mod census;
-pub mod closure;
-pub mod columns;
-pub mod constrained;
-pub mod constraint;
-mod cutter;
+//!
+//! | room | what it holds, from the bottom up |
+//! |---|---|
+//! | [`mask`] | sets of nodes of a block as bits; offsets between blocks |
+//! | [`order`] | in which order the arenas that reach a node are added |
+//! | [`constraints`] | which nodes are parents of which, with which weights |
+//! | [`plan`] | bins and blocks of one tree and partition; what a rank needs of others |
+//! | [`arenas`] | memory that bins scatter into |
+//! | [`sums`] | node fields of a step: sums of arenas, exchange, restriction, prolongation |
+//! | [`direct`] | weights by definition, cell by cell: the oracle of tests |
+pub mod arenas;
+pub mod constraints;
 pub mod direct;
-pub mod exchange;
-pub mod feeders;
-pub mod fields;
-pub mod known;
-mod levels;
-pub mod links;
 pub mod mask;
-mod mixed;
 pub mod order;
-pub mod parents;
 pub mod plan;
-pub mod reach;
-pub mod region;
-pub mod sources;
-mod sums;
-pub mod waves;
-pub mod window;
+pub mod sums;
 
-pub use exchange::ArenaExchange;
-pub use fields::NodeFields;
-pub use known::{Cover, KnownTree};
+pub use arenas::waves::Seam;
+pub use arenas::window::Window;
 pub use plan::GridPlan;
-pub use waves::Seam;
-pub use window::Window;
+pub use plan::known::{Cover, KnownTree};
+pub use sums::exchange::ArenaExchange;
+pub use sums::fields::NodeFields;

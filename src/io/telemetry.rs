@@ -9,7 +9,7 @@ use partition::{MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
 use super::hdf5_file::FileError;
-use crate::grid::census::Census;
+use crate::grid::sums::census::Census;
 use crate::particle::chunk::Chunk;
 
 /// A quantity over the ranks.

@@ -1,7 +1,7 @@
 //! Constrained nodes of an arena: hanging ones, and those that first and second moments belong to.
 //!
 //! Moments are for nodes whose parents are constrained themselves, beside jumps over more than one level. Most of their
-//! columns are zero (see `grid/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its
+//! columns are zero (see `grid/constraints/columns.rs`). Those that are not are kept one after the other, and a stencil visits those of its
 //! own nodes.
 use std::sync::LazyLock;
 

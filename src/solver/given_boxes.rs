@@ -13,7 +13,7 @@ use super::transfer::{extent, sort_with};
 use super::update::update_velocity;
 use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
-use crate::grid::constraint::node_coord;
+use crate::grid::constraints::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};

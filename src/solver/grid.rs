@@ -11,10 +11,10 @@ use super::phases::Phase;
 use super::resample::{Resampling, Splits};
 use super::transfer::extent;
 use super::{Physics, Solver};
-use crate::grid::arena::Arenas;
-use crate::grid::census::{Census, surface_bytes};
-use crate::grid::exchange::ReceivedSums;
-use crate::grid::known::Allowance;
+use crate::grid::arenas::Arenas;
+use crate::grid::plan::known::Allowance;
+use crate::grid::sums::census::{Census, surface_bytes};
+use crate::grid::sums::exchange::ReceivedSums;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::memory::Block;
 

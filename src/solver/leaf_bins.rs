@@ -12,7 +12,7 @@ use super::bins::{BinMissing, BoxWidths};
 use super::members::Members;
 use super::sides::{NearLeaf, Side, Sides, near_leaf};
 use crate::grid::mask::{offset, offset_count};
-use crate::grid::reach::leaves_around;
+use crate::grid::plan::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::particle::chunk::{Chunk, Layout};

@@ -47,7 +47,7 @@ use self::time_step::StepControl;
 use self::totals::Weighed;
 use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
-use crate::grid::waves;
+use crate::grid::arenas::waves;
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::Material;
 use crate::particle::Chunk;

@@ -3,9 +3,9 @@ use partition::comm::Comm;
 use partition::{Forest, Octant, Region};
 use rayon::prelude::*;
 
-use crate::grid::known::{Cover, KnownTree};
 use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count, product, shifted};
 use crate::grid::plan::NO_BLOCK;
+use crate::grid::plan::known::{Cover, KnownTree};
 use crate::grid::{GridPlan, NodeFields};
 use crate::particle::Chunk;
 

@@ -1,16 +1,16 @@
 //! The sum of one block.
 use std::ops::RangeInclusive;
 
-use super::arena::Arenas;
-use super::columns::axes_in;
 use super::exchange::ReceivedSums;
-use super::feeders::NO_BIN;
-use super::mask::{bits, block_nodes, opposite};
 use super::mixed::{Mixed, Other};
-use super::order::Origin;
-use super::plan::{Block, GridPlan};
-use super::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
-use super::window::Window;
+use crate::grid::arenas::Arenas;
+use crate::grid::arenas::window::Window;
+use crate::grid::constraints::columns::axes_in;
+use crate::grid::mask::{bits, block_nodes, opposite};
+use crate::grid::order::Origin;
+use crate::grid::order::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
+use crate::grid::plan::feeders::NO_BIN;
+use crate::grid::plan::{Block, GridPlan};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 
 pub(super) const ZERO: Row = Row([0.0; 4]);
@@ -28,19 +28,19 @@ pub(super) struct Sources<'a, const D: usize> {
 
 /// What reaches one block in this step.
 pub(super) struct BlockSum<'a, const D: usize> {
-    pub(super) plan: &'a GridPlan<D>,
-    pub(super) arenas: &'a Arenas<D>,
+    pub(in crate::grid) plan: &'a GridPlan<D>,
+    pub(in crate::grid) arenas: &'a Arenas<D>,
     pub(super) received: Option<&'a ReceivedSums<D>>,
-    pub(super) scratch: &'a mut Mixed<D>,
-    pub(super) block: usize,
-    pub(super) regions: &'static Regions,
-    pub(super) order: &'static Order,
+    pub(in crate::grid) scratch: &'a mut Mixed<D>,
+    pub(in crate::grid) block: usize,
+    pub(in crate::grid) regions: &'static Regions,
+    pub(in crate::grid) order: &'static Order,
     /// Rows of the arena at each position; zeros where there is none.
     rows: [&'a [Row]; 32],
     /// Nodes that the arena at a position touches, where these are not all.
     touched: [u64; 32],
     /// Positions with arenas.
-    pub(super) occupied: u32,
+    pub(in crate::grid) occupied: u32,
     /// Those whose particles do not touch all nodes.
     partial: u32,
     /// Regions that something else reaches as well: bins outside their leaves, or sums of other ranks.

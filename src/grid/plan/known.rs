@@ -3,7 +3,7 @@ use partition::{Brick, Forest, MAX_LEVEL, Octant};
 
 use rustc_hash::FxHashSet;
 
-use super::mask::{offset, offset_count, shifted};
+use crate::grid::mask::{offset, offset_count, shifted};
 use crate::kernel::BLOCK;
 
 /// What covers an octant, as far as this rank knows.

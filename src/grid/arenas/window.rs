@@ -2,7 +2,7 @@
 //!
 //! Bins beside level jumps often hold a few particles along one face. Clearing, summing, sending and loading
 //! only the nodes that these reach keeps their cost in proportion.
-use super::mask::{offset, product};
+use crate::grid::mask::{offset, product};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 use crate::simd::prefetch;
 
@@ -105,7 +105,7 @@ impl<const D: usize> Window<D> {
 }
 
 /// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing of what the
-/// arena shares with a region of a block (see [`super::region`]), so that sums never meet part of a region.
+/// arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums never meet part of a region.
 const FIRST: [u8; 5] = [0, 1, 1, 3, 4];
 const END: [u8; 5] = [3, 4, 5, 7, 7];
 

@@ -3,7 +3,7 @@
 //! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have scattered, and an
 //! arena whose blocks are all summed up serves a bin of a later wave. The first wave are the bins that other ranks need, so that
 //! their exchange can start. No sum depends on any of this: what a block adds up, and in which order, the plan says.
-use super::plan::GridPlan;
+use crate::grid::plan::GridPlan;
 use crate::kernel::{Row, arena_nodes};
 
 /// Bytes of the arenas of a wave, for each thread: few enough for its cache, and so many bins (64 in 3D) that threads rarely

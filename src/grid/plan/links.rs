@@ -4,10 +4,12 @@
 use rustc_hash::FxHashMap;
 
 use super::closure::constrained_nodes;
-use super::columns::{Columns, axes_in};
-use super::mask::{bits, block_nodes, node_of_bit, offset};
-use super::parents::{ParentTable, children, coarser_at, parents, parity, place_beside, weight_of};
-use super::plan::{Block, GridPlan, NO_BLOCK};
+use super::{Block, GridPlan, NO_BLOCK};
+use crate::grid::constraints::columns::{Columns, axes_in};
+use crate::grid::constraints::parents::{
+    ParentTable, children, coarser_at, parents, parity, place_beside, weight_of,
+};
+use crate::grid::mask::{bits, block_nodes, node_of_bit, offset};
 
 /// A block with constrained nodes.
 #[derive(Clone, Copy, Debug)]

@@ -3,15 +3,15 @@
 //! Along one axis nodes 0 and 1 of a block lie in the arenas of the bins below it and at it, node 2 in that of the bin
 //! at it alone, node 3 in those at it and above it. So a block has `3^D` regions, each reached by the bins of up to
 //! `2^D` blocks, a cube of them. Region `i` has along each axis the part that digit `axis` of `i` in base 3 names.
-//! A bin's *position* is the offset number (see [`super::mask::offset`]) of its block from the block of nodes.
+//! A bin's *position* is the offset number (see [`crate::grid::mask::offset`]) of its block from the block of nodes.
 //!
-//! The binary tree of Morton keys (see [`super::order`]) parts the two blocks along an axis at the highest
+//! The binary tree of Morton keys (see [`crate::grid::order`]) parts the two blocks along an axis at the highest
 //! bit in which their coordinates differ, so the cube falls apart along one axis after the other. Which axis comes when depends
 //! on the block's coordinate alone, in so few ways that tables hold them all.
 use std::sync::LazyLock;
 
-use super::mask::{arena_overlap, bits, node_of_bit};
-use super::mask::{offset, offset_count, offset_index, opposite, product};
+use crate::grid::mask::{arena_overlap, bits, node_of_bit};
+use crate::grid::mask::{offset, offset_count, offset_index, opposite, product};
 use crate::kernel::ARENA_EDGE;
 
 /// One of the three parts of a block along an axis.

@@ -5,13 +5,13 @@
 use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
-use super::columns::Columns;
 use super::feeders::NO_BIN;
-use super::mask::{box_offsets, offset, offset_count, shifted};
-use super::order::each_subtree;
-use super::plan::{Block, GridPlan};
 use super::reach::bin_sources;
-use super::region::Regions;
+use super::{Block, GridPlan};
+use crate::grid::constraints::columns::Columns;
+use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
+use crate::grid::order::each_subtree;
+use crate::grid::order::region::Regions;
 
 /// What another rank's bins in a subtree contribute to nodes of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,12 +1,12 @@
 //! What a rank holds of the tree and sends of its grid, and what of that other ranks need at least.
 use rustc_hash::FxHashMap;
 
-use super::arena::Arenas;
-use super::columns::Columns;
+use super::block_sum::Sources;
 use super::exchange::ArenaExchange;
 use super::mixed::Mixed;
-use super::plan::GridPlan;
-use super::sums::Sources;
+use crate::grid::arenas::Arenas;
+use crate::grid::constraints::columns::Columns;
+use crate::grid::plan::GridPlan;
 
 /// Counts of one rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Which own bins reach each block.
-use super::mask::{offset_count, opposite};
-use super::plan::{Bin, NO_BLOCK};
+use super::{Bin, NO_BLOCK};
+use crate::grid::mask::{offset_count, opposite};
 
 /// No own bin.
 pub const NO_BIN: u32 = u32::MAX;

@@ -4,17 +4,17 @@
 //! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
 use rayon::prelude::*;
 
-use super::arena::Arenas;
-use super::columns::axes_in;
-use super::cutter::Cutter;
+use super::block_sum::{BlockSum, Sources};
 use super::exchange::ReceivedSums;
-use super::mask::{bits, block_nodes, offset_count};
 use super::mixed::Mixed;
-use super::plan::{Bin, GridPlan, NO_BLOCK};
-use super::region::Regions;
-use super::sums::{BlockSum, Sources};
-use super::waves::FIRST;
-use super::window::{Shared, Window};
+use crate::grid::arenas::Arenas;
+use crate::grid::arenas::cutter::Cutter;
+use crate::grid::arenas::waves::FIRST;
+use crate::grid::arenas::window::{Shared, Window};
+use crate::grid::constraints::columns::axes_in;
+use crate::grid::mask::{bits, block_nodes, offset_count};
+use crate::grid::order::region::Regions;
+use crate::grid::plan::{Bin, GridPlan, NO_BLOCK};
 use crate::kernel::{Row, arena_nodes};
 use crate::memory::Block;
 
@@ -32,7 +32,7 @@ pub struct NodeFields<const D: usize> {
     /// Nodes that own arenas touch in this step, of blocks whose sums other ranks ask for.
     touched: Vec<u64>,
     /// Per block, whether the gather of this step reads it or a block that it is a parent of.
-    pub(super) needed: Vec<bool>,
+    pub(in crate::grid) needed: Vec<bool>,
     /// Per block, whether its rows may differ from zero.
     pub(super) dirty: Vec<bool>,
 }
@@ -189,12 +189,12 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Nodes that own arenas touch in this step, of a block whose sums other ranks ask for.
-    pub(super) fn touched(&self, block: usize) -> u64 {
+    pub(in crate::grid) fn touched(&self, block: usize) -> u64 {
         self.touched[block]
     }
 
     /// First moments of a block.
-    pub(super) fn moments_of(&self, plan: &GridPlan<D>, block: usize) -> &[Row] {
+    pub(in crate::grid) fn moments_of(&self, plan: &GridPlan<D>, block: usize) -> &[Row] {
         &self.moments[plan.moments_of(block)]
     }
 

@@ -1,11 +1,14 @@
 //! Arenas: what the particles of each bin scattered, before nodes sum it up.
+pub(super) mod cutter;
+pub mod waves;
+pub mod window;
 use std::sync::Arc;
 
-use super::constrained::{ArenaConstraints, ArenaMoments};
-use super::cutter::Cutter;
+use self::cutter::Cutter;
+use self::waves::{Seam, Waves};
+use self::window::Window;
 use super::plan::GridPlan;
-use super::waves::{Seam, Waves};
-use super::window::Window;
+use super::plan::constrained::{ArenaConstraints, ArenaMoments};
 use crate::kernel::{Row, arena_nodes};
 
 /// No arena.

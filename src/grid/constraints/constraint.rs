@@ -4,7 +4,7 @@
 //! (Gao et al. 2017, section 4.2): along an axis where its coordinate is even it coincides with the parent
 //! `x/2`; where it is odd the parents `(x ± 1)/2` take part with one half each. Restriction is the
 //! transpose. Parents may be constrained themselves; chains over several levels follow by recursion.
-use super::mask::{bit_of_node, node_of_bit};
+use crate::grid::mask::{bit_of_node, node_of_bit};
 
 /// One parent of a constrained node.
 #[derive(Clone, Copy, Debug, PartialEq)]

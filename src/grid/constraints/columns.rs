@@ -3,7 +3,7 @@
 //!
 //! First moments are matrices, and what counts of their columns are those along axes on which a node's value comes from
 //! nodes beside it: where its coordinate is odd, or where a constrained parent has that column.
-use super::mask::bits;
+use crate::grid::mask::bits;
 use crate::kernel::Row;
 
 /// First moments of one node: row `k` is column `k` of the matrix `A_j = Σ w m C` on the way from particles

@@ -1,23 +1,23 @@
 //! Exchange of partial sums between ranks: one message per neighbour and step.
 //!
 //! A rank that sums up a node which bins of others reach has asked their owners, once per plan, for the sums of
-//! the largest subtrees (see [`super::order`]) that these own alone. In each step an owner adds up its arenas over
+//! the largest subtrees (see [`crate::grid::order`]) that these own alone. In each step an owner adds up its arenas over
 //! these nodes and sends the sums of those that its particles touch.
 use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use super::arena::Arenas;
-use super::columns::{Columns, Moments, axes_in};
-use super::feeders::NO_BIN;
+use super::block_sum::{BlockSum, Sources};
 use super::fields::NodeFields;
-use super::mask::{bits, block_nodes};
 use super::mixed::Mixed;
-use super::plan::GridPlan;
-use super::region::Regions;
-use super::sources::Piece;
-use super::sums::{BlockSum, Sources};
-use super::waves::Seam;
+use crate::grid::arenas::Arenas;
+use crate::grid::arenas::waves::Seam;
+use crate::grid::constraints::columns::{Columns, Moments, axes_in};
+use crate::grid::mask::{bits, block_nodes};
+use crate::grid::order::region::Regions;
+use crate::grid::plan::GridPlan;
+use crate::grid::plan::feeders::NO_BIN;
+use crate::grid::plan::sources::Piece;
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -295,12 +295,12 @@ impl<const D: usize> ReceivedSums<D> {
     }
 
     /// Nodes of a piece that have values in this step.
-    pub(super) fn touched(&self, piece: u32) -> u64 {
+    pub(in crate::grid) fn touched(&self, piece: u32) -> u64 {
         self.touched[piece as usize]
     }
 
     /// Momentum and mass that a piece adds to a node.
-    pub(super) fn row(&self, piece: u32, bit: u32) -> Row {
+    pub(in crate::grid) fn row(&self, piece: u32, bit: u32) -> Row {
         let touched = self.touched[piece as usize];
         if touched >> bit & 1 == 0 {
             return ZERO;
@@ -310,7 +310,7 @@ impl<const D: usize> ReceivedSums<D> {
     }
 
     /// First moments that it adds to a node.
-    pub(super) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
+    pub(in crate::grid) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
         let (place, touched) = (&self.pieces[piece as usize], self.touched[piece as usize]);
         place.columns.within(touched).read(&self.moments[place.first_moment..], bit)
     }

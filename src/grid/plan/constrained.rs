@@ -1,9 +1,9 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
 use rustc_hash::FxHashMap;
 
-use super::columns::{Columns, Moments};
-use super::mask::{arena_overlap, bits, offset, offset_count};
-use super::plan::{Block, NO_BLOCK, arena_index};
+use super::{Block, NO_BLOCK, arena_index};
+use crate::grid::constraints::columns::{Columns, Moments};
+use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
 use crate::kernel::constrained::{Column, ConstrainedNodes};
 use crate::kernel::hanging::HangingNodes;
 use crate::kernel::{Row, arena_nodes};
@@ -38,7 +38,7 @@ pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32
 }
 
 /// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
-pub(super) struct Tables<'a, const D: usize> {
+pub(in crate::grid) struct Tables<'a, const D: usize> {
     blocks: &'a [Block<D>],
     /// Second moments of all columns.
     second: Vec<f64>,

@@ -3,12 +3,12 @@
 //! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another rank are the
 //! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
 //! does not fit is listed and added up along the tree of keys.
-use super::columns::Moments;
-use super::mask::{bits, offset_count, opposite};
-use super::order::{Origin, Term, arrange, fold};
-use super::region::{MOST_BINS, SPAN, arena_node};
-use super::sources::{NO_HOME, Part};
-use super::sums::{BlockSum, ZERO, ZEROS};
+use super::block_sum::{BlockSum, ZERO, ZEROS};
+use crate::grid::constraints::columns::Moments;
+use crate::grid::mask::{bits, offset_count, opposite};
+use crate::grid::order::region::{MOST_BINS, SPAN, arena_node};
+use crate::grid::order::{Origin, Term, arrange, fold};
+use crate::grid::plan::sources::{NO_HOME, Part};
 use crate::kernel::Row;
 
 /// A bin outside its leaf that reaches a block.

@@ -7,6 +7,7 @@
 //!
 //! A contribution that is not there counts as zero. Adding a zero changes no other number, so it makes no difference whether
 //! it is added or passed over, but for the sign of a zero sum; sums therefore end with `+ 0.0`.
+pub mod region;
 
 /// Where a contribution comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

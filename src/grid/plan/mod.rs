@@ -1,4 +1,11 @@
 //! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
+pub mod closure;
+pub mod constrained;
+pub mod feeders;
+pub mod known;
+pub mod links;
+pub mod reach;
+pub mod sources;
 
 use std::sync::Arc;
 
@@ -6,15 +13,15 @@ use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
-use super::closure::{Closure, NodeSets, nodes_in_domain};
-use super::columns::Columns;
-use super::constrained::{ArenaConstraints, Tables, has_constrained};
-use super::constraint::node_coord;
-use super::feeders::Feeders;
-use super::known::{Allowance, Cover, KnownTree};
-use super::links::Links;
+use self::closure::{Closure, NodeSets, nodes_in_domain};
+use self::constrained::{ArenaConstraints, Tables, has_constrained};
+use self::feeders::Feeders;
+use self::known::{Allowance, Cover, KnownTree};
+use self::links::Links;
+use self::sources::{Part, Piece};
+use super::constraints::columns::Columns;
+use super::constraints::constraint::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
-use super::sources::{Part, Piece};
 use crate::kernel::ARENA_EDGE;
 use crate::simd::prefetch;
 

@@ -1,14 +1,14 @@
 //! Node fields between levels: sums go from constrained nodes to their parents, velocities back.
 use rayon::prelude::*;
 
-use super::arena::Arenas;
-use super::columns::axes_in;
-use super::cutter::Cutter;
 use super::fields::NodeFields;
-use super::links::{Child, FineBlock};
-use super::mask::{bits, block_nodes, offset};
-use super::parents::{ParentNode, ParentTable, parity, weight_of};
-use super::plan::{Block, GridPlan, NO_BLOCK};
+use crate::grid::arenas::Arenas;
+use crate::grid::arenas::cutter::Cutter;
+use crate::grid::constraints::columns::axes_in;
+use crate::grid::constraints::parents::{ParentNode, ParentTable, parity, weight_of};
+use crate::grid::mask::{bits, block_nodes, offset};
+use crate::grid::plan::links::{Child, FineBlock};
+use crate::grid::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
 use crate::simd::F64x4;
 

@@ -12,9 +12,11 @@ use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::known::{Cover, KnownTree};
-use super::mask::{arena_overlap, box_offsets, lower_face, offset, offset_count, opposite, product, shifted};
-use super::parents::{ParentTable, children, coarser_at, parents, parity, place_beside};
 use super::reach::{SourceSearch, bin_container, interior, own_bins};
+use crate::grid::constraints::parents::{ParentTable, children, coarser_at, parents, parity, place_beside};
+use crate::grid::mask::{
+    arena_overlap, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
+};
 
 /// Node sets of one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::constraint::{block_and_bit, node_coord, parents_of};
-use super::mask::{block_nodes, moved_along, offset, offset_index};
+use crate::grid::mask::{block_nodes, moved_along, offset, offset_index};
 
 /// A parent of a node of a fine block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

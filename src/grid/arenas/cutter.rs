@@ -2,7 +2,7 @@
 use std::ops::Range;
 
 /// Cuts pieces out of a slice from its beginning to its end.
-pub(super) struct Cutter<'a, T> {
+pub(in crate::grid) struct Cutter<'a, T> {
     rest: &'a mut [T],
     /// Index of the first element of the rest.
     first: usize,

@@ -9,7 +9,7 @@ use partition::{MAX_LEVEL, Octant, Region};
 use rayon::prelude::*;
 
 use super::known::{Cover, KnownTree};
-use super::mask::{box_offsets, offset, offset_count, shifted};
+use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
 
 /// Bins of known leaf `leaf` inside itself: its own block first, then every block inside it, on the level of
 /// a finer leaf that it touches, by level and curve position.
