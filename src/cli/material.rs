@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Deserialize;
 
+use super::Failure;
 use crate::material::driver::{Matrix, Point, increment};
 use crate::material::parameters::OutOfRange;
 use crate::material::{Parameters, build};
 
-/// Drives one particle along a path of deformation and prints its states as CSV.
+/// Arguments of `agimp material`.
 #[derive(Args, Clone, Debug)]
 pub struct Arguments {
     /// Model and parameters as in a job, for example 'model = "hencky", young = 1e6, poisson = 0.3';
@@ -26,15 +27,16 @@ pub struct Arguments {
     pub substeps: u32,
 
     /// The path: CSV or JSON. Each row is the total deformation since the start: 3 numbers are
-    /// logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a list
-    /// of such rows (the 9 may be nested), alone or under the key "path".
+    /// logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a list of
+    /// rows, alone or under the key "path" or "rows"; a row is a list of numbers (the 9 may be nested) or
+    /// an object that holds one under "F" or "eps_log"; its other keys do not matter.
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
 }
 
 /// Why `agimp material` cannot go on.
 #[derive(Debug, thiserror::Error)]
-pub enum MaterialError {
+enum MaterialError {
     /// A file cannot be read.
     #[error("cannot read {}: {error}", path.display())]
     Read {
@@ -75,13 +77,19 @@ pub enum MaterialError {
     Write(#[from] std::io::Error),
 }
 
-/// Runs the command and writes to standard output.
-pub fn execute(args: &Arguments) -> Result<(), MaterialError> {
-    drive(args, &mut std::io::stdout().lock())
+/// Drives the particle and prints its states as CSV.
+///
+/// # Errors
+/// Model or path cannot be used, or standard output cannot be written.
+pub fn execute(args: &Arguments) -> Result<(), Failure> {
+    drive(args, &mut std::io::stdout().lock()).map_err(|error| match error {
+        MaterialError::Write(error) => error.into(),
+        other => Failure::Usage(other.to_string()),
+    })
 }
 
 /// Runs the command and writes CSV to `out`: the undeformed state, then one line per row of the path.
-pub fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
+fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     let parameters = model(&args.model)?;
     parameters.check()?;
     if !(args.density > 0.0 && args.density.is_finite()) {
@@ -125,7 +133,9 @@ pub fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError>
                 Some(step) => point.deform(&step),
                 None => {
                     let reason =
-                        "the way to this deformation gradient leads through a singular one".to_string();
+                        "the straight line from the row before to this deformation gradient passes a \
+                                  singular one; give rows between them"
+                            .to_string();
                     return Err(MaterialError::Row { path: args.path.clone(), row: i + 1, reason });
                 }
             }
@@ -218,7 +228,10 @@ fn read(path: &Path) -> Result<String, MaterialError> {
 #[serde(untagged)]
 enum JsonPath {
     Alone(Vec<JsonRow>),
-    Keyed { path: Vec<JsonRow> },
+    Keyed {
+        #[serde(alias = "rows")]
+        path: Vec<JsonRow>,
+    },
 }
 
 #[derive(Deserialize)]
@@ -226,6 +239,20 @@ enum JsonPath {
 enum JsonRow {
     Flat(Vec<f64>),
     Nested(Vec<Vec<f64>>),
+    Keyed {
+        #[serde(rename = "F", alias = "eps_log")]
+        deformation: Box<JsonRow>,
+    },
+}
+
+impl JsonRow {
+    fn numbers(self) -> Vec<f64> {
+        match self {
+            Self::Flat(numbers) => numbers,
+            Self::Nested(rows) => rows.concat(),
+            Self::Keyed { deformation } => deformation.numbers(),
+        }
+    }
 }
 
 fn read_path(path: &Path) -> Result<Vec<Deformation>, MaterialError> {
@@ -236,12 +263,7 @@ fn read_path(path: &Path) -> Result<Vec<Deformation>, MaterialError> {
             Ok(JsonPath::Alone(rows) | JsonPath::Keyed { path: rows }) => rows,
             Err(error) => return Err(MaterialError::Json { path: path.to_path_buf(), error }),
         };
-        let numbers = rows.into_iter().map(|row| match row {
-            JsonRow::Flat(numbers) => numbers,
-            JsonRow::Nested(rows) => rows.concat(),
-        });
-        return numbers
-            .enumerate()
+        return (rows.into_iter().map(JsonRow::numbers).enumerate())
             .map(|(i, numbers)| Deformation::from_numbers(&numbers).map_err(|reason| failed(i + 1, reason)))
             .collect();
     }

@@ -3,19 +3,20 @@ use crate::job::JobError;
 use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};
 
-pub mod bench;
-pub mod check;
-pub mod diff;
-pub mod digest;
-pub mod info;
-pub mod material;
+// Private, so that the compiler finds a subcommand that is not in `Command`.
+mod bench;
+mod check;
+mod diff;
+mod digest;
+mod info;
+mod material;
 mod message;
 pub use message::unusable;
-pub mod new;
-pub mod plot;
+mod new;
+mod plot;
 mod ranks;
-pub mod run;
-pub mod schema;
+mod run;
+mod schema;
 pub mod weights;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
@@ -46,6 +47,8 @@ pub enum Command {
     Digest(digest::Arguments),
     /// Tell where the states in two files differ.
     Diff(diff::Arguments),
+    /// Drive one particle of a material along a path of deformation.
+    Material(material::Arguments),
     /// Print the weights of given boxes on given trees.
     Weights(weights::Arguments),
     /// Measure the speed of whole steps on built-in jobs.
@@ -114,6 +117,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Plot(arguments) => plot::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),
+        Command::Material(arguments) => material::execute(&arguments),
         Command::Weights(arguments) => weights::execute(&arguments),
         Command::Bench(arguments) => bench::execute(&arguments),
     }
