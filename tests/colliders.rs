@@ -206,7 +206,7 @@ fn restart_gives_the_same(done: &Path, name: &str, whole: &Outcome) {
     assert!(history.column("force_paddle_x").iter().any(|force| force.abs() > 1.0));
     let files = launch::contents(&done.join("out").join(name));
     let checkpoints: Vec<_> =
-        files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("vtkhdf")).collect();
+        files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
     assert!(checkpoints.len() > 3, "{:?}", files.keys());
     let from = format!("out/{name}/{}", checkpoints[checkpoints.len() / 2]);
     succeed(&mut run(done, 3, 1, &job(name), &["--quiet", "--restart", &from]));

@@ -153,13 +153,13 @@ fn bytes(path: &Path) -> Vec<u8> {
 
 fn write_read_write<const D: usize>(comm: &Comm, directory: &Path) {
     let n = comm.size();
-    let path = |kind: &str| directory.join(format!("{kind}{D}_{n}.vtkhdf"));
+    let path = |kind: &str| directory.join(format!("{kind}{D}_{n}.hdf"));
     let run = Run::<D>::example(share(comm, 40, 0b0010), 20);
     snapshot::write(comm, &path("run"), &run.view(), &options()).expect("written");
     snapshot::write_tree(comm, &path("tree"), &run.view()).expect("written");
 
     // Back from the file that the first launch has written, on this number of ranks.
-    let source = directory.join(format!("run{D}_1.vtkhdf"));
+    let source = directory.join(format!("run{D}_1.hdf"));
     let back = snapshot::read::<D>(comm, &source, Some(0xfeed_face_dead_beef)).expect("read");
     let names = (back.header.materials.clone(), back.header.histories.clone());
     let again = Run {
@@ -190,7 +190,7 @@ fn files_are_the_same_on_any_ranks_and_come_back() {
         },
         |directory| {
             for d in [2, 3] {
-                let path = |kind: &str, n: usize| directory.join(format!("{kind}{d}_{n}.vtkhdf"));
+                let path = |kind: &str, n: usize| directory.join(format!("{kind}{d}_{n}.hdf"));
                 for n in 1..=4 {
                     for (kind, like) in [("run", "run"), ("tree", "tree"), ("again", "run")] {
                         assert!(
@@ -213,10 +213,10 @@ fn ranks_without_rows_do_no_harm() {
         "ranks_without_rows_do_no_harm",
         &[1, 4],
         |comm, directory| {
-            let reference = directory.join("reference.vtkhdf");
+            let reference = directory.join("reference.hdf");
             for repetition in 0..if comm.size() == 1 { 1 } else { 48 } {
                 let run = Run::<3>::example(share(comm, 9, repetition % 8), 6);
-                let path = if comm.size() == 1 { reference.clone() } else { directory.join("part.vtkhdf") };
+                let path = if comm.size() == 1 { reference.clone() } else { directory.join("part.hdf") };
                 snapshot::write(comm, &path, &run.view(), &options()).expect("written");
                 if comm.rank() == 0 {
                     assert!(bytes(&path) == bytes(&reference), "repetition {repetition}");
@@ -236,10 +236,9 @@ fn a_step_without_particles_or_leaves() {
         |comm, directory| {
             for (kind, leaves) in [("bare", 0), ("unused", 5)] {
                 let run = Run::<2>::example(share(comm, leaves, 0), 1);
-                let path = directory.join(format!("{kind}_{}.vtkhdf", comm.size()));
+                let path = directory.join(format!("{kind}_{}.hdf", comm.size()));
                 snapshot::write(comm, &path, &run.view(), &options()).expect("written");
-                snapshot::write_tree(comm, &path.with_extension("tree.vtkhdf"), &run.view())
-                    .expect("written");
+                snapshot::write_tree(comm, &path.with_extension("tree.hdf"), &run.view()).expect("written");
                 let back = snapshot::read::<2>(comm, &path, None).expect("read");
                 assert_eq!(back.header.leaves, leaves as u64);
                 assert_eq!(back.header.particles, 0);
@@ -247,10 +246,10 @@ fn a_step_without_particles_or_leaves() {
         },
         |directory| {
             for kind in ["bare", "unused"] {
-                let path = |n: usize| directory.join(format!("{kind}_{n}.vtkhdf"));
+                let path = |n: usize| directory.join(format!("{kind}_{n}.hdf"));
                 assert!(bytes(&path(1)) == bytes(&path(3)));
                 for python in pythons() {
-                    let found = vtk(&python, &[&path(1), &path(1).with_extension("tree.vtkhdf")]);
+                    let found = vtk(&python, &[&path(1), &path(1).with_extension("tree.hdf")]);
                     assert_eq!(found[0]["points"], 0, "{python}");
                     assert_eq!(found[1]["cells"], if kind == "bare" { 0 } else { 5 }, "{python}");
                 }
@@ -266,12 +265,12 @@ fn damaged_and_foreign_files_are_refused() {
         NAME,
         &[1, 2],
         |comm, directory| {
-            let path = directory.join("good.vtkhdf");
+            let path = directory.join("good.hdf");
             if comm.size() == 1 {
                 let run = Run::<3>::example(share(comm, 12, 0), 9);
                 snapshot::write(comm, &path, &run.view(), &options()).expect("written");
                 let light = Options { restart: false, ..options() };
-                snapshot::write(comm, &directory.join("light.vtkhdf"), &run.view(), &light).expect("written");
+                snapshot::write(comm, &directory.join("light.hdf"), &run.view(), &light).expect("written");
                 damage(directory);
                 return;
             }
@@ -280,25 +279,25 @@ fn damaged_and_foreign_files_are_refused() {
                 let error = snapshot::read::<3>(comm, &path, job).expect_err(file).to_string();
                 assert!(error.contains(reason) && error.contains(file), "{file}: {error}");
             };
-            refused("missing.vtkhdf", None, "No such file");
-            refused("text.vtkhdf", None, "not an HDF5 file");
-            refused("tiny.vtkhdf", None, "cut short");
-            refused("cut.vtkhdf", None, "cut short");
-            refused("flipped.vtkhdf", None, "wrong checksum of state/particles/position");
-            refused("flipped_header.vtkhdf", None, "");
-            refused("flipped_mark.vtkhdf", None, "");
-            let file = ParallelFile::create(comm, &directory.join("format.vtkhdf")).expect("created");
+            refused("missing.hdf", None, "No such file");
+            refused("text.hdf", None, "not an HDF5 file");
+            refused("tiny.hdf", None, "cut short");
+            refused("cut.hdf", None, "cut short");
+            refused("flipped.hdf", None, "wrong checksum of state/particles/position");
+            refused("flipped_header.hdf", None, "");
+            refused("flipped_mark.hdf", None, "");
+            let file = ParallelFile::create(comm, &directory.join("format.hdf")).expect("created");
             file.create_group("state").expect("group");
             file.set_text("state", "magic", "agimp state").expect("text");
             file.set_text("state", "program", "7.0.0").expect("text");
             file.set_attribute("state", "format", &[99_u64]).expect("number");
             file.close().expect("closed");
-            refused("format.vtkhdf", None, "written in format 99 by agimp 7.0.0");
-            let file = ParallelFile::create(comm, &directory.join("foreign.vtkhdf")).expect("created");
+            refused("format.hdf", None, "written in format 99 by agimp 7.0.0");
+            let file = ParallelFile::create(comm, &directory.join("foreign.hdf")).expect("created");
             file.close().expect("closed");
-            refused("foreign.vtkhdf", None, "not a file of agimp");
-            refused("light.vtkhdf", None, "no restart state");
-            refused("good.vtkhdf", Some(7), "belongs to another job");
+            refused("foreign.hdf", None, "not a file of agimp");
+            refused("light.hdf", None, "no restart state");
+            refused("good.hdf", Some(7), "belongs to another job");
             let error = snapshot::read::<2>(comm, &path, None).expect_err("dimension").to_string();
             assert!(error.contains("3D run, the job is 2D"), "{error}");
             snapshot::read::<3>(comm, &path, Some(0xfeed_face_dead_beef)).expect("the whole file is read");
@@ -307,13 +306,13 @@ fn damaged_and_foreign_files_are_refused() {
     );
 }
 
-/// Makes damaged copies of `good.vtkhdf`.
+/// Makes damaged copies of `good.hdf`.
 fn damage(directory: &Path) {
-    let good = bytes(&directory.join("good.vtkhdf"));
+    let good = bytes(&directory.join("good.hdf"));
     let save = |name: &str, contents: &[u8]| std::fs::write(directory.join(name), contents).expect("saved");
-    save("text.vtkhdf", b"# a text that is longer than eight bytes\n");
-    save("tiny.vtkhdf", &good[..5]);
-    save("cut.vtkhdf", &good[..good.len() - good.len() / 3]);
+    save("text.hdf", b"# a text that is longer than eight bytes\n");
+    save("tiny.hdf", &good[..5]);
+    save("cut.hdf", &good[..good.len() - good.len() / 3]);
     let flip = |needle: &[u8]| {
         let at: Vec<usize> =
             (0..good.len() - needle.len()).filter(|&i| good[i..].starts_with(needle)).collect();
@@ -326,10 +325,10 @@ fn damage(directory: &Path) {
     let run = Run::<3>::example(0..12, 9);
     let chunk = run.chunks.iter().find(|chunk| !chunk.is_empty()).expect("particles");
     let position: Vec<u8> = chunk.position(0).iter().flat_map(|x| x.to_le_bytes()).collect();
-    save("flipped.vtkhdf", &flip(&position));
+    save("flipped.hdf", &flip(&position));
     // The library's own checksum of metadata notices these.
-    save("flipped_header.vtkhdf", &flip(&0.1_f64.to_le_bytes()));
-    save("flipped_mark.vtkhdf", &flip(b"agimp state"));
+    save("flipped_header.hdf", &flip(&0.1_f64.to_le_bytes()));
+    save("flipped_mark.hdf", &flip(b"agimp state"));
 }
 
 #[test]
@@ -338,7 +337,7 @@ fn a_failing_rank_leaves_no_file() {
         "a_failing_rank_leaves_no_file",
         &[3],
         |comm, directory| {
-            let path = directory.join("never.vtkhdf");
+            let path = directory.join("never.hdf");
             let mut run = Run::<2>::example(share(comm, 12, 0), 9);
             if comm.rank() == 1 {
                 run.chunks.pop();
@@ -346,7 +345,7 @@ fn a_failing_rank_leaves_no_file() {
             let error =
                 snapshot::write(comm, &path, &run.view(), &options()).expect_err("chunks are missing");
             assert!(error.to_string().starts_with("rank 1: "), "{error}");
-            let nowhere = directory.join("nowhere/never.vtkhdf");
+            let nowhere = directory.join("nowhere/never.hdf");
             snapshot::write(comm, &nowhere, &run.view(), &options()).expect_err("no such directory");
             comm.barrier();
             let left = std::fs::read_dir(directory).expect("listed").count();
@@ -364,14 +363,14 @@ fn a_full_disk_leaves_the_old_file() {
     if let Some(directory) = std::env::var_os("AGIMP_TEST_DIRECTORY").map(PathBuf::from) {
         let world = World::init().expect("MPI starts");
         let comm = world.comm();
-        let path = directory.join("kept.vtkhdf");
+        let path = directory.join("kept.hdf");
         let small = Run::<3>::example(share(comm, 2, 0), 3);
         snapshot::write(comm, &path, &small.view(), &options()).expect("small enough");
         let before = bytes(&path);
         comm.barrier();
         let large = Run::<3>::example(share(comm, 400, 0), 200);
         let error = snapshot::write(comm, &path, &large.view(), &options()).expect_err("too large");
-        assert!(error.to_string().contains("kept.vtkhdf.part"), "{error}");
+        assert!(error.to_string().contains("kept.hdf.part"), "{error}");
         comm.barrier();
         assert!(bytes(&path) == before, "the old file is untouched");
         assert!(!path.with_added_extension("part").exists());
@@ -432,16 +431,73 @@ fn outputs_checkpoints_and_the_latest() {
             std::fs::write(&latest.path, &whole[..whole.len() / 2]).expect("cut");
             let before = find_latest(directory, "col", None).expect("listed").expect("found");
             assert_eq!((before.header.step, before.damaged.len()), (20, 1));
-            let series = directory.join("col.vtkhdf.series");
+            let series = directory.join("col.hdf.series");
             let text = std::fs::read_to_string(&series).expect("series");
             assert!(text.contains("\"time\": 0.2") && !text.contains("000003"), "{text}");
             for python in pythons() {
-                let tree = directory.join("col.tree.vtkhdf.series");
+                let tree = directory.join("col.tree.hdf.series");
                 let found = vtk(&python, &[&series, &tree, &output_path(directory, "col", 1)]);
                 assert_eq!(found[0]["times"].as_array().map(Vec::len), Some(3), "{python}");
                 assert_eq!(found[2]["point_data"]["velocity"]["type"], "float", "{python}");
             }
         },
+    );
+}
+
+/// Earlier versions named their files `.vtkhdf`. A run restarts from them, its index goes on to list them, and its
+/// checkpoints replace theirs.
+#[test]
+fn files_named_by_earlier_versions_are_found_and_continued() {
+    let earlier = |path: PathBuf| path.with_file_name(name(&path).replace(".hdf", ".vtkhdf"));
+    fn name(path: &Path) -> String {
+        path.file_name().expect("a name").to_string_lossy().into_owned()
+    }
+    on_ranks(
+        "files_named_by_earlier_versions_are_found_and_continued",
+        &[1],
+        |comm, directory| {
+            let run = Run::<2>::example(0..6, 9);
+            let at = |i: u64| View { step: 10 * i, time: 0.1 * i as f64, ..run.view() };
+            let mut outputs = Outputs::create(comm, directory, "old", options()).expect("created");
+            for i in 0..3 {
+                outputs.write(comm, &at(i)).expect("written");
+                outputs.checkpoint(comm, &at(i), 9).expect("written");
+            }
+            outputs.settle(comm).expect("on disk");
+            for entry in std::fs::read_dir(directory).expect("listed") {
+                let path = entry.expect("listed").path();
+                if name(&path).ends_with(".series") {
+                    let text = std::fs::read_to_string(&path).expect("index");
+                    std::fs::write(&path, text.replace(".hdf", ".vtkhdf")).expect("written");
+                }
+                std::fs::rename(&path, earlier(path.clone())).expect("renamed");
+            }
+            // An output that its index does not list is of another run.
+            std::fs::copy(
+                earlier(output_path(directory, "old", 2)),
+                earlier(output_path(directory, "old", 9)),
+            )
+            .expect("copied");
+            let latest = find_latest(directory, "old", None).expect("listed").expect("found");
+            assert_eq!(latest.path, earlier(checkpoint_path(directory, "old", 20)));
+            let back = snapshot::read::<2>(comm, &latest.path, None).expect("read");
+            assert_eq!(back.header.step, 20);
+
+            let mut outputs = Outputs::resume(comm, directory, "old", options(), 2, 0.1).expect("resumed");
+            outputs.write(comm, &at(2)).expect("written");
+            outputs.checkpoint(comm, &at(2), 1).expect("written");
+            outputs.settle(comm).expect("on disk");
+            let latest = find_latest(directory, "old", None).expect("listed").expect("found");
+            assert_eq!(latest.path, checkpoint_path(directory, "old", 20), "of both names the new one");
+            assert!(!earlier(checkpoint_path(directory, "old", 10)).exists(), "replaced by a later one");
+            for series in ["old.hdf.series", "old.tree.hdf.series"] {
+                let text = std::fs::read_to_string(directory.join(series)).expect("index");
+                let listed = |file: &str| text.contains(&format!("\"old_{file}"));
+                assert!(listed("000000.") && text.contains(".vtkhdf"), "{text}");
+                assert!(listed("000002.hdf") || listed("000002.tree.hdf"), "{text}");
+            }
+        },
+        |_| {},
     );
 }
 
@@ -452,16 +508,16 @@ fn differences_are_named() {
         &[1],
         |comm, directory| {
             let mut run = Run::<2>::example(0..6, 9);
-            snapshot::write(comm, &directory.join("a.vtkhdf"), &run.view(), &options()).expect("written");
+            snapshot::write(comm, &directory.join("a.hdf"), &run.view(), &options()).expect("written");
             let leaf = run.chunks.iter().rposition(|chunk| chunk.len() > 2).expect("crowded leaf");
             let column = Layout::<2>::STRESS + 1;
             run.chunks[leaf].column_mut(column)[1] += 1.0;
             run.chunks[leaf].ids_mut()[0] = 1 << 40;
             run.leaves[3].level += 1;
-            snapshot::write(comm, &directory.join("b.vtkhdf"), &run.view(), &options()).expect("written");
+            snapshot::write(comm, &directory.join("b.hdf"), &run.view(), &options()).expect("written");
         },
         |directory| {
-            let paths = ["a.vtkhdf", "b.vtkhdf"].map(|name| directory.join(name));
+            let paths = ["a.hdf", "b.hdf"].map(|name| directory.join(name));
             let found = diff(&paths[0], &paths[1]).expect("compared");
             assert_ne!(digest(&paths[0]).expect("digest"), digest(&paths[1]).expect("digest"));
             assert!(matches!(found[0], Difference::Tree { leaf: 3, .. }), "{found:?}");
@@ -521,10 +577,10 @@ fn vtk_reads_particles_and_tree() {
         &[2],
         |comm, directory| {
             let run = Run::<3>::example(share(comm, 10, 0), 9);
-            snapshot::write(comm, &directory.join("p.vtkhdf"), &run.view(), &options()).expect("written");
-            snapshot::write_tree(comm, &directory.join("t.vtkhdf"), &run.view()).expect("written");
+            snapshot::write(comm, &directory.join("p.hdf"), &run.view(), &options()).expect("written");
+            snapshot::write_tree(comm, &directory.join("t.hdf"), &run.view()).expect("written");
             let flat = Run::<2>::example(share(comm, 10, 0), 9);
-            snapshot::write_tree(comm, &directory.join("f.vtkhdf"), &flat.view()).expect("written");
+            snapshot::write_tree(comm, &directory.join("f.hdf"), &flat.view()).expect("written");
         },
         |directory| {
             let run = Run::<3>::example(0..10, 9);
@@ -533,7 +589,7 @@ fn vtk_reads_particles_and_tree() {
             let x: Vec<f64> =
                 run.chunks.iter().flat_map(|chunk| chunk.column(0)).map(|x| ORIGIN + x).collect();
             for python in pythons() {
-                let paths = ["p.vtkhdf", "t.vtkhdf", "f.vtkhdf"].map(|name| directory.join(name));
+                let paths = ["p.hdf", "t.hdf", "f.hdf"].map(|name| directory.join(name));
                 let found = vtk(&python, &paths.each_ref().map(PathBuf::as_path));
                 let points = &found[0];
                 assert_eq!(points["points"], particles);

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reads output files with VTK's own reader and prints what it found, one JSON object per file.
 
-    vtk_check.py FILE.vtkhdf ...
-    vtk_check.py NAME.vtkhdf.series    checks that each file of the series opens and has its time
+    vtk_check.py FILE.hdf ...
+    vtk_check.py NAME.hdf.series    checks that each file of the series opens and has its time
 """
 import json
 import os

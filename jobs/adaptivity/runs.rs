@@ -83,7 +83,7 @@ pub fn run(job: &toml::Table, name: &str, folder: &Path) -> Run {
     let records =
         lines.lines().map(|line| checked(serde_json::from_str(line), telemetry.display())).collect();
     let history = last_row(&results.join(format!("{name}.history.csv")));
-    let last_output = results.join(format!("{name}_000001.vtkhdf"));
+    let last_output = results.join(format!("{name}_000001.hdf"));
     Run { records, wall, processor, history, last_output }
 }
 

@@ -1,4 +1,4 @@
-//! `NAME.vtkhdf.series`: the index that gives ParaView the times of the output files.
+//! `NAME.hdf.series`: the index that gives ParaView the times of the output files.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -42,10 +42,9 @@ impl Series {
         Some(serde_json::from_slice::<Contents>(&text).ok()?.files)
     }
 
-    /// Not collective. The series of an earlier run without the entries after `time`, from which it
-    /// is restarted. An unreadable index starts anew: it can be made again from the files.
-    pub fn resume(path: &Path, time: f64) -> Self {
-        let entries = Self::listed(path).unwrap_or_default();
+    /// Not collective. The series of an earlier run, of which `entries` are listed, without those after `time`, from
+    /// which it is restarted.
+    pub fn resume(path: &Path, entries: Vec<Entry>, time: f64) -> Self {
         Self { path: path.into(), entries: entries.into_iter().filter(|entry| entry.time <= time).collect() }
     }
 
@@ -83,15 +82,16 @@ mod tests {
     #[test]
     fn restart_drops_later_entries() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.vtkhdf.series");
+        let path = dir.path().join("a.hdf.series");
         let mut series = Series::new(&path);
         for i in 0..5 {
-            series.push(&format!("a_{i:06}.vtkhdf"), 0.1 * f64::from(i)).unwrap();
+            series.push(&format!("a_{i:06}.hdf"), 0.1 * f64::from(i)).unwrap();
         }
-        let mut again = Series::resume(&path, 0.25);
+        let listed = || Series::listed(&path).unwrap();
+        let mut again = Series::resume(&path, listed(), 0.25);
         assert_eq!(again.entries(), &series.entries()[..3]);
-        again.push("a_000003.vtkhdf", 0.1 * 3.0).unwrap();
-        assert_eq!(Series::resume(&path, 9.0).entries(), &series.entries()[..4]);
+        again.push("a_000003.hdf", 0.1 * 3.0).unwrap();
+        assert_eq!(Series::resume(&path, listed(), 9.0).entries(), &series.entries()[..4]);
         assert!(!path.with_added_extension("part").exists());
     }
 }

@@ -214,7 +214,7 @@ impl Outcome {
             picture: files[&format!("{name}.png")].clone(),
             files: files
                 .into_keys()
-                .filter(|file| !(file.contains("checkpoint") && file.ends_with("vtkhdf")))
+                .filter(|file| !(file.contains("checkpoint") && file.ends_with("hdf")))
                 .collect(),
         }
     }

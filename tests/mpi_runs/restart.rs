@@ -56,9 +56,9 @@ fn refused_with_the_reason() {
     let output = succeed(&mut run(directory, 2, 1, &job(name), &[]));
     says_where_results_are(&String::from_utf8_lossy(&output.stdout));
 
-    let good = file(directory, name, "_000002.vtkhdf");
+    let good = file(directory, name, "_000002.hdf");
     let whole = std::fs::read(&good).expect("output");
-    let bad = directory.join("bad.vtkhdf");
+    let bad = directory.join("bad.hdf");
     let before = contents(&directory.join("out").join(name));
     let refused = |ranks: usize, name: &str, from: &Path, reason: &str| {
         let from = from.to_str().expect("path");
@@ -75,9 +75,9 @@ fn refused_with_the_reason() {
     refused(3, name, &bad, "wrong checksum");
     std::fs::write(&bad, "a text that is not a file of states").expect("written");
     refused(1, name, &bad, "not an HDF5 file");
-    refused(1, name, &file(directory, name, "_000002.tree.vtkhdf"), "holds no restart state");
+    refused(1, name, &file(directory, name, "_000002.tree.hdf"), "holds no restart state");
     refused(2, "few_leaves", &good, "belongs to another job");
-    refused(1, name, &directory.join("missing.vtkhdf"), "No such file");
+    refused(1, name, &directory.join("missing.hdf"), "No such file");
     let output =
         Running::start(&mut run(directory, 2, 1, &job("few_leaves"), &["--restart", "latest"])).finish();
     let shown = text(&output);
@@ -90,12 +90,12 @@ fn refused_with_the_reason() {
 
 /// The file with one bit changed where the digest notices it.
 fn flipped_in_the_state(directory: &Path, whole: &[u8]) -> Vec<u8> {
-    let probe = directory.join("probe.vtkhdf");
+    let probe = directory.join("probe.hdf");
     for part in 1..32 {
         let mut bytes = whole.to_vec();
         bytes[whole.len() * part / 32] ^= 0x10;
         std::fs::write(&probe, &bytes).expect("written");
-        let output = agimp(directory).args(["digest", "probe.vtkhdf"]).output().expect("agimp starts");
+        let output = agimp(directory).args(["digest", "probe.hdf"]).output().expect("agimp starts");
         if text(&output).contains("wrong checksum of state/particles") {
             return bytes;
         }
@@ -106,7 +106,7 @@ fn flipped_in_the_state(directory: &Path, whole: &[u8]) -> Vec<u8> {
 /// The last lines of a run: where its results are, and the evaluation that the job asks for.
 fn says_where_results_are(shown: &str) {
     let expected = [
-        "outputs  out/collapse_2d/collapse_2d.vtkhdf.series",
+        "outputs  out/collapse_2d/collapse_2d.hdf.series",
         "picture  out/collapse_2d/collapse_2d.png",
         "column collapse, aspect ratio",
         "  run-out radius  ",

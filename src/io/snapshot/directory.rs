@@ -6,24 +6,48 @@ use super::header::Header;
 use crate::io::hdf5_file::{FileError, ParallelFile};
 use crate::io::series::{Entry, Series};
 
+/// How names of files in ParaView's format end. Every ParaView that reads the format (5.11 and newer) opens `.hdf`;
+/// the longer `.vtkhdf` is unknown to 5.11.
+const ENDING: &str = ".hdf";
+/// Endings under which the files of a run are found; earlier versions of agimp ended their names in `.vtkhdf`.
+const KNOWN_ENDINGS: [&str; 2] = [ENDING, ".vtkhdf"];
+
 /// Path of output number `number` of the run `name`.
 pub fn output_path(directory: &Path, name: &str, number: u64) -> PathBuf {
-    directory.join(format!("{name}_{number:06}.vtkhdf"))
+    directory.join(format!("{name}_{number:06}{ENDING}"))
 }
 
 /// Path of the tree that belongs to an output.
 pub fn tree_path(directory: &Path, name: &str, number: u64) -> PathBuf {
-    directory.join(format!("{name}_{number:06}.tree.vtkhdf"))
+    directory.join(format!("{name}_{number:06}.tree{ENDING}"))
 }
 
 /// Path of the index of the outputs.
 pub fn series_path(directory: &Path, name: &str) -> PathBuf {
-    directory.join(format!("{name}.vtkhdf.series"))
+    directory.join(format!("{name}{ENDING}.series"))
+}
+
+/// Path of the index of the trees.
+pub fn tree_series_path(directory: &Path, name: &str) -> PathBuf {
+    directory.join(format!("{name}.tree{ENDING}.series"))
+}
+
+/// Not collective. The entries of an index, or of the one that an earlier version has left in its place, if either can be read.
+pub fn listed(series: &Path) -> Option<Vec<Entry>> {
+    KNOWN_ENDINGS.iter().find_map(|ending| {
+        let name = file_name(series).strip_suffix(&format!("{ENDING}.series"))?;
+        Series::listed(&series.with_file_name(format!("{name}{ending}.series")))
+    })
+}
+
+/// What stands before the ending of a file of a run.
+fn stem(name: &str) -> Option<&str> {
+    KNOWN_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending))
 }
 
 /// Path of the checkpoint of a step.
 pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
-    directory.join(format!("{name}.checkpoint_{step:09}.vtkhdf"))
+    directory.join(format!("{name}.checkpoint_{step:09}{ENDING}"))
 }
 
 /// What [`find_latest`] found.
@@ -49,15 +73,14 @@ pub fn find_latest(
 ) -> Result<Option<Latest>, FileError> {
     let mut best: Option<(PathBuf, Header)> = None;
     let (mut damaged, mut other) = (Vec::new(), None);
-    let listed = Series::listed(&series_path(directory, name));
+    let listed = listed(&series_path(directory, name));
     let is_listed = |name: &str| {
         listed.as_ref().is_none_or(|entries: &Vec<Entry>| entries.iter().any(|entry| entry.name == name))
     };
     for path in files(directory)? {
         let Some(rest) = file_name(&path).strip_prefix(name) else { continue };
-        let number = rest
-            .strip_suffix(".vtkhdf")
-            .and_then(|rest| rest.strip_prefix(".checkpoint_").or_else(|| rest.strip_prefix('_')));
+        let number =
+            stem(rest).and_then(|rest| rest.strip_prefix(".checkpoint_").or_else(|| rest.strip_prefix('_')));
         if !number.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())) {
             continue;
         }
@@ -93,14 +116,15 @@ pub fn remove_old_checkpoints(directory: &Path, name: &str, step: u64, keep: usi
     let mut remove = Vec::new();
     for path in files(directory)? {
         let Some(rest) = file_name(&path).strip_prefix(&prefix) else { continue };
-        match rest.strip_suffix(".vtkhdf").and_then(|digits| digits.parse().ok()) {
+        match stem(rest).and_then(|digits| digits.parse().ok()) {
             Some(at) if at <= step => finished.push((at, path)),
             Some(_) => remove.push(path),
-            None if rest.ends_with(".vtkhdf.part") => remove.push(path),
+            None if rest.strip_suffix(".part").and_then(stem).is_some() => remove.push(path),
             None => {}
         }
     }
-    finished.sort();
+    // Of two names for one step the present one is the later.
+    finished.sort_by_key(|(at, path)| (*at, file_name(path).ends_with(ENDING)));
     let old = finished.len().saturating_sub(keep);
     remove.extend(finished.into_iter().take(old).map(|(_, path)| path));
     remove.into_iter().try_for_each(|path| {

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use partition::comm::Comm;
 
 use super::commit::Unnamed;
-use super::directory::{checkpoint_path, output_path, remove_old_checkpoints, tree_path};
+use super::directory::{
+    checkpoint_path, listed, output_path, remove_old_checkpoints, series_path, tree_path, tree_series_path,
+};
 use super::{Options, View, start_write, write, write_tree};
 use crate::io::hdf5_file::FileError;
 use crate::io::series::Series;
@@ -62,14 +64,14 @@ impl Outputs {
             action: "create the directory",
             source,
         }))?;
-        let series = |suffix: &str| {
-            let path = directory.join(format!("{name}{suffix}.vtkhdf.series"));
-            match from {
-                Some((_, time)) if comm.rank() == 0 => Series::resume(&path, time),
-                _ => Series::new(&path),
+        let series = |path: PathBuf| match from {
+            Some((_, time)) if comm.rank() == 0 => {
+                Series::resume(&path, listed(&path).unwrap_or_default(), time)
             }
+            _ => Series::new(&path),
         };
-        let (particles, tree) = (series(""), series(".tree"));
+        let (particles, tree) =
+            (series(series_path(directory, name)), series(tree_series_path(directory, name)));
         let (directory, name) = (directory.into(), name.into());
         Ok(Self {
             directory,
