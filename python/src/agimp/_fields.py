@@ -1,0 +1,51 @@
+"""Units and descriptions of the data sets, and names for their components."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Field(NamedTuple):
+    """What a data set holds."""
+
+    unit: str
+    """SI unit, empty for pure numbers."""
+    description: str
+
+
+KNOWN: dict[str, Field] = {
+    "position": Field("m", "position"),
+    "velocity": Field("m/s", "velocity"),
+    "speed": Field("m/s", "magnitude of the velocity"),
+    "id": Field("", "identifier of the particle"),
+    "material": Field("", "material"),
+    "body": Field("", "body"),
+    "particle_level": Field("", "tree level that the particle was made for"),
+    "leaf_level": Field("", "level of the leaf that holds the particle"),
+    "plastic_strain": Field("", "first history variable of the material, as a rule the accumulated plastic strain"),
+    "pressure": Field("Pa", "mean Cauchy stress with the sign changed; positive in compression"),
+    "von_mises": Field("Pa", "von Mises equivalent of the Cauchy stress"),
+    "stress": Field("Pa", "Cauchy stress"),
+    "mass": Field("kg", "mass; per metre of thickness in plane strain"),
+    "density": Field("kg/m3", "density"),
+    "volume_ratio": Field("", "volume over reference volume, det F"),
+    "half_width": Field("m", "half of the undeformed edge of the particle's box"),
+    "plastic_work": Field("J/m3", "plastic work done so far, per reference volume"),
+    "level": Field("", "level of the leaf"),
+    "particles": Field("", "particles in the leaf"),
+    "edge": Field("m", "edge of the leaf"),
+}
+"""Fields of files that do not describe themselves. Descriptions in a file come first."""
+
+AXES = ("x", "y", "z")
+SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
+"""Components of a symmetric tensor in the order of VTK."""
+
+
+def components(name: str, count: int) -> tuple[str, ...]:
+    """Names for the columns of a field with `count` components: `velocity_x`, `stress_xy`."""
+    if count in (2, 3):
+        return tuple(f"{name}_{axis}" for axis in AXES[:count])
+    if count == len(SYMMETRIC):
+        return tuple(f"{name}_{pair}" for pair in SYMMETRIC)
+    return tuple(f"{name}_{number}" for number in range(count))

@@ -1,0 +1,132 @@
+"""The header that every file of agimp carries in the attributes of its group `state`."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ._errors import FileRefused
+
+MAGIC = "agimp state"
+GROUP = "state"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a file says about itself."""
+
+    program: str
+    """Version of the program that wrote it."""
+    format: int
+    """Version of the layout of its restart state."""
+    dimension: int
+    """2 (plane strain) or 3."""
+    job_digest: int
+    """Digest of the job."""
+    origin: tuple[float, ...]
+    """Lower corner of the domain, m."""
+    root_edge: float
+    """Edge of a root octant, m."""
+    roots: tuple[int, ...]
+    """Root octants along each axis."""
+    step: int
+    """Steps done."""
+    time: float
+    """Simulated time, s."""
+    dt: float
+    """Last time step, s."""
+    leaves: int
+    """Leaves of the tree."""
+    particles: int
+    """Particles."""
+    restart: bool
+    """Whether a run can restart from the file."""
+    materials: tuple[str, ...]
+    """Names of the materials, by number."""
+    bodies: tuple[str, ...]
+    """Names of the bodies, by number; empty in files that do not name them."""
+    job: str
+    """Text of the job file; empty in files without it."""
+    title: str
+    """Title of the job; empty in files without it."""
+
+    @property
+    def domain(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Lower and upper corner of the domain, m."""
+        upper = (low + self.root_edge * count for low, count in zip(self.origin, self.roots, strict=True))
+        return self.origin, tuple(upper)
+
+
+def text(value: Any) -> str:
+    """An attribute that holds text."""
+    if isinstance(value, np.ndarray):
+        value = value.item()
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """The HDF5 file, for reading. A file that has its name is complete, so no lock is needed."""
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        kind = "is still being written, or its writer failed" if path.suffix == ".part" else "is not a whole HDF5 file"
+        raise FileRefused(f"{path}: {kind} ({error})") from error
+    with file:
+        yield file
+
+
+def read_header(path: Path, file: Any) -> Header:
+    """The header of an open file; refuses files that are not of agimp or not complete."""
+    if GROUP not in file or text(file[GROUP].attrs.get("magic", "")) != MAGIC:
+        raise FileRefused(f"{path}: not a file of agimp (no group 'state' with its mark)")
+    attributes = file[GROUP].attrs
+    if "complete" not in attributes:
+        raise FileRefused(f"{path}: incomplete; its writer did not finish")
+
+    def one(name: str) -> Any:
+        if name not in attributes:
+            raise FileRefused(f"{path}: the header has no '{name}'")
+        return np.ravel(attributes[name])[0].item()
+
+    def several(name: str) -> Any:
+        return np.ravel(attributes[name]).tolist()
+
+    def names(name: str) -> tuple[str, ...]:
+        joined = text(attributes.get(name, ""))
+        return tuple(joined.split("\n")) if joined else ()
+
+    return Header(
+        program=text(attributes["program"]),
+        format=one("format"),
+        dimension=one("dimension"),
+        job_digest=one("job_digest"),
+        origin=tuple(several("origin")),
+        root_edge=one("root_edge"),
+        roots=tuple(several("roots")),
+        step=one("step"),
+        time=one("time"),
+        dt=one("dt"),
+        leaves=one("leaves"),
+        particles=one("particles"),
+        restart=bool(one("restart")),
+        materials=names("materials"),
+        bodies=names("bodies"),
+        job=_job_text(file),
+        title=text(attributes.get("title", "")),
+    )
+
+
+def _job_text(file: Any) -> str:
+    group = file[GROUP]
+    if "job" in group:
+        return bytes(np.ravel(group["job"][()]).tobytes()).rstrip(b"\0").decode()
+    return text(group.attrs.get("job", ""))

@@ -1,0 +1,159 @@
+"""Single files: arrays, tables, meshes, units, names, damage."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import agimp
+import h5py
+import numpy as np
+import pytest
+
+
+def test_table_has_units_and_names(plane: agimp.Results) -> None:
+    out = plane[-1]
+    table = out.particles()
+    units = table.attrs["units"]
+    assert list(table.columns[:2]) == ["x", "y"]
+    assert {"velocity_x", "velocity_y"} < set(table.columns) and "velocity_z" not in table.columns
+    assert units["x"] == "m" and units["pressure"] == "Pa" and units["density"] == "kg/m3" and units["id"] == ""
+    assert set(units) == set(table.columns) == set(table.attrs["descriptions"])
+    assert table["material"].cat.categories.tolist() == ["rubber", "sand"] == list(out.materials)
+    # The base lies lower at the start and fills twice the area of the other: 0.12 x 0.04 and 0.06 x 0.06 m².
+    area = plane[0].particles().assign(area=lambda t: t["mass"] / t["density"]).groupby("material", observed=True)["area"].sum()
+    assert area["rubber"] == pytest.approx(0.12 * 0.04, rel=0.05)
+    assert area["sand"] == pytest.approx(0.06 * 0.06, rel=0.05)
+    assert out.particles(["pressure"], names=False).columns.tolist() == ["x", "y", "pressure"]
+
+
+def test_selection_by_name(plane: agimp.Results) -> None:
+    out = plane[0]
+    sand = out.select(material="sand")
+    assert np.all(out.positions()[sand][:, 1] > 0.04) and np.all(out.positions()[~sand][:, 1] < 0.04)
+    assert np.all(out.field("velocity")[sand] == [0.2, -1.0])
+    with pytest.raises(KeyError, match="found the material 'sandy'; the file has rubber, sand"):
+        out.select(material="sandy")
+
+
+def test_stress_in_space_has_six_components(space: agimp.Results) -> None:
+    out = space[-1]
+    table = out.particles()
+    names = [f"stress_{pair}" for pair in ("xx", "yy", "zz", "xy", "yz", "xz")]
+    assert set(names) < set(table.columns)
+    assert np.array_equal(table[names].to_numpy(), out.field("stress"))
+    velocity = table[["velocity_x", "velocity_y", "velocity_z"]].to_numpy()
+    assert np.allclose(np.linalg.norm(velocity, axis=1), table["speed"])
+    assert out.description("volume_ratio") and out.unit("stress") == "Pa"
+
+
+def test_unknown_field_is_told(plane: agimp.Results) -> None:
+    with pytest.raises(KeyError, match="does not show 'presure'; it shows .*pressure"):
+        plane[0].field("presure")
+
+
+@pytest.mark.parametrize("which", ["plane", "space"])
+def test_leaves_fill_the_domain_and_hold_the_particles(which: str, request: pytest.FixtureRequest) -> None:
+    run: agimp.Results = request.getfixturevalue(which)
+    out = run[-1]
+    tree, points = out.tree, out.positions()
+    low, high = (np.array(corner) for corner in out.header.domain)
+    assert (tree.edge**out.dimension).sum() == pytest.approx(np.prod(high - low), rel=1e-12)
+    assert np.allclose(tree.lower.min(axis=0), low) and np.allclose((tree.lower + tree.edge[:, None]).max(axis=0), high)
+    inside = np.all((points >= tree.lower[:, None]) & (points < (tree.lower + tree.edge[:, None])[:, None]), axis=2)
+    assert np.array_equal(inside.sum(axis=1), tree.fields["particles"])
+    leaves = tree.leaves()
+    assert leaves.attrs["units"]["edge"] == "m" and len(leaves) == out.header.leaves
+    assert np.array_equal(tree.cell_size, tree.edge / 4)
+
+
+def test_tree_of_the_state_is_that_of_the_tree_file(plane: agimp.Results, tmp_path: Path) -> None:
+    alone = tmp_path / plane.paths[-1].name
+    shutil.copy(plane.paths[-1], alone)
+    a, b = agimp.read(alone).tree, plane[-1].tree
+    assert np.allclose(a.lower, b.lower, atol=1e-15) and np.array_equal(a.level, b.level)
+    assert set(a.fields) == set(b.fields)
+    for name in a.fields:
+        assert np.array_equal(a.fields[name], b.fields[name]), name
+
+
+def test_no_tree_is_told(space: agimp.Results, tmp_path: Path) -> None:
+    alone = tmp_path / space.paths[-1].name
+    shutil.copy(space.paths[-1], alone)
+    with pytest.raises(FileNotFoundError, match="no tree file beside it, and it holds no restart state"):
+        agimp.read(alone).tree  # noqa: B018
+    with pytest.raises(agimp.FileRefused, match="no restart state"):
+        agimp.read(alone).state("affine")
+
+
+def test_checkpoints_open_like_outputs(plane: agimp.Results) -> None:
+    out = agimp.read(plane.checkpoints[-1])
+    assert {"velocity", "leaf_level", "id", "mass"} <= set(out.fields)
+    assert out.state("left_cauchy_green").shape == (len(out), 4)
+    assert len(out.tree) == out.header.leaves
+    with pytest.raises(KeyError, match="the state has no 'afine'; it has .*affine"):
+        out.state("afine")
+
+
+@pytest.mark.parametrize("which", ["plane", "space"])
+def test_meshes_show_particles_and_leaves(which: str, request: pytest.FixtureRequest) -> None:
+    pytest.importorskip("pyvista")
+    run: agimp.Results = request.getfixturevalue(which)
+    out = run[-1]
+    points = out.mesh()
+    assert points.n_points == points.n_cells == len(out)
+    assert np.array_equal(points.points[:, : out.dimension], out.positions())
+    assert np.array_equal(points["speed" if which == "space" else "pressure"], out.field("speed" if which == "space" else "pressure"))
+    assert points.field_data["time"][0] == out.time
+    assert list(points.field_data["materials"]) == list(out.materials)
+    leaves = out.tree.mesh()
+    sizes = leaves.compute_cell_sizes()["Area" if out.dimension == 2 else "Volume"]
+    assert np.allclose(sizes, out.tree.edge**out.dimension)
+    assert np.array_equal(leaves["level"], out.tree.level)
+
+
+def test_damage_is_found(plane: agimp.Results, tmp_path: Path) -> None:
+    whole = plane[-1]
+    whole.verify()
+    damaged = tmp_path / whole.path.name
+    shutil.copy(whole.path, damaged)
+    with h5py.File(damaged, "r+") as file:
+        file["VTKHDF/PointData/pressure"][7] += 1.0
+    with pytest.raises(agimp.FileRefused, match="wrong checksum of VTKHDF/PointData/pressure: the file is damaged"):
+        agimp.read(damaged).verify()
+
+
+def test_what_is_not_an_output_is_refused(plane: agimp.Results, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        agimp.read(tmp_path / "a.hdf")
+    cut = tmp_path / "cut.hdf"
+    cut.write_bytes(plane.paths[0].read_bytes()[:5000])
+    with pytest.raises(agimp.FileRefused, match="not a whole HDF5 file"):
+        agimp.read(cut)
+    part = tmp_path / "a_000000.hdf.part"
+    part.write_bytes(b"")
+    with pytest.raises(agimp.FileRefused, match="still being written"):
+        agimp.read(part)
+    with h5py.File(tmp_path / "other.hdf", "w") as file:
+        file["x"] = 1
+    with pytest.raises(agimp.FileRefused, match="not a file of agimp"):
+        agimp.read(tmp_path / "other.hdf")
+    unfinished = tmp_path / "unfinished.hdf"
+    shutil.copy(plane.paths[0], unfinished)
+    with h5py.File(unfinished, "r+") as file:
+        del file["state"].attrs["complete"]
+    with pytest.raises(agimp.FileRefused, match="incomplete"):
+        agimp.read(unfinished)
+    tree = next(path for path in plane.directory.iterdir() if ".tree." in path.name and path.suffix != ".series")
+    with pytest.raises(agimp.FileRefused, match="no particles; is it a tree file"):
+        agimp.read(tree)
+
+
+@pytest.mark.parametrize(("package", "call"), [("pandas", "particles"), ("pyvista", "mesh")])
+def test_optional_packages_are_asked_for_by_name(
+    plane: agimp.Results, monkeypatch: pytest.MonkeyPatch, package: str, call: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=rf"pip install 'agimp\[{package}\]'"):
+        getattr(plane[0], call)()
