@@ -8,7 +8,7 @@ use std::path::Path;
 use agimp::cli::weights::{CaseWeights, evaluate};
 use agimp::kernel::Transfer;
 use agimp::particle::chunk::{Chunk, Layout};
-use agimp::solver::given_boxes::{GivenBoxes, GivenParticle};
+use agimp::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle};
 use common::boxes::gradient_sums;
 use common::launch::{Scenario, agrees_for, report, work};
 use common::tree::{forest_of, octants};
@@ -277,7 +277,7 @@ fn transfer<const D: usize>(comm: &Comm, name: &str) {
 
 fn check_nodes<const D: usize>(
     reference: &Value,
-    nodes: &[agimp::solver::given_boxes::RealNode<D>],
+    nodes: &[agimp::solver::diagnostics::given_boxes::RealNode<D>],
     errors: &mut Errors,
 ) {
     let level = reference["node_lattice_level"].as_u64().expect("a level") as u32;

@@ -10,7 +10,7 @@ use agimp::exact_sum::ExactSum;
 use agimp::grid::{KnownTree, direct};
 use agimp::kernel::Transfer;
 use agimp::particle::chunk::Layout;
-use agimp::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
+use agimp::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 use common::boxes::{
     ALL, NARROW, WIDE, cell_at, gradient_sums, kappa, position, random_box, random_tree, tree_with_jump, unit,
 };

@@ -3,7 +3,7 @@
 //! A criterion looks at one occupied leaf and wants it fine, lets it stay as it is, or has no objection to
 //! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any criterion
 //! wants that, and coarsened when none objects. The solver finds the values and changes the tree
-//! (`solver/regrid.rs`); nothing here knows of trees and ranks.
+//! (`solver/refinement/regrid.rs`); nothing here knows of trees and ranks.
 use self::resample::Limits;
 
 pub mod resample;

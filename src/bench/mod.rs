@@ -14,7 +14,8 @@ use crate::particle::chunk::Layout;
 use crate::run::record::Recorder;
 use crate::run::{Options, RunError};
 use crate::setup;
-use crate::solver::{Requests, phases::Phase};
+use crate::solver::Requests;
+use crate::solver::step::phases::Phase;
 
 /// How much to measure.
 #[derive(Clone, Copy, Debug)]

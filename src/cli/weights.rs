@@ -10,7 +10,7 @@ use super::Failure;
 use super::message::together;
 use crate::grid::direct;
 use crate::grid::plan::known::KnownTree;
-use crate::solver::given_boxes::{GivenBoxes, GivenParticle, RealNode};
+use crate::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 
 /// Arguments of `agimp weights`.
 #[derive(Debug, clap::Args)]

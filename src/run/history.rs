@@ -2,9 +2,9 @@
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::io::history::Column;
-use crate::solver::contact::Reaction;
-use crate::solver::resample::BooksTotal;
-use crate::solver::totals::{GridTotals, ParticleTotals};
+use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
+use crate::solver::refinement::resample::BooksTotal;
+use crate::solver::step::contact::Reaction;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
     Column { name, unit }

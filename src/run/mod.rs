@@ -21,7 +21,7 @@ use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
 use crate::setup;
-use crate::solver::phases::Phase;
+use crate::solver::step::phases::Phase;
 use crate::solver::{Clock, Requests, Solver};
 
 /// How a run is started.

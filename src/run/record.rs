@@ -10,8 +10,8 @@ use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::solver::Solver;
-use crate::solver::phases::Phase;
-use crate::solver::totals::{GridTotals, ParticleTotals};
+use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
+use crate::solver::step::phases::Phase;
 
 /// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {

@@ -12,7 +12,7 @@ use crate::io::snapshot::{self, Scalars, directory};
 use crate::job::Problem;
 use crate::particle::Chunk;
 use crate::setup;
-use crate::solver::rebalance::{cut_at, leaf_weight};
+use crate::solver::balance::rebalance::{cut_at, leaf_weight};
 use crate::solver::{Clock, Solver};
 
 /// Where a run goes on from.

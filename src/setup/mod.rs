@@ -7,8 +7,8 @@ use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::solver::rebalance::{cut_at, leaf_cost};
-use crate::solver::time_step::StepControl;
+use crate::solver::balance::rebalance::{cut_at, leaf_cost};
+use crate::solver::step::time_step::StepControl;
 use crate::solver::{Clock, Physics, Solver};
 
 pub mod estimate;

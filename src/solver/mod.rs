@@ -1,50 +1,38 @@
 //! The time integration: one explicit step of the adaptive material point method.
 //!
-//! [`Solver::step`] is the method; the files beside it hold its phases.
-pub mod bins;
-pub mod contact;
-pub mod cost;
-pub mod depart;
-pub mod given_boxes;
-pub mod grid;
-mod increment;
-mod indicators;
-mod leaf_bins;
-mod members;
-pub mod migrate;
-mod pace;
-pub mod parts;
-pub mod phases;
-pub mod rebalance;
-mod records;
-pub mod regrid;
-pub mod resample;
-mod reunion;
-mod sides;
-mod surroundings;
-mod survey;
-pub mod time_step;
-pub mod totals;
-pub mod transfer;
-pub mod update;
-mod widths;
+//! [`Solver::step`] is the method; the rooms beside it hold its phases.
+//!
+//! | room | what it holds, from the bottom up |
+//! |---|---|
+//! | [`sorting`] | particles into bins |
+//! | [`migration`] | particles between leaves and ranks |
+//! | [`step`] | phases of a step |
+//! | [`refinement`] | the tree follows the material |
+//! | [`balance`] | load balance: measured costs, new partitions |
+//! | [`diagnostics`] | totals; weights of given boxes |
+pub mod balance;
+pub mod diagnostics;
+pub mod migration;
+pub mod refinement;
+pub mod sorting;
+pub mod step;
 
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
-use self::bins::BinMissing;
-use self::contact::Contacts;
-use self::cost::Costs;
-use self::grid::Grid;
-use self::migrate::{MigrateError, Moved};
-use self::parts::Parts;
-use self::phases::{Phase, Phases, thread_time};
-use self::rebalance::LastPartition;
-use self::regrid::Recall;
-use self::resample::Books;
-use self::survey::Survey;
-use self::time_step::StepControl;
-use self::totals::Weighed;
+use self::balance::cost::Costs;
+use self::balance::rebalance::LastPartition;
+use self::diagnostics::totals::Weighed;
+use self::migration::migrate::{MigrateError, Moved};
+use self::refinement::regrid::Recall;
+use self::refinement::resample::Books;
+use self::sorting::bins::BinMissing;
+use self::step::contact::Contacts;
+use self::step::grid::Grid;
+use self::step::parts::Parts;
+use self::step::phases::{Phase, Phases, thread_time};
+use self::step::survey::Survey;
+use self::step::time_step::StepControl;
 use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
 use crate::grid::arenas::waves;

@@ -87,7 +87,7 @@ pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
     let leaves = solver.forest.leaves().iter().zip(&solver.chunks).filter(|(_, chunk)| !chunk.is_empty());
     leaves
         .map(|(leaf, chunk)| {
-            let (lower, upper) = agimp::solver::migrate::leaf_box(leaf, solver.physics.root_edge);
+            let (lower, upper) = agimp::solver::migration::migrate::leaf_box(leaf, solver.physics.root_edge);
             let plastic = chunk.column(Layout::<D>::HISTORY).iter().copied().fold(0.0, f64::max);
             let body = Tag::unpack(chunk.tags()[0]).body;
             Filled { level: leaf.level, lower, upper, body, plastic_strain: plastic }

@@ -2,7 +2,7 @@
 use super::random::Random;
 use super::tree::{contains, graded, random_leaves};
 use agimp::grid::{KnownTree, direct};
-use agimp::solver::given_boxes::GivenParticle;
+use agimp::solver::diagnostics::given_boxes::GivenParticle;
 use partition::{Brick, MAX_LEVEL, Octant};
 use std::collections::BTreeMap;
 

@@ -1,7 +1,10 @@
 //! Arenas: what the particles of each bin scattered, before nodes sum it up.
-pub(super) mod cutter;
-pub mod waves;
-pub mod window;
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`window`] | which nodes of an arena particles can touch |
+//! | [`waves`] | when which arena is in use, so that few are held |
+//! | `cutter` | disjoint mutable parts of one slice |
 use std::sync::Arc;
 
 use self::cutter::Cutter;
@@ -10,6 +13,10 @@ use self::window::Window;
 use super::plan::GridPlan;
 use super::plan::constrained::{ArenaConstraints, ArenaMoments};
 use crate::kernel::{Row, arena_nodes};
+
+pub(super) mod cutter;
+pub mod waves;
+pub mod window;
 
 /// No arena.
 const NONE: u32 = u32::MAX;

@@ -1,12 +1,14 @@
 //! The grid of one rank: blocks, bins and constraints, for one tree and one partition.
-pub mod closure;
-pub mod constrained;
-pub mod feeders;
-pub mod known;
-pub mod links;
-pub mod reach;
-pub mod sources;
-
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`known`] | the leaves of this rank and its ghost layer |
+//! | [`reach`] | which leaves feed a bin |
+//! | [`closure`] | which nodes this rank needs |
+//! | [`feeders`] | bins by the blocks that they reach |
+//! | [`sources`] | sums that other ranks are asked for |
+//! | [`links`] | pairs of blocks of two levels |
+//! | [`constrained`] | constrained nodes in the arena of a bin |
 use std::sync::Arc;
 
 use partition::comm::Comm;
@@ -24,6 +26,14 @@ use super::constraints::constraint::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use crate::kernel::ARENA_EDGE;
 use crate::simd::prefetch;
+
+pub mod closure;
+pub mod constrained;
+pub mod feeders;
+pub mod known;
+pub mod links;
+pub mod reach;
+pub mod sources;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;

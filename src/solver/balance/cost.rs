@@ -7,10 +7,10 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Solver;
-use super::phases::{Phase, thread_time};
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
+use crate::solver::Solver;
+use crate::solver::step::phases::{Phase, thread_time};
 
 /// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
 /// processor time takes as long as several particles.
@@ -82,7 +82,7 @@ pub fn leaf_cost<const D: usize>(particles: u64) -> u64 {
 
 impl Costs {
     /// No costs yet, in a run that starts or goes on at a step.
-    pub(super) fn new(step: u64) -> Self {
+    pub(in crate::solver) fn new(step: u64) -> Self {
         Self { first_step: step, agreed_step: step, ..Self::default() }
     }
 
@@ -92,7 +92,7 @@ impl Costs {
     }
 
     /// Not collective. Begins a step of `leaves` own leaves.
-    pub(super) fn begin_step(&mut self, step: u64, leaves: usize) {
+    pub(in crate::solver) fn begin_step(&mut self, step: u64, leaves: usize) {
         if self.nanoseconds.len() != leaves {
             self.forget(leaves);
         }
@@ -102,18 +102,18 @@ impl Costs {
     }
 
     /// Not collective. Particles have been transferred.
-    pub(super) fn end_step(&mut self) {
+    pub(in crate::solver) fn end_step(&mut self) {
         self.is_step = false;
     }
 
     /// Not collective. Forgets times that belong to other leaves.
-    pub(super) fn forget(&mut self, leaves: usize) {
+    pub(in crate::solver) fn forget(&mut self, leaves: usize) {
         self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
         self.steps = 0..0;
     }
 
     /// Runs work on the particles of a leaf, on any thread.
-    pub(super) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
+    pub(in crate::solver) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
         if !self.is_step || !is_measured(leaf, self.steps.end) {
             return work();
         }

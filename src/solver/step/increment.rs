@@ -10,13 +10,13 @@
 //! more exchange, so FLIP pays for one and XPIC(m) for m beside the usual one; APIC and TPIC pay nothing.
 use rayon::prelude::*;
 
-use super::Solver;
 use super::phases::Phase;
 use super::update::{apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
 use crate::memory::Block;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
+use crate::solver::Solver;
 
 /// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.
 #[derive(Clone, Debug, Default)]
@@ -45,7 +45,7 @@ fn subtract(to: &mut [Row], from: &[Row]) {
 
 impl<const D: usize> Solver<D> {
     /// Before P2G: velocities of the nodes without the impulse of stress.
-    pub(super) fn note_velocities(&mut self) {
+    pub(in crate::solver) fn note_velocities(&mut self) {
         let sweeps = match self.physics.transfer {
             Transfer::Apic | Transfer::Tpic => return,
             Transfer::Flip { .. } => 0,
@@ -77,7 +77,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// After the update: what the nodes give to particles, prolonged like velocities.
-    pub(super) fn form_increments(&mut self) {
+    pub(in crate::solver) fn form_increments(&mut self) {
         if !self.physics.transfer.has_increments() {
             return;
         }

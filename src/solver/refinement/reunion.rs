@@ -2,12 +2,12 @@
 use partition::comm::Disagreement;
 use rayon::prelude::*;
 
-use super::migrate::{Moved, leaf_box};
 use super::resample::Resampling;
-use super::{Solver, StepError};
 use crate::adaptivity::resample::family::separated;
 use crate::adaptivity::resample::patience::{self, Look};
 use crate::particle::Chunk;
+use crate::solver::migration::migrate::{Moved, leaf_box};
+use crate::solver::{Solver, StepError};
 
 impl<const D: usize> Solver<D> {
     /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go
@@ -21,7 +21,7 @@ impl<const D: usize> Solver<D> {
         let Some(limits) = adaptivity.merge else { return Ok(false) };
         let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
         let scheme = self.physics.scheme();
-        let extent = super::transfer::extent(&self.grid.plan);
+        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
         let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
             return Ok(false);
         };

@@ -2,7 +2,7 @@
 use std::time::{Duration, Instant};
 
 /// Processor time of this thread: what other programs take of the machine does not count.
-pub(super) fn thread_time() -> Duration {
+pub(in crate::solver) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
 }

@@ -1,16 +1,11 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::bins::{BinMissing, BoxWidths, window_of};
 use super::contact::SUMS;
-use super::depart::Departed;
 use super::grid::Grid;
-use super::leaf_bins::{self, LeafBins};
 use super::phases::{Phase, Phases};
-use super::resample::Resampling;
 use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
-use super::{Physics, Solver};
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
@@ -25,13 +20,18 @@ use crate::kernel::{Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, g
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place};
 use crate::simd::prefetch;
+use crate::solver::migration::depart::Departed;
+use crate::solver::refinement::resample::Resampling;
+use crate::solver::sorting::bins::{BinMissing, BoxWidths, window_of};
+use crate::solver::sorting::leaf_bins::{self, LeafBins};
+use crate::solver::{Physics, Solver};
 
 /// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
 const READ_AHEAD: usize = 25;
 
 impl<const D: usize> Physics<D> {
     /// What the kernels need to know.
-    pub(super) fn scheme(&self) -> Scheme<'_> {
+    pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
         Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)
     }
 }
@@ -60,7 +60,7 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 /// Upper corner of the domain, m.
-pub(super) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
+pub(in crate::solver) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
     plan.tree.brick().roots.map(|n| f64::from(n) * plan.root_edge)
 }
 
@@ -107,7 +107,7 @@ impl<'a, const D: usize> Selected<'a, D> {
 }
 
 /// Lists the particles of each bin and makes room for the arenas of those that have any.
-pub(super) fn sort_with<const D: usize>(
+pub(in crate::solver) fn sort_with<const D: usize>(
     grid: &mut Grid<D>,
     chunks: &[Chunk<D>],
     phases: &mut Phases,
@@ -126,14 +126,14 @@ pub(super) fn sort_with<const D: usize>(
 
 impl<const D: usize> Solver<D> {
     /// Lists the particles of each bin in leaves beside finer leaves.
-    pub(super) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
+    pub(in crate::solver) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
         let widths = self.physics.widths(&self.grid.plan);
         sort_with(&mut self.grid, &self.chunks, &mut self.phases, &widths)
     }
 
     /// P2G: scatters mass, affine momentum and the impulse of stress of the bins of a wave into their
     /// arenas.
-    pub(super) fn scatter(&mut self, dt: f64, wave: usize) {
+    pub(in crate::solver) fn scatter(&mut self, dt: f64, wave: usize) {
         let scheme = self.physics.scheme();
         let (grid, chunks, costs) = (&mut self.grid, &self.chunks, &self.costs);
         let (plan, lists) = (&grid.plan, &grid.lists);
@@ -169,7 +169,7 @@ impl<const D: usize> Solver<D> {
 
     /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
     /// keep none.
-    pub(super) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
+    pub(in crate::solver) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
         match self.physics.transfer {
             Transfer::Apic => {}
             Transfer::Tpic => return Ok(()),
@@ -208,13 +208,13 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Adds up own arenas on the nodes of the blocks of a wave.
-    pub(super) fn sum_nodes(&mut self, wave: usize) {
+    pub(in crate::solver) fn sum_nodes(&mut self, wave: usize) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Sum, || grid.fields.sum(&grid.plan, &grid.arenas, wave));
     }
 
     /// Hands sums of constrained nodes to their parents.
-    pub(super) fn restrict(&mut self) {
+    pub(in crate::solver) fn restrict(&mut self) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || grid.fields.restrict(&grid.plan));
     }
@@ -222,7 +222,7 @@ impl<const D: usize> Solver<D> {
     /// Velocities on real nodes: momentum over mass, gravity, then the conditions of the colliders in their order, at
     /// last those of the domain's faces, so that nothing is driven out of the domain. Returns impulse and angular
     /// impulse on each collider from the nodes of this rank.
-    pub(super) fn update_nodes(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
+    pub(in crate::solver) fn update_nodes(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
         let (grid, gravity) = (&mut self.grid, self.physics.gravity);
         self.phases.time(Phase::Nodes, || {
             update_velocity(&mut grid.fields, &grid.plan, gravity, dt);
@@ -234,14 +234,14 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Interpolates velocities on constrained nodes from their parents.
-    pub(super) fn prolong(&mut self) {
+    pub(in crate::solver) fn prolong(&mut self) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
     }
 
     /// G2P: velocity, affine matrix, deformation, stress and position of all particles. Returns what has departed from
     /// leaves, in their order, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
-    pub(super) fn gather(&mut self, dt: f64) -> Vec<Departed> {
+    pub(in crate::solver) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
         let resampling = resampling.as_ref();

@@ -1,15 +1,15 @@
 //! What the solver notes of each leaf's particles right after G2P, while they are in the cache: what refinement
 //! criteria and splitting will ask for. Looking at them again later would cost more than all the rest of a regrid that
 //! changes nothing.
-use super::Solver;
 use crate::adaptivity::resample::patience::Levels;
 use crate::adaptivity::{Adaptivity, Kind};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::solver::Solver;
 
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Survey<const D: usize> {
+pub(in crate::solver) struct Survey<const D: usize> {
     /// Least and greatest velocity along each axis, 0 among them, m/s. Nodes would not do: those with next to no mass
     /// may be very fast.
     pub velocity: [[f64; D]; 2],
@@ -100,7 +100,7 @@ impl Watch {
 }
 
 /// A bound on the half widths of a chunk's boxes, m.
-pub(super) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
+pub(in crate::solver) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
     greatest_stretch(chunk) * chunk.column(Layout::<D>::HALF).greatest()
 }
 
@@ -118,7 +118,7 @@ fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
 
 impl<const D: usize> Solver<D> {
     /// Not collective. Notes the state as it is now; rates stay.
-    pub(super) fn survey_now(&mut self) {
+    pub(in crate::solver) fn survey_now(&mut self) {
         let Some(adaptivity) = &self.physics.adaptivity else { return };
         let watch = Watch::after_step(adaptivity, 0);
         self.surveys.resize(self.chunks.len(), Survey::default());

@@ -54,12 +54,12 @@ impl Default for Parts {
 
 impl Parts {
     /// A part begins now.
-    pub(super) fn begin(&mut self) {
+    pub(in crate::solver) fn begin(&mut self) {
         self.since = Instant::now();
     }
 
     /// A part ends now, and the next begins.
-    pub(super) fn end(&mut self, part: Part) {
+    pub(in crate::solver) fn end(&mut self, part: Part) {
         let now = Instant::now();
         self.seconds[part as usize] += (now - self.since).as_secs_f64();
         self.since = now;

@@ -82,13 +82,13 @@ impl<const D: usize> BinLists<D> {
     }
 
     /// The lists of each own leaf, for what advances its particles.
-    pub(super) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
+    pub(in crate::solver) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds);
         leaves.map(|((bins, &sorted), own)| OfLeaf { bins: bins.as_deref_mut(), sorted, own })
     }
 
     /// Not collective. To be called when particles have not only advanced or been appended since the last sort.
-    pub(super) fn forget(&mut self) {
+    pub(in crate::solver) fn forget(&mut self) {
         self.leaves.iter_mut().flatten().for_each(|bins| bins.forget());
     }
 
@@ -152,7 +152,7 @@ impl<const D: usize> BinLists<D> {
 }
 
 /// The lists of one own leaf.
-pub(super) struct OfLeaf<'a, const D: usize> {
+pub(in crate::solver) struct OfLeaf<'a, const D: usize> {
     bins: Option<&'a mut LeafBins<D>>,
     sorted: bool,
     own: &'a NearLeaf<D>,
@@ -197,6 +197,6 @@ fn may_need_lists<const D: usize>(
 }
 
 /// The nodes that the members of a bin touch.
-pub(super) fn window_of<const D: usize>(lists: Option<&LeafBins<D>>, bin: usize) -> Window<D> {
+pub(in crate::solver) fn window_of<const D: usize>(lists: Option<&LeafBins<D>>, bin: usize) -> Window<D> {
     lists.map_or(Window::FULL, |lists| lists.members[bin].window)
 }

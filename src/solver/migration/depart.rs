@@ -2,19 +2,19 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
-use super::leaf_bins::{list_lanes, positions};
 use super::migrate::{MigrateError, leaf_box, position_key};
 use super::records::{push_record, record_words};
-use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::simd::VectorMask;
+use crate::solver::refinement::resample::{Resampling, Splits};
+use crate::solver::sorting::leaf_bins::{list_lanes, positions};
 
 /// Where a particle goes.
 #[derive(Clone, Copy)]
-pub(super) enum Destination {
+pub(in crate::solver) enum Destination {
     /// Nowhere: it is in the leaf.
     Stay,
     /// To a known leaf.
@@ -34,7 +34,7 @@ pub struct Borders<const D: usize> {
 
 /// What has been taken out of one leaf.
 #[derive(Debug, Default)]
-pub(super) struct Departed {
+pub(in crate::solver) struct Departed {
     /// Records of the particles that go to other leaves, in their order.
     pub records: Vec<u64>,
     /// Number of particles out of the domain.
@@ -83,12 +83,12 @@ impl<const D: usize> Borders<D> {
     }
 
     /// Lower and upper corner of an own leaf, m.
-    pub(super) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
+    pub(in crate::solver) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
         &self.boxes[leaf]
     }
 
     /// Where a position is, if it is in another leaf than own leaf `leaf`.
-    pub(super) fn elsewhere(
+    pub(in crate::solver) fn elsewhere(
         &self,
         tree: &KnownTree<D>,
         leaf: usize,
@@ -101,7 +101,7 @@ impl<const D: usize> Borders<D> {
     /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to another or to
     /// none. With `resampling`, particles that enter a leaf finer than they were made for become their children, which
     /// go each their own way; those that stay come last in the leaf.
-    pub(super) fn depart(
+    pub(in crate::solver) fn depart(
         &self,
         tree: &KnownTree<D>,
         leaf: usize,
@@ -220,7 +220,10 @@ fn too_coarse<const D: usize>(
 }
 
 /// Particles that are not in a box, in order; one whose position is not a number is in none.
-pub(super) fn outside<const D: usize>(chunk: &Chunk<D>, bounds: &([f64; D], [f64; D])) -> Vec<u32> {
+pub(in crate::solver) fn outside<const D: usize>(
+    chunk: &Chunk<D>,
+    bounds: &([f64; D], [f64; D]),
+) -> Vec<u32> {
     let mut leavers = leavers::Leavers::default();
     leavers.begin(bounds);
     let mut found = Vec::new();

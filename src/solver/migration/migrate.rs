@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::depart::{Borders, Departed, outside};
 use super::records::{append_all, record_words};
-use super::resample::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::solver::refinement::resample::{Resampling, Splits};
 
 const TAG: u16 = 12;
 
@@ -43,7 +43,7 @@ pub enum MigrateError {
 /// Moves particles to the leaves that contain them.
 pub struct Migration<const D: usize> {
     exchange: NeighbourExchange,
-    pub(super) borders: Borders<D>,
+    pub(in crate::solver) borders: Borders<D>,
 }
 
 /// Particles that left their leaf in one step.
@@ -73,7 +73,7 @@ impl<const D: usize> Migration<D> {
     ///
     /// # Errors
     /// As those of [`Migration::arrive`].
-    pub(super) fn migrate(
+    pub(in crate::solver) fn migrate(
         &mut self,
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],
@@ -93,7 +93,7 @@ impl<const D: usize> Migration<D> {
 
     /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the places given
     /// with them, which must be in or next to their leaf; they stay where they are in space.
-    pub(super) fn gather(
+    pub(in crate::solver) fn gather(
         &mut self,
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],
@@ -116,7 +116,7 @@ impl<const D: usize> Migration<D> {
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
     /// in any case.
-    pub(super) fn arrive(
+    pub(in crate::solver) fn arrive(
         &mut self,
         tree: &KnownTree<D>,
         chunks: &mut [Chunk<D>],

@@ -5,11 +5,7 @@
 use partition::Octant;
 use rayon::prelude::*;
 
-use super::migrate::leaf_box;
 use super::surroundings::{MassRange, Surroundings};
-use super::survey::Survey;
-use super::transfer::extent;
-use super::{Physics, Solver};
 use crate::adaptivity::{Criterion, Kind, Value};
 use crate::boundary::ColliderState;
 use crate::geometry::Aabb;
@@ -18,6 +14,10 @@ use crate::grid::plan::NO_BLOCK;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::{Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::solver::migration::migrate::leaf_box;
+use crate::solver::step::survey::Survey;
+use crate::solver::step::transfer::extent;
+use crate::solver::{Physics, Solver};
 
 /// What the values follow from: the state of one rank after a step.
 #[derive(Clone, Copy)]

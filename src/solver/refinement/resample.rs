@@ -4,16 +4,16 @@ use partition::comm::Comm;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
-use super::grid::reach_of_width;
-use super::migrate::leaf_box;
-use super::survey::widest;
-use super::{Physics, Solver};
 use crate::adaptivity::resample::patience::{self, Look, Turn};
 use crate::adaptivity::resample::{Merged, Setting, ids, merge, needs_split, split};
 use crate::exact_sum::ExactSum;
 use crate::kernel::{BoxPolicy, Scheme};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
+use crate::solver::migration::migrate::leaf_box;
+use crate::solver::step::grid::reach_of_width;
+use crate::solver::step::survey::widest;
+use crate::solver::{Physics, Solver};
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
 #[derive(Clone, Debug, Default)]
@@ -77,7 +77,7 @@ impl Books {
 
 /// Splits in one leaf.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Splits {
+pub(in crate::solver) struct Splits {
     split: u64,
     refused: u64,
     energies: Vec<f64>,
@@ -85,7 +85,7 @@ pub(super) struct Splits {
 
 /// How particles follow the size of cells.
 #[derive(Clone, Copy)]
-pub(super) struct Resampling<'a, const D: usize> {
+pub(in crate::solver) struct Resampling<'a, const D: usize> {
     scheme: &'a Scheme<'a>,
     extent: [f64; D],
     nominal: &'a [f64],
@@ -209,7 +209,7 @@ impl<const D: usize> Solver<D> {
     /// the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any was split.
     pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> Vec<bool> {
         let scheme = self.physics.scheme();
-        let extent = super::transfer::extent(&self.grid.plan);
+        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
         let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
             return Vec::new();
         };
@@ -236,7 +236,7 @@ impl<const D: usize> Solver<D> {
         is_wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<Merged> {
         let scheme = self.physics.scheme();
-        let extent = super::transfer::extent(&self.grid.plan);
+        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
         let resampling = Resampling::new(&self.physics, &scheme, extent);
         let limits = self.physics.adaptivity.as_ref().and_then(|a| a.merge);
         let Some((resampling, limits)) = resampling.zip(limits) else { return Vec::new() };
@@ -302,7 +302,7 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]): with that the grid needs
     /// not be made anew for them.
-    pub(super) fn reach_of_merges(&self) -> u32 {
+    pub(in crate::solver) fn reach_of_merges(&self) -> u32 {
         let Some(adaptivity) = self.physics.adaptivity.as_ref().filter(|a| a.merge.is_some()) else {
             return 0;
         };
@@ -321,14 +321,14 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. The root after the highest that any living particle's identifier has.
-    pub(super) fn first_free_root(&self) -> u64 {
+    pub(in crate::solver) fn first_free_root(&self) -> u64 {
         let mut next = [self.chunks.iter().filter_map(ids::highest_root).max().map_or(0, |root| root + 1)];
         self.comm.max_u64(&mut next);
         next[0]
     }
 
     /// Books of splits on the way to other leaves.
-    pub(super) fn book_entries(&mut self, splits: &[Splits]) {
+    pub(in crate::solver) fn book_entries(&mut self, splits: &[Splits]) {
         splits.iter().for_each(|done| self.books.book_split(done));
     }
 }

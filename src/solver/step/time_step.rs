@@ -1,9 +1,9 @@
 //! Choice of the time step.
 use rayon::prelude::*;
 
-use super::{Physics, Solver};
 use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};
+use crate::solver::{Physics, Solver};
 
 /// Limits on the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct StepControl {
 
 impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
-    pub(super) fn choose_dt(&self, limit: f64) -> f64 {
+    pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
         let mut dt = self.clock.bound.min(control.dt_max.unwrap_or(f64::INFINITY));
         if self.clock.dt > 0.0 {
@@ -29,7 +29,7 @@ impl<const D: usize> Solver<D> {
 
     /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
     /// the sum of wave speed and particle speed. Colliders bound it as well.
-    pub(super) fn local_bound(&self) -> f64 {
+    pub(in crate::solver) fn local_bound(&self) -> f64 {
         let plan = &self.grid.plan;
         let particles = self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
             f64::INFINITY,
@@ -42,7 +42,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, from the materials at rest.
-    pub(super) fn signals_at_rest(&self) -> Vec<f64> {
+    pub(in crate::solver) fn signals_at_rest(&self) -> Vec<f64> {
         let physics = &self.physics;
         self.chunks.par_iter().with_min_len(64).map(|chunk| physics.signal_at_rest(chunk)).collect()
     }

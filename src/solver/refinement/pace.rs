@@ -1,7 +1,7 @@
 //! How often the tree may change: rarely while nothing goes far.
-use super::Solver;
-use super::transfer::extent;
 use crate::adaptivity::Kind;
+use crate::solver::Solver;
+use crate::solver::step::transfer::extent;
 
 /// Most occasions from one change of the tree to the next: what has come to rest shall become coarse soon.
 const RAREST: u64 = 4;

@@ -1,16 +1,16 @@
 //! Widths of boxes, as sorting needs them.
-use super::Physics;
 use super::bins::BoxWidths;
 use super::leaf_bins::{list_lanes, values};
-use super::transfer::extent;
 use crate::grid::GridPlan;
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
+use crate::solver::Physics;
+use crate::solver::step::transfer::extent;
 
 /// Half widths as the kernels compute them.
-pub(super) struct Widths<'a, const D: usize> {
+pub(in crate::solver) struct Widths<'a, const D: usize> {
     pub scheme: Scheme<'a>,
     /// Upper corner of the domain, m.
     pub extent: [f64; D],
@@ -18,7 +18,7 @@ pub(super) struct Widths<'a, const D: usize> {
 
 impl<const D: usize> Physics<D> {
     /// Half widths of boxes in the domain of a plan.
-    pub(super) fn widths(&self, plan: &GridPlan<D>) -> Widths<'_, D> {
+    pub(in crate::solver) fn widths(&self, plan: &GridPlan<D>) -> Widths<'_, D> {
         Widths { scheme: self.scheme(), extent: extent(plan) }
     }
 }

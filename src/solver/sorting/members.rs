@@ -26,12 +26,12 @@ impl<const D: usize> Members<D> {
     const NO_FACES: [[f64; D]; 2] = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
 
     /// Whether there are no members.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(in crate::solver) fn is_empty(&self) -> bool {
         self.whole.is_empty() && self.parts.is_empty()
     }
 
     /// Takes out all members.
-    pub(super) fn clear(&mut self) {
+    pub(in crate::solver) fn clear(&mut self) {
         self.whole.clear();
         self.parts.clear();
         self.window = Window::EMPTY;
@@ -49,7 +49,7 @@ impl<const D: usize> Members<D> {
     }
 
     /// Makes the window from all boxes that were included.
-    pub(super) fn close(&mut self, plan: &GridPlan<D>, bin: &Bin<D>) {
+    pub(in crate::solver) fn close(&mut self, plan: &GridPlan<D>, bin: &Bin<D>) {
         if self.lower_faces[0][0] <= self.lower_faces[1][0] {
             let cell = plan.cell(bin.block.level);
             for faces in self.lower_faces {

@@ -3,20 +3,20 @@ use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
 
-use super::bins::{BinLists, BoxWidths};
-use super::depart::Departed;
 use super::increment::Increments;
-use super::migrate::{MigrateError, Migration, Moved};
 use super::phases::Phase;
-use super::resample::{Resampling, Splits};
 use super::transfer::extent;
-use super::{Physics, Solver};
 use crate::grid::arenas::Arenas;
 use crate::grid::plan::known::Allowance;
 use crate::grid::sums::census::{Census, surface_bytes};
 use crate::grid::sums::exchange::ReceivedSums;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::memory::Block;
+use crate::solver::migration::depart::Departed;
+use crate::solver::migration::migrate::{MigrateError, Migration, Moved};
+use crate::solver::refinement::resample::{Resampling, Splits};
+use crate::solver::sorting::bins::{BinLists, BoxWidths};
+use crate::solver::{Physics, Solver};
 
 /// By how much boxes may widen until the tree changes next without a new grid in between. A grid for boxes wider than a cell has
 /// bins of every leaf in those around it and takes three times as long to make.
@@ -26,13 +26,13 @@ const GROWTH: f64 = 1.1;
 pub struct Grid<const D: usize> {
     /// Blocks, bins and constraints.
     pub plan: GridPlan<D>,
-    pub(super) arenas: Arenas<D>,
-    pub(super) fields: NodeFields<D>,
+    pub(in crate::solver) arenas: Arenas<D>,
+    pub(in crate::solver) fields: NodeFields<D>,
     pub(super) increments: Increments,
-    pub(super) exchange: ArenaExchange<D>,
-    pub(super) received: ReceivedSums<D>,
-    pub(super) migration: Migration<D>,
-    pub(super) lists: BinLists<D>,
+    pub(in crate::solver) exchange: ArenaExchange<D>,
+    pub(in crate::solver) received: ReceivedSums<D>,
+    pub(in crate::solver) migration: Migration<D>,
+    pub(in crate::solver) lists: BinLists<D>,
     pub(super) seam: Seam,
 }
 
@@ -41,7 +41,12 @@ impl<const D: usize> Grid<D> {
     ///
     /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
     /// [`reach_of_width`] gives it.
-    pub(super) fn build(comm: &Comm, forest: &Forest<D>, physics: &Physics<D>, reach: u32) -> Self {
+    pub(in crate::solver) fn build(
+        comm: &Comm,
+        forest: &Forest<D>,
+        physics: &Physics<D>,
+        reach: u32,
+    ) -> Self {
         let allowance = Allowance { reach, graded: physics.graded };
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
@@ -60,7 +65,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Gives back the memory of what the next step fills anew.
-    pub(super) fn clear(&mut self) {
+    pub(in crate::solver) fn clear(&mut self) {
         self.arenas = Arenas::default();
         self.increments = Increments::default();
         self.fields.rows = Block::default();
@@ -73,7 +78,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// In how many waves bins scatter.
-    pub(super) fn waves(&self) -> usize {
+    pub(in crate::solver) fn waves(&self) -> usize {
         self.arenas.waves().count()
     }
 
@@ -93,7 +98,7 @@ impl<const D: usize> Grid<D> {
 }
 
 /// Reach that boxes of a half width need, which is given in cells.
-pub(super) fn reach_of_width(cells: f64) -> u32 {
+pub(in crate::solver) fn reach_of_width(cells: f64) -> u32 {
     // Rounding must not make a box that is exactly one cell wide a wide one.
     if cells <= 0.5 * (1.0 + 4.0 * f64::EPSILON) { 0 } else { cells.ceil() as u32 }
 }
@@ -118,19 +123,19 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Reach for a new grid: what the boxes of all ranks need, also when they have become a little wider, and once
     /// particles that are due to merge have done so.
-    pub(super) fn agreed_reach(&self) -> u32 {
+    pub(in crate::solver) fn agreed_reach(&self) -> u32 {
         let mut reach = [u64::from(self.local_reach(GROWTH, 0).max(self.reach_of_merges()))];
         self.comm.max_u64(&mut reach);
         reach[0] as u32
     }
 
     /// Not collective. Reach that the boxes of this rank need now, exact where it is more than the grid has.
-    pub(super) fn reach_now(&self) -> u32 {
+    pub(in crate::solver) fn reach_now(&self) -> u32 {
         self.local_reach(1.0, self.grid.plan.tree.reach())
     }
 
     /// Collective. Makes the grid anew if the boxes of any rank need more reach than it has.
-    pub(super) fn provide_reach(&mut self, of_any_rank: u32) {
+    pub(in crate::solver) fn provide_reach(&mut self, of_any_rank: u32) {
         if of_any_rank > self.grid.plan.tree.reach() {
             self.rebuild_grid(of_any_rank);
         }
@@ -156,7 +161,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Starts sending the sums that neighbours need.
-    pub(super) fn send_sums(&mut self) -> Pending {
+    pub(in crate::solver) fn send_sums(&mut self) -> Pending {
         let grid = &mut self.grid;
         let before = grid.exchange.traffic().bytes;
         let messages =
@@ -167,7 +172,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Notes what the surface between partitions needs, while the arenas are those of the present tree.
-    pub(super) fn note_surface(&mut self) {
+    pub(in crate::solver) fn note_surface(&mut self) {
         self.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
     }
 
@@ -185,7 +190,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Waits for the sums of neighbours and adds them.
-    pub(super) fn add_sums_of_neighbours(&mut self, pending: Pending) {
+    pub(in crate::solver) fn add_sums_of_neighbours(&mut self, pending: Pending) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));
         self.phases.time(Phase::Sum, || grid.fields.add_received(&grid.plan, &grid.arenas, &grid.received));
@@ -193,7 +198,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective over neighbours. Moves particles to the leaves that contain them; those of other leaves than `may_stray` says
     /// are in theirs.
-    pub(super) fn migrate(
+    pub(in crate::solver) fn migrate(
         &mut self,
         may_stray: impl Fn(usize) -> bool + Sync,
     ) -> Result<Moved, MigrateError> {
@@ -208,7 +213,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. The second half of [`Solver::migrate`], after G2P, which has the first.
-    pub(super) fn arrive(&mut self, departed: Vec<Departed>) -> Result<Moved, MigrateError> {
+    pub(in crate::solver) fn arrive(&mut self, departed: Vec<Departed>) -> Result<Moved, MigrateError> {
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self

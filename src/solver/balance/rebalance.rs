@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use partition::{CutAt, Cuts};
 
-use super::Solver;
 pub use super::cost::{leaf_cost, leaf_weight};
-use super::parts::Part;
-use super::phases::{Phase, thread_time};
 use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
+use crate::solver::Solver;
+use crate::solver::step::parts::Part;
+use crate::solver::step::phases::{Phase, thread_time};
 
 /// Steps between looks at the imbalance.
 const LOOK_EVERY: u64 = 10;
@@ -56,7 +56,7 @@ impl Prospect {
 
 /// What the current partition has cost, in seconds of processor time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LastPartition {
+pub(in crate::solver) struct LastPartition {
     /// Of making it; at first of building the grid.
     price: f64,
     /// Lost to its imbalance so far.

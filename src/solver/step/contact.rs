@@ -3,7 +3,6 @@ use rayon::prelude::*;
 
 use super::phases::Phase;
 use super::transfer::extent;
-use super::{Physics, Solver};
 use crate::boundary::collider::cross;
 use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState};
@@ -13,6 +12,7 @@ use crate::grid::mask::{block_nodes, node_of_bit};
 use crate::grid::plan::Block;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
+use crate::solver::{Physics, Solver};
 
 /// Components of an impulse and of an angular impulse.
 pub const SUMS: usize = 6;
@@ -39,7 +39,7 @@ pub struct Contacts<const D: usize> {
 
 impl<const D: usize> Contacts<D> {
     /// The colliders at a time, nothing summed.
-    pub(super) fn new(physics: &Physics<D>, time: f64) -> Self {
+    pub(in crate::solver) fn new(physics: &Physics<D>, time: f64) -> Self {
         Self {
             states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
             sums: vec![std::array::from_fn(|_| ExactSum::new()); physics.colliders.len()],
@@ -118,7 +118,7 @@ fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
 
 impl<const D: usize> Solver<D> {
     /// Mean velocities of the colliders over the next step.
-    pub(super) fn collider_rates(&self, dt: f64) -> Vec<Rate<D>> {
+    pub(in crate::solver) fn collider_rates(&self, dt: f64) -> Vec<Rate<D>> {
         let all = self.physics.colliders.iter().zip(&self.contacts.states);
         all.map(|(collider, state)| collider.step_rate(state, &self.physics.gravity, self.clock.time, dt))
             .collect()
@@ -150,7 +150,12 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Moves the colliders over the step that has just been done. One more reduction if any is free.
-    pub(super) fn advance_colliders(&mut self, rates: &[Rate<D>], step: Vec<[ExactSum; SUMS]>, dt: f64) {
+    pub(in crate::solver) fn advance_colliders(
+        &mut self,
+        rates: &[Rate<D>],
+        step: Vec<[ExactSum; SUMS]>,
+        dt: f64,
+    ) {
         for (sums, step) in self.contacts.sums.iter_mut().zip(&step) {
             sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
         }

@@ -5,12 +5,12 @@
 use partition::comm::Comm;
 use rayon::prelude::*;
 
-use super::phases::Phase;
-use super::{Physics, Solver, StepError};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{LANES, Lanes, Mask, Vector, VectorMask};
+use crate::solver::step::phases::Phase;
+use crate::solver::{Physics, Solver, StepError};
 
 /// Components of a torque or angular momentum, for both dimensions.
 const AXES: [(usize, usize); 3] = [(1, 2), (2, 0), (0, 1)];
@@ -29,7 +29,7 @@ pub struct GridTotals {
 
 /// Mass on the real nodes and of the particles in one step, on one rank.
 #[derive(Clone, Debug)]
-pub(super) struct Weighed([ExactSum; 2]);
+pub(in crate::solver) struct Weighed([ExactSum; 2]);
 
 /// Sums over all particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,7 +96,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Adds up masses, if that is asked for, in a step whose nodes have their sums.
-    pub(super) fn weigh(&mut self) {
+    pub(in crate::solver) fn weigh(&mut self) {
         if !std::mem::take(&mut self.is_to_weigh) {
             return;
         }

@@ -6,15 +6,15 @@ use std::cmp::Ordering;
 
 use partition::Octant;
 
-use super::migrate::leaf_box;
 use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count, offset_index};
 use crate::grid::plan::Bin;
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
+use crate::solver::migration::migrate::leaf_box;
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct NearLeaf<const D: usize> {
+pub(in crate::solver) struct NearLeaf<const D: usize> {
     /// Its level.
     pub level: u8,
     /// Lower corner relative to that of the domain, m.

@@ -5,13 +5,6 @@
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
-use super::bins::{BinMissing, BoxWidths};
-use super::leaf_bins::values;
-use super::migrate::position_key;
-use super::time_step::StepControl;
-use super::transfer::{extent, sort_with};
-use super::update::update_velocity;
-use super::{Clock, Physics, Solver};
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraints::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
@@ -19,6 +12,13 @@ use crate::kernel::{BoxPolicy, Transfer};
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{Lanes, Vector};
+use crate::solver::migration::migrate::position_key;
+use crate::solver::sorting::bins::{BinMissing, BoxWidths};
+use crate::solver::sorting::leaf_bins::values;
+use crate::solver::step::time_step::StepControl;
+use crate::solver::step::transfer::{extent, sort_with};
+use crate::solver::step::update::update_velocity;
+use crate::solver::{Clock, Physics, Solver};
 
 /// A particle with its box. Lengths in m, relative to the domain's lower corner.
 #[derive(Clone, Copy, Debug)]

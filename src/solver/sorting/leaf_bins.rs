@@ -32,7 +32,7 @@ pub struct LeafBins<const D: usize> {
     /// Particles whose box is cut, in order; a part's slot points here.
     pub cut: Vec<u32>,
     /// Finer leaves around.
-    pub(super) finer: Vec<NearLeaf<D>>,
+    pub(in crate::solver) finer: Vec<NearLeaf<D>>,
     /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
     around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
@@ -48,13 +48,13 @@ const CUT: u32 = u32::MAX;
 
 /// Memory that a thread reuses from leaf to leaf.
 #[derive(Debug, Default)]
-pub(super) struct Scratch {
+pub(in crate::solver) struct Scratch {
     /// Particles whose bin may be another than the leaf's own.
     undecided: Vec<u32>,
 }
 
 /// What sorting needs to know beside the particles.
-pub(super) struct Sorting<'a, const D: usize, W> {
+pub(in crate::solver) struct Sorting<'a, const D: usize, W> {
     pub plan: &'a GridPlan<D>,
     pub widths: &'a W,
     /// Own leaf.
@@ -64,7 +64,7 @@ pub(super) struct Sorting<'a, const D: usize, W> {
 
 impl<const D: usize> LeafBins<D> {
     /// Of a known leaf, if leaves around it are finer.
-    pub(super) fn beside_finer(plan: &GridPlan<D>, known: usize) -> Option<Box<Self>> {
+    pub(in crate::solver) fn beside_finer(plan: &GridPlan<D>, known: usize) -> Option<Box<Self>> {
         let tree = &plan.tree;
         let here = tree.leaves()[known];
         let near = |leaf| near_leaf(tree, leaf, plan.root_edge);
@@ -95,7 +95,7 @@ impl<const D: usize> LeafBins<D> {
     }
 
     /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
-    pub(super) fn sort(
+    pub(in crate::solver) fn sort(
         &mut self,
         chunk: &Chunk<D>,
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
@@ -127,7 +127,7 @@ impl<const D: usize> LeafBins<D> {
 
     /// Does what of [`LeafBins::sort`] has to look at particles, as long as these are in the cache. Until then others may only
     /// be appended to the leaf, or [`LeafBins::forget`] is called.
-    pub(super) fn sort_ahead(
+    pub(in crate::solver) fn sort_ahead(
         &mut self,
         chunk: &Chunk<D>,
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
@@ -145,7 +145,7 @@ impl<const D: usize> LeafBins<D> {
     }
 
     /// Has the next [`LeafBins::sort`] look at all particles.
-    pub(super) fn forget(&mut self) {
+    pub(in crate::solver) fn forget(&mut self) {
         self.ahead = 0;
     }
 
@@ -357,7 +357,11 @@ impl<const D: usize> LeafBins<D> {
 /// Appends to a list those of some particles whose bits are set in what `lanes` gives for the batch from some particle on;
 /// bits behind the last particle are of no use.
 #[inline(always)]
-pub(super) fn list_lanes(particles: Range<usize>, list: &mut Vec<u32>, lanes: impl Fn(usize) -> u32) {
+pub(in crate::solver) fn list_lanes(
+    particles: Range<usize>,
+    list: &mut Vec<u32>,
+    lanes: impl Fn(usize) -> u32,
+) {
     for first in particles.clone().step_by(LANES) {
         let members = LANES.min(particles.end - first);
         let mut left = lanes(first) & ((1 << members) - 1);
@@ -380,12 +384,12 @@ fn positions_of<const D: usize>(chunk: &Chunk<D>, particles: &[u32]) -> [Lanes; 
 
 /// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
 #[inline(always)]
-pub(super) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
+pub(in crate::solver) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
     Lanes::new(chunk.values(column, first))
 }
 
 /// Positions, as [`values`] gives them.
-pub(super) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
+pub(in crate::solver) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
     std::array::from_fn(|axis| values(chunk, Layout::<D>::POSITION + axis, first))
 }
 

@@ -5,15 +5,15 @@ use partition::comm::Disagreement;
 use partition::{Forest, MAX_LEVEL, Mark, Octant, Region, correspondence};
 use rayon::prelude::*;
 
-use super::migrate::{MigrateError, Moved, leaf_box, position_key};
-use super::parts::Part;
-use super::phases::Phase;
 use super::surroundings::Surroundings;
-use super::survey::Survey;
-use super::{Solver, StepError};
 use crate::adaptivity::{Adaptivity, Value};
 use crate::geometry::Aabb;
 use crate::particle::Chunk;
+use crate::solver::migration::migrate::{MigrateError, Moved, leaf_box, position_key};
+use crate::solver::step::parts::Part;
+use crate::solver::step::phases::Phase;
+use crate::solver::step::survey::Survey;
+use crate::solver::{Solver, StepError};
 
 /// A region with the level that all leaves which meet it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
@@ -38,7 +38,7 @@ impl<const D: usize> Wish<D> {
 
 /// What regrids remember from one time to the next. It saves work and changes no bit.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Recall<const D: usize> {
+pub(in crate::solver) struct Recall<const D: usize> {
     /// See there.
     pub surroundings: Surroundings,
     /// With what the tree stays as it is.

@@ -1,0 +1,3 @@
+//! Load balance.
+pub mod cost;
+pub mod rebalance;

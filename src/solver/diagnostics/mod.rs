@@ -1,0 +1,3 @@
+//! What is measured of a state.
+pub mod given_boxes;
+pub mod totals;

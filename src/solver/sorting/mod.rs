@@ -1,0 +1,14 @@
+//! Particles into bins: which leaf, level and arena each one scatters into.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`bins`] | the bins of all leaves |
+//! | `leaf_bins` | the bins of one leaf |
+//! | `sides` | levels across the faces of a leaf |
+//! | `members` | the content of a bin |
+//! | `widths` | boxes of particles |
+pub mod bins;
+pub(super) mod leaf_bins;
+mod members;
+mod sides;
+mod widths;
