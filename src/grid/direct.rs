@@ -54,8 +54,9 @@ struct Interval {
     cell: u32,
     /// Share of the box's width that lies in the cell.
     share: f64,
-    /// Middle of that share, from 0 to 1 over the cell.
-    middle: f64,
+    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is found on its own, as
+    /// a small one keeps its digits only so.
+    middle: [f64; 2],
 }
 
 /// What the corners of a leaf's cells get, cell by cell.
@@ -80,8 +81,8 @@ fn in_leaf<const D: usize>(
         for corner in 0..1u32 << D {
             let upper = |axis: usize| corner >> axis & 1;
             let hat = |axis: usize| match upper(axis) {
-                0 => cut[axis].share * (1.0 - cut[axis].middle),
-                _ => cut[axis].share * cut[axis].middle,
+                0 => cut[axis].share * cut[axis].middle[1],
+                _ => cut[axis].share * cut[axis].middle[0],
             };
             let slope = |axis: usize| cut[axis].share / cell * if upper(axis) == 0 { -1.0 } else { 1.0 };
             let place = std::array::from_fn(|axis| (cut[axis].cell + upper(axis)) * size);
@@ -105,7 +106,7 @@ fn intervals(leaf: u32, cell: f64, centre: f64, half: f64) -> Vec<Interval> {
             (high > low).then(|| Interval {
                 cell: at,
                 share: (high - low) / (2.0 * half),
-                middle: 0.5 * (low + high) / cell,
+                middle: [0.5 * (low + high) / cell, 0.5 * ((cell - low) + (cell - high)) / cell],
             })
         })
         .collect()

@@ -9,6 +9,11 @@
 //! w2 = b² / (2 V)                    dw2 = b / (V h)
 //! ```
 //! with `m = min(hi, 1)`, `a = m - lo`, `b = max(hi - 1, 0)`, `V = a + b`.
+//!
+//! Where the box reaches across a grid line the outer weights are `a²/(2V)` and `b²/(2V)`: they vanish as the squares of
+//! their slopes. Rounding must keep that, down to overlaps of one unit of the last place: the impulse of stress goes with
+//! the slope, and a node that gets an impulse without mass takes on any velocity. So `1 - (lo + m)/2` is evaluated as
+//! `((1 - lo) + (1 - m))/2`, whose differences are exact near 1.
 use super::BLOCK;
 use crate::simd::Vector;
 
@@ -43,9 +48,10 @@ impl<V: Vector> Axis<V> {
         let a_share = a * volume_inverse;
         let b_share = b * volume_inverse;
         let mean = (low + middle) * 0.5;
+        let mean_to_one = ((one - low) + (one - middle)) * 0.5;
         let half_b = b * 0.5;
         let weight =
-            [a_share * (one - mean), a_share.mul_add(mean, b_share * (one - half_b)), b_share * half_b];
+            [a_share * mean_to_one, a_share.mul_add(mean, b_share * (one - half_b)), b_share * half_b];
         let (a_slope, b_slope) = (a_share * inverse_cell, b_share * inverse_cell);
         Self { base, weight, slope: [-a_slope, a_slope - b_slope, b_slope] }
     }
@@ -98,6 +104,40 @@ mod tests {
                 assert!(((0..3).map(|i| dw[i] * d[i]).sum::<f64>() - 1.0).abs() <= slope, "{x} {l}");
             }
         }
+    }
+
+    /// Boxes that reach by 1 to 100 units of the last place and more across the line between two cells, at the lower or the
+    /// upper side: the node beyond has a weight that goes with the square of its slope, and neither is zero alone.
+    #[test]
+    fn outer_weights_are_squares_of_slopes() {
+        let overlaps =
+            (1..=100).chain((7..=51).map(|power| 1u64 << power)).map(|n| n as f64 * 0.5 * f64::EPSILON);
+        let overlaps: Vec<f64> = overlaps.collect();
+        let mut reached = 0;
+        for half in [0.5, 0.25, 0.125, 0.1, 1.0 / 3.0, 0.499_999, 0.02] {
+            for line in 0..=4 {
+                for &overlap in &overlaps {
+                    for side in [-1.0, 1.0] {
+                        let centre = Lanes::splat(f64::from(line) + side * (half - overlap));
+                        let axis = Axis::new(centre, Lanes::splat(half), 8.0);
+                        let base = axis.base.to_array()[0];
+                        // On the other side of the line, unless the overlap has been rounded away.
+                        let beyond = f64::from(line) - side - base;
+                        let is_inside = (0.0..=4.0).contains(&centre.to_array()[0]);
+                        if overlap >= half || !is_inside || !(0.0..=2.0).contains(&beyond) {
+                            continue;
+                        }
+                        let beyond = beyond as usize;
+                        let [weight, slope] = [axis.weight, axis.slope].map(|of| of[beyond].to_array()[0]);
+                        let width = 2.0 * half;
+                        let square = (slope / 8.0 * width).powi(2);
+                        assert!((weight * 2.0 * width - square).abs() <= 1e-14 / half * square);
+                        reached += usize::from(weight > 0.0);
+                    }
+                }
+            }
+        }
+        assert!(reached > 4000, "{reached}");
     }
 
     #[test]
