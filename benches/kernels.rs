@@ -7,8 +7,7 @@ use agimp::kernel::constrained::ConstrainedNodes;
 use agimp::kernel::hanging::HangingNodes;
 use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
-use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
-use agimp::material::{Material, Parameters, build};
+use agimp::material::{Material, Parameters};
 use agimp::particle::chunk::{Chunk, Layout, Place, Tag};
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -17,31 +16,33 @@ const CELL: f64 = 0.01;
 const PARTICLES: usize = 1 << 20;
 const DT: f64 = 1e-6;
 
-const MODELS: [&str; 5] = ["neo_hookean", "fixed_corotated", "hencky", "von_mises", "drucker_prager"];
-
 fn main() {
     divan::main();
 }
 
-fn material(model: &str) -> Box<dyn Material> {
-    let elastic = Elastic { young: 1e6, poisson: 0.3 };
-    let parameters = match model {
-        "neo_hookean" => Parameters::NeoHookean(elastic),
-        "fixed_corotated" => Parameters::FixedCorotated(elastic),
-        "hencky" => Parameters::Hencky(elastic),
-        "von_mises" => {
-            Parameters::VonMises(VonMises { young: 1e6, poisson: 0.3, yield_stress: 1e3, hardening: 0.0 })
-        }
-        _ => Parameters::DruckerPrager(DruckerPrager {
-            young: 1e6,
-            poisson: 0.3,
-            friction_angle: 30.0,
-            matching: FrictionMatch::TriaxialCompression,
-            volume_correction: true,
-        }),
-    };
-    build(&parameters, 1000.0)
+/// Parameters of a model, named by what tells it from other models.
+#[derive(Clone, Copy)]
+struct Model(&'static str);
+
+impl std::fmt::Display for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let common = |key: &&str| !key.starts_with("young") && !key.starts_with("poisson");
+        let keys: Vec<&str> = self.0.split(", ").filter(common).collect();
+        f.write_str(&keys.join(" ").replace("model = ", "").replace(" = ", "="))
+    }
 }
+
+/// The examples of all models.
+fn models() -> Vec<Model> {
+    Parameters::examples().into_iter().map(Model).collect()
+}
+
+fn material(model: Model) -> Box<dyn Material> {
+    let parameters: Parameters = model.0.parse().expect("examples can be read");
+    parameters.build(1000.0)
+}
+
+const ELASTIC: Model = Model("model = 'neo_hookean', young = 1e6, poisson = 0.3");
 
 /// Blocks full of particles, sheared and slightly compressed, with their nodes' velocities.
 struct Setting<const D: usize> {
@@ -53,7 +54,7 @@ struct Setting<const D: usize> {
 
 impl<const D: usize> Setting<D> {
     /// `distinct` blocks, visited in turn: two stay in the cache, as many as the particles fill do not.
-    fn new(model: &str, distinct: usize) -> Self {
+    fn new(model: Model, distinct: usize) -> Self {
         // An odd number of cache lines per column: columns do not fall into the same cache set.
         let mut chunk = Chunk::with_capacity(8usize.pow(D as u32) + 8);
         for i in 0..8usize.pow(D as u32) {
@@ -97,7 +98,7 @@ fn blocks<const D: usize>() -> usize {
     PARTICLES / 8usize.pow(D as u32)
 }
 
-fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
+fn scatter<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
     let setting = Setting::<D>::new(model, distinct);
     let mut arena = vec![Row::default(); arena_nodes(D)];
     let mut scratch = p2g::Scratch::default();
@@ -112,7 +113,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
     });
 }
 
-fn gather<const D: usize>(bencher: Bencher, model: &str, distinct: usize) {
+fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
     let mut setting = Setting::<D>::new(model, distinct);
     let mut chunks = std::mem::take(&mut setting.chunks);
     let (mut scratch, mut leavers) = (g2p::Scratch::default(), Leavers::default());
@@ -153,7 +154,7 @@ fn members(quarters: u32) -> Vec<u32> {
 
 #[divan::bench(args = MIXES, sample_count = 9)]
 fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
-    let setting = Setting::<3>::new("neo_hookean", PARTICLES);
+    let setting = Setting::<3>::new(ELASTIC, PARTICLES);
     let mut arena = vec![Row::default(); arena_nodes(3)];
     let mut scratch = p2g::Scratch::default();
     let nodes = constrained();
@@ -181,7 +182,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
 
 #[divan::bench(args = MIXES, sample_count = 9)]
 fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
-    let mut setting = Setting::<3>::new("neo_hookean", PARTICLES);
+    let mut setting = Setting::<3>::new(ELASTIC, PARTICLES);
     let mut chunks = std::mem::take(&mut setting.chunks);
     let (mut scratch, mut leavers) = (g2p::Scratch::default(), Leavers::default());
     let nodes = constrained();
@@ -206,32 +207,32 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     });
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn p2g_3d(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn p2g_3d(bencher: Bencher, model: Model) {
     scatter::<3>(bencher, model, PARTICLES);
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn g2p_3d(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn g2p_3d(bencher: Bencher, model: Model) {
     gather::<3>(bencher, model, PARTICLES);
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn p2g_2d(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn p2g_2d(bencher: Bencher, model: Model) {
     scatter::<2>(bencher, model, PARTICLES);
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn g2p_2d(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn g2p_2d(bencher: Bencher, model: Model) {
     gather::<2>(bencher, model, PARTICLES);
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn p2g_3d_in_cache(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn p2g_3d_in_cache(bencher: Bencher, model: Model) {
     scatter::<3>(bencher, model, 2);
 }
 
-#[divan::bench(args = MODELS, sample_count = 9)]
-fn g2p_3d_in_cache(bencher: Bencher, model: &str) {
+#[divan::bench(args = models(), sample_count = 9)]
+fn g2p_3d_in_cache(bencher: Bencher, model: Model) {
     gather::<3>(bencher, model, 2);
 }

@@ -1,8 +1,7 @@
 //! Constitutive models along strain paths, against closed forms computed by independent code
 //! (`tests/data/driver_*.json`).
 use agimp::material::driver::{Matrix, Point, increment};
-use agimp::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
-use agimp::material::{Material, Parameters, build};
+use agimp::material::{HISTORIES, Material, Parameters};
 use serde_json::Value;
 
 const UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -46,19 +45,21 @@ fn deformed<'a>(material: &'a dyn Material, f: &Matrix) -> Point<'a> {
     point
 }
 
-fn elastic_models(young: f64, poisson: f64) -> [(&'static str, Box<dyn Material>); 3] {
-    let elastic = Elastic { young, poisson };
-    [
-        ("NH", build(&Parameters::NeoHookean(elastic), 1000.0)),
-        ("FCR", build(&Parameters::FixedCorotated(elastic), 1000.0)),
-        ("HEN", build(&Parameters::Hencky(elastic), 1000.0)),
-    ]
+/// A model with the elastic constants of a case and more keys.
+fn model(name: &str, case: &Value, keys: &str) -> Box<dyn Material> {
+    let text = format!("model = '{name}', young = {}, poisson = {}{keys}", case["E"], case["nu"]);
+    text.parse::<Parameters>().unwrap_or_else(|error| panic!("{text}: {error}")).build(1000.0)
+}
+
+fn elastic_models(data: &Value) -> [(&'static str, Box<dyn Material>); 3] {
+    [("NH", "neo_hookean"), ("FCR", "fixed_corotated"), ("HEN", "hencky")]
+        .map(|(key, name)| (key, model(name, data, "")))
 }
 
 #[test]
 fn elastic_stress_and_energy() {
     let data = data("driver_elastic.json");
-    let models = elastic_models(number(&data["E"]), number(&data["nu"]));
+    let models = elastic_models(&data);
     let modulus = number(&data["E"]);
     for row in data["rows"].as_array().unwrap() {
         let f = matrix(&row["F"]);
@@ -79,7 +80,7 @@ fn elastic_stress_and_energy() {
 #[test]
 fn elastic_models_are_objective() {
     let data = data("driver_elastic.json");
-    let models = elastic_models(number(&data["E"]), number(&data["nu"]));
+    let models = elastic_models(&data);
     let (c, s) = (0.6, 0.8);
     let turn =
         product(&[[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], &[[1.0, 0.0, 0.0], [0.0, s, c], [0.0, -c, s]]);
@@ -99,7 +100,7 @@ fn elastic_models_are_objective() {
 #[test]
 fn elastic_stress_is_the_derivative_of_the_energy() {
     let data = data("driver_elastic.json");
-    let models = elastic_models(number(&data["E"]), number(&data["nu"]));
+    let models = elastic_models(&data);
     let step = 1e-5;
     for row in data["rows"].as_array().unwrap() {
         let f = matrix(&row["F"]);
@@ -137,13 +138,8 @@ fn stretch_to(point: &mut Point, from: [f64; 3], end: [f64; 3], steps: u32) {
 fn von_mises_closed_forms() {
     let data = data("driver_j2.json");
     for case in data["cases"].as_array().unwrap() {
-        let parameters = VonMises {
-            young: number(&case["E"]),
-            poisson: number(&case["nu"]),
-            yield_stress: number(&case["sigma_y"]),
-            hardening: number(&case["H"]),
-        };
-        let material = build(&Parameters::VonMises(parameters), 1000.0);
+        let keys = format!(", yield_stress = {}, hardening = {}", case["sigma_y"], case["H"]);
+        let material = model("von_mises", case, &keys);
         for row in case["rows"].as_array().unwrap() {
             for steps in [1, 7, 60] {
                 let mut point = Point::new(material.as_ref());
@@ -183,13 +179,7 @@ fn von_mises_closed_forms() {
 #[test]
 fn von_mises_simple_shear() {
     let data = &data("driver_j2.json")["simple_shear_perfect_plasticity"];
-    let parameters = VonMises {
-        young: number(&data["E"]),
-        poisson: number(&data["nu"]),
-        yield_stress: number(&data["sigma_y"]),
-        hardening: 0.0,
-    };
-    let material = build(&Parameters::VonMises(parameters), 1000.0);
+    let material = model("von_mises", data, &format!(", yield_stress = {}", data["sigma_y"]));
     // First order in the step: extrapolate.
     let run = |steps: usize| {
         let mut point = Point::new(material.as_ref());
@@ -216,15 +206,12 @@ fn von_mises_simple_shear() {
     }
 }
 
-fn sand(case: &Value, volume_correction: bool, matching: FrictionMatch) -> Box<dyn Material> {
-    let parameters = DruckerPrager {
-        young: number(&case["E"]),
-        poisson: number(&case["nu"]),
-        friction_angle: number(&case["phi_deg"]),
-        matching,
-        volume_correction,
-    };
-    build(&Parameters::DruckerPrager(parameters), 1600.0)
+fn sand(case: &Value, volume_correction: bool, matching: &str) -> Box<dyn Material> {
+    let keys = format!(
+        ", friction_angle = {}, match = '{matching}', volume_correction = {volume_correction}",
+        case["phi_deg"]
+    );
+    model("drucker_prager", case, &keys)
 }
 
 #[test]
@@ -232,7 +219,7 @@ fn drucker_prager_closed_forms() {
     let data = data("driver_drucker_prager.json");
     for case in data["cases"].as_array().unwrap() {
         for correction in [false, true] {
-            let material = sand(case, correction, FrictionMatch::TriaxialCompression);
+            let material = sand(case, correction, "triaxial_compression");
             for row in case["rows"].as_array().unwrap() {
                 let path = row["path"].as_str().unwrap();
                 let end: [f64; 3] =
@@ -276,7 +263,7 @@ fn drucker_prager_volume_correction() {
                 (true, "with_vc", "mean_tau_with_volume_correction"),
                 (false, "without_vc", "mean_tau_no_correction"),
             ] {
-                let material = sand(case, correction, FrictionMatch::TriaxialCompression);
+                let material = sand(case, correction, "triaxial_compression");
                 let mut point = Point::new(material.as_ref());
                 let mut volume = 0.0;
                 let mut go = |point: &mut Point, to: f64| {
@@ -315,8 +302,8 @@ fn drucker_prager_in_plane_strain_mobilises_the_stated_friction() {
             case["rows"].as_array().unwrap().iter().find(|r| r["path"] == "plane strain mobilised friction");
         let expected = expected.unwrap();
         let cases = [
-            (FrictionMatch::TriaxialCompression, number(&expected["3D_embedding_F33_1"])),
-            (FrictionMatch::PlaneStrain, number(&case["phi_deg"]).to_radians().sin()),
+            ("triaxial_compression", number(&expected["3D_embedding_F33_1"])),
+            ("plane_strain", number(&case["phi_deg"]).to_radians().sin()),
         ];
         for (matching, expected) in cases {
             let material = sand(case, true, matching);
@@ -336,8 +323,8 @@ fn drucker_prager_in_plane_strain_mobilises_the_stated_friction() {
 fn elastic_states_keep_their_bits() {
     let trial = [[1.0 + 1e-5, 2e-5, 1e-5], [-1e-5, 1.0 - 3e-5, 0.0], [0.0, 1e-5, 1.0 - 2e-5]];
     let case = serde_json::json!({"E": 1e6, "nu": 0.3, "phi_deg": 40.0});
-    let metal = VonMises { young: 1e6, poisson: 0.3, yield_stress: 1e5, hardening: 0.0 };
-    for material in [build(&Parameters::VonMises(metal), 1e3), sand(&case, true, FrictionMatch::default())] {
+    let metal = model("von_mises", &case, ", yield_stress = 1e5");
+    for material in [metal, sand(&case, true, "triaxial_compression")] {
         let mut point = Point::new(material.as_ref());
         point.stretch([-0.01; 3]);
         let b = full(&point.elastic);
@@ -359,7 +346,7 @@ fn elastic_states_keep_their_bits() {
         for (c, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
             assert_eq!(point.elastic[c].to_bits(), expected[i][j].to_bits());
         }
-        assert_eq!((point.work, point.history), (0.0, [0.0; 2]));
+        assert_eq!((point.work, point.history), (0.0, [0.0; HISTORIES]));
     }
 }
 

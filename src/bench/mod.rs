@@ -123,7 +123,8 @@ fn run<const D: usize>(
     let mut counts = [0, 0];
     for chunk in &solver.chunks {
         counts[0] += chunk.len() as u64;
-        counts[1] += chunk.column(Layout::<D>::HISTORY).iter().filter(|&&shear| shear > 0.0).count() as u64;
+        counts[1] +=
+            chunk.column(Layout::<D>::PLASTIC_STRAIN).iter().filter(|&&shear| shear > 0.0).count() as u64;
     }
     comm.sum_u64(&mut counts);
     if comm.rank() != 0 {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::Failure;
 use crate::material::driver::{Matrix, Point, increment};
-use crate::material::parameters::OutOfRange;
+use crate::material::parameters::NotAModel;
 use crate::material::{Parameters, build};
 
 /// Arguments of `agimp material`.
@@ -45,12 +45,9 @@ enum MaterialError {
         /// The system's reason.
         error: std::io::Error,
     },
-    /// The model is no valid TOML, or not a model.
-    #[error("the model cannot be understood: {0}")]
-    Model(#[from] toml::de::Error),
-    /// A parameter out of range.
-    #[error("the model cannot be used: {0}")]
-    Parameter(#[from] OutOfRange),
+    /// The text of the model is none.
+    #[error(transparent)]
+    Model(#[from] NotAModel),
     /// The density is not above zero.
     #[error("--density {0} is out of range: it must be above 0 (kg/m³)")]
     Density(f64),
@@ -91,7 +88,6 @@ pub fn execute(args: &Arguments) -> Result<(), Failure> {
 /// Runs the command and writes CSV to `out`: the undeformed state, then one line per row of the path.
 fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     let parameters = model(&args.model)?;
-    parameters.check()?;
     if !(args.density > 0.0 && args.density.is_finite()) {
         return Err(MaterialError::Density(args.density));
     }
@@ -201,23 +197,12 @@ impl Deformation {
     }
 }
 
-#[derive(Deserialize)]
-struct Inline {
-    model: Parameters,
-}
-
 /// Reads a model from TOML text or from the file of that name.
 fn model(text: &str) -> Result<Parameters, MaterialError> {
     if text.contains('=') {
-        // One line with commas is the inside of an inline table, otherwise a document.
-        let inline = toml::from_str::<Inline>(&format!("model = {{ {text} }}"));
-        return Ok(match inline {
-            Ok(inline) => inline.model,
-            Err(_) if text.contains('\n') => toml::from_str(text)?,
-            Err(error) => return Err(error.into()),
-        });
+        return Ok(text.parse()?);
     }
-    Ok(toml::from_str(&read(Path::new(text))?)?)
+    Ok(read(Path::new(text))?.parse()?)
 }
 
 fn read(path: &Path) -> Result<String, MaterialError> {

@@ -259,7 +259,7 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
     names(checks, materials.iter().map(|material| material.name.as_str()), path);
     materials
         .iter()
-        .map(|m| MaterialSetup { name: m.name.clone(), density: m.density, model: m.model })
+        .map(|m| MaterialSetup { name: m.name.clone(), density: m.density, model: m.model.clone() })
         .collect()
 }
 

@@ -5,7 +5,7 @@
 use super::batch::{Batch, Batches, Tile};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
-use crate::particle::chunk::{Chunk, Layout, Place, Tag};
+use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 
@@ -65,7 +65,7 @@ pub fn read_ahead<const D: usize>(place: Place, first: usize) {
 fn columns<const D: usize>() -> impl Iterator<Item = usize> {
     let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
     let position = Layout::<D>::POSITION..Layout::<D>::POSITION + D;
-    position.chain(elastic).chain([Layout::<D>::HALF, Layout::<D>::HISTORY + 1])
+    position.chain(elastic).chain([Layout::<D>::HALF, Layout::<D>::PLASTIC_VOLUME])
 }
 
 fn collect<const D: usize>(
@@ -103,10 +103,7 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
     let mut half = match scheme.boxes {
         BoxPolicy::Fixed => [batch.load(tile, Layout::<D>::HALF); D],
         BoxPolicy::Cell => {
-            let half = std::array::from_fn(|lane| {
-                let level = Tag::unpack(tags[batch.particle(lane)]).level;
-                0.5 * scheme.root_cell / f64::from(1u32 << level.min(31))
-            });
+            let half = scheme.sizes(tags, batch).map(|size| 0.5 * size);
             [V::new(half); D]
         }
         BoxPolicy::Volume { min_stretch, max_stretch } => {
@@ -146,7 +143,7 @@ fn stretches<V: Vector, const D: usize>(
     for c in D..Layout::<D>::SYMMETRIC {
         elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
     }
-    let gain = batch.load(tile, Layout::<D>::HISTORY + 1);
+    let gain = batch.load(tile, Layout::<D>::PLASTIC_VOLUME);
     let volume_log = ln(determinant(&elastic)).mul_add(V::splat(0.5), gain);
     let isotropic = exp(volume_log * (1.0 / D as f64));
     if plastic == (1 << LANES) - 1 {

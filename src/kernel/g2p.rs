@@ -13,7 +13,7 @@ use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
-use crate::material::{self, State};
+use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
@@ -78,7 +78,7 @@ impl<const D: usize> Kernel for Gather<'_, D> {
             let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, extent, scheme);
             weights.fill(frame, &position, &position, &half);
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
-            greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+            greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
         largest(greatest)
@@ -112,7 +112,8 @@ pub fn gather_sub_boxes<const D: usize>(
     }
 }
 
-/// Advances the particles of a list by `dt` with what they gathered. Returns as [`gather`].
+/// Advances the particles of a list by `dt` with what they gathered. `cell` is the least edge of the cells that their
+/// boxes overlap, m. Returns as [`gather`].
 pub fn advance_gathered<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
@@ -120,6 +121,7 @@ pub fn advance_gathered<const D: usize>(
     gathered: &[Gathered<D>],
     scheme: &Scheme,
     dt: f64,
+    cell: f64,
     leavers: &mut Leavers<D>,
 ) -> f64 {
     let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -132,7 +134,7 @@ pub fn advance_gathered<const D: usize>(
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
         }
-        greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, leavers).max(greatest);
+        greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
         batch.put_back::<D>(tiles, spare);
     }
     largest(greatest)
@@ -178,6 +180,7 @@ fn advance<V: Vector, const D: usize>(
     sums: &Sums<D>,
     scheme: &Scheme,
     dt: f64,
+    cell: f64,
     leavers: &mut Leavers<D>,
 ) -> V {
     let zero = V::splat(0.0);
@@ -232,19 +235,21 @@ fn advance<V: Vector, const D: usize>(
         trial[c].store(state.elastic[c].as_array_mut());
     }
     if plastic {
-        for h in 0..material::HISTORIES {
+        for h in 0..scheme.histories {
             let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
             history.store(state.history[h].as_array_mut());
         }
     }
-    material::update(scheme.materials, &index, &mut state, D == 2);
+    let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
+    let update = Step { dt, plane: D == 2, cell, size };
+    material::update(scheme.materials, &index, &mut state, &update);
     let result = |lanes: &Lanes| V::load(lanes.as_array());
     for c in 0..Layout::<D>::SYMMETRIC {
         batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
         batch.store(tile, Layout::<D>::STRESS + c, result(&state.stress[c]));
     }
     if plastic {
-        for h in 0..material::HISTORIES {
+        for h in 0..scheme.histories {
             batch.store(tile, Layout::<D>::HISTORY + h, result(&state.history[h]));
         }
         let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);

@@ -5,8 +5,10 @@
 //! over particles in the order of the selection, so the bits of a result depend on nothing else.
 use bytemuck::{Pod, Zeroable};
 
+use self::batch::Batch;
 use crate::material::Material;
-use crate::simd::{F64x4, Lanes, Vector};
+use crate::particle::chunk::Tag;
+use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 mod batch;
 pub mod constrained;
@@ -144,6 +146,10 @@ pub struct Scheme<'a> {
     pub materials: &'a [Box<dyn Material>],
     /// Whether any of them flows. If not, no particle is asked.
     pub is_plastic: bool,
+    /// History variables that they use.
+    pub histories: usize,
+    /// Whether any of them asks for the size of cells.
+    pub softens: bool,
 }
 
 impl<'a> Scheme<'a> {
@@ -155,7 +161,20 @@ impl<'a> Scheme<'a> {
         materials: &'a [Box<dyn Material>],
     ) -> Self {
         let is_plastic = materials.iter().any(|material| material.is_plastic());
-        Self { boxes, root_cell, transfer, materials, is_plastic }
+        let histories = materials.iter().map(|material| material.history_names().len()).max().unwrap_or(0);
+        let softens = materials.iter().any(|material| material.softens());
+        Self { boxes, root_cell, transfer, materials, is_plastic, histories, softens }
+    }
+
+    /// Edge of a cell of a level, m.
+    pub fn cell(&self, level: u8) -> f64 {
+        self.root_cell / f64::from(1u32 << level.min(31))
+    }
+
+    /// Edges of the cells that the particles of a batch were made for, m.
+    #[inline(always)]
+    fn sizes(&self, tags: &[u64], batch: &Batch) -> [f64; LANES] {
+        std::array::from_fn(|lane| self.cell(Tag::unpack(tags[batch.particle(lane)]).level))
     }
 }
 

@@ -1,5 +1,5 @@
 //! A material point driven along a prescribed path of deformation.
-use super::{HISTORIES, Material, State};
+use super::{HISTORIES, Material, State, Step};
 use crate::simd::{Lanes, Vector};
 
 /// A 3×3 matrix, `m[i][j]` in row i and column j.
@@ -54,7 +54,9 @@ impl<'a> Point<'a> {
 
     /// Elastic energy per reference volume, J/m³.
     pub fn energy(&self) -> f64 {
-        self.material.energy(&self.elastic.map(Lanes::splat), self.is_plane()).to_array()[0]
+        let mut state = State::new(self.elastic.map(Lanes::splat));
+        state.history = self.history.map(Lanes::splat);
+        self.material.energy(&state, self.is_plane()).to_array()[0]
     }
 
     fn is_plane(&self) -> bool {
@@ -65,7 +67,7 @@ impl<'a> Point<'a> {
         self.elastic = trial;
         let mut state = State::new(trial.map(Lanes::splat));
         state.history = self.history.map(Lanes::splat);
-        self.material.update(&mut state, self.is_plane());
+        self.material.update(&mut state, &Step::rest(self.is_plane()));
         let scalar = |lanes: Lanes| lanes.to_array()[0];
         self.elastic = state.elastic.map(scalar);
         self.stress = state.stress.map(scalar);

@@ -1,4 +1,5 @@
 //! What a particle consists of: real-valued columns and a tag.
+use crate::material;
 
 /// Column numbers of the real-valued components of a particle in `D` dimensions.
 ///
@@ -25,10 +26,14 @@ impl<const D: usize> Layout<D> {
     pub const MASS: usize = Self::STRESS + Self::SYMMETRIC;
     /// Half width of the undeformed box, m; the reference volume is `(2 half)^D`.
     pub const HALF: usize = Self::MASS + 1;
-    /// First history variable; its meaning belongs to the material (plastic strain, as a rule).
+    /// First history variable (see [`material::Material::history_names`]).
     pub const HISTORY: usize = Self::HALF + 1;
     /// Number of history variables.
-    pub const HISTORIES: usize = 2;
+    pub const HISTORIES: usize = material::HISTORIES;
+    /// Measure of plastic strain of the material; 0 for materials that do not flow.
+    pub const PLASTIC_STRAIN: usize = Self::HISTORY + material::PLASTIC_STRAIN;
+    /// Logarithm of the plastic volume ratio; 0 for materials without.
+    pub const PLASTIC_VOLUME: usize = Self::HISTORY + material::PLASTIC_VOLUME;
     /// Plastic work dissipated so far per reference volume, J/m³.
     pub const WORK: usize = Self::HISTORY + Self::HISTORIES;
     /// Number of real-valued columns (32 in 3D, 21 in 2D).

@@ -3,7 +3,7 @@ use rustc_hash::FxHashSet;
 
 use super::{Limits, Setting, read_matrix, volume, write_matrix};
 use crate::kernel::{Select, Transfer};
-use crate::material::{self, HISTORIES, State, Symmetric, eigen};
+use crate::material::{self, HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, Symmetric, eigen};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector};
@@ -151,8 +151,8 @@ fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) ->
             square(&difference).sqrt() <= bound * (1.0 + 1e-9) + 1e-12
         })
     };
-    within(Layout::<D>::HISTORY, limits.history)
-        && within(Layout::<D>::HISTORY + 1, limits.volume)
+    within(Layout::<D>::PLASTIC_STRAIN, limits.history)
+        && within(Layout::<D>::PLASTIC_VOLUME, limits.volume)
         && strains_may_be()
 }
 
@@ -296,7 +296,7 @@ struct Difference {
     strain: f64,
     /// Of the logarithm of the plastic volume ratio.
     volume: f64,
-    /// Of the first history variable.
+    /// Of the plastic strain.
     history: f64,
 }
 
@@ -325,17 +325,18 @@ fn mix_matter<const D: usize>(
     let mut difference = Difference { strain: 0.0, volume: 0.0, history: 0.0 };
     for (i, own) in strains.iter().enumerate() {
         let rest: [f64; 6] = std::array::from_fn(|c| own[c] - strain[c]);
-        let gain = (history(i)[1] - mean_history[1]).abs();
+        let gain = (history(i)[PLASTIC_VOLUME] - mean_history[PLASTIC_VOLUME]).abs();
         difference.strain = difference.strain.max(square(&rest).sqrt());
         difference.volume = difference.volume.max(gain);
-        difference.history = difference.history.max((history(i)[0] - mean_history[0]).abs());
+        difference.history =
+            difference.history.max((history(i)[PLASTIC_STRAIN] - mean_history[PLASTIC_STRAIN]).abs());
     }
 
     // The mean of logarithms is the logarithm of the geometric mean; the volume that is missing is added.
     let tag = Tag::unpack(chunk.tags()[member(0)]);
     let is_plastic = setting.scheme.materials[usize::from(tag.material)].is_plastic();
     let logarithm = |strain: &[f64; 6], history: &[f64; HISTORIES]| {
-        strain[0] + strain[1] + strain[2] + if is_plastic { history[1] } else { 0.0 }
+        strain[0] + strain[1] + strain[2] + if is_plastic { history[PLASTIC_VOLUME] } else { 0.0 }
     };
     let middle = logarithm(&strain, &mean_history);
     let excess = (0..shares.len()).fold(0.0, |sum, i| {
@@ -388,7 +389,9 @@ fn restore<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, strains: 
             *history = Lanes::new(std::array::from_fn(|lane| column[at(lane)]));
         }
         let index = std::array::from_fn(|lane| Tag::unpack(chunk.tags()[at(lane)]).material);
-        material::update(setting.scheme.materials, &index, &mut state, D == 2);
+        let cell = |lane: usize| setting.scheme.cell(Tag::unpack(chunk.tags()[at(lane)]).level);
+        let step = Step { size: std::array::from_fn(cell), ..Step::rest(D == 2) };
+        material::update(setting.scheme.materials, &index, &mut state, &step);
         let (elastic, stress) = (state.elastic.map(Lanes::to_array), state.stress.map(Lanes::to_array));
         let (history, work) = (state.history.map(Lanes::to_array), state.work.to_array());
         for lane in 0..count {

@@ -189,7 +189,7 @@ pub(crate) fn speed<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 
 /// First history variable.
 pub(crate) fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    chunk.column(Layout::<D>::HISTORY)[p]
+    chunk.column(Layout::<D>::PLASTIC_STRAIN)[p]
 }
 
 /// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
@@ -204,7 +204,7 @@ fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 
 fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
     let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    determinant.sqrt() * libm::exp(chunk.column(Layout::<D>::HISTORY + 1)[p])
+    determinant.sqrt() * libm::exp(chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
 }
 
 /// σ = τ / det F.

@@ -5,8 +5,7 @@ use super::hanging::HangingNodes;
 use super::leavers::Leavers;
 use super::p2g::MomentSums;
 use super::*;
-use crate::material::parameters::{DruckerPrager, Elastic, FrictionMatch, VonMises};
-use crate::material::{Material, Parameters, build};
+use crate::material::{Material, Parameters};
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 mod beside_coarser;
@@ -66,25 +65,15 @@ const CELL: f64 = 0.05;
 const DT: f64 = 1e-4;
 
 fn materials() -> Vec<Box<dyn Material>> {
-    let elastic = Elastic { young: 1e5, poisson: 0.3 };
-    let von_mises = VonMises { young: 1e5, poisson: 0.3, yield_stress: 500.0, hardening: 100.0 };
-    let sand = DruckerPrager {
-        young: 1e5,
-        poisson: 0.3,
-        friction_angle: 30.0,
-        matching: FrictionMatch::TriaxialCompression,
-        volume_correction: true,
-    };
     [
-        Parameters::NeoHookean(elastic),
-        Parameters::VonMises(von_mises),
-        Parameters::DruckerPrager(sand),
-        Parameters::Hencky(elastic),
-        Parameters::FixedCorotated(elastic),
+        "model = 'neo_hookean', young = 1e5, poisson = 0.3",
+        "model = 'von_mises', young = 1e5, poisson = 0.3, yield_stress = 500, hardening = 100",
+        "model = 'drucker_prager', young = 1e5, poisson = 0.3, friction_angle = 30",
+        "model = 'hencky', young = 1e5, poisson = 0.3",
+        "model = 'fixed_corotated', young = 1e5, poisson = 0.3",
     ]
-    .iter()
-    .map(|p| build(p, 1000.0))
-    .collect()
+    .map(|text| text.parse::<Parameters>().unwrap().build(1000.0))
+    .into()
 }
 
 fn frame<const D: usize>() -> Frame<D> {

@@ -63,6 +63,7 @@ fn parts_equal_the_whole<const D: usize>() {
         &gathered,
         &scheme,
         DT,
+        CELL,
         &mut Leavers::default(),
     );
     for column in 0..Layout::<D>::REALS {

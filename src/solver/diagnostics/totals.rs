@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
+use crate::material::State;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{LANES, Lanes, Mask, Vector, VectorMask};
 use crate::solver::step::phases::Phase;
@@ -282,9 +283,12 @@ fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubl
 
 /// Elastic energy of the particles from `first` on per reference volume, J/m³.
 fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first: usize) -> Lanes {
-    let mut elastic = [Lanes::splat(0.0); 6];
-    for (c, elastic) in elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
+    let mut state = State::new([Lanes::splat(0.0); 6]);
+    for (c, elastic) in state.elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
         *elastic = Lanes::new(chunk.values(Layout::<D>::LEFT_CAUCHY_GREEN + c, first));
+    }
+    for (h, history) in state.history.iter_mut().enumerate() {
+        *history = Lanes::new(chunk.values(Layout::<D>::HISTORY + h, first));
     }
     let tags = &chunk.tags()[first..chunk.len().min(first + LANES)];
     let material = |lane: usize| Tag::unpack(tags[lane]).material;
@@ -295,7 +299,7 @@ fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first:
         let index = material(left.trailing_zeros() as usize);
         let same =
             (0..tags.len()).filter(|&lane| material(lane) == index).fold(0, |bits, lane| bits | 1 << lane);
-        let values = physics.materials[usize::from(index)].energy(&elastic, D == 2);
+        let values = physics.materials[usize::from(index)].energy(&state, D == 2);
         energy = Mask::from_bits(same).select(values, energy);
         left &= !same;
     }

@@ -68,14 +68,14 @@ impl Watch {
     /// To be called before the leaf's particles advance.
     pub fn before<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
         if self.rate {
-            survey.plastic_rate = chunk.column(Layout::<D>::HISTORY).sum();
+            survey.plastic_rate = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum();
         }
     }
 
     /// To be called after the leaf's particles have advanced by `dt` (s).
     pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, survey: &mut Survey<D>) {
         if self.rate {
-            let gain = chunk.column(Layout::<D>::HISTORY).sum() - survey.plastic_rate;
+            let gain = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum() - survey.plastic_rate;
             survey.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
         }
         self.look(chunk, survey);
@@ -90,7 +90,7 @@ impl Watch {
             survey.levels = Some(Levels::of(chunk.tags()));
         }
         if self.strain {
-            survey.plastic_strain = chunk.column(Layout::<D>::HISTORY).greatest();
+            survey.plastic_strain = chunk.column(Layout::<D>::PLASTIC_STRAIN).greatest();
         }
         if self.width {
             survey.stretch = greatest_stretch(chunk);
@@ -108,10 +108,9 @@ pub(in crate::solver) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
 fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
     let first = Layout::<D>::LEFT_CAUCHY_GREEN;
     // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
-    // them, no volume more than its power 3/2; the second history variable is ln of the plastic volume ratio
-    // where a model has one.
+    // them, no volume more than its power 3/2.
     let elastic = (first..first + 3).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
-    let plastic = chunk.column(Layout::<D>::HISTORY + 1).greatest();
+    let plastic = chunk.column(Layout::<D>::PLASTIC_VOLUME).greatest();
     let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
     elastic.sqrt().max(isotropic)
 }

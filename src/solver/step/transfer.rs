@@ -304,7 +304,10 @@ impl<const D: usize> Solver<D> {
                             signal = signal.max(fastest);
                         }
                     }
-                    let fastest = g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, leavers);
+                    let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
+                    let cell = plan.cell(finest.unwrap_or(0));
+                    let fastest =
+                        g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, cell, leavers);
                     // Bins take them in turn.
                     leavers.found.sort_unstable();
                     signal.max(fastest)

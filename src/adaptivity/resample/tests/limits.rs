@@ -33,8 +33,8 @@ fn limits_are_respected() {
     // Three of four follow an affine field, the fourth differs.
     assert!(shift(Layout::<2>::VELOCITY, 0.1 * speed) && !shift(Layout::<2>::VELOCITY, 0.5 * speed));
     assert!(shift(Layout::<2>::LEFT_CAUCHY_GREEN, 1e-3) && !shift(Layout::<2>::LEFT_CAUCHY_GREEN, 5e-3));
-    assert!(shift(Layout::<2>::HISTORY, 1e-3) && !shift(Layout::<2>::HISTORY, 2e-3));
-    assert!(shift(Layout::<2>::HISTORY + 1, 1e-3) && !shift(Layout::<2>::HISTORY + 1, 2e-3));
+    assert!(shift(Layout::<2>::PLASTIC_STRAIN, 1e-3) && !shift(Layout::<2>::PLASTIC_STRAIN, 2e-3));
+    assert!(shift(Layout::<2>::PLASTIC_VOLUME, 1e-3) && !shift(Layout::<2>::PLASTIC_VOLUME, 2e-3));
     assert!(shift(Layout::<2>::POSITION, 0.001) && !shift(Layout::<2>::POSITION, 0.1));
     // Of another material; of a coarser level.
     assert!(!merges(&|chunk| chunk.tags_mut()[2] += 1));

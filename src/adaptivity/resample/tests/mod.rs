@@ -2,7 +2,7 @@
 use super::family::{Bounds, separated};
 use super::*;
 use crate::kernel::Transfer;
-use crate::material::{self, Material, Parameters, State, parameters};
+use crate::material::{self, HISTORIES, Material, Parameters, State, Step};
 use crate::simd::{Lanes, Vector};
 use proptest::prelude::*;
 
@@ -19,19 +19,13 @@ const KINDS: u16 = 3;
 const OPEN: Limits = Limits { velocity: 1e9, strain: 1e9, volume: 1e9, history: 1e9, stretch: 4.0 };
 
 fn materials() -> Vec<Box<dyn Material>> {
-    let elastic = parameters::Elastic { young: 1e6, poisson: 0.3 };
-    let metal = parameters::VonMises { young: 1e6, poisson: 0.3, yield_stress: 2e4, hardening: 1e4 };
-    let sand = parameters::DruckerPrager {
-        young: 1e6,
-        poisson: 0.3,
-        friction_angle: 30.0,
-        matching: parameters::FrictionMatch::default(),
-        volume_correction: true,
-    };
-    [Parameters::Hencky(elastic), Parameters::VonMises(metal), Parameters::DruckerPrager(sand)]
-        .iter()
-        .map(|parameters| material::build(parameters, 1000.0))
-        .collect()
+    [
+        "model = 'hencky', young = 1e6, poisson = 0.3",
+        "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 2e4, hardening = 1e4",
+        "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 30",
+    ]
+    .map(|text| text.parse::<Parameters>().unwrap().build(1000.0))
+    .into()
 }
 
 fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
@@ -84,17 +78,20 @@ fn particles<const D: usize>(seed: u64, level: u8, per_edge: usize, kind: Option
             4 | 5 if D == 2 => 0.0,
             _ => 0.03 * numbers.next(),
         });
-        let history = if material == 0 { [0.0; 2] } else { [0.05 + 0.04 * numbers.next(), 0.0] };
+        let mut history = [0.0; HISTORIES];
+        if material != 0 {
+            history[material::PLASTIC_STRAIN] = 0.05 + 0.04 * numbers.next();
+        }
         set_matter(&mut chunk, p, elastic, history);
     }
     chunk
 }
 
 /// Returns `b` to the yield surface and sets it, with stress and history.
-fn set_matter<const D: usize>(chunk: &mut Chunk<D>, p: usize, elastic: [f64; 6], history: [f64; 2]) {
+fn set_matter<const D: usize>(chunk: &mut Chunk<D>, p: usize, elastic: [f64; 6], history: [f64; HISTORIES]) {
     let mut state = State::new(elastic.map(Lanes::splat));
     state.history = history.map(Lanes::splat);
-    materials()[usize::from(Tag::unpack(chunk.tags()[p]).material)].update(&mut state, D == 2);
+    materials()[usize::from(Tag::unpack(chunk.tags()[p]).material)].update(&mut state, &Step::rest(D == 2));
     let of = |tensor: &[Lanes; 6]| tensor.map(|component| component.to_array()[0]);
     chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &of(&state.elastic)[..Layout::<D>::SYMMETRIC]);
     chunk.write(Layout::<D>::STRESS, p, &of(&state.stress)[..Layout::<D>::SYMMETRIC]);
@@ -140,7 +137,7 @@ fn totals<const D: usize>(chunk: &Chunk<D>) -> Totals {
                 }
             }
         }
-        let [gain] = chunk.read(Layout::<D>::HISTORY + 1, p);
+        let [gain] = chunk.read(Layout::<D>::PLASTIC_VOLUME, p);
         let [work] = chunk.read(Layout::<D>::WORK, p);
         let determinant = material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0];
         add(2 * D + 3, volume(chunk, p));

@@ -1,9 +1,11 @@
 //! Compressible neo-Hookean elasticity: `W = μ/2 (tr b - 3) - μ ln J + λ/2 ln² J`,
 //! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
-use super::eigen::{determinant, greatest_bound};
-use super::{Lame, Law, Material, Response, State, Symmetric};
+use super::Model;
+use crate::material::eigen::{determinant, greatest_bound};
+use crate::material::parameters::{Elastic, Lame};
+use crate::material::{Law, State, Step};
+use crate::simd::Vector;
 use crate::simd::math::ln;
-use crate::simd::{Lanes, Vector, widest};
 
 /// Compressible neo-Hookean solid.
 #[derive(Clone, Copy, Debug)]
@@ -12,17 +14,22 @@ pub struct NeoHookean {
     density: f64,
 }
 
-impl NeoHookean {
-    /// From elastic constants and density, kg/m³.
-    pub fn new(lame: Lame, density: f64) -> Self {
-        Self { lame, density }
+impl Model for NeoHookean {
+    type Parameters = Elastic;
+
+    fn new(p: &Elastic, density: f64) -> Self {
+        Self { lame: Lame::new(p.young, p.poisson), density }
+    }
+
+    fn examples() -> &'static [&'static str] {
+        &["model = 'neo_hookean', young = 1e6, poisson = 0.3"]
     }
 }
 
 impl Law for NeoHookean {
     /// Along a principal direction of stretch s, `ρ₀ c² = s² ∂P/∂F = μ (s² + 1) + λ (1 - ln J)`.
     #[inline(always)]
-    fn respond<V: Vector>(&self, state: &mut State<V>, _plane: bool) {
+    fn respond<V: Vector>(&self, state: &mut State<V>, _step: &Step) {
         let Lame { lambda, mu } = self.lame;
         let one = V::splat(1.0);
         let b = &state.elastic;
@@ -38,16 +45,12 @@ impl Law for NeoHookean {
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
         state.work = V::splat(0.0);
     }
-}
 
-impl Material for NeoHookean {
-    fn update(&self, state: &mut State, plane: bool) {
-        widest(Response(self, state, plane));
-    }
-
-    fn energy(&self, b: &Symmetric, _plane: bool) -> Lanes {
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, _plane: bool) -> V {
         let Lame { lambda, mu } = self.lame;
-        let one = Lanes::splat(1.0);
+        let b = &state.elastic;
+        let one = V::splat(1.0);
         let volume_log = ln(determinant(b)) * 0.5;
         let trace = (b[0] - one) + (b[1] - one) + (b[2] - one);
         (trace * 0.5 - volume_log) * mu + volume_log * volume_log * (0.5 * lambda)

@@ -1,9 +1,11 @@
 //! Hencky elasticity: `W = μ Σ ε² + λ/2 (Σ ε)²`, `τ = 2μ ε + λ tr(ε) I` with the logarithmic strain
 //! `ε = ½ ln b`. Also the elastic part of the plastic models.
-use super::eigen::greatest_bound;
-use super::strain::Strain;
-use super::{Lame, Law, Material, Response, State, Symmetric};
-use crate::simd::{Lanes, Vector, each, widest};
+use super::Model;
+use crate::material::eigen::greatest_bound;
+use crate::material::parameters::{Elastic, Lame};
+use crate::material::tensor::strain::Strain;
+use crate::material::{Law, State, Step, Symmetric};
+use crate::simd::{Vector, each};
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]
@@ -12,14 +14,24 @@ pub struct Hencky {
     density: f64,
 }
 
-impl Hencky {
-    /// From elastic constants and density, kg/m³.
-    pub fn new(lame: Lame, density: f64) -> Self {
-        Self { lame, density }
+impl Model for Hencky {
+    type Parameters = Elastic;
+
+    fn new(p: &Elastic, density: f64) -> Self {
+        Self { lame: Lame::new(p.young, p.poisson), density }
+    }
+
+    fn examples() -> &'static [&'static str] {
+        &["model = 'hencky', young = 1e6, poisson = 0.3"]
     }
 }
 
 impl Hencky {
+    /// The elastic part of a plastic model: Young's modulus, Pa, Poisson's ratio and density, kg/m³.
+    pub(super) fn of(young: f64, poisson: f64, density: f64) -> Self {
+        Self { lame: Lame::new(young, poisson), density }
+    }
+
     /// Shear modulus, Pa.
     pub(super) fn shear_modulus(&self) -> f64 {
         self.lame.mu
@@ -27,7 +39,12 @@ impl Hencky {
 
     /// Writes Kirchhoff stress and wave speed of a strain with this trace and this deviator.
     #[inline(always)]
-    pub(super) fn load<V: Vector>(&self, state: &mut State<V>, trace: V, deviator: &Symmetric<V>) {
+    pub(in crate::material) fn load<V: Vector>(
+        &self,
+        state: &mut State<V>,
+        trace: V,
+        deviator: &Symmetric<V>,
+    ) {
         let pressure = trace * (self.lame.lambda + 2.0 / 3.0 * self.lame.mu);
         state.stress = each(*deviator, |component| component * (2.0 * self.lame.mu));
         for normal in &mut state.stress[..3] {
@@ -47,20 +64,15 @@ impl Hencky {
 
 impl Law for Hencky {
     #[inline(always)]
-    fn respond<V: Vector>(&self, state: &mut State<V>, plane: bool) {
-        let strain = Strain::of(&state.elastic, plane);
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        let strain = Strain::of(&state.elastic, step.plane);
         self.load(state, strain.trace, &strain.deviator);
         state.work = V::splat(0.0);
     }
-}
 
-impl Material for Hencky {
-    fn update(&self, state: &mut State, plane: bool) {
-        widest(Response(self, state, plane));
-    }
-
-    fn energy(&self, b: &Symmetric, plane: bool) -> Lanes {
-        let Strain { trace, norm, .. } = Strain::of(b, plane);
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
+        let Strain { trace, norm, .. } = Strain::of(&state.elastic, plane);
         norm * norm * self.lame.mu + trace * trace * (0.5 * self.lame.lambda + self.lame.mu / 3.0)
     }
 

@@ -3,8 +3,7 @@
 //! By the theorem of Cayley and Hamilton a tensor Y without trace obeys `Y³ = q Y + d I` with `q = tr(Y²)/2` and
 //! `d = det Y`. So all powers, and with them every power series, are sums of I, Y and Y², and a step of Horner's scheme
 //! takes two multiply-adds for the whole tensor.
-use super::Symmetric;
-use super::eigen::determinant;
+use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, each};
 
 /// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most 0.82 times as

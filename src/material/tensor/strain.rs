@@ -2,15 +2,15 @@
 //!
 //! Elastic strains of metals and soils are small, so most tensors are near a multiple of the unit tensor and need no
 //! eigenvectors (`near_unit.rs`). The others are decomposed; which way a particle goes follows from its own state.
-use super::eigen::{Eigen, decompose};
-use super::hencky::Hencky;
+use super::eigen::{Eigen, Symmetric, decompose};
 use super::near_unit::TraceFree;
-use super::{State, Symmetric};
+use crate::material::State;
+use crate::material::laws::hencky::Hencky;
 use crate::simd::math::{exp, ln};
 use crate::simd::{Lanes, Mask, Vector, VectorMask, each};
 
 /// The logarithmic strain `½ ln b` of a trial tensor.
-pub(super) struct Strain<V = Lanes> {
+pub struct Strain<V = Lanes> {
     /// Trace.
     pub trace: V,
     /// Deviator.

@@ -1,0 +1,198 @@
+//! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the trait
+//! that the solver calls ([`Material`]).
+use super::tensor::eigen::Symmetric;
+use super::{HISTORIES, PLASTIC_STRAIN};
+use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
+
+/// State of a batch of particles. Symmetric tensors have components `xx, yy, zz, xy, xz, yz`.
+#[derive(Clone, Copy, Debug)]
+pub struct State<V = Lanes> {
+    /// Elastic left Cauchy-Green tensor: the trial value before, the final one after an update.
+    pub elastic: Symmetric<V>,
+    /// Kirchhoff stress after an update, Pa.
+    pub stress: Symmetric<V>,
+    /// History variables: [`PLASTIC_STRAIN`], [`super::PLASTIC_VOLUME`], then those of the model (see
+    /// [`Material::history_names`]).
+    pub history: [V; HISTORIES],
+    /// Plastic work of the update per reference volume, J/m³; not negative.
+    pub work: V,
+    /// Upper bound of the wave speeds after an update, m/s.
+    pub wave_speed: V,
+}
+
+impl<V: Vector> State<V> {
+    /// A batch at rest with `elastic` as trial value and no history.
+    pub fn new(elastic: Symmetric<V>) -> Self {
+        let zero = V::splat(0.0);
+        Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+    }
+}
+
+impl State {
+    /// In the registers of a kernel, with the first `histories` history variables.
+    #[inline(always)]
+    fn read<V: Vector>(&self, histories: usize) -> State<V> {
+        let mut state = State::new([V::splat(0.0); 6]);
+        for c in 0..6 {
+            state.elastic[c] = V::load(self.elastic[c].as_array());
+            state.stress[c] = V::load(self.stress[c].as_array());
+        }
+        for h in 0..HISTORIES {
+            if h < histories {
+                state.history[h] = V::load(self.history[h].as_array());
+            }
+        }
+        state.work = V::load(self.work.as_array());
+        state.wave_speed = V::load(self.wave_speed.as_array());
+        state
+    }
+
+    /// Takes over what is in the registers of a kernel.
+    #[inline(always)]
+    fn write<V: Vector>(&mut self, state: &State<V>, histories: usize) {
+        for c in 0..6 {
+            state.elastic[c].store(self.elastic[c].as_array_mut());
+            state.stress[c].store(self.stress[c].as_array_mut());
+        }
+        for h in 0..HISTORIES {
+            if h < histories {
+                state.history[h].store(self.history[h].as_array_mut());
+            }
+        }
+        state.work.store(self.work.as_array_mut());
+        state.wave_speed.store(self.wave_speed.as_array_mut());
+    }
+}
+
+/// What a law is told of the step.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Length of the step, s; 0 for an update without increment, in which nothing flows by its rate.
+    pub dt: f64,
+    /// Whether the components xz and yz of all tensors are zero.
+    pub plane: bool,
+    /// Edge of the cells on which the particles move, m: what bounds the step of viscous flow.
+    pub cell: f64,
+    /// Edge of the cells that each particle was made for, m: what softening is regularised with. 0: no cells. Set
+    /// only for models that ask for it ([`Material::softens`]).
+    pub size: [f64; LANES],
+}
+
+impl Step {
+    /// An update without increment and without cells.
+    pub fn rest(plane: bool) -> Self {
+        Self { dt: 0.0, plane, cell: f64::INFINITY, size: [0.0; LANES] }
+    }
+}
+
+/// A constitutive model for the registers of any instruction set. [`Material`] follows from it.
+///
+/// Each lane is computed from that lane alone, so the bits of a particle do not depend on its neighbours in the batch.
+pub trait Law: std::fmt::Debug + Send + Sync {
+    /// History columns that it reads and writes; 0 for laws without history.
+    const HISTORIES: usize = 0;
+
+    /// See [`Material::update`]. To be marked `inline(always)`.
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step);
+
+    /// See [`Material::energy`]. To be marked `inline(always)`.
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V;
+
+    /// See [`Material::density`].
+    fn density(&self) -> f64;
+
+    /// See [`Material::wave_speed`].
+    fn wave_speed(&self) -> f64;
+
+    /// See [`Material::history_names`].
+    fn history_names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// See [`Material::initial_history`].
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        [0.0; HISTORIES]
+    }
+
+    /// See [`Material::softens`].
+    fn softens(&self) -> bool {
+        false
+    }
+}
+
+/// A constitutive model with its parameters, called once for each batch of particles.
+pub trait Material: std::fmt::Debug + Send + Sync {
+    /// From the trial elastic tensor to the final one, stress, history, work and wave speed.
+    fn update(&self, state: &mut State, step: &Step);
+
+    /// Elastic energy per reference volume, J/m³, of elastic tensor and history. `plane` says that the components xz and
+    /// yz of all tensors are zero.
+    fn energy(&self, state: &State, plane: bool) -> Lanes;
+
+    /// Density of the undeformed material, kg/m³.
+    fn density(&self) -> f64;
+
+    /// Greatest wave speed of the undeformed material, m/s.
+    fn wave_speed(&self) -> f64;
+
+    /// Names of the history variables in use, at most [`HISTORIES`]. The first, if there are any, is a measure of plastic
+    /// strain; the second, if there are two, the logarithm of the plastic volume ratio; more belong to the model.
+    fn history_names(&self) -> &'static [&'static str];
+
+    /// History variables of an undeformed particle.
+    fn initial_history(&self) -> [f64; HISTORIES];
+
+    /// Whether it asks for the size of cells ([`Step::size`]).
+    fn softens(&self) -> bool;
+
+    /// True for models that flow: they have history, do plastic work, and their stretch since the
+    /// start is unbounded.
+    fn is_plastic(&self) -> bool {
+        self.history_names().len() > PLASTIC_STRAIN
+    }
+}
+
+impl<L: Law> Material for L {
+    fn update(&self, state: &mut State, step: &Step) {
+        widest(Response(self, state, step));
+    }
+
+    fn energy(&self, state: &State, plane: bool) -> Lanes {
+        Law::energy(self, state, plane)
+    }
+
+    fn density(&self) -> f64 {
+        Law::density(self)
+    }
+
+    fn wave_speed(&self) -> f64 {
+        Law::wave_speed(self)
+    }
+
+    fn history_names(&self) -> &'static [&'static str] {
+        Law::history_names(self)
+    }
+
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        Law::initial_history(self)
+    }
+
+    fn softens(&self) -> bool {
+        Law::softens(self)
+    }
+}
+
+/// A [`Law`] with its arguments, to be compiled for several instruction sets.
+struct Response<'a, L>(&'a L, &'a mut State, &'a Step);
+
+impl<L: Law> Kernel for Response<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self(law, state, step) = self;
+        let mut own = state.read::<V>(L::HISTORIES);
+        law.respond(&mut own, step);
+        state.write(&own, L::HISTORIES);
+    }
+}

@@ -1,0 +1,116 @@
+//! The constitutive models, one file each, and the list of them.
+//!
+//! A file holds the parameters of a model as they stand in a job file, with ranges and units, and its law. A line of the
+//! list below makes it a choice of the job file and of `agimp material`, with schema, checks and reference, and has it
+//! tested and benchmarked with the rest.
+//!
+//! | file | model |
+//! |---|---|
+//! | `neo_hookean.rs` | compressible neo-Hookean elasticity |
+//! | `fixed_corotated.rs` | fixed corotated elasticity |
+//! | `hencky.rs` | Hencky elasticity; elastic part of the plastic models |
+//! | `von_mises.rs` | metal: von Mises yield, isotropic hardening |
+//! | `drucker_prager.rs` | sand: Drucker-Prager yield |
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::law::{Law, Material};
+use super::parameters::{OutOfRange, ranges};
+
+pub mod drucker_prager;
+pub mod fixed_corotated;
+pub mod hencky;
+pub mod neo_hookean;
+pub mod von_mises;
+
+/// A constitutive model with the form of its parameters.
+pub trait Model: Law {
+    /// Parameters as they stand in a job file. Descriptions and ranges of the keys are those of the schema.
+    type Parameters: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema;
+
+    /// The model with these parameters and the density of the undeformed material, kg/m³.
+    fn new(parameters: &Self::Parameters, density: f64) -> Self;
+
+    /// Checks what the ranges of single keys cannot say.
+    fn check(_parameters: &Self::Parameters) -> Result<(), OutOfRange> {
+        Ok(())
+    }
+
+    /// Sets of parameters, in the form of a job file, that between them take every way through the law: for tests and
+    /// benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
+    fn examples() -> &'static [&'static str];
+}
+
+/// Makes the choice of models from a list of them.
+macro_rules! materials {
+    ($($(#[$description:meta])* $name:ident($law:ty),)*) => {
+        /// A constitutive model and its parameters.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(tag = "model", rename_all = "snake_case")]
+        pub enum Parameters {
+            $($(#[$description])* $name(<$law as Model>::Parameters),)*
+        }
+
+        /// History variables that each particle has room for: as many as the model with most of them asks for.
+        pub const HISTORIES: usize = {
+            let mut most = super::PLASTIC_VOLUME + 1;
+            $(if <$law as Law>::HISTORIES > most {
+                most = <$law as Law>::HISTORIES;
+            })*
+            most
+        };
+
+        impl Parameters {
+            /// The model with these parameters and the density of the undeformed material, kg/m³.
+            pub fn build(&self, density: f64) -> Box<dyn Material> {
+                match self {
+                    $(Self::$name(parameters) => Box::new(<$law as Model>::new(parameters, density)),)*
+                }
+            }
+
+            /// Checks the ranges that the models need.
+            pub fn check(&self) -> Result<(), OutOfRange> {
+                ranges::check(self)?;
+                match self {
+                    $(Self::$name(parameters) => <$law as Model>::check(parameters),)*
+                }
+            }
+
+            /// Every model with the parameters of its examples.
+            pub fn examples() -> Vec<&'static str> {
+                [$(<$law as Model>::examples(),)*].concat()
+            }
+        }
+
+        /// Calls a function with the law of each example of each model.
+        #[cfg(test)]
+        pub(super) fn for_each_law(visitor: &impl Visitor) {
+            $(for text in <$law as Model>::examples() {
+                if let Ok(Parameters::$name(parameters)) = text.parse() {
+                    visitor.visit(text, &<$law as Model>::new(&parameters, 1000.0));
+                }
+            })*
+        }
+    };
+}
+
+/// What [`for_each_law`] calls.
+#[cfg(test)]
+pub(super) trait Visitor {
+    /// An example and its law.
+    fn visit(&self, example: &str, law: &impl Law);
+}
+
+materials! {
+    /// Compressible neo-Hookean elasticity: `τ = μ (b - I) + λ ln(J) I`.
+    NeoHookean(neo_hookean::NeoHookean),
+    /// Fixed corotated elasticity: `τ = 2μ (V² - V) + λ (J - 1) J I`.
+    FixedCorotated(fixed_corotated::FixedCorotated),
+    /// Hencky elasticity: `τ = 2μ ln V + λ ln(J) I`.
+    Hencky(hencky::Hencky),
+    /// Von Mises plasticity.
+    VonMises(von_mises::VonMises),
+    /// Drucker-Prager plasticity.
+    DruckerPrager(drucker_prager::DruckerPrager),
+}
