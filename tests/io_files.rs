@@ -15,6 +15,17 @@ use partition::{Brick, Octant};
 /// Runs `body` on each number of ranks in a directory shared by all of them, then `after` in the test
 /// process. Each number of ranks is a new process group, as MPI starts once per process.
 fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm, &Path), after: impl Fn(&Path)) {
+    launch(test, ranks, body, after, |_| {});
+}
+
+/// As [`on_ranks`]; what the ranks print goes to `tell`.
+fn launch(
+    test: &str,
+    ranks: &[usize],
+    body: impl Fn(&Comm, &Path),
+    after: impl Fn(&Path),
+    tell: impl Fn(&str),
+) {
     if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
         let world = World::init().expect("MPI starts");
         let directory = PathBuf::from(std::env::var_os("AGIMP_TEST_DIRECTORY").expect("set by the launcher"));
@@ -26,11 +37,12 @@ fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm, &Path), after: imp
         let output = mpirun(directory.path())
             .args(["-n", &n.to_string()])
             .arg(std::env::current_exe().expect("own path"))
-            .args(["--exact", test, "--nocapture", "--test-threads=1"])
+            .args(["--exact", test, "--nocapture", "--test-threads=1", "--include-ignored"])
             .output()
             .expect("mpirun starts");
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
+        tell(&text);
     }
     after(directory.path());
 }
@@ -615,5 +627,44 @@ fn vtk_reads_particles_and_tree() {
                 assert_eq!(found[1]["cell_data"]["particles"]["sum"].as_f64(), Some(particles as f64));
             }
         },
+    );
+}
+
+/// Speed of checkpoints, a few MB and many, by ranks:
+/// `cargo test --release --test io_files -- --ignored --nocapture speed_of_checkpoints`.
+#[test]
+#[ignore = "measures; checks nothing but that the files are written"]
+fn speed_of_checkpoints() {
+    const NAME: &str = "speed_of_checkpoints";
+    launch(
+        NAME,
+        &[1, 2, 3, 4],
+        |comm, directory| {
+            for (leaves, crowd, times) in [(400, 100, 20), (40_000, 100, 5)] {
+                let run = Run::<3>::example(share(comm, leaves, 0), crowd);
+                let path = directory.join("speed.vtkhdf");
+                let (mut handed, mut on_disk) = (Vec::new(), Vec::new());
+                for _ in 0..times {
+                    comm.barrier();
+                    let start = std::time::Instant::now();
+                    let file = snapshot::start_write(comm, &path, &run.view(), &options()).expect("written");
+                    handed.push(start.elapsed().as_secs_f64());
+                    file.finish(comm).expect("on disk");
+                    on_disk.push(start.elapsed().as_secs_f64());
+                }
+                let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+                if comm.rank() == 0 {
+                    let size = bytes(&path).len() as f64 / 1e6;
+                    println!(
+                        "speed: {} ranks, {size:.1} MB: {:.1} ms to hand over, {:.1} ms until on disk",
+                        comm.size(),
+                        1e3 * least(&handed),
+                        1e3 * least(&on_disk)
+                    );
+                }
+            }
+        },
+        |_| {},
+        |text| text.lines().filter(|line| line.starts_with("speed:")).for_each(|line| println!("{line}")),
     );
 }

@@ -8,11 +8,11 @@ use hdf5_sys::h5o::{H5Oclose, H5Oopen};
 use hdf5_sys::h5p::H5P_DEFAULT;
 use hdf5_sys::h5s::{H5S_SCALAR, H5Sclose, H5Screate, H5Screate_simple, H5Sget_simple_extent_npoints};
 use hdf5_sys::h5t::{
-    H5T_C_S1, H5T_STR_NULLPAD, H5T_STRING, H5Tclose, H5Tcopy, H5Tget_class, H5Tget_size, H5Tset_size,
-    H5Tset_strpad,
+    H5T_C_S1, H5T_STR_NULLPAD, H5T_STRING, H5Tclose, H5Tcopy, H5Tget_class, H5Tget_size, H5Tis_variable_str,
+    H5Tset_size, H5Tset_strpad,
 };
 
-use super::{Element, FileError, Handle, ParallelFile, c_text};
+use super::{Element, FileError, Handle, ParallelFile, c_text, library_error};
 
 impl ParallelFile {
     /// Not collective. True when the object has that attribute.
@@ -73,14 +73,21 @@ impl ParallelFile {
     /// Not collective. The values of a numeric attribute.
     pub fn attribute<T: Element>(&self, object: &str, name: &str) -> Result<Vec<T>, FileError> {
         let attribute = self.open_attribute(object, name)?;
-        // SAFETY: open attribute; the buffer has as many elements as the attribute's space.
+        // SAFETY: open attribute, whose numbers are of the kind and size of `T`; the buffer has as many elements as its space.
         unsafe {
-            let space = self.wrap(H5Aget_space(attribute.id), H5Sclose, "read attribute", name)?;
             let kind = self.wrap(H5Aget_type(attribute.id), H5Tclose, "read attribute", name)?;
             if H5Tget_class(kind.id) == H5T_STRING {
                 return Err(self.refuse(format!("attribute {object}/{name} is a text, not a number")));
             }
-            let mut values = vec![T::zeroed(); H5Sget_simple_extent_npoints(space.id).max(0) as usize];
+            let same = H5Tget_class(kind.id) == H5Tget_class(T::file_type());
+            if !(same && H5Tget_size(kind.id) == size_of::<T>()) {
+                return Err(
+                    self.refuse(format!("attribute {object}/{name} is no number of the kind expected"))
+                );
+            }
+            let count = self.elements(&attribute, name)?;
+            self.check_bytes(count, size_of::<T>(), || format!("attribute {object}/{name}"))?;
+            let mut values = vec![T::zeroed(); count as usize];
             let code = H5Aread(attribute.id, T::memory_type(), values.as_mut_ptr().cast());
             self.check(code, "read attribute", name)?;
             Ok(values)
@@ -90,19 +97,33 @@ impl ParallelFile {
     /// Not collective. A text attribute.
     pub fn text(&self, object: &str, name: &str) -> Result<String, FileError> {
         let attribute = self.open_attribute(object, name)?;
-        // SAFETY: open attribute; the buffer is as long as the attribute's fixed-length string type.
+        // SAFETY: open attribute with one element of a string type of fixed length; the buffer is as long as that.
         unsafe {
             let kind = self.wrap(H5Aget_type(attribute.id), H5Tclose, "read attribute", name)?;
-            if H5Tget_class(kind.id) != H5T_STRING {
-                return Err(self.refuse(format!("attribute {object}/{name} is not a text")));
+            // An element of variable length would be read as the address of its text.
+            let fixed = H5Tget_class(kind.id) == H5T_STRING && H5Tis_variable_str(kind.id) == 0;
+            if !fixed || self.elements(&attribute, name)? != 1 {
+                return Err(self.refuse(format!("attribute {object}/{name} is not one text of fixed length")));
             }
-            let mut bytes = vec![0_u8; H5Tget_size(kind.id)];
+            let length = H5Tget_size(kind.id);
+            self.check_bytes(1, length, || format!("attribute {object}/{name}"))?;
+            let mut bytes = vec![0_u8; length];
             self.check(H5Aread(attribute.id, kind.id, bytes.as_mut_ptr().cast()), "read attribute", name)?;
             let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
             bytes.truncate(end);
             String::from_utf8(bytes)
                 .map_err(|_| self.refuse(format!("attribute {object}/{name} is not UTF-8")))
         }
+    }
+
+    /// Not collective. Elements of an attribute.
+    fn elements(&self, attribute: &Handle, name: &str) -> Result<u64, FileError> {
+        // SAFETY: open attribute; the space is checked and closed by `wrap`.
+        let count = unsafe {
+            let space = self.wrap(H5Aget_space(attribute.id), H5Sclose, "read attribute", name)?;
+            H5Sget_simple_extent_npoints(space.id)
+        };
+        u64::try_from(count).map_err(|_| self.error("read attribute", name, library_error()))
     }
 
     fn open_attribute(&self, object: &str, name: &str) -> Result<Handle, FileError> {

@@ -77,10 +77,13 @@ impl ParallelFile {
                     "{dataset} has {global_rows} rows; {rows} from row {offset} were asked for"
                 )));
             }
-            Ok((set, global_rows, components.max(1)))
+            let width = components.max(1);
+            let row_bytes = width.saturating_mul(size_of::<T>());
+            self.check_bytes(rows, row_bytes, || format!("data set {dataset}"))?;
+            Ok((set, global_rows, width, rows as usize * width))
         });
-        let (set, global_rows, width) = self.agree(opened)?;
-        let mut values = vec![T::zeroed(); rows as usize * width];
+        let (set, global_rows, width, numbers) = self.agree(opened)?;
+        let mut values = vec![T::zeroed(); numbers];
         let slab = Slab { offset, rows, width: width as u64 };
         self.in_rounds::<T>(&set, dataset, slab, global_rows, "read", |memory, file, first| {
             let part = &mut values[first * width..];

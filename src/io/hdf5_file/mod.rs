@@ -218,6 +218,21 @@ impl ParallelFile {
         FileError::Refused { path: self.path.clone(), reason: reason.into() }
     }
 
+    /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it. To be asked before any
+    /// memory whose size a file tells is taken.
+    fn check_bytes(&self, count: u64, element: usize, object: impl Fn() -> String) -> Result<(), FileError> {
+        let held = std::fs::metadata(&self.path).map_or(0, |data| data.len());
+        // No type of ours shrinks a number to less than an eighth, when the file's are converted.
+        let most = held.saturating_mul(8);
+        match count.checked_mul(element as u64) {
+            Some(bytes) if bytes <= most && usize::try_from(bytes).is_ok() => Ok(()),
+            _ => Err(self.refuse(format!(
+                "{} has {count} elements of {element} bytes, more than the file of {held} bytes holds",
+                object()
+            ))),
+        }
+    }
+
     /// Collective on a shared file. The same result on all ranks.
     pub fn agree<T>(&self, result: Result<T, FileError>) -> Result<T, FileError> {
         agreed(self.comm.as_ref(), result)
