@@ -23,7 +23,7 @@ const D: usize = 3;
 
 fn main() {
     let world = World::init().expect("MPI starts");
-    let text = include_str!("../jobs/scaling/block.toml");
+    let text = include_str!("../studies/scaling/block.toml");
     let words = [
         ("SIZE_X", "1.0"),
         ("SIZE_Y", "1.0"),

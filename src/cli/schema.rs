@@ -17,7 +17,7 @@ pub struct Arguments {
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if arguments.markdown {
-        write!(out, "{}", crate::job::reference::reference())?;
+        write!(out, "{}", crate::job::schema::reference::reference())?;
         return Ok(());
     }
     let text = serde_json::to_string_pretty(&crate::job::schema())

@@ -3,27 +3,14 @@
 //! A file is parsed to a tree that knows where everything stands ([`load`]), checked against the
 //! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a
 //! [`Problem`] of its dimension.
-mod adaptivity;
-mod colliders;
 mod convert;
-pub mod error;
-pub mod file;
-pub mod file_adaptivity;
-pub mod file_colliders;
-pub mod file_output;
-pub mod file_shape;
-mod overlap;
+mod parse;
 pub mod problem;
-pub mod reference;
-mod schema;
-mod settings;
-mod shapes;
-mod source;
-mod structure;
+pub mod schema;
 
-pub use error::{Fault, FaultList, JobError};
+pub use parse::error::{Fault, FaultList, JobError};
 pub use problem::{AnyProblem, Problem};
-pub use schema::schema;
+pub use schema::json::schema;
 
 use std::path::Path;
 
@@ -65,19 +52,19 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
 /// All faults that were found.
 pub fn parse(text: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
     let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None }];
-    let tree = source::Node::parse(text).map_err(|(span, message)| match text.get(span.clone()) {
+    let tree = parse::source::Node::parse(text).map_err(|(span, message)| match text.get(span.clone()) {
         Some(key) if message == "duplicate key" => {
             let message = "found the key a second time; expected it once".into();
             vec![Fault { key: key.to_owned(), message, span, help: None }]
         }
         _ => alone(span, message),
     })?;
-    let faults = structure::check(&tree, &schema());
+    let faults = parse::structure::check(&tree, &schema());
     if !faults.is_empty() {
         return Err(faults);
     }
     // What the schema accepts, the types accept; should they ever differ, the parser's words count.
-    let file: file::JobFile = toml::from_str(text)
+    let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
     convert::convert(&file, &tree, text, path)
 }

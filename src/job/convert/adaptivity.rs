@@ -1,0 +1,162 @@
+//! Dynamic refinement of the job file to that of the solver.
+use super::{Checks, Space};
+use crate::adaptivity::resample::Limits;
+use crate::adaptivity::{Adaptivity, Criterion, Kind};
+use crate::boundary::motion::{Knot, Motion};
+use crate::job::parse::error::alternatives;
+use crate::job::parse::source::Path;
+use crate::job::problem::{Body, BoxPolicy, TreeSetup};
+use crate::job::schema::adaptivity::{Criterion as Written, Way};
+use crate::job::schema::job_file::JobFile;
+
+/// What the conversion needs of the rest of the job.
+pub(super) struct Context<'a, const D: usize> {
+    pub file: &'a JobFile,
+    pub space: &'a Space<D>,
+    pub tree: &'a TreeSetup<D>,
+    pub bodies: &'a [Body<D>],
+    pub boxes: BoxPolicy,
+    pub root_edge: f64,
+}
+
+/// The job's dynamic refinement, if it wants any.
+pub(in crate::job) fn adaptivity<const D: usize>(
+    checks: &mut Checks,
+    context: &Context<D>,
+    path: &Path,
+) -> Option<Adaptivity<D>> {
+    let written = context.file.adaptivity.as_ref()?;
+    let merge = &written.merge;
+    if let BoxPolicy::Volume { max_stretch, .. } = context.boxes {
+        if written.split_stretch > max_stretch {
+            checks.fault(
+                &path.key("split_stretch"),
+                format!(
+                    "found {}; expected at most {max_stretch}, the upper bound of numerics.box_stretch",
+                    written.split_stretch
+                ),
+            );
+        }
+        if merge.enabled && merge.stretch >= written.split_stretch {
+            checks.fault(
+                &path.key("merge").key("stretch"),
+                format!(
+                    "found {}; expected less than adaptivity.split_stretch = {}, or merges would undo splits",
+                    merge.stretch, written.split_stretch
+                ),
+            );
+        }
+    }
+    let criteria: Vec<Option<Criterion<D>>> = (written.criteria.iter().enumerate())
+        .map(|(i, criterion)| self::criterion(checks, criterion, context, &path.key("criteria").index(i)))
+        .collect();
+    let limits = Limits {
+        velocity: merge.velocity,
+        strain: merge.strain,
+        volume: merge.volume,
+        history: merge.plastic_strain,
+        stretch: merge.stretch,
+    };
+    let regions = context.tree.regions.iter().map(|region| (region.shape.clone(), region.level));
+    let cell = context.root_edge / 4.0;
+    Some(Adaptivity {
+        every: written.every_steps,
+        travel: written.travel,
+        buffer: written.buffer,
+        base_level: context.tree.base_level,
+        regions: regions.collect(),
+        criteria: criteria.into_iter().collect::<Option<_>>()?,
+        split_stretch: matches!(context.boxes, BoxPolicy::Volume { .. }).then_some(written.split_stretch),
+        merge: merge.enabled.then_some(limits),
+        nominal: context.bodies.iter().map(|body| 0.5 * cell / body.particles_per_cell).collect(),
+    })
+}
+
+fn criterion<const D: usize>(
+    checks: &mut Checks,
+    written: &Written,
+    context: &Context<D>,
+    path: &Path,
+) -> Option<Criterion<D>> {
+    let file = context.file;
+    let (kind, level, refine, coarsen) = match written {
+        Written::Region { level, shape, distance, coarsen, motion } => {
+            let shape = checks.shape(shape, context.space, &path.key("shape"));
+            let motion = ways(checks, motion, &path.key("motion"));
+            let coarsen = coarsen.unwrap_or(1.5 * distance);
+            (Kind::Region { shape: shape?, motion: motion? }, *level, *distance, coarsen)
+        }
+        Written::Collider { level, collider, distance, coarsen } => {
+            let names = || file.colliders.iter().map(|collider| collider.name.as_str());
+            let index = named(checks, collider, names, "collider", &path.key("collider"))?;
+            (Kind::Collider(index), *level, *distance, coarsen.unwrap_or(1.5 * distance))
+        }
+        Written::FreeSurface { level } => (Kind::FreeSurface, *level, 1.0, 1.0),
+        Written::VelocityGradient { level, refine, coarsen } => {
+            (Kind::VelocityGradient, *level, *refine, coarsen.unwrap_or(0.5 * refine))
+        }
+        Written::PlasticStrain { level, refine, coarsen } => {
+            (Kind::PlasticStrain, *level, *refine, coarsen.unwrap_or(0.5 * refine))
+        }
+        Written::PlasticStrainRate { level, refine, coarsen } => {
+            (Kind::PlasticStrainRate, *level, *refine, coarsen.unwrap_or(0.5 * refine))
+        }
+        Written::Stretch { level, refine, coarsen } => {
+            (Kind::Stretch, *level, *refine, coarsen.unwrap_or(0.5 + 0.5 * refine))
+        }
+        Written::Material { level, material } => {
+            let names = || file.materials.iter().map(|material| material.name.as_str());
+            let index = named(checks, material, names, "material", &path.key("material"))?;
+            (Kind::Material(index as u16), *level, 1.0, 1.0)
+        }
+    };
+    let base = context.tree.base_level;
+    if level <= base {
+        let message = format!("found {level}; expected a level deeper than tree.base_level = {base}");
+        checks.fault(&path.key("level"), message);
+    }
+    let is_distance = matches!(kind, Kind::Region { .. } | Kind::Collider(_));
+    let key = if is_distance { "distance" } else { "refine" };
+    if is_distance && coarsen < refine || !is_distance && coarsen > refine {
+        let side = if is_distance { "least" } else { "most" };
+        checks.fault(
+            &path.key("coarsen"),
+            format!("found {coarsen}; expected at {side} {key} = {refine}, or leaves would flicker"),
+        );
+    }
+    Some(Criterion { kind, level, refine, coarsen })
+}
+
+/// Index of a name among others.
+fn named<'a, I: Iterator<Item = &'a str>>(
+    checks: &mut Checks,
+    name: &str,
+    known: impl Fn() -> I,
+    what: &str,
+    path: &Path,
+) -> Option<usize> {
+    let index = known().position(|other| other == name);
+    if index.is_none() {
+        let list = if known().next().is_some() { alternatives(known()) } else { "there is none".into() };
+        checks.fault(path, format!("found \"{name}\"; expected the name of a {what}: {list}"));
+    }
+    index
+}
+
+/// The motion of a region.
+fn ways<const D: usize>(checks: &mut Checks, ways: &[Way], path: &Path) -> Option<Motion<D>> {
+    if ways.is_empty() {
+        return Some(Motion::Fixed);
+    }
+    let mut knots: Vec<Knot<D>> = Vec::new();
+    for (i, way) in ways.iter().enumerate() {
+        let here = path.index(i);
+        if let Some(before) = knots.last().filter(|before| before.time >= way.time) {
+            let message = format!("found {}; expected more than {} of the row before", way.time, before.time);
+            checks.fault(&here.key("time"), message);
+        }
+        let translation = checks.vector(&way.translation, &here.key("translation"))?;
+        knots.push(Knot { time: way.time, translation, angle: 0.0 });
+    }
+    Some(Motion::Table(knots))
+}

@@ -1,0 +1,194 @@
+//! Colliders of the job file to those of the solver.
+use super::{Checks, Space};
+use crate::boundary::motion::{Free, Knot, Motion, Rate};
+use crate::boundary::{Collider, Contact};
+use crate::geometry::Aabb;
+use crate::job::parse::source::Path;
+use crate::job::schema::colliders::{Contact as WrittenContact, Motion as Written, Row};
+use crate::job::schema::job_file::{self as file, AxisName, Spin};
+
+/// Most colliders of a job: what a checkpoint's header has room for.
+const MAX_COLLIDERS: usize = 16;
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
+
+/// All colliders, or faults.
+pub(in crate::job) fn colliders<const D: usize>(
+    checks: &mut Checks,
+    colliders: &[file::Collider],
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Collider<D>>> {
+    if colliders.len() > MAX_COLLIDERS {
+        checks.fault(path, format!("found {} colliders; expected at most {MAX_COLLIDERS}", colliders.len()));
+    }
+    let mut all = Vec::new();
+    for (i, written) in colliders.iter().enumerate() {
+        let here = path.index(i);
+        name(checks, written, &colliders[..i], &here.key("name"));
+        all.push(collider(checks, written, space, &here));
+    }
+    all.into_iter().collect()
+}
+
+/// The name is part of the names of columns.
+fn name(checks: &mut Checks, written: &file::Collider, before: &[file::Collider], path: &Path) {
+    let name = &written.name;
+    let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(allowed) {
+        checks.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
+    } else if before.iter().any(|other| other.name == *name) {
+        checks.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
+    }
+}
+
+fn collider<const D: usize>(
+    checks: &mut Checks,
+    written: &file::Collider,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Collider<D>> {
+    let motion = motion::<D>(checks, written.motion.as_ref(), &path.key("motion"));
+    let here = path.key("shape");
+    let shape = checks.shape(&written.shape, space, &here)?;
+    let bounds = shape.bounds();
+    if bounds.is_empty() {
+        checks.fault(&here, "found a shape without a point; expected one with a volume".into());
+        return None;
+    }
+    let reference = match &written.reference {
+        Some(point) => checks.point(point, space, &path.key("reference"))?,
+        None => centre(&bounds, space),
+    };
+    let (motion, axis) = motion?;
+    let contact = match written.contact {
+        None => Contact::Separating { friction: 0.0 },
+        Some(WrittenContact::Sticky {}) => Contact::Sticky,
+        Some(WrittenContact::Slip {}) => Contact::Slip,
+        Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },
+    };
+    Some(Collider { name: written.name.clone(), shape, reference, axis, contact, motion })
+}
+
+/// The centre of a box, along each axis cut by the domain where it is unbounded.
+fn centre<const D: usize>(bounds: &Aabb<D>, space: &Space<D>) -> [f64; D] {
+    std::array::from_fn(|a| {
+        let (low, high) = (bounds.lower[a], bounds.upper[a]);
+        match (low.is_finite(), high.is_finite()) {
+            (true, true) => 0.5 * (low + high),
+            (true, false) => 0.5 * (low + space.size[a].max(low)),
+            (false, true) => 0.5 * high.max(0.0),
+            (false, false) => 0.5 * space.size[a],
+        }
+    })
+}
+
+/// A motion with its axis.
+fn motion<const D: usize>(
+    checks: &mut Checks,
+    motion: Option<&Written>,
+    path: &Path,
+) -> Option<(Motion<D>, [f64; 3])> {
+    match motion {
+        None | Some(Written::Fixed {}) => Some((Motion::Fixed, Z)),
+        Some(Written::Steady { velocity, angular_velocity }) => {
+            let velocity = optional(checks, velocity.as_ref(), &path.key("velocity"))?;
+            let spin = match (angular_velocity, D) {
+                (None, _) => [0.0; 3],
+                (Some(Spin::Plane(spin)), 2) => [0.0, 0.0, *spin],
+                (Some(Spin::Space(spin)), 3) => *spin,
+                (Some(given), _) => {
+                    let (found, expected) = match given {
+                        Spin::Plane(_) => ("a number", "an array of 3 components in a 3D job"),
+                        Spin::Space(_) => ("an array", "a number (about z) in a 2D job"),
+                    };
+                    let message = format!("found {found}; expected {expected}");
+                    checks.fault(&path.key("angular_velocity"), message);
+                    return None;
+                }
+            };
+            if D == 2 {
+                return Some((Motion::Steady(Rate { velocity, spin: spin[2] }), Z));
+            }
+            let speed = spin.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt();
+            let axis = if speed > 0.0 { spin.map(|c| c / speed) } else { Z };
+            Some((Motion::Steady(Rate { velocity, spin: speed }), axis))
+        }
+        Some(Written::Table { axis, rows }) => {
+            let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"));
+            let rows = table(checks, rows, &path.key("rows"));
+            Some((Motion::Table(rows?), axis?))
+        }
+        Some(Written::Free { mass, velocity, along, inertia, axis, angular_velocity }) => {
+            let velocity = optional(checks, velocity.as_ref(), &path.key("velocity"));
+            if inertia.is_none() && *angular_velocity != 0.0 {
+                let message = "found an angular velocity; expected it only with inertia";
+                checks.fault(&path.key("angular_velocity"), message.into());
+            }
+            let along = allowed::<D>(checks, along.as_deref(), &path.key("along"))?;
+            let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"))?;
+            let velocity: [f64; D] = velocity?;
+            for a in (0..D).filter(|&a| !along[a] && velocity[a] != 0.0) {
+                let message = format!("found {}; expected 0 along an axis that is not in along", velocity[a]);
+                checks.fault(&path.key("velocity").index(a), message);
+            }
+            let start = Rate { velocity, spin: *angular_velocity };
+            Some((Motion::Free(Free { mass: *mass, along, inertia: *inertia, start }), axis))
+        }
+    }
+}
+
+/// A vector, or 0 where none is given.
+fn optional<const D: usize>(
+    checks: &mut Checks,
+    vector: Option<&file::Vector>,
+    path: &Path,
+) -> Option<[f64; D]> {
+    vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
+}
+
+fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Vec<Knot<D>>> {
+    if rows.len() < 2 {
+        checks.fault(path, format!("found {} rows; expected at least 2", rows.len()));
+        return None;
+    }
+    let mut knots = Vec::new();
+    for (i, row) in rows.iter().enumerate() {
+        let here = path.index(i);
+        if i > 0 && row.time <= rows[i - 1].time {
+            let message = format!("found {}; expected more than the {} before", row.time, rows[i - 1].time);
+            checks.fault(&here.key("time"), message);
+        }
+        let translation = optional(checks, row.translation.as_ref(), &here.key("translation"));
+        knots.push(translation.map(|translation| Knot {
+            time: row.time,
+            translation,
+            angle: row.rotation.to_radians(),
+        }));
+    }
+    knots.into_iter().collect()
+}
+
+/// Which axes a list names.
+fn allowed<const D: usize>(
+    checks: &mut Checks,
+    along: Option<&[AxisName]>,
+    path: &Path,
+) -> Option<[bool; D]> {
+    let Some(names) = along else { return Some([true; D]) };
+    let mut allowed = [false; D];
+    for (i, name) in names.iter().enumerate() {
+        let axis = match name {
+            AxisName::X => 0,
+            AxisName::Y => 1,
+            AxisName::Z => 2,
+        };
+        match allowed.get_mut(axis) {
+            None => {
+                checks.fault(&path.index(i), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
+                return None;
+            }
+            Some(allowed) => *allowed = true,
+        }
+    }
+    Some(allowed)
+}

@@ -1,0 +1,368 @@
+//! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
+//! and bodies.
+//!
+//! | file | what it checks |
+//! |---|---|
+//! | `settings` | faces, numerics, output, report |
+//! | `shapes` | shapes |
+//! | `adaptivity` | dynamic refinement |
+//! | `colliders` | colliders and their motion |
+//! | `overlap` | whether bodies overlap |
+use self::adaptivity::{Context, adaptivity};
+use self::colliders::colliders;
+use self::settings::{digest, faces, numerics, output, report};
+use super::parse::error::{Fault, alternatives, nearest, position};
+use super::parse::source::{Node, Path};
+use super::problem::*;
+use super::schema::job_file::{self as file, JobFile};
+use crate::geometry::{Aabb, Shape};
+use partition::{Brick, key::MAX_ROOTS};
+
+mod adaptivity;
+mod colliders;
+mod overlap;
+mod settings;
+mod shapes;
+
+/// Most leaves that a uniform tree of the base level may have.
+const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
+
+/// Converts and checks; `text` is what `file` and `tree` were made from.
+pub(super) fn convert(
+    file: &JobFile,
+    tree: &Node,
+    text: &str,
+    path: &std::path::Path,
+) -> Result<AnyProblem, Vec<Fault>> {
+    let mut checks = Checks { tree, text, faults: Vec::new() };
+    let problem = if file.dimension == 2 {
+        problem(&mut checks, file, path).map(AnyProblem::Two)
+    } else {
+        problem(&mut checks, file, path).map(AnyProblem::Three)
+    };
+    match problem {
+        Some(problem) if checks.faults.is_empty() => Ok(problem),
+        _ => {
+            checks.faults.sort_by_key(|fault| fault.span.start);
+            Err(checks.faults)
+        }
+    }
+}
+
+/// Collects faults; knows where the keys of the file stand.
+pub(super) struct Checks<'t> {
+    tree: &'t Node,
+    text: &'t str,
+    faults: Vec<Fault>,
+}
+
+impl Checks<'_> {
+    /// Notes a fault of the value at `path`.
+    pub fn fault(&mut self, path: &Path, message: String) {
+        let span = self.tree.locate(path);
+        self.faults.push(Fault { key: path.to_string(), message, span, help: None });
+    }
+
+    /// The components of a vector of the job's dimension.
+    pub fn vector<const D: usize>(&mut self, vector: &file::Vector, path: &Path) -> Option<[f64; D]> {
+        let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();
+        if array.is_none() {
+            self.fault(path, format!("found {} components; expected {D} in a {D}D job", vector.0.len()));
+        }
+        array
+    }
+}
+
+fn problem<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    path: &std::path::Path,
+) -> Option<Problem<D>> {
+    let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
+    let root = Path::default();
+    let (origin, brick) = domain::<D>(checks, &file.domain, &root.key("domain"))?;
+    let root_edge = file.domain.root_edge;
+    let space = Space { origin, size: brick.roots.map(|n| f64::from(n) * root_edge) };
+
+    let tree = tree(checks, &file.tree, &brick, &space, &root.key("tree"));
+    let materials = materials(checks, &file.materials, &root.key("materials"));
+    let bodies = bodies(checks, file, &space, &root.key("bodies"));
+    let colliders = colliders(checks, &file.colliders, &space, &root.key("colliders"));
+    let gravity = match &file.gravity {
+        Some(gravity) => checks.vector(gravity, &root.key("gravity")),
+        None => Some([0.0; D]),
+    };
+    let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
+    let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
+    let (tree, bodies) = (tree?, bodies?);
+    let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
+    let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
+    let output = output(checks, file, &name, &root.key("output"));
+    let report = match &file.report {
+        Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
+        None => None,
+    };
+    let problem = Problem {
+        name,
+        path: path.to_path_buf(),
+        title: file.title.clone(),
+        digest: digest(file),
+        origin,
+        root_edge,
+        brick,
+        tree,
+        adaptivity,
+        materials,
+        bodies,
+        gravity: gravity?,
+        faces: faces?,
+        colliders: colliders?,
+        leaving: match file.boundaries.leaving {
+            file::Leaving::Error => LeavingPolicy::Error,
+            file::Leaving::Delete => LeavingPolicy::Delete,
+            file::Leaving::Clamp => LeavingPolicy::Clamp,
+        },
+        time: TimeSetup {
+            end: file.time.end,
+            cfl: file.time.cfl,
+            dt_max: file.time.dt_max,
+            growth: file.time.growth,
+        },
+        transfer,
+        boxes,
+        output,
+        checkpoint: CheckpointSetup {
+            every_steps: file.checkpoint.every_steps,
+            every_time: file.checkpoint.every_time,
+            every_wall_minutes: file.checkpoint.every_wall_minutes,
+            keep: file.checkpoint.keep as usize,
+        },
+        history_every: file.history.every_steps,
+        telemetry_every: file.telemetry.every_steps,
+        report,
+    };
+    for overlap in overlap::find(&problem) {
+        let [first, second] = overlap.bodies.map(|body| &problem.bodies[body].name);
+        let point = space.words(&overlap.point);
+        checks.fault(
+            &root.key("bodies").index(overlap.bodies[1]).key("shape"),
+            format!("found the body \"{second}\" overlapping \"{first}\" at {point}; expected bodies that share no point"),
+        );
+    }
+    Some(problem)
+}
+
+/// The domain in the file's coordinates, for conversions and messages.
+pub(super) struct Space<const D: usize> {
+    pub origin: [f64; D],
+    pub size: [f64; D],
+}
+
+impl<const D: usize> Space<D> {
+    fn words(&self, x: &[f64; D]) -> String {
+        let components: Vec<String> = (0..D).map(|a| format!("{:.6}", x[a] + self.origin[a])).collect();
+        format!("[{}]", components.join(", "))
+    }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn domain<const D: usize>(
+    checks: &mut Checks,
+    domain: &file::Domain,
+    path: &Path,
+) -> Option<([f64; D], Brick<D>)> {
+    let origin = match &domain.min {
+        Some(min) => checks.vector(min, &path.key("min")),
+        None => Some([0.0; D]),
+    };
+    let size: [f64; D] = checks.vector(&domain.size, &path.key("size"))?;
+    let mut roots = [0; D];
+    for a in 0..D {
+        let here = path.key("size").index(a);
+        let count = size[a] / domain.root_edge;
+        let whole = count.round();
+        let edge = domain.root_edge;
+        if whole < 1.0 || (count - whole).abs() > 1e-9 * whole {
+            let (below, above) = (count.floor().max(1.0) * edge, (count.floor() + 1.0).max(1.0) * edge);
+            let near = if below < above { format!("{below} or {above}") } else { format!("{above}") };
+            checks.fault(
+                &here,
+                format!(
+                    "found {}; expected a whole multiple of domain.root_edge = {edge}, such as {near}",
+                    size[a]
+                ),
+            );
+        } else if whole > f64::from(MAX_ROOTS) {
+            checks.fault(
+                &here,
+                format!("found {whole} root octants along {}; expected at most {MAX_ROOTS}: a larger domain.root_edge", AXES[a]),
+            );
+        } else {
+            roots[a] = whole as u32;
+        }
+    }
+    if roots.contains(&0) { None } else { Some((origin?, Brick { roots })) }
+}
+
+fn tree<const D: usize>(
+    checks: &mut Checks,
+    tree: &file::Tree,
+    brick: &Brick<D>,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<TreeSetup<D>> {
+    let roots: f64 = brick.roots.iter().map(|&n| f64::from(n)).product();
+    let leaves = roots * f64::from(1_u32 << tree.base_level).powi(D as i32);
+    if leaves > MAX_BASE_LEAVES {
+        checks.fault(
+            &path.key("base_level"),
+            format!("found {}, which makes {leaves:.3e} leaves; expected a level with at most {MAX_BASE_LEAVES:.1e}", tree.base_level),
+        );
+    }
+    let mut regions = Vec::new();
+    for (i, region) in tree.regions.iter().enumerate() {
+        let here = path.key("regions").index(i);
+        if region.level <= tree.base_level {
+            checks.fault(
+                &here.key("level"),
+                format!(
+                    "found {}; expected a level deeper than tree.base_level = {}",
+                    region.level, tree.base_level
+                ),
+            );
+        }
+        let Some(shape) = checks.shape(&region.shape, space, &here.key("shape")) else { continue };
+        let inside = shape.bounds().intersection(&Aabb::new([0.0; D], space.size));
+        if inside.is_empty() {
+            checks.fault(
+                &here.key("shape"),
+                "found a region outside the domain; expected one that meets it".into(),
+            );
+        }
+        regions.push(Region { shape, level: region.level });
+    }
+    (regions.len() == tree.regions.len()).then_some(TreeSetup {
+        base_level: tree.base_level,
+        graded: tree.graded,
+        regions,
+    })
+}
+
+/// Faults for names that are empty or taken.
+fn names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &Path) {
+    let mut seen: Vec<&str> = Vec::new();
+    for (i, name) in names.enumerate() {
+        let here = path.index(i).key("name");
+        if name.trim().is_empty() {
+            checks.fault(&here, "found an empty name; expected at least one letter".into());
+        } else if seen.contains(&name) {
+            checks.fault(&here, format!("found \"{name}\" a second time; expected a name that is not taken"));
+        }
+        seen.push(name);
+    }
+    if seen.is_empty() {
+        checks.fault(path, "found an empty array; expected at least one element".into());
+    } else if seen.len() > usize::from(u16::MAX) {
+        checks.fault(path, format!("found {} elements; expected at most {}", seen.len(), u16::MAX));
+    }
+}
+
+fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> Vec<MaterialSetup> {
+    names(checks, materials.iter().map(|material| material.name.as_str()), path);
+    materials
+        .iter()
+        .map(|m| MaterialSetup { name: m.name.clone(), density: m.density, model: m.model.clone() })
+        .collect()
+}
+
+fn bodies<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Body<D>>> {
+    names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
+    let bodies: Vec<Body<D>> = file
+        .bodies
+        .iter()
+        .enumerate()
+        .filter_map(|(i, body)| self::body(checks, body, &file.materials, space, &path.index(i)))
+        .collect();
+    (bodies.len() == file.bodies.len()).then_some(bodies)
+}
+
+fn body<const D: usize>(
+    checks: &mut Checks,
+    body: &file::Body,
+    materials: &[file::Material],
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Body<D>> {
+    let material = materials.iter().position(|material| material.name == body.material);
+    if material.is_none() {
+        let known = || materials.iter().map(|material| material.name.as_str());
+        let guess =
+            nearest(&body.material, known()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
+        checks.fault(
+            &path.key("material"),
+            format!(
+                "found \"{}\"; expected the name of a material: {}{guess}",
+                body.material,
+                alternatives(known())
+            ),
+        );
+    }
+    let velocity = match &body.velocity {
+        Some(velocity) => checks.vector(velocity, &path.key("velocity")),
+        None => Some([0.0; D]),
+    };
+    let angular_velocity = match (&body.angular_velocity, D) {
+        (None, _) => Some([0.0; 3]),
+        (Some(file::Spin::Plane(spin)), 2) => Some([0.0, 0.0, *spin]),
+        (Some(file::Spin::Space(spin)), 3) => Some(*spin),
+        (Some(given), _) => {
+            let (found, expected) = match given {
+                file::Spin::Plane(_) => ("a number", "an array of 3 components in a 3D job"),
+                file::Spin::Space(_) => ("an array", "a number (about z) in a 2D job"),
+            };
+            checks.fault(&path.key("angular_velocity"), format!("found {found}; expected {expected}"));
+            None
+        }
+    };
+    let here = path.key("shape");
+    let shape: Shape<D> = checks.shape(&body.shape, space, &here)?;
+    let bounds = shape.bounds();
+    if bounds.is_empty() {
+        checks.fault(&here, "found a shape without a point; expected one with a volume".into());
+        return None;
+    }
+    for a in 0..D {
+        // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
+        let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
+        let (low, high) = (bounds.lower[a], bounds.upper[a]);
+        let below = low.is_finite() && low < -slack;
+        let above = high.is_finite() && high > space.size[a] + slack;
+        if below || above || low >= space.size[a] || high <= 0.0 {
+            let o = space.origin[a];
+            checks.fault(
+                &here,
+                format!(
+                    "found the body \"{}\" from {axis} = {:.6} to {:.6}; expected it inside the domain, from {axis} = {:.6} to {:.6}",
+                    body.name, low + o, high + o, o, o + space.size[a], axis = AXES[a],
+                ),
+            );
+            return None;
+        }
+    }
+    Some(Body {
+        name: body.name.clone(),
+        place: position(checks.text, checks.tree.locate(&here).start),
+        centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
+        shape,
+        material: material?,
+        velocity: velocity?,
+        angular_velocity: angular_velocity?,
+        particles_per_cell: body.particles_per_cell,
+    })
+}

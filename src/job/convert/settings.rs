@@ -1,0 +1,164 @@
+//! From the file's types to a checked problem: faces, numerics, output and report.
+use super::{Checks, Space};
+use crate::job::parse::source::Path;
+use crate::job::problem::*;
+use crate::job::schema::job_file::{self as file, JobFile};
+
+/// Most output files of one run.
+const MAX_OUTPUTS: f64 = 100_000.0;
+
+/// Conditions on the faces of the domain.
+pub(in crate::job) fn faces<const D: usize>(
+    checks: &mut Checks,
+    boundaries: &file::Boundaries,
+    path: &Path,
+) -> Option<[[FaceCondition; 2]; D]> {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    if D == 2 {
+        for (key, face) in [("z_min", z_min), ("z_max", z_max)] {
+            if face.is_some() {
+                checks
+                    .fault(&path.key(key), "found a face along z; expected only x and y in a 2D job".into());
+                return None;
+            }
+        }
+    }
+    let condition = |face: &Option<file::Face>| match face {
+        None | Some(file::Face::Slip {}) => FaceCondition::Slip,
+        Some(file::Face::Sticky {}) => FaceCondition::Sticky,
+        Some(file::Face::Separating { friction }) => FaceCondition::Separating { friction: *friction },
+        Some(file::Face::Symmetric {}) => FaceCondition::Symmetric,
+    };
+    let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
+    Some(std::array::from_fn(|a| all[a].map(condition)))
+}
+
+/// Transfer and box policy.
+pub(in crate::job) fn numerics(
+    checks: &mut Checks,
+    numerics: &file::Numerics,
+    path: &Path,
+) -> (Transfer, BoxPolicy) {
+    if let (Some(_), false) = (numerics.flip, numerics.transfer == file::Transfer::Flip) {
+        checks.fault(
+            &path.key("flip"),
+            "found a share of FLIP; expected it only with transfer = \"flip\"".into(),
+        );
+    }
+    if numerics.xpic_order.is_some() && numerics.transfer != file::Transfer::Xpic {
+        checks.fault(
+            &path.key("xpic_order"),
+            "found an order of XPIC; expected it only with transfer = \"xpic\"".into(),
+        );
+    }
+    let transfer = match numerics.transfer {
+        file::Transfer::Apic => Transfer::Apic,
+        file::Transfer::Flip => Transfer::Flip { blend: numerics.flip.unwrap_or(0.99) },
+        file::Transfer::Tpic => Transfer::Tpic,
+        file::Transfer::Xpic => Transfer::Xpic { order: numerics.xpic_order.unwrap_or(2) },
+    };
+    let here = path.key("box_stretch");
+    if numerics.box_stretch.is_some() && numerics.boxes != file::Boxes::Volume {
+        checks.fault(&here, "found bounds of the stretch; expected them only with boxes = \"volume\"".into());
+    }
+    let [min_stretch, max_stretch] = numerics.box_stretch.unwrap_or([0.25, 2.0]);
+    if min_stretch <= 0.0 || min_stretch > 1.0 || !(1.0..=8.0).contains(&max_stretch) {
+        checks.fault(
+            &here,
+            format!("found [{min_stretch}, {max_stretch}]; expected a lower bound above 0 and at most 1 and an upper one from 1 to 8"),
+        );
+    }
+    let boxes = match numerics.boxes {
+        file::Boxes::Volume => BoxPolicy::Volume { min_stretch, max_stretch },
+        file::Boxes::Fixed => BoxPolicy::Fixed,
+        file::Boxes::Cell => BoxPolicy::Cell,
+    };
+    (transfer, boxes)
+}
+
+/// Output files.
+pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> OutputSetup {
+    let output = &file.output;
+    let directory = match output.directory.as_deref() {
+        Some(directory) if directory.trim().is_empty() => {
+            checks.fault(
+                &path.key("directory"),
+                "found an empty text; expected the name of a directory".into(),
+            );
+            String::new()
+        }
+        Some(directory) => directory.to_owned(),
+        None => format!("out/{name}"),
+    };
+    if let Some(every) = output.every.filter(|every| file.time.end / every > MAX_OUTPUTS) {
+        checks.fault(
+            &path.key("every"),
+            format!(
+                "found {every}; expected at least {:e}, for at most {MAX_OUTPUTS} outputs until time.end",
+                file.time.end / MAX_OUTPUTS
+            ),
+        );
+    }
+    for (i, field) in output.fields.iter().enumerate() {
+        if output.fields[..i].contains(field) {
+            checks.fault(
+                &path.key("fields").index(i),
+                "found a field a second time; expected each once".into(),
+            );
+        }
+    }
+    OutputSetup {
+        directory: directory.into(),
+        every: output.every,
+        fields: output.fields.clone(),
+        restart: output.restart,
+        picture: output.picture,
+        picture_field: output.picture_field,
+    }
+}
+
+/// The evaluation at the end of the run.
+pub(in crate::job) fn report<const D: usize>(
+    checks: &mut Checks,
+    report: &file::Report,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<ReportSetup<D>> {
+    let file::Report::ColumnCollapse { base, up, radius, height, law } = report;
+    let base: [f64; D] = checks.vector(base, &path.key("base"))?;
+    let base: [f64; D] = std::array::from_fn(|a| base[a] - space.origin[a]);
+    if (0..D).any(|a| base[a] < -1e-9 * space.size[a] || base[a] > space.size[a] * (1.0 + 1e-9)) {
+        checks.fault(&path.key("base"), "found a point outside the domain; expected one inside".into());
+    }
+    let up = match up {
+        None => D - 1,
+        Some(file::AxisName::X) => 0,
+        Some(file::AxisName::Y) => 1,
+        Some(file::AxisName::Z) => 2,
+    };
+    if up >= D {
+        checks.fault(&path.key("up"), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
+        return None;
+    }
+    if D == 2 && *law == CollapseLaw::Axisymmetric {
+        checks.fault(&path.key("law"), "found \"axisymmetric\"; expected \"planar\" in a 2D job".into());
+    }
+    Some(ReportSetup::ColumnCollapse { base, up, radius: *radius, height: *height, law: *law })
+}
+
+/// Checksum (64-bit FNV-1a) of what changes the state, from the file with all defaults filled in.
+pub(in crate::job) fn digest(file: &JobFile) -> u64 {
+    let mut state = file.clone();
+    state.title.clear();
+    state.output = file::Output::default();
+    state.checkpoint = file::Checkpoint::default();
+    state.history = file::History::default();
+    state.telemetry = file::Telemetry::default();
+    state.report = None;
+    state.time.end = 0.0;
+    // Field order and shortest round-trip numbers make the text canonical.
+    let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}

@@ -1,0 +1,216 @@
+//! Shapes of the job file to geometry, with checks that they have a volume.
+use super::{Checks, Space};
+use crate::geometry::{Aabb, Frustum, Placement, Shape, rotation};
+use crate::job::parse::source::Path;
+use crate::job::schema::job_file::Vector;
+use crate::job::schema::shape::Shape as Written;
+
+impl Checks<'_> {
+    /// The shape in coordinates relative to the domain's lower corner.
+    pub(in crate::job) fn shape<const D: usize>(
+        &mut self,
+        shape: &Written,
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<Shape<D>> {
+        match shape {
+            Written::Box { min, max } => {
+                let lower = self.point(min, space, &path.key("min"))?;
+                let upper = self.point(max, space, &path.key("max"))?;
+                if let Some(a) = (0..D).find(|&a| lower[a] >= upper[a]) {
+                    let message = format!("found {}; expected more than min[{a}] = {}", max.0[a], min.0[a]);
+                    self.fault(&path.key("max").index(a), message);
+                    return None;
+                }
+                Some(Shape::Box(Aabb::new(lower, upper)))
+            }
+            Written::Circle { centre, radius } => {
+                self.only(2, D, "circle", "sphere", path)?;
+                Some(Shape::Sphere {
+                    centre: self.point(centre, space, &path.key("centre"))?,
+                    radius: *radius,
+                })
+            }
+            Written::Sphere { centre, radius } => {
+                self.only(3, D, "sphere", "circle", path)?;
+                Some(Shape::Sphere {
+                    centre: self.point(centre, space, &path.key("centre"))?,
+                    radius: *radius,
+                })
+            }
+            Written::Cylinder { base, axis, height, radius } => {
+                self.only(3, D, "cylinder", "box", path)?;
+                Some(Shape::Frustum(Frustum {
+                    base: self.point(base, space, &path.key("base"))?,
+                    axis: self.axis(axis.as_ref(), &path.key("axis"))?,
+                    height: *height,
+                    lower_radius: *radius,
+                    upper_radius: *radius,
+                }))
+            }
+            Written::Cone { base, axis, height, radius, top_radius } => {
+                self.only(3, D, "cone", "polygon", path)?;
+                Some(Shape::Frustum(Frustum {
+                    base: self.point(base, space, &path.key("base"))?,
+                    axis: self.axis(axis.as_ref(), &path.key("axis"))?,
+                    height: *height,
+                    lower_radius: *radius,
+                    upper_radius: *top_radius,
+                }))
+            }
+            Written::HalfSpace { point, normal } => Some(Shape::HalfSpace {
+                point: self.point(point, space, &path.key("point"))?,
+                normal: self.direction(normal, &path.key("normal"))?,
+            }),
+            Written::Polygon { points } => {
+                self.only(2, D, "polygon", "union of boxes", path)?;
+                self.polygon(points, space, &path.key("points"))
+            }
+            Written::Rotated { shape, centre, axis, angle } => {
+                let inner = self.shape(shape, space, &path.key("shape"))?;
+                let pivot = self.point(centre, space, &path.key("centre"))?;
+                let axis = self.turning_axis::<D>(axis.as_ref(), &path.key("axis"))?;
+                let rotation = rotation(axis, angle.to_radians());
+                Some(Shape::Rotated(Box::new(inner), Placement { rotation, pivot }))
+            }
+            Written::Union { parts } => Some(Shape::Union(self.parts(parts, space, &path.key("parts"))?)),
+            Written::Intersection { parts } => {
+                Some(Shape::Intersection(self.parts(parts, space, &path.key("parts"))?))
+            }
+            Written::Difference { from, remove } => {
+                let from = self.shape(from, space, &path.key("from"));
+                let remove = self.parts(remove, space, &path.key("remove"));
+                Some(Shape::Difference(Box::new(from?), remove?))
+            }
+        }
+    }
+
+    fn only(
+        &mut self,
+        needed: usize,
+        dimension: usize,
+        kind: &str,
+        instead: &str,
+        path: &Path,
+    ) -> Option<()> {
+        if needed != dimension {
+            self.fault(
+                &path.key("kind"),
+                format!("found \"{kind}\"; expected a shape of a {dimension}D job, such as a {instead}"),
+            );
+            return None;
+        }
+        Some(())
+    }
+
+    pub(in crate::job) fn point<const D: usize>(
+        &mut self,
+        point: &Vector,
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<[f64; D]> {
+        let point: [f64; D] = self.vector(point, path)?;
+        Some(std::array::from_fn(|a| point[a] - space.origin[a]))
+    }
+
+    fn parts<const D: usize>(
+        &mut self,
+        parts: &[Written],
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<Vec<Shape<D>>> {
+        if parts.is_empty() {
+            self.fault(path, "found an empty array; expected at least one shape".into());
+            return None;
+        }
+        let shapes: Vec<Option<Shape<D>>> =
+            parts.iter().enumerate().map(|(i, part)| self.shape(part, space, &path.index(i))).collect();
+        shapes.into_iter().collect()
+    }
+
+    fn direction<const D: usize>(&mut self, direction: &Vector, path: &Path) -> Option<[f64; D]> {
+        let direction: [f64; D] = self.vector(direction, path)?;
+        let length = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length == 0.0 {
+            self.fault(path, "found a vector of length 0; expected a direction".into());
+            return None;
+        }
+        Some(direction.map(|c| c / length))
+    }
+
+    fn axis<const D: usize>(&mut self, axis: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
+        match axis {
+            Some(axis) => self.direction(axis, path),
+            None => Some(std::array::from_fn(|a| if a == D - 1 { 1.0 } else { 0.0 })),
+        }
+    }
+
+    /// The axis of a rotation; z, and nothing else, in 2D.
+    pub(super) fn turning_axis<const D: usize>(
+        &mut self,
+        axis: Option<&Vector>,
+        path: &Path,
+    ) -> Option<[f64; 3]> {
+        match axis {
+            None => Some([0.0, 0.0, 1.0]),
+            Some(_) if D == 2 => {
+                self.fault(
+                    path,
+                    "found an axis; expected none in a 2D job, where shapes turn about z".into(),
+                );
+                None
+            }
+            Some(axis) => self.direction(axis, path),
+        }
+    }
+
+    fn polygon<const D: usize>(
+        &mut self,
+        points: &[Vector],
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<Shape<D>> {
+        let corners: Vec<Option<[f64; D]>> =
+            points.iter().enumerate().map(|(i, point)| self.point(point, space, &path.index(i))).collect();
+        let corners: Vec<[f64; 2]> =
+            corners.into_iter().map(|corner| corner.map(|c| [c[0], c[1]])).collect::<Option<_>>()?;
+        if corners.len() < 3 {
+            self.fault(path, format!("found {} corners; expected at least 3", corners.len()));
+            return None;
+        }
+        if let Some(i) = first_crossing(&corners) {
+            let message = "found an edge from here that meets another edge; expected a simple polygon";
+            self.fault(&path.index(i), message.into());
+            return None;
+        }
+        Some(Shape::Polygon(corners))
+    }
+}
+
+/// The first edge that meets an edge other than its neighbours, or has no length or folds back.
+fn first_crossing(corners: &[[f64; 2]]) -> Option<usize> {
+    let n = corners.len();
+    let turn =
+        |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let within = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (0..2).all(|k| a[k].min(b[k]) <= c[k] && c[k] <= a[k].max(b[k]))
+    };
+    let meet = |a, b, c, d| {
+        let (s, t, u, v) = (turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b));
+        (s * t < 0.0 && u * v < 0.0)
+            || (s == 0.0 && within(a, b, c))
+            || (t == 0.0 && within(a, b, d))
+            || (u == 0.0 && within(c, d, a))
+            || (v == 0.0 && within(c, d, b))
+    };
+    (0..n).find(|&i| {
+        let (a, b) = (corners[i], corners[(i + 1) % n]);
+        let next = corners[(i + 2) % n];
+        let folds = turn(a, b, next) == 0.0
+            && (next[0] - b[0]) * (b[0] - a[0]) + (next[1] - b[1]) * (b[1] - a[1]) <= 0.0;
+        folds
+            || (0..n)
+                .filter(|&j| j != i && (j + 1) % n != i && (i + 1) % n != j)
+                .any(|j| meet(a, b, corners[j], corners[(j + 1) % n]))
+    })
+}

@@ -1,0 +1,240 @@
+//! Dynamic refinement as it is written in a job file.
+use super::job_file::Vector;
+use super::shape::Shape;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Dynamic refinement: the tree follows the material, and particles split and merge with the size of cells. Leaves are
+/// never coarser than `tree.base_level` and the levels of `tree.regions`. Without this table tree and particles keep
+/// their sizes.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptivity {
+    /// Steps from one occasion for changing the tree, splitting and merging to the next.
+    #[serde(default = "twenty")]
+    #[schemars(range(min = 1, max = 100_000))]
+    pub every_steps: u64,
+    /// Part of the edge of a finest leaf that the fastest particle, collider or region may go from one change of the tree to
+    /// the next: as long as it goes less, the tree changes at every second or fourth occasion only. By default at each.
+    /// What comes into coarse leaves before the tree has changed is less exact; a buffer helps.
+    // Left out of the digest, so that files of jobs without it can be continued.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = 4.0))]
+    pub travel: f64,
+    /// Width of the layer around what a criterion wants, in leaves of the wanted level. To this comes the way that
+    /// the material can go until the tree changes next.
+    #[serde(default = "one")]
+    #[schemars(range(max = 16))]
+    pub buffer: u32,
+    /// Width of a particle's box over that of an undeformed particle of its leaf's level above which it splits; only
+    /// with `boxes = "volume"`.
+    #[serde(default = "default_split")]
+    #[schemars(range(max = 8.0), extend("exclusiveMinimum" = 1.0))]
+    pub split_stretch: f64,
+    /// Merging of particles in leaves coarser than they were made for.
+    #[serde(default)]
+    pub merge: Merge,
+    /// Reasons for fine leaves; a leaf is as fine as the most demanding wants it.
+    #[serde(default)]
+    pub criteria: Vec<Criterion>,
+}
+
+fn twenty() -> u64 {
+    20
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn default_split() -> f64 {
+    1.8
+}
+
+/// Merging of particles: only those that are close in state become one.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Merge {
+    /// Whether particles merge at all.
+    #[serde(default = "yes")]
+    pub enabled: bool,
+    /// Greatest difference of a velocity from the affine field through those of the group, over the wave speed.
+    #[serde(default = "default_velocity")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub velocity: f64,
+    /// Greatest difference from the mean elastic strain.
+    #[serde(default = "default_strain")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub strain: f64,
+    /// Greatest difference from the mean logarithm of the plastic volume ratio: by how much some grains are further
+    /// apart than others.
+    #[serde(default = "default_volume")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub volume: f64,
+    /// Greatest difference from the mean plastic strain.
+    #[serde(default = "default_plastic")]
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub plastic_strain: f64,
+    /// Greatest width of the merged box over that of an undeformed particle; below `split_stretch`.
+    #[serde(default = "default_stretch")]
+    #[schemars(range(max = 8.0), extend("exclusiveMinimum" = 1.0))]
+    pub stretch: f64,
+}
+
+impl Default for Merge {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            velocity: default_velocity(),
+            strain: default_strain(),
+            volume: default_volume(),
+            plastic_strain: default_plastic(),
+            stretch: default_stretch(),
+        }
+    }
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn default_velocity() -> f64 {
+    0.005
+}
+
+fn default_strain() -> f64 {
+    0.02
+}
+
+fn default_volume() -> f64 {
+    0.1
+}
+
+fn default_plastic() -> f64 {
+    0.2
+}
+
+fn default_stretch() -> f64 {
+    1.5
+}
+
+/// A reason for fine leaves where there are particles.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Criterion {
+    /// In and near a shape, which may move.
+    Region {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Where, at the start of its motion.
+        shape: Shape,
+        /// Distance within which leaves are refined, m.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        distance: f64,
+        /// Distance within which fine leaves stay, m; 1.5 times `distance` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+        /// Its motion: linear between rows, at rest before the first and after the last.
+        #[serde(default)]
+        motion: Vec<Way>,
+    },
+    /// Near a collider.
+    Collider {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Name of the collider.
+        collider: String,
+        /// Distance within which leaves are refined, m.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        distance: f64,
+        /// Distance within which fine leaves stay, m; 1.5 times `distance` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+    },
+    /// At free surfaces: where nodes of a leaf, or next to it, have next to no mass.
+    FreeSurface {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+    },
+    /// Where the velocity varies: the root mean square of the norm of its gradient over the leaf.
+    VelocityGradient {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Value from which leaves are refined, 1/s.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        refine: f64,
+        /// Value from which fine leaves stay, 1/s; half of `refine` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+    },
+    /// Where a particle has plastic strain.
+    PlasticStrain {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Value from which leaves are refined.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        refine: f64,
+        /// Value from which fine leaves stay; half of `refine` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+    },
+    /// Where the material flows plastically: the mean rate of plastic strain over the leaf's particles.
+    PlasticStrainRate {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Value from which leaves are refined, 1/s.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        refine: f64,
+        /// Value from which fine leaves stay, 1/s; half of `refine` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+    },
+    /// Where a particle's box is stretched.
+    Stretch {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Width over undeformed width from which leaves are refined.
+        #[schemars(extend("exclusiveMinimum" = 1.0))]
+        refine: f64,
+        /// Value from which fine leaves stay; half way from 1 to `refine` by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        coarsen: Option<f64>,
+    },
+    /// Where there is a material.
+    Material {
+        /// Level of the leaves there.
+        #[schemars(range(min = 1, max = 15))]
+        level: u8,
+        /// Name of the material.
+        material: String,
+    },
+}
+
+/// A row of the motion of a region.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Way {
+    /// Time, s.
+    pub time: f64,
+    /// Way from its place in the job, m.
+    pub translation: Vector,
+}

@@ -1,0 +1,108 @@
+//! Colliders as they are written in a job file.
+use super::job_file::{AxisName, Spin, Vector};
+use super::shape::Shape;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A rigid body that acts on the nodes inside it. Only nodes are held, so nothing less than two cells thick stops
+/// material. Forces, torques and places are columns of `history.csv`: `force_NAME_x` and so on, each force the mean
+/// since the row before.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Collider {
+    /// Name, of letters, digits, `_` and `-`.
+    pub name: String,
+    /// Where it is before it moves; may reach out of the domain.
+    pub shape: Shape,
+    /// What happens to material that touches it; by default it may leave, without friction.
+    #[serde(default)]
+    pub contact: Option<Contact>,
+    /// How it moves; not at all by default.
+    #[serde(default)]
+    pub motion: Option<Motion>,
+    /// Point about which it turns and to which its torque refers, m; by default the centre of its bounding box, cut by
+    /// the domain where it is unbounded.
+    #[serde(default)]
+    pub reference: Option<Vector>,
+}
+
+/// What happens to material that touches a collider.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Contact {
+    /// It moves with the collider.
+    Sticky {},
+    /// It moves along the surface without friction and never leaves it.
+    Slip {},
+    /// It may leave; while it presses, Coulomb friction.
+    Separating {
+        /// Friction coefficient, the tangent of the friction angle; 0 by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 100.0))]
+        friction: f64,
+    },
+}
+
+/// How a collider moves.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Motion {
+    /// Not at all.
+    Fixed {},
+    /// With velocities that never change.
+    Steady {
+        /// Velocity of the reference point, m/s; 0 by default.
+        #[serde(default)]
+        velocity: Option<Vector>,
+        /// Angular velocity about the reference point, rad/s: three components in 3D, one number in 2D.
+        #[serde(default)]
+        angular_velocity: Option<Spin>,
+    },
+    /// By a table, linear between its rows; at rest before the first and after the last one. The velocity in a time
+    /// step is the mean of the table over it.
+    Table {
+        /// Axis of the rotations, any length; 3D only, z by default.
+        #[serde(default)]
+        axis: Option<Vector>,
+        /// Rows with increasing times; at least two.
+        rows: Vec<Row>,
+    },
+    /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
+    /// touches within a cell of its surface. It does not feel the faces of the domain nor other colliders.
+    Free {
+        /// Mass, kg; in 2D of one metre of thickness.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        mass: f64,
+        /// Velocity at the start, m/s; 0 by default.
+        #[serde(default)]
+        velocity: Option<Vector>,
+        /// Axes along which it may move; all by default.
+        #[serde(default)]
+        along: Option<Vec<AxisName>>,
+        /// Moment of inertia about the axis through the reference point, kg m²; in 2D of one metre of thickness. It
+        /// does not turn by default.
+        #[serde(default)]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        inertia: Option<f64>,
+        /// Axis about which it turns, fixed, any length; 3D only, z by default.
+        #[serde(default)]
+        axis: Option<Vector>,
+        /// Angular velocity about the axis at the start, rad/s; 0 by default.
+        #[serde(default)]
+        angular_velocity: f64,
+    },
+}
+
+/// A row of a table of motion.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// Time, s.
+    pub time: f64,
+    /// Way of the reference point from its place in the job, m; 0 by default.
+    #[serde(default)]
+    pub translation: Option<Vector>,
+    /// Angle from the place in the job, degrees, counter-clockwise seen against the axis; may exceed a turn.
+    #[serde(default)]
+    pub rotation: f64,
+}

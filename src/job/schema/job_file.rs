@@ -1,0 +1,335 @@
+//! The job file as it is written: the types that parse it and from which its JSON schema is made.
+//!
+//! The comments here are the descriptions in the schema and in error messages, so each says its unit.
+pub use super::adaptivity::Adaptivity;
+pub use super::colliders::Collider;
+pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
+use super::shape::Shape;
+use crate::material::parameters::Parameters;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Version of the job file format that this program reads.
+pub const VERSION: u32 = 1;
+
+/// A job of agimp. All quantities are in SI units.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "agimp job")]
+pub struct JobFile {
+    /// Version of the job file format; 1.
+    #[schemars(range(min = 1, max = 1))]
+    pub version: u32,
+    /// Title for people.
+    #[serde(default)]
+    pub title: String,
+    /// Dimension: 2 for plane strain (one metre thick), 3 for space.
+    #[schemars(range(min = 2, max = 3))]
+    pub dimension: u32,
+    /// Acceleration of gravity, m/s²; none by default.
+    #[serde(default)]
+    pub gravity: Option<Vector>,
+    /// The box in which everything happens.
+    pub domain: Domain,
+    /// Conditions on the faces of the domain.
+    #[serde(default)]
+    pub boundaries: Boundaries,
+    /// Levels of the tree.
+    #[serde(default)]
+    pub tree: Tree,
+    /// Dynamic refinement; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adaptivity: Option<Adaptivity>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Bodies.
+    pub bodies: Vec<Body>,
+    /// Rigid bodies that act on the material, in the order in which they act; the faces of the domain act last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub colliders: Vec<Collider>,
+    /// End of the run and time step.
+    pub time: Time,
+    /// Choices of the method.
+    #[serde(default)]
+    pub numerics: Numerics,
+    /// Output files.
+    #[serde(default)]
+    pub output: Output,
+    /// Checkpoints.
+    #[serde(default)]
+    pub checkpoint: Checkpoint,
+    /// Table of scalars, `history.csv`.
+    #[serde(default)]
+    pub history: History,
+    /// Measurements of the run itself, `telemetry.jsonl`.
+    #[serde(default)]
+    pub telemetry: Telemetry,
+    /// Evaluation at the end of the run.
+    #[serde(default)]
+    pub report: Option<Report>,
+}
+
+/// Components along x, y (and z in 3D): as many as the job has dimensions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline, transform = two_or_three)]
+pub struct Vector(pub Vec<f64>);
+
+fn two_or_three(schema: &mut schemars::Schema) {
+    schema.insert("minItems".into(), 2.into());
+    schema.insert("maxItems".into(), 3.into());
+}
+
+/// The box in which everything happens: a brick of cubic root octants.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Domain {
+    /// Lower corner, m; the coordinate origin by default.
+    #[serde(default)]
+    pub min: Option<Vector>,
+    /// Edge lengths, m; whole multiples of the root edge.
+    pub size: Vector,
+    /// Edge of a root octant (level 0), m. A leaf of level L has the edge `root_edge / 2^L` and 4 cells
+    /// along it.
+    #[schemars(range(max = 1e7), extend("exclusiveMinimum" = 0.0))]
+    pub root_edge: f64,
+}
+
+/// Conditions on the faces of the domain; a face not named is `slip`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Boundaries {
+    /// Lower face along x.
+    #[serde(default)]
+    pub x_min: Option<Face>,
+    /// Upper face along x.
+    #[serde(default)]
+    pub x_max: Option<Face>,
+    /// Lower face along y.
+    #[serde(default)]
+    pub y_min: Option<Face>,
+    /// Upper face along y.
+    #[serde(default)]
+    pub y_max: Option<Face>,
+    /// Lower face along z; 3D only.
+    #[serde(default)]
+    pub z_min: Option<Face>,
+    /// Upper face along z; 3D only.
+    #[serde(default)]
+    pub z_max: Option<Face>,
+    /// What happens to particles that leave the domain.
+    #[serde(default)]
+    pub leaving: Leaving,
+}
+
+/// Condition on a face of the domain.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Face {
+    /// No velocity on the face.
+    Sticky {},
+    /// No velocity through the face, no friction.
+    Slip {},
+    /// Material may leave the face; while it presses on it, Coulomb friction.
+    Separating {
+        /// Friction coefficient, the tangent of the friction angle; 0 by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 100.0))]
+        friction: f64,
+    },
+    /// A plane of symmetry.
+    Symmetric {},
+}
+
+/// What happens to particles that leave the domain.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Leaving {
+    /// The run ends with an error that names them.
+    #[default]
+    Error,
+    /// They are deleted and counted.
+    Delete,
+    /// They are put back to the face and counted.
+    Clamp,
+}
+
+/// Levels of the tree.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tree {
+    /// Level of all leaves outside the regions.
+    #[serde(default)]
+    #[schemars(range(max = 15))]
+    pub base_level: u8,
+    /// Whether neighbouring leaves differ by one level at most (over faces, edges and corners).
+    #[serde(default = "yes")]
+    pub graded: bool,
+    /// Regions of deeper level.
+    #[serde(default)]
+    pub regions: Vec<Region>,
+}
+
+impl Default for Tree {
+    fn default() -> Self {
+        Self { base_level: 0, graded: true, regions: Vec::new() }
+    }
+}
+
+pub(super) fn yes() -> bool {
+    true
+}
+
+/// A region of deeper level: every leaf that meets it is split until it has that level.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Where.
+    pub shape: Shape,
+    /// Level of the leaves there; deeper than `base_level`.
+    #[schemars(range(max = 15))]
+    pub level: u8,
+}
+
+/// A material: a name, a density, a model and the model's parameters.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Material {
+    /// Name, by which bodies refer to it.
+    pub name: String,
+    /// Density of the undeformed material, kg/m³.
+    #[schemars(range(max = 1e5), extend("exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Constitutive model and its parameters.
+    #[serde(flatten)]
+    pub model: Parameters,
+}
+
+/// A body: a shape filled with particles of a material.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Name of its material.
+    pub material: String,
+    /// Region that it fills. Unbounded shapes end at the faces of the domain.
+    pub shape: Shape,
+    /// Particles per cell along each axis, on a lattice through the whole domain; need not be whole.
+    #[serde(default = "two")]
+    #[schemars(range(min = 0.5, max = 8.0))]
+    pub particles_per_cell: f64,
+    /// Velocity, m/s; at rest by default.
+    #[serde(default)]
+    pub velocity: Option<Vector>,
+    /// Angular velocity about the centre of the body's bounding box, rad/s: three components in 3D, one
+    /// number in 2D (about z, counter-clockwise).
+    #[serde(default)]
+    pub angular_velocity: Option<Spin>,
+}
+
+fn two() -> f64 {
+    2.0
+}
+
+/// An angular velocity.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Spin {
+    /// About z, in 2D, rad/s.
+    Plane(f64),
+    /// Components about x, y and z, in 3D, rad/s.
+    Space([f64; 3]),
+}
+
+/// End of the run and time step.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// End of the run, s.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub end: f64,
+    /// Courant number: the part of a cell that the fastest wave may cross in one step.
+    #[serde(default = "default_cfl")]
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
+    pub cfl: f64,
+    /// Longest time step, s; unlimited by default.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub dt_max: Option<f64>,
+    /// Most that a time step may exceed the one before it, as a factor.
+    #[serde(default = "default_growth")]
+    #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 1.0))]
+    pub growth: f64,
+}
+
+fn default_cfl() -> f64 {
+    0.4
+}
+
+fn default_growth() -> f64 {
+    1.1
+}
+
+/// Choices of the method.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Numerics {
+    /// Transfer of velocity between particles and grid.
+    #[serde(default)]
+    pub transfer: Transfer,
+    /// Share of FLIP for `transfer = "flip"`: 1 is pure FLIP, 0 pure PIC; 0.99 by default.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub flip: Option<f64>,
+    /// Order for `transfer = "xpic"`: 1 is PIC, high orders approach FLIP; 2 by default. Each order above the first
+    /// costs one more sweep between particles and nodes with one more exchange between ranks.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 16))]
+    pub xpic_order: Option<u32>,
+    /// How the box of a particle follows its deformation.
+    #[serde(default)]
+    pub boxes: Boxes,
+    /// Bounds of half width over undeformed half width for `boxes = "volume"`; [0.25, 2] by default.
+    #[serde(default)]
+    pub box_stretch: Option<[f64; 2]>,
+}
+
+/// Transfer of velocity between particles and grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Transfer {
+    /// Affine particle-in-cell.
+    #[default]
+    Apic,
+    /// Blend of FLIP and PIC.
+    Flip,
+    /// Taylor particle-in-cell.
+    Tpic,
+    /// Extended particle-in-cell of order `xpic_order`.
+    Xpic,
+}
+
+/// How the box of a particle follows its deformation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Boxes {
+    /// Half widths follow the stretch along each axis, within bounds.
+    #[default]
+    Volume,
+    /// Half widths never change.
+    Fixed,
+    /// One cell of the particle's own level.
+    Cell,
+}
+
+/// Name of a coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisName {
+    /// First axis.
+    X,
+    /// Second axis.
+    Y,
+    /// Third axis.
+    Z,
+}

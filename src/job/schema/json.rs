@@ -1,0 +1,54 @@
+//! JSON schema of the job file, made from the types that parse it.
+use super::job_file::JobFile;
+use serde_json::Value;
+
+/// The schema (JSON Schema, draft 2020-12).
+///
+/// It is also what job files are checked against before they are parsed, so the two cannot differ.
+pub fn schema() -> Value {
+    schemars::schema_for!(JobFile).to_value()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every key that a user can write is explained.
+    #[test]
+    fn every_property_has_a_description() {
+        fn walk(value: &Value, path: &str, missing: &mut Vec<String>) {
+            if let Some(properties) = value.get("properties").and_then(Value::as_object) {
+                for (key, property) in properties {
+                    if property.get("const").is_none() && property.get("description").is_none() {
+                        missing.push(format!("{path}/{key}"));
+                    }
+                }
+            }
+            match value {
+                Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), missing)),
+                Value::Array(list) => {
+                    list.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), missing));
+                }
+                _ => {}
+            }
+        }
+        let mut missing = Vec::new();
+        walk(&schema(), "", &mut missing);
+        assert!(missing.is_empty(), "{missing:?}");
+    }
+
+    /// Every number among the parameters of a model has a range.
+    #[test]
+    fn models_have_limits() {
+        let schema = schema();
+        let models = schema["$defs"]["Material"]["oneOf"].as_array().unwrap();
+        assert!(models.len() >= 5);
+        let limits = ["minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"];
+        for model in models {
+            for (key, property) in model["properties"].as_object().unwrap() {
+                let has_limits = limits.iter().any(|limit| property.get(limit).is_some());
+                assert!(property["type"] != "number" || has_limits, "{key} of {model}");
+            }
+        }
+    }
+}

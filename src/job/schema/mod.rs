@@ -1,0 +1,15 @@
+//! The job file as it is written: types that parse it, and what is made from them.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`job_file`] | the file and its tables |
+//! | [`adaptivity`], [`colliders`], [`output`], [`shape`] | tables of a part of the file |
+//! | `json` | the JSON schema |
+//! | [`reference`](mod@reference) | the reference in Markdown |
+pub mod adaptivity;
+pub mod colliders;
+pub mod job_file;
+pub(super) mod json;
+pub mod output;
+pub mod reference;
+pub mod shape;

@@ -1,0 +1,107 @@
+//! Shapes as they are written in a job file.
+use super::job_file::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A region of space.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// A box along the axes.
+    Box {
+        /// Lower corner, m.
+        min: Vector,
+        /// Upper corner, m.
+        max: Vector,
+    },
+    /// A disc; 2D only.
+    Circle {
+        /// Centre, m.
+        centre: Vector,
+        /// Radius, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        radius: f64,
+    },
+    /// A ball; 3D only.
+    Sphere {
+        /// Centre, m.
+        centre: Vector,
+        /// Radius, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        radius: f64,
+    },
+    /// A circular cylinder; 3D only.
+    Cylinder {
+        /// Centre of one end, m.
+        base: Vector,
+        /// Direction from that end to the other, any length; z by default.
+        #[serde(default)]
+        axis: Option<Vector>,
+        /// Distance between the ends, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        height: f64,
+        /// Radius, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        radius: f64,
+    },
+    /// A circular cone, possibly truncated; 3D only.
+    Cone {
+        /// Centre of the wide end, m.
+        base: Vector,
+        /// Direction from the base to the tip, any length; z by default.
+        #[serde(default)]
+        axis: Option<Vector>,
+        /// Distance from the base to the tip or to the truncated end, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        height: f64,
+        /// Radius of the base, m.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        radius: f64,
+        /// Radius of the other end, m; 0, a pointed cone, by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0))]
+        top_radius: f64,
+    },
+    /// Everything on one side of a plane.
+    HalfSpace {
+        /// A point of the plane, m.
+        point: Vector,
+        /// Direction out of the half-space, any length.
+        normal: Vector,
+    },
+    /// A simple polygon; 2D only.
+    Polygon {
+        /// Corners in order, m; at least three.
+        points: Vec<Vector>,
+    },
+    /// A shape turned about a point.
+    Rotated {
+        /// The shape before the rotation.
+        shape: Box<Shape>,
+        /// Fixed point, m.
+        centre: Vector,
+        /// Axis of the rotation, any length; 3D only, z by default.
+        #[serde(default)]
+        axis: Option<Vector>,
+        /// Angle, degrees, counter-clockwise seen against the axis.
+        #[schemars(range(min = -360.0, max = 360.0))]
+        angle: f64,
+    },
+    /// Points of any of the parts.
+    Union {
+        /// Parts; at least one.
+        parts: Vec<Shape>,
+    },
+    /// Points of all the parts.
+    Intersection {
+        /// Parts; at least one.
+        parts: Vec<Shape>,
+    },
+    /// Points of a shape that lie in none of those removed.
+    Difference {
+        /// What is left over is part of this shape.
+        from: Box<Shape>,
+        /// Shapes removed; at least one.
+        remove: Vec<Shape>,
+    },
+}
