@@ -9,6 +9,7 @@ pub mod grid;
 pub mod io;
 pub mod job;
 pub mod kernel;
+pub mod load;
 pub mod material;
 pub mod memory;
 pub mod particle;

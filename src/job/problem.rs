@@ -8,6 +8,7 @@ pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
 pub use crate::kernel::{BoxPolicy, Transfer};
+use crate::load::{Gravity, Load};
 use crate::material::parameters::Parameters;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
@@ -73,8 +74,10 @@ pub struct Problem<const D: usize> {
     pub materials: Vec<MaterialSetup>,
     /// Bodies, in the order of the job file.
     pub bodies: Vec<Body<D>>,
-    /// Acceleration of gravity, m/s².
-    pub gravity: [f64; D],
+    /// Acceleration of gravity.
+    pub gravity: Gravity<D>,
+    /// Loads, in the order in which they act.
+    pub loads: Vec<Load<D>>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.

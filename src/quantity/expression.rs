@@ -74,6 +74,11 @@ impl Expression {
         self.used.iter().any(|&variable| variable < 3)
     }
 
+    /// Whether it names z.
+    pub fn names_z(&self) -> bool {
+        self.used.contains(&2)
+    }
+
     /// Whether it names t.
     pub fn depends_on_time(&self) -> bool {
         self.used.contains(&3)

@@ -2,9 +2,11 @@
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::io::history::Column;
+use crate::load::Load;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::refinement::resample::BooksTotal;
 use crate::solver::step::contact::Reaction;
+use crate::solver::step::loads::LoadTotals;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
     Column { name, unit }
@@ -29,13 +31,21 @@ const COLUMNS: [Column<'static>; 15] = [
     column("particles", ""),
 ];
 
-/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each collider those of its force, its torque and, if it moves, of
+/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
 /// its place follow the others.
-pub fn columns<const D: usize>(colliders: &[Collider<D>], is_adaptive: bool) -> Vec<(String, &'static str)> {
+pub fn columns<const D: usize>(
+    loads: &[Load<D>],
+    colliders: &[Collider<D>],
+    is_adaptive: bool,
+) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
     if is_adaptive {
         columns.extend(BOOKS.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    for load in loads {
+        AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
+        columns.push((format!("work_{}", load.name), "J"));
     }
     for collider in colliders {
         let mut add = |what: &str, axis: &str, unit| {
@@ -91,6 +101,12 @@ pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) ->
         grid.mass,
         particles.count as f64,
     ]
+}
+
+/// The values of a row that are of one load.
+pub fn load_values<const D: usize>(totals: &LoadTotals) -> impl Iterator<Item = f64> {
+    let LoadTotals { force, work } = *totals;
+    force.into_iter().take(D).chain([work])
 }
 
 /// The values of a row that are of one collider. `origin` is the lower corner of the domain, m.

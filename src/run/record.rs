@@ -38,7 +38,11 @@ impl Recorder {
         let step = solver.clock.step;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
-        let named = history::columns(&solver.physics.colliders, solver.physics.adaptivity.is_some());
+        let named = history::columns(
+            &solver.physics.loads,
+            &solver.physics.colliders,
+            solver.physics.adaptivity.is_some(),
+        );
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), step) {
             (0, 0) => History::create(&rows, &columns)
@@ -147,6 +151,7 @@ impl Recorder {
     ) -> Result<(), FileError> {
         let clock = solver.clock;
         let reactions = solver.reactions();
+        let loads = solver.load_totals();
         let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
         let mut written = Ok(());
         if let Some(history) = &mut self.history {
@@ -154,6 +159,7 @@ impl Recorder {
             if let Some(books) = &books {
                 values.extend(history::book_values(books));
             }
+            loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
             for ((collider, state), reaction) in all {
                 values.extend(history::collider_values(collider, state, reaction, &self.origin));
@@ -162,6 +168,7 @@ impl Recorder {
         }
         // Where the row of this step has been written already, there is nothing to forget.
         solver.forget_reactions();
+        solver.load_books.forget_forces(clock.time);
         written
     }
 

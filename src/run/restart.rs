@@ -56,6 +56,12 @@ pub fn scalars<const D: usize>(
         ExactSum::sum_over_ranks(comm, &mut sums);
         exact = sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())).collect();
     }
+    if !solver.load_books.sums.is_empty() {
+        reals.push((LOADS_SINCE.into(), solver.load_books.since));
+        let mut sums: Vec<ExactSum> = solver.load_books.sums.iter().flatten().cloned().collect();
+        ExactSum::sum_over_ranks(comm, &mut sums);
+        exact.extend(sums.iter_mut().enumerate().map(|(i, sum)| (load_sum(i), sum.words().to_vec())));
+    }
     if solver.physics.adaptivity.is_some() {
         let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
         let numbers = [splits, merges, removed, solver.books.next_root];
@@ -73,6 +79,30 @@ pub fn scalars<const D: usize>(
         }
     }
     Scalars { reals, counts, exact }
+}
+
+/// Name of the time since which impulses of loads are summed.
+const LOADS_SINCE: &str = "load_sums_since";
+
+/// Name of an exact sum of loads, counted through all of them.
+fn load_sum(number: usize) -> String {
+    format!("load_sum_{number}")
+}
+
+/// Takes over what is booked of the loads; the sums are on rank 0. `None` if the file lacks one.
+fn restore_loads<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    let books = &mut solver.load_books;
+    if books.sums.is_empty() {
+        return Some(());
+    }
+    books.since = scalars.real(LOADS_SINCE)?;
+    for (number, sum) in books.sums.iter_mut().flatten().enumerate() {
+        let read = ExactSum::from_words(scalars.exact(&load_sum(number))?)?;
+        if rank == 0 {
+            *sum = read;
+        }
+    }
+    Some(())
 }
 
 /// Names of the counters of splits and merges.
@@ -164,6 +194,10 @@ pub fn solver<const D: usize>(
     if restore_colliders(comm.rank(), &mut solver, &header.scalars).is_none() {
         // Every rank has read the same header.
         let reason = "the state of a collider is missing".into();
+        return Err(FileError::Refused { path, reason }.into());
+    }
+    if restore_loads(comm.rank(), &mut solver, &header.scalars).is_none() {
+        let reason = "the sums of a load are missing".into();
         return Err(FileError::Refused { path, reason }.into());
     }
     if restore_books(comm.rank(), &mut solver, &header.scalars).is_none() {

@@ -29,6 +29,7 @@ use self::refinement::resample::Books;
 use self::sorting::bins::BinMissing;
 use self::step::contact::Contacts;
 use self::step::grid::Grid;
+use self::step::loads::LoadBooks;
 use self::step::parts::Parts;
 use self::step::phases::{Phase, Phases, thread_time};
 use self::step::survey::Survey;
@@ -37,6 +38,7 @@ use crate::adaptivity::Adaptivity;
 use crate::boundary::{Collider, FaceCondition, Leaving};
 use crate::grid::arenas::waves;
 use crate::kernel::{BoxPolicy, Transfer};
+use crate::load::{Gravity, Load};
 use crate::material::Material;
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
@@ -49,8 +51,10 @@ pub struct Physics<const D: usize> {
     pub graded: bool,
     /// Materials by index.
     pub materials: Vec<Box<dyn Material>>,
-    /// Acceleration of gravity, m/s².
-    pub gravity: [f64; D],
+    /// Acceleration of gravity.
+    pub gravity: Gravity<D>,
+    /// Loads, in the order in which they act.
+    pub loads: Vec<Load<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
@@ -128,6 +132,8 @@ pub struct Solver<const D: usize> {
     pub clock: Clock,
     /// Where the colliders are, and their reactions.
     pub contacts: Contacts<D>,
+    /// What is booked of the loads.
+    pub load_books: LoadBooks,
     /// Wall time by phase since the last report.
     pub phases: Phases,
     grid: Grid<D>,
@@ -178,6 +184,7 @@ impl<const D: usize> Solver<D> {
             comm: comm.clone(),
             signal: vec![0.0; chunks.len()],
             contacts: Contacts::new(&physics, clock.time),
+            load_books: LoadBooks::new(physics.loads.len(), clock.time),
             physics,
             forest,
             chunks,

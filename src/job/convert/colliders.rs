@@ -24,21 +24,10 @@ pub(in crate::job) fn colliders<const D: usize>(
     let mut all = Vec::new();
     for (i, written) in colliders.iter().enumerate() {
         let here = path.index(i);
-        name(checks, written, &colliders[..i], &here.key("name"));
+        checks.column_name(&written.name, colliders[..i].iter().map(|other| &*other.name), &here.key("name"));
         all.push(collider(checks, written, space, &here));
     }
     all.into_iter().collect()
-}
-
-/// The name is part of the names of columns.
-fn name(checks: &mut Checks, written: &file::Collider, before: &[file::Collider], path: &Path) {
-    let name = &written.name;
-    let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-    if name.is_empty() || !name.chars().all(allowed) {
-        checks.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
-    } else if before.iter().any(|other| other.name == *name) {
-        checks.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
-    }
 }
 
 fn collider<const D: usize>(

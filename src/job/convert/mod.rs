@@ -7,19 +7,23 @@
 //! | `shapes` | shapes |
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
+//! | `loads` | loads and quantities |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
 use self::colliders::colliders;
+use self::loads::{loads, vector};
 use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, alternatives, nearest, position};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::{Aabb, Shape};
+use crate::load::Gravity;
 use partition::{Brick, key::MAX_ROOTS};
 
 mod adaptivity;
 mod colliders;
+mod loads;
 mod overlap;
 mod settings;
 mod shapes;
@@ -63,6 +67,16 @@ impl Checks<'_> {
         self.faults.push(Fault { key: path.to_string(), message, span, help: None });
     }
 
+    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
+    pub fn column_name<'a>(&mut self, name: &str, mut before: impl Iterator<Item = &'a str>, path: &Path) {
+        let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(allowed) {
+            self.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
+        } else if before.any(|other| other == name) {
+            self.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
+        }
+    }
+
     /// The components of a vector of the job's dimension.
     pub fn vector<const D: usize>(&mut self, vector: &file::Vector, path: &Path) -> Option<[f64; D]> {
         let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();
@@ -89,9 +103,10 @@ fn problem<const D: usize>(
     let bodies = bodies(checks, file, &space, &root.key("bodies"));
     let colliders = colliders(checks, &file.colliders, &space, &root.key("colliders"));
     let gravity = match &file.gravity {
-        Some(gravity) => checks.vector(gravity, &root.key("gravity")),
-        None => Some([0.0; D]),
+        Some(gravity) => self::gravity(checks, gravity, &root.key("gravity")),
+        None => Some(Gravity::constant([0.0; D])),
     };
+    let loads = loads(checks, &file.loads, file.colliders.len(), &space, &root.key("loads"));
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
     let (tree, bodies) = (tree?, bodies?);
@@ -115,6 +130,7 @@ fn problem<const D: usize>(
         materials,
         bodies,
         gravity: gravity?,
+        loads: loads?,
         faces: faces?,
         colliders: colliders?,
         leaving: match file.boundaries.leaving {
@@ -163,6 +179,20 @@ impl<const D: usize> Space<D> {
         let components: Vec<String> = (0..D).map(|a| format!("{:.6}", x[a] + self.origin[a])).collect();
         format!("[{}]", components.join(", "))
     }
+}
+
+/// Gravity is the same everywhere.
+fn gravity<const D: usize>(
+    checks: &mut Checks,
+    written: &[file::Quantity],
+    path: &Path,
+) -> Option<Gravity<D>> {
+    let components = vector::<D>(checks, written, path)?;
+    for (axis, _) in components.iter().enumerate().filter(|(_, component)| component.depends_on_place()) {
+        let message = "found an expression of place; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
+        checks.fault(&path.index(axis), message.into());
+    }
+    Some(Gravity(components))
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];

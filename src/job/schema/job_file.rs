@@ -3,6 +3,7 @@
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
 pub use super::colliders::Collider;
+pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 use super::shape::Shape;
 use crate::material::parameters::Parameters;
@@ -26,9 +27,11 @@ pub struct JobFile {
     /// Dimension: 2 for plane strain (one metre thick), 3 for space.
     #[schemars(range(min = 2, max = 3))]
     pub dimension: u32,
-    /// Acceleration of gravity, m/s²; none by default.
+    /// Components of the acceleration of gravity, m/s², as many as the job has dimensions; each a number, an expression in t,
+    /// or a table over time. None by default.
     #[serde(default)]
-    pub gravity: Option<Vector>,
+    #[schemars(length(min = 2, max = 3))]
+    pub gravity: Option<Vec<Quantity>>,
     /// The box in which everything happens.
     pub domain: Domain,
     /// Conditions on the faces of the domain.
@@ -44,6 +47,9 @@ pub struct JobFile {
     pub materials: Vec<Material>,
     /// Bodies.
     pub bodies: Vec<Body>,
+    /// Loads, in the order in which they act.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<Load>,
     /// Rigid bodies that act on the material, in the order in which they act; the faces of the domain act last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub colliders: Vec<Collider>,

@@ -3,13 +3,14 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`output`], [`shape`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`shape`] | tables of a part of the file |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
 pub mod adaptivity;
 pub mod colliders;
 pub mod job_file;
 pub(super) mod json;
+pub mod loads;
 pub mod output;
 pub mod reference;
 pub mod shape;

@@ -9,6 +9,7 @@ use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraints::constraint::node_coord;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{BoxPolicy, Transfer};
+use crate::load::Gravity;
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{Lanes, Vector};
@@ -91,7 +92,8 @@ impl<const D: usize> GivenBoxes<D> {
             root_edge,
             graded: forest.is_balanced(comm),
             materials: vec![material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)],
-            gravity: [0.0; D],
+            gravity: Gravity::constant([0.0; D]),
+            loads: Vec::new(),
             faces: [[FaceCondition::Slip; 2]; D],
             colliders: Vec::new(),
             adaptivity: None,

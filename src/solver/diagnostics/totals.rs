@@ -138,7 +138,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Sums over all particles.
     pub fn particle_totals(&self) -> ParticleTotals {
-        particle_totals(&self.comm, &self.physics, &self.chunks)
+        particle_totals(&self.comm, &self.physics, &self.chunks, self.clock.time)
     }
 }
 
@@ -162,14 +162,16 @@ fn add_point<const D: usize>(sums: &mut [ExactSum], mass: f64, momentum: &[f64],
     }
 }
 
-/// Collective. Sums over the particles of all ranks.
+/// Collective. Sums over the particles of all ranks, with gravity at a time, s.
 pub fn particle_totals<const D: usize>(
     comm: &Comm,
     physics: &Physics<D>,
     chunks: &[Chunk<D>],
+    time: f64,
 ) -> ParticleTotals {
+    let gravity = physics.gravity.at(time);
     let of_leaves: Vec<[Doubled; SUMS]> =
-        chunks.par_iter().with_min_len(4).map(|chunk| leaf_totals(physics, chunk)).collect();
+        chunks.par_iter().with_min_len(4).map(|chunk| leaf_totals(physics, &gravity, chunk)).collect();
     let mut sums = vec![ExactSum::new(); SUMS];
     for leaf in &of_leaves {
         sums.iter_mut().zip(leaf).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
@@ -257,7 +259,11 @@ fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> Doubled {
 }
 
 /// Sums over the particles of one leaf, in their order.
-fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubled; SUMS] {
+fn leaf_totals<const D: usize>(
+    physics: &Physics<D>,
+    gravity: &[f64; D],
+    chunk: &Chunk<D>,
+) -> [Doubled; SUMS] {
     let mut sums = [DoubledLanes::new(); SUMS];
     for first in (0..chunk.len()).step_by(LANES) {
         let members = Mask::from_bits((1 << LANES.min(chunk.len() - first)) - 1);
@@ -269,7 +275,7 @@ fn leaf_totals<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>) -> [Doubl
             let v = load(Layout::<D>::VELOCITY + axis);
             sums[1 + axis].add(mass * v);
             speed_squared = v.mul_add(v, speed_squared);
-            height = Lanes::splat(physics.gravity[axis]).mul_add(load(Layout::<D>::POSITION + axis), height);
+            height = Lanes::splat(gravity[axis]).mul_add(load(Layout::<D>::POSITION + axis), height);
         }
         sums[0].add(mass);
         sums[4].add(mass * 0.5 * speed_squared);

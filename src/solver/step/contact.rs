@@ -119,9 +119,9 @@ fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
 impl<const D: usize> Solver<D> {
     /// Mean velocities of the colliders over the next step.
     pub(in crate::solver) fn collider_rates(&self, dt: f64) -> Vec<Rate<D>> {
+        let gravity = self.physics.gravity.at(self.clock.time + 0.5 * dt);
         let all = self.physics.colliders.iter().zip(&self.contacts.states);
-        all.map(|(collider, state)| collider.step_rate(state, &self.physics.gravity, self.clock.time, dt))
-            .collect()
+        all.map(|(collider, state)| collider.step_rate(state, &gravity, self.clock.time, dt)).collect()
     }
 
     /// Not collective. Holds the nodes inside colliders to their conditions. Returns impulse and angular impulse on
@@ -159,7 +159,7 @@ impl<const D: usize> Solver<D> {
         for (sums, step) in self.contacts.sums.iter_mut().zip(&step) {
             sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
         }
-        let gravity = self.physics.gravity;
+        let gravity = self.physics.gravity.at(self.clock.time - 0.5 * dt);
         let mut impulses = vec![[0.0; SUMS]; step.len()];
         if self.physics.colliders.iter().any(|collider| collider.free().is_some()) {
             let comm = &self.comm;

@@ -7,6 +7,7 @@
 //! | [`update`] | velocities of nodes; conditions on faces |
 //! | `increment` | velocities that FLIP and XPIC need |
 //! | [`contact`] | colliders |
+//! | [`loads`] | loads: their effect on nodes, impulse and work |
 //! | [`grid`] | the grid of a step: plan, arenas, fields |
 //! | `survey` | extrema per leaf for criteria |
 //! | [`phases`] | timers of phases |
@@ -14,6 +15,7 @@
 pub mod contact;
 pub mod grid;
 mod increment;
+pub mod loads;
 pub mod parts;
 pub mod phases;
 pub(super) mod survey;

@@ -219,17 +219,20 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Nodes, || grid.fields.restrict(&grid.plan));
     }
 
-    /// Velocities on real nodes: momentum over mass, gravity, then the conditions of the colliders in their order, at
+    /// Velocities on real nodes: momentum over mass, gravity, loads, then the conditions of the colliders in their order, at
     /// last those of the domain's faces, so that nothing is driven out of the domain. Returns impulse and angular
     /// impulse on each collider from the nodes of this rank.
     pub(in crate::solver) fn update_nodes(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
-        let (grid, gravity) = (&mut self.grid, self.physics.gravity);
+        let gravity = self.physics.gravity.at(self.clock.time + 0.5 * dt);
+        let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || {
             update_velocity(&mut grid.fields, &grid.plan, gravity, dt);
         });
+        let pushes = self.apply_loads(dt);
         let impulses = self.collide(rates);
         let (grid, faces) = (&mut self.grid, &self.physics.faces);
         self.phases.time(Phase::Nodes, || apply_faces(&mut grid.fields, &grid.plan, faces));
+        self.book_loads(&pushes);
         impulses
     }
 

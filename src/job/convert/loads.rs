@@ -1,0 +1,125 @@
+//! Loads of the job file to those of the solver.
+use super::{Checks, Space};
+use crate::job::parse::source::Path;
+use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity};
+use crate::load::{Kind, Load};
+use crate::quantity::{Expression, Quantity, Table};
+
+/// Most exact sums of colliders (six each) and loads (four each) that a checkpoint's header has room for.
+const MAX_SUMS: usize = 108;
+
+/// All loads, or faults.
+pub(super) fn loads<const D: usize>(
+    checks: &mut Checks,
+    loads: &[Written],
+    colliders: usize,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Load<D>>> {
+    let most = (MAX_SUMS - 6 * colliders.min(MAX_SUMS / 6)) / 4;
+    if loads.len() > most {
+        checks.fault(
+            path,
+            format!("found {} loads; expected at most {most} beside {colliders} colliders", loads.len()),
+        );
+    }
+    let mut all = Vec::new();
+    for (i, written) in loads.iter().enumerate() {
+        let here = path.index(i);
+        checks.column_name(&written.name, loads[..i].iter().map(|load| &*load.name), &here.key("name"));
+        all.push(load(checks, written, space, &here));
+    }
+    all.into_iter().collect()
+}
+
+fn load<const D: usize>(
+    checks: &mut Checks,
+    written: &Written,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Load<D>> {
+    let until = written.until.unwrap_or(f64::INFINITY);
+    if until <= written.from {
+        let message = format!("found {until} s; expected a time after from = {} s", written.from);
+        checks.fault(&path.key("until"), message);
+    }
+    let region = match &written.shape {
+        Some(shape) => Some(checks.shape(shape, space, &path.key("shape"))?),
+        None => None,
+    };
+    let kind = match &written.kind {
+        LoadKind::BodyForce { acceleration } => {
+            Kind::BodyForce(vector(checks, acceleration, &path.key("acceleration"))?)
+        }
+        LoadKind::Velocity { x, y, z } => {
+            if D == 2 && z.is_some() {
+                checks.fault(
+                    &path.key("z"),
+                    "found a component along z; expected x and y only in a 2D job".into(),
+                );
+            }
+            let given = [x, y, z];
+            if given[..D].iter().all(|component| component.is_none()) {
+                checks.fault(path, "found no component; expected a velocity along x, y or z".into());
+            }
+            let mut components: [Option<Quantity>; D] = std::array::from_fn(|_| None);
+            for (axis, component) in components.iter_mut().enumerate() {
+                if let Some(written) = given[axis] {
+                    *component = Some(quantity::<D>(checks, written, &path.key(["x", "y", "z"][axis]))?);
+                }
+            }
+            Kind::Velocity(components)
+        }
+        LoadKind::Damping { rate } => {
+            let rate = quantity::<D>(checks, rate, &path.key("rate"))?;
+            if let Quantity::Constant(value) = rate
+                && value < 0.0
+            {
+                checks.fault(&path.key("rate"), format!("found {value}; expected 0 or more (1/s)"));
+            }
+            Kind::Damping(rate)
+        }
+    };
+    Some(Load { name: written.name.clone(), kind, region, from: written.from, until, origin: space.origin })
+}
+
+/// As many quantities as the job has dimensions, or faults.
+pub(super) fn vector<const D: usize>(
+    checks: &mut Checks,
+    written: &[WrittenQuantity],
+    path: &Path,
+) -> Option<[Quantity; D]> {
+    if written.len() != D {
+        checks.fault(path, format!("found {} components; expected {D}", written.len()));
+        return None;
+    }
+    let mut all = Vec::new();
+    for (i, component) in written.iter().enumerate() {
+        all.push(quantity::<D>(checks, component, &path.index(i)));
+    }
+    let all: Option<Vec<Quantity>> = all.into_iter().collect();
+    all?.try_into().ok()
+}
+
+/// A quantity, or a fault.
+pub(super) fn quantity<const D: usize>(
+    checks: &mut Checks,
+    written: &WrittenQuantity,
+    path: &Path,
+) -> Option<Quantity> {
+    let read = match written {
+        WrittenQuantity::Number(value) => Ok(Quantity::Constant(*value)),
+        WrittenQuantity::Expression(text) => match Expression::parse(text) {
+            Ok(expression) if D == 2 && expression.names_z() => {
+                Err(format!("found z in \"{text}\"; expected x, y and t in a 2D job"))
+            }
+            Ok(expression) => Ok(Quantity::Expression(Box::new(expression))),
+            Err(error) => Err(error.to_string()),
+        },
+        WrittenQuantity::Table(rows) => {
+            let rows: Vec<(f64, f64)> = rows.iter().map(|[time, value]| (*time, *value)).collect();
+            Table::new(&rows).map(Quantity::Table).map_err(|error| error.to_string())
+        }
+    };
+    read.map_err(|message| checks.fault(path, message)).ok()
+}

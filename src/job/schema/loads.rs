@@ -1,0 +1,66 @@
+//! Loads and quantities as they are written in a job file.
+use super::shape::Shape;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A quantity: a number; an expression in x, y, z (m) and t (s), such as "0.1 * sin(2 * pi * t)"; or a table over time,
+/// [[time, value], …], linear between its rows and constant outside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Quantity {
+    /// The same everywhere and always.
+    Number(f64),
+    /// An expression in x, y, z (m) and t (s) with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
+    /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, floor, ceil, min, max.
+    Expression(String),
+    /// Rows [time (s), value] with increasing times.
+    Table(Vec<[f64; 2]>),
+}
+
+/// A load: what acts on the material beside gravity, contact and the faces of the domain. It acts on nodes inside its shape.
+/// Its mean force (N) since the row before and its work (J) since the start are columns of `history.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Load {
+    /// Name, of letters, digits, `_` and `-`.
+    pub name: String,
+    /// Where it acts; everywhere by default.
+    #[serde(default)]
+    pub shape: Option<Shape>,
+    /// Time from which it acts, s; 0 by default.
+    #[serde(default)]
+    pub from: f64,
+    /// Time until which it acts, s; to the end by default.
+    #[serde(default)]
+    pub until: Option<f64>,
+    /// What it does.
+    #[serde(flatten)]
+    pub kind: LoadKind,
+}
+
+/// What a load does.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum LoadKind {
+    /// A force per mass.
+    BodyForce {
+        /// Components of the acceleration, m/s²: as many as the job has dimensions.
+        acceleration: Vec<Quantity>,
+    },
+    /// Material is gripped: its velocity is prescribed along the axes that are named.
+    Velocity {
+        /// Component along x, m/s; free by default.
+        #[serde(default)]
+        x: Option<Quantity>,
+        /// Component along y, m/s; free by default.
+        #[serde(default)]
+        y: Option<Quantity>,
+        /// Component along z, m/s; free by default; 3D only.
+        #[serde(default)]
+        z: Option<Quantity>,
+    },
+    /// Drag in proportion to mass: velocities decay as exp(-rate time).
+    Damping {
+        /// Rate, 1/s.
+        rate: Quantity,
+    },
+}

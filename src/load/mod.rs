@@ -1,0 +1,132 @@
+//! Loads: what acts on the material beside stress, contact and the faces of the domain.
+//!
+//! A load acts on real nodes inside its region, between two times. Each kind is one variant of [`Kind`] with its effect on
+//! the velocity of a node in [`Load::apply`]; the solver books impulse and work of each load from that alone.
+use crate::geometry::Shape;
+use crate::quantity::Quantity;
+
+/// Acceleration of gravity, which may change in time.
+#[derive(Clone, Debug)]
+pub struct Gravity<const D: usize>(pub [Quantity; D]);
+
+impl<const D: usize> Gravity<D> {
+    /// The same at all times, m/s².
+    pub fn constant(acceleration: [f64; D]) -> Self {
+        Self(acceleration.map(Quantity::Constant))
+    }
+
+    /// Acceleration at a time (s), m/s².
+    pub fn at(&self, time: f64) -> [f64; D] {
+        std::array::from_fn(|axis| self.0[axis].at(&[0.0; 3], time))
+    }
+}
+
+/// A load of a job.
+#[derive(Clone, Debug)]
+pub struct Load<const D: usize> {
+    /// Name; part of the names of its columns in the history.
+    pub name: String,
+    /// What it does.
+    pub kind: Kind<D>,
+    /// Where it acts, relative to the lower corner of the domain; everywhere without.
+    pub region: Option<Shape<D>>,
+    /// Time from which it acts, s.
+    pub from: f64,
+    /// Time until which it acts, s.
+    pub until: f64,
+    /// Lower corner of the domain, m: expressions are in the job's coordinates.
+    pub origin: [f64; D],
+}
+
+/// What a load does to the velocity v of a node in a step of length Δt.
+#[derive(Clone, Debug)]
+pub enum Kind<const D: usize> {
+    /// Force per mass a (m/s²): `v += Δt a`.
+    BodyForce([Quantity; D]),
+    /// Prescribed velocity (m/s) along the axes that have one: `v = value`.
+    Velocity([Option<Quantity>; D]),
+    /// Drag in proportion to mass, with a rate r (1/s): `v *= exp(-r Δt)`.
+    Damping(Quantity),
+}
+
+impl<const D: usize> Load<D> {
+    /// Whether it acts in a step that begins at `time`, s.
+    pub fn is_active(&self, time: f64) -> bool {
+        self.from <= time && time < self.until
+    }
+
+    /// Whether it acts at a point, m from the lower corner of the domain.
+    pub fn reaches(&self, x: &[f64; D]) -> bool {
+        self.region.as_ref().is_none_or(|region| region.distance(x) <= 0.0)
+    }
+
+    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
+    /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
+    /// the prescribed motion to second order.
+    pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
+        let mut place = [0.0; 3];
+        for axis in 0..D {
+            place[axis] = self.origin[axis] + x[axis];
+        }
+        match &self.kind {
+            Kind::BodyForce(acceleration) => {
+                for axis in 0..D {
+                    velocity[axis] = dt.mul_add(acceleration[axis].at(&place, middle), velocity[axis]);
+                }
+            }
+            Kind::Velocity(prescribed) => {
+                for axis in 0..D {
+                    if let Some(value) = &prescribed[axis] {
+                        velocity[axis] = value.at(&place, middle);
+                    }
+                }
+            }
+            Kind::Damping(rate) => {
+                let kept = libm::exp(-rate.at(&place, middle) * dt);
+                velocity.iter_mut().for_each(|v| *v *= kept);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quantity::{Expression, Table};
+
+    fn load(kind: Kind<2>) -> Load<2> {
+        Load { name: "load".into(), kind, region: None, from: 1.0, until: 2.0, origin: [10.0, 0.0] }
+    }
+
+    #[test]
+    fn body_forces_are_taken_in_the_middle_of_the_step_at_the_place_in_the_job() {
+        let x = Quantity::Expression(Box::new(Expression::parse("x * t").unwrap()));
+        let force = load(Kind::BodyForce([x, Quantity::Constant(-9.81)]));
+        let mut velocity = [1.0, 0.0];
+        force.apply(&mut velocity, &[0.5, 3.0], 1.5, 0.1);
+        assert_eq!(velocity, [1.0 + 0.1 * (10.5 * 1.5), 0.1 * -9.81]);
+        assert!(!force.is_active(0.99) && force.is_active(1.0) && !force.is_active(2.0));
+    }
+
+    #[test]
+    fn a_grip_leaves_free_axes_alone() {
+        let table = Table::new(&[(0.0, 0.0), (2.0, 4.0)]).unwrap();
+        let grip = load(Kind::Velocity([None, Some(Quantity::Table(table))]));
+        let mut velocity = [7.0, 8.0];
+        grip.apply(&mut velocity, &[0.0, 0.0], 1.5, 0.1);
+        assert_eq!(velocity, [7.0, 3.0]);
+    }
+
+    /// Two half steps damp as much as a whole one.
+    #[test]
+    fn damping_does_not_depend_on_the_step() {
+        let damping = load(Kind::Damping(Quantity::Constant(3.0)));
+        let (mut whole, mut halves) = ([2.0, -1.0], [2.0, -1.0]);
+        damping.apply(&mut whole, &[0.0; 2], 1.5, 0.2);
+        damping.apply(&mut halves, &[0.0; 2], 1.45, 0.1);
+        damping.apply(&mut halves, &[0.0; 2], 1.55, 0.1);
+        for axis in 0..2 {
+            assert!((whole[axis] - halves[axis]).abs() <= 4.0 * f64::EPSILON * whole[axis].abs());
+        }
+    }
+}
