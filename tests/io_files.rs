@@ -1,5 +1,8 @@
 //! Output and restart files at several numbers of ranks. Each test launches its own binary under mpirun.
 
+#[path = "common/mpirun.rs"]
+mod mpirun;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -9,7 +12,7 @@ use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{checkpoint_path, find_latest, output_path};
 use agimp::io::snapshot::{self, Options, Outputs, PointField, Scalars, View};
 use agimp::particle::chunk::{Chunk, Layout, Tag};
-use partition::comm::{Comm, World};
+use partition::comm::{Comm, World, is_launched};
 use partition::{Brick, Octant};
 
 /// Runs `body` on each number of ranks in a directory shared by all of them, then `after` in the test
@@ -26,7 +29,7 @@ fn launch(
     after: impl Fn(&Path),
     tell: impl Fn(&str),
 ) {
-    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
+    if is_launched() {
         let world = World::init().expect("MPI starts");
         let directory = PathBuf::from(std::env::var_os("AGIMP_TEST_DIRECTORY").expect("set by the launcher"));
         body(world.comm(), &directory);
@@ -34,28 +37,17 @@ fn launch(
     }
     let directory = tempfile::tempdir().expect("temporary directory");
     for n in ranks {
-        let output = mpirun(directory.path())
-            .args(["-n", &n.to_string()])
+        let mut command = mpirun::command(*n, 120);
+        command
             .arg(std::env::current_exe().expect("own path"))
             .args(["--exact", test, "--nocapture", "--test-threads=1", "--include-ignored"])
-            .output()
-            .expect("mpirun starts");
-        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+            .env("AGIMP_TEST_DIRECTORY", directory.path());
+        let output = mpirun::finish(&mut command);
+        let text = mpirun::text(&output);
         assert!(output.status.success(), "{test} on {n} ranks:\n{text}");
         tell(&text);
     }
     after(directory.path());
-}
-
-fn mpirun(directory: &Path) -> Command {
-    let mut command = Command::new("mpirun");
-    command
-        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .env("OMPI_MCA_io", "^ompio")
-        .env("AGIMP_TEST_DIRECTORY", directory)
-        .args(["--oversubscribe", "--bind-to", "none"]);
-    command
 }
 
 /// A number that depends on all bits of its arguments.
@@ -392,12 +384,10 @@ fn a_full_disk_leaves_the_old_file() {
     let directory = tempfile::tempdir().expect("temporary directory");
     let launch = |script: &str| {
         Command::new("unshare")
-            .args(["-rm", "sh", "-c", &format!("mount -t tmpfs -o size=1m none \"$0\" && {script}")])
+            .args(["-rm", "bash", "-c", &format!("mount -t tmpfs -o size=1m none \"$0\" && {script}")])
             .arg(directory.path())
             .arg(std::env::current_exe().expect("own path"))
-            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-            .env("OMPI_MCA_io", "^ompio")
+            .arg(mpirun::environment())
             .env("AGIMP_TEST_DIRECTORY", directory.path())
             .output()
     };
@@ -405,7 +395,7 @@ fn a_full_disk_leaves_the_old_file() {
         return;
     }
     let mpirun = format!(
-        "mpirun --oversubscribe --bind-to none -n 3 \"$1\" --exact {NAME} --nocapture --test-threads=1"
+        "source \"$2\" && mpirun --bind-to none -n 3 \"$1\" --exact {NAME} --nocapture --test-threads=1"
     );
     let output = launch(&mpirun).expect("unshare starts");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);

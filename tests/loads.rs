@@ -3,6 +3,8 @@
 #[path = "mpi_runs/launch.rs"]
 #[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
 mod launch;
+#[path = "common/mpirun.rs"]
+mod mpirun;
 
 use std::collections::HashMap;
 use std::path::Path;

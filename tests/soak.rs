@@ -1,6 +1,8 @@
 //! Plain jobs, many of them: bodies of every model fall, spin, bounce and are squeezed, on lattices aligned with the cells and
 //! not, on uniform and refined trees. All run through, keep every particle, and gain no energy beyond a bound.
 
+#[path = "common/mpirun.rs"]
+mod mpirun;
 #[path = "common/relaunch.rs"]
 mod relaunch;
 

@@ -1,5 +1,7 @@
 //! Free flight across level jumps: what each transfer conserves. Each test launches its own binary under mpirun.
 
+#[path = "common/mpirun.rs"]
+mod mpirun;
 #[path = "common/relaunch.rs"]
 mod relaunch;
 #[path = "common/spinning.rs"]

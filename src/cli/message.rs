@@ -2,7 +2,7 @@
 use std::io::{IsTerminal as _, Write as _};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
-use partition::comm::{Comm, World};
+use partition::comm::{Comm, World, is_launched};
 
 use super::Failure;
 use crate::job::{FaultList, JobError};
@@ -42,8 +42,7 @@ pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, 
 
 /// Collective under `mpirun`: its ranks. A process that it has not started is alone, and need not be able to start MPI.
 pub(super) fn launched() -> Result<Option<World>, Failure> {
-    let is_launched = std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some();
-    is_launched.then(World::init).transpose().map_err(|error| Failure::Run(error.to_string()))
+    is_launched().then(World::init).transpose().map_err(|error| Failure::Run(error.to_string()))
 }
 
 /// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the parser

@@ -106,8 +106,9 @@ fn run(block: &Block, name: &str, ranks: usize, threads: usize) -> Result<Vec<Va
     let mut command = match ranks {
         1 => Command::new(&program),
         _ => {
+            // That ranks may share cores, `jobs/environment` says, which `run` sources.
             let mut command = Command::new("mpirun");
-            command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]).arg(&program);
+            command.args(["--bind-to", "none", "-n", &ranks.to_string()]).arg(&program);
             command
         }
     };

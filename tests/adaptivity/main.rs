@@ -4,6 +4,8 @@
 #[path = "../mpi_runs/launch.rs"]
 #[allow(dead_code, reason = "shared with another test")]
 mod launch;
+#[path = "../common/mpirun.rs"]
+mod mpirun;
 #[path = "../common/relaunch.rs"]
 mod relaunch;
 

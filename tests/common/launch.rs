@@ -1,8 +1,10 @@
-//! Starts scenarios under `mpirun`: a test launches its own binary, where the hidden test `worker` runs the
-//! scenario that an environment variable names.
+//! Runs scenarios on several ranks: a test launches its own binary, where the hidden test `worker` runs the scenario
+//! that an environment variable names.
+use super::mpirun;
+use partition::comm::is_launched;
 use partition::{Comm, World};
 use std::process::{Command, Output};
-use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 /// What each rank runs.
 pub type Scenario = fn(&Comm);
@@ -12,10 +14,7 @@ const SCENARIO: &str = "AGIMP_TEST_SCENARIO";
 /// Begins a line of output that must be the same for any number of ranks.
 const RESULT: &str = "result: ";
 /// Seconds after which `mpirun` ends a job that hangs.
-const LIMIT: &str = "120";
-
-/// One launch at a time: more would only compete for the same cores.
-static ONE_LAUNCH: Mutex<()> = Mutex::new(());
+const LIMIT: u32 = 120;
 
 /// Prints what must not depend on the number of ranks.
 pub fn report(comm: &Comm, text: impl std::fmt::Display) {
@@ -29,12 +28,13 @@ pub fn work(scenarios: &[(&str, Scenario)]) {
     let Ok(name) = std::env::var(SCENARIO) else { return };
     let (_, scenario) = scenarios.iter().find(|(n, _)| *n == name).expect("a scenario of this name");
     let world = World::init().expect("MPI starts");
+    assert!(World::init().is_err(), "MPI starts once");
     scenario(world.comm());
 }
 
 /// Runs the scenario with each number of ranks; it must succeed and report the same.
 pub fn agrees_for(scenario: &str, ranks: &[usize]) {
-    if std::env::var_os("OMPI_COMM_WORLD_SIZE").is_some() {
+    if is_launched() {
         return; // somebody has started the tests themselves under mpirun
     }
     let mut first: Option<Vec<String>> = None;
@@ -46,27 +46,49 @@ pub fn agrees_for(scenario: &str, ranks: &[usize]) {
     }
 }
 
-fn results(scenario: &str, output: &Output) -> Vec<String> {
-    let stdout = String::from_utf8_lossy(&output.stdout);
+/// Runs the scenario in one process without `mpirun`; it must succeed.
+pub fn alone(scenario: &str) {
+    if is_launched() {
+        return;
+    }
+    let this = Command::new(std::env::current_exe().expect("own path"));
+    results(scenario, &mpirun::finish(&mut worker(this, scenario)));
+}
+
+/// Runs the scenario, which must end soon, with one line of explanation that names a place in `comm.rs`.
+pub fn fails(scenario: &str, ranks: usize, explanation: &str) {
+    if is_launched() {
+        return;
+    }
+    let start = Instant::now();
+    let output = launch(scenario, ranks);
+    let duration = start.elapsed();
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{scenario} failed\n{stdout}\n{stderr}");
+    let lines: Vec<&str> = stderr.lines().filter(|line| line.starts_with("agimp: ")).collect();
+    assert!(!output.status.success(), "{scenario} must fail");
+    assert_eq!(lines.len(), 1, "one message in:\n{stderr}");
+    let expected = format!("agimp: {explanation} (");
+    assert!(lines[0].starts_with(&expected) && lines[0].contains("comm.rs:"), "{}", lines[0]);
+    assert!(duration < Duration::from_secs(10), "took {duration:?} to start and end");
+}
+
+fn results(scenario: &str, output: &Output) -> Vec<String> {
+    assert!(output.status.success(), "{scenario} failed\n{}", mpirun::text(output));
+    let stdout = String::from_utf8_lossy(&output.stdout);
     stdout.lines().filter_map(|line| line.strip_prefix(RESULT)).map(str::to_owned).collect()
 }
 
 fn launch(scenario: &str, ranks: usize) -> Output {
-    let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let this = std::env::current_exe().expect("this binary has a path");
-    Command::new("mpirun")
-        .args(["-n", &ranks.to_string(), "--oversubscribe", "--bind-to", "none"])
-        .arg(this)
+    let mut command = mpirun::command(ranks, LIMIT);
+    command.arg(std::env::current_exe().expect("this binary has a path"));
+    mpirun::finish(&mut worker(command, scenario))
+}
+
+/// The worker entry of this binary.
+fn worker(mut command: Command, scenario: &str) -> Command {
+    command
         .args(["worker", "--exact", "--ignored", "--nocapture", "--test-threads=1"])
         .env(SCENARIO, scenario)
-        .env("MPIEXEC_TIMEOUT", LIMIT)
-        .env("RAYON_NUM_THREADS", "1")
-        .env("OMPI_MCA_mpi_yield_when_idle", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .env("OMPI_MCA_io", "^ompio")
-        .output()
-        .expect("mpirun is installed")
+        .env("RAYON_NUM_THREADS", "1");
+    command
 }

@@ -3,5 +3,6 @@
 pub mod boxes;
 pub mod exact;
 pub mod launch;
+pub mod mpirun;
 pub mod random;
 pub mod tree;

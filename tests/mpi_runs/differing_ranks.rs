@@ -39,7 +39,7 @@ fn jobs(home: &Path, (from, to): (&str, &str)) -> [PathBuf; 2] {
 /// Each rank in its own folder, so that the same words on the command line mean different files.
 fn each_in_its_folder(home: &Path, arguments: &str) -> Command {
     let mut command = mpirun(home, 2);
-    let script = format!("cd $OMPI_COMM_WORLD_RANK && exec \"$0\" {arguments}");
+    let script = format!("cd ${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}} && exec \"$0\" {arguments}");
     command.args(["bash", "-c", &script, env!("CARGO_BIN_EXE_agimp")]);
     command
 }

@@ -205,7 +205,7 @@ fn ranks_end_after_the_message_has_gone_out() {
     let directory = home.path();
     // Another process group, which `mpirun` does not end; the pipe is full, so rank 0 cannot write.
     let slow = r#"
-        if [ "$OMPI_COMM_WORLD_RANK" = 0 ]; then
+        if [ "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}" = 0 ]; then
             exec 2> >(exec setsid bash -c 'sleep 3; head -c 65536 >/dev/null; cat >told.part; mv told.part told')
             head -c 65536 /dev/zero >&2
         fi

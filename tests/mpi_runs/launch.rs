@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use super::mpirun;
+
 /// After this a run counts as hanging.
 const PATIENCE: Duration = Duration::from_secs(300);
 
@@ -19,15 +21,10 @@ pub fn agimp(directory: &Path) -> Command {
     command
 }
 
-/// `mpirun` with the settings of a bare machine: what the program needs of Open MPI it has to set itself.
+/// `mpirun` in a directory. What the program needs of the MPI library it has to set itself.
 pub fn mpirun(directory: &Path, ranks: usize) -> Command {
-    let mut command = Command::new("mpirun");
-    command
-        .current_dir(directory)
-        .env_remove("OMPI_MCA_io")
-        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()]);
+    let mut command = mpirun::command(ranks, PATIENCE.as_secs() as u32);
+    command.current_dir(directory).env_remove("OMPI_MCA_io").env_remove("OMPI_MCA_mpi_yield_when_idle");
     command
 }
 

@@ -3,6 +3,8 @@
 mod differing_ranks;
 mod faults;
 mod launch;
+#[path = "../common/mpirun.rs"]
+mod mpirun;
 mod ranks;
 mod restart;
 mod same_bits;

@@ -5,12 +5,14 @@
 //!   [`Comm::agree`] (`agree.rs`) and [`Comm::sparse_exchange`] (`sparse.rs`),
 //! * [`NeighbourExchange`] sends one message to each of a fixed set of neighbours, with a begin
 //!   and a finish between which other work can be done (`neighbour.rs`),
-//! * `request.rs` owns the buffers of sends under way; it holds all `unsafe` of this crate.
+//! * `environment.rs` has what differs between MPI libraries,
+//! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for environment variables that are set before MPI starts.
 //!
 //! Everything here runs on the main thread (`MPI_THREAD_FUNNELED`); [`Comm`] is neither `Send`
 //! nor `Sync`, so the compiler keeps it there. No call has a cost that grows like the number of
 //! ranks times a message: the only O(P) data are the scalars of [`Comm::all_gather_u64`].
 mod agree;
+mod environment;
 mod neighbour;
 mod reduce;
 mod request;
@@ -18,6 +20,7 @@ mod sparse;
 mod world;
 
 pub use agree::Disagreement;
+pub use environment::is_launched;
 pub use neighbour::{NeighbourExchange, Pending, Traffic};
 pub use world::{Comm, CommError, RawComm, World};
 

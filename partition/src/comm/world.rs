@@ -11,6 +11,8 @@ use mpi::environment::Universe;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
+use super::environment;
+
 /// MPI's own communicator handle, for libraries that need one (the parallel HDF5 driver).
 pub type RawComm = mpi::ffi::MPI_Comm;
 
@@ -57,7 +59,9 @@ impl World {
     ///
     /// To be called before the program starts threads, since it may set an environment variable.
     pub fn init() -> Result<World, CommError> {
-        prefer_romio();
+        // SAFETY: nothing reads the environment meanwhile: by the contract of this function the program has no other
+        // threads yet (a test harness has, but they wait), and MPI starts its own later.
+        unsafe { environment::prepare() };
         let (universe, threading) =
             mpi::initialize_with_threading(Threading::Funneled).ok_or(CommError::AlreadyStarted)?;
         if threading < Threading::Funneled {
@@ -161,19 +165,6 @@ impl Comm {
 impl std::fmt::Debug for Comm {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Comm(rank {} of {})", self.rank, self.size)
-    }
-}
-
-/// Before MPI starts: Open MPI up to version 4 shall access files through ROMIO, not through its own layer
-/// `ompio`, which has written wrong parallel HDF5 files. A choice of the user's own wins.
-fn prefer_romio() {
-    const CHOICE: &str = "OMPI_MCA_io";
-    let old = mpi::environment::library_version()
-        .is_ok_and(|version| (1..=4).any(|major| version.starts_with(&format!("Open MPI v{major}."))));
-    if old && std::env::var_os(CHOICE).is_none() {
-        // SAFETY: nothing reads the environment meanwhile: by the contract of `World::init` the program has no
-        // other threads yet (a test harness has, but they wait), and MPI starts its own later.
-        unsafe { std::env::set_var(CHOICE, "^ompio") };
     }
 }
 

@@ -4,17 +4,16 @@
 //! hidden test `worker` runs the scenario that an environment variable names.
 
 mod comm;
+#[path = "../../../tests/common/launch.rs"]
 mod launch;
+#[path = "../../../tests/common/mpirun.rs"]
+mod mpirun;
 mod oracle;
 mod random;
 mod search;
 mod tree;
 
-use launch::{agrees_for, fails};
-use partition::{Comm, World};
-
-/// What each rank runs.
-type Scenario = fn(&Comm);
+use launch::{Scenario, agrees_for, fails};
 
 /// Everything that can be run on several ranks, by name.
 const SCENARIOS: &[(&str, Scenario)] = &[
@@ -38,11 +37,7 @@ const SCENARIOS: &[(&str, Scenario)] = &[
 #[test]
 #[ignore = "started by the other tests under mpirun"]
 fn worker() {
-    let Ok(name) = std::env::var(launch::SCENARIO) else { return };
-    let (_, scenario) = SCENARIOS.iter().find(|(n, _)| *n == name).expect("a scenario of this name");
-    let world = World::init().expect("MPI starts");
-    assert!(World::init().is_err(), "MPI starts once");
-    scenario(world.comm());
+    launch::work(SCENARIOS);
 }
 
 #[test]
