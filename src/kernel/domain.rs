@@ -13,6 +13,10 @@ use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 /// what a box then has outside the domain is below round-off.
 const LEAST_SHARE: f64 = 1.0 / 70_368_744_177_664.0;
 
+/// Half width, as a share of the cell, below which the slopes of a box that a wall cuts are reduced (see [`softening`]): that
+/// of the usual box of half a cell at the usual least stretch.
+const SOFT_SHARE: f64 = 1.0 / 16.0;
+
 /// Half widths of the selected particles along each axis, m, as the kernels use them on cells of edge
 /// `cell`: at most half a cell, and cut so that the box stays within the domain `[0, extent]`.
 /// Replaces the content of `out`.
@@ -100,6 +104,91 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
     extent: &[f64; D],
     scheme: &Scheme,
 ) -> [V; D] {
+    let whole = whole_of_batch(tile, tags, batch, greatest, scheme);
+    cut_at_walls(&whole, position, cell, extent)
+}
+
+/// Half widths of boxes within the domain `[0, extent]`, each side cut as the side at the wall.
+#[inline(always)]
+pub(super) fn cut_at_walls<V: Vector, const D: usize>(
+    whole: &[V; D],
+    position: &[V; D],
+    cell: f64,
+    extent: &[f64; D],
+) -> [V; D] {
+    let mut half = *whole;
+    for axis in 0..D {
+        let wall = position[axis].min(V::splat(extent[axis]) - position[axis]);
+        half[axis] = half[axis].min(wall).max(V::splat(LEAST_SHARE * cell));
+    }
+    half
+}
+
+/// Factors of the slopes along each axis, for boxes of half widths `half` that were cut from `whole`; `None` if all are 1.
+///
+/// A particle at a distance d from a wall has the weight `d/h` at the next node, and the slope `1/h`. Where it is alone, so that
+/// this node has no other mass, its stress acts on its own velocity gradient with a stiffness in proportion to `1/d`, which no time
+/// step in use resolves when d is small: fragments near walls would gain energy without bound. With the factor `d/d₀` below
+/// `d₀ = h/16`, or below the half width of the box before it was cut, this stiffness falls with d instead. As the same
+/// factor is in the force and in the velocity gradient, energy goes neither way.
+#[inline(always)]
+pub(super) fn softening<V: Vector, const D: usize>(
+    whole: &[V; D],
+    half: &[V; D],
+    cell: f64,
+) -> Option<[V; D]> {
+    let mut least = *whole;
+    let mut is_cut = V::Mask::from_bits(0);
+    for axis in 0..D {
+        least[axis] = whole[axis].min(V::splat(SOFT_SHARE * cell));
+        is_cut = is_cut | half[axis].lt(least[axis]);
+    }
+    // Few particles come so near to a wall.
+    is_cut.any().then(|| factors(half, &least))
+}
+
+/// [`softening`] of a box that is wider than a cell along another axis, of cells of edge `cell`. Before a wall cut it, it was wider
+/// than the limit along every axis.
+pub fn softening_at<const D: usize>(
+    position: &[f64; D],
+    half: &[f64; D],
+    cell: f64,
+    extent: &[f64; D],
+) -> [f64; D] {
+    std::array::from_fn(|axis| {
+        let is_cut = half[axis] >= position[axis].min(extent[axis] - position[axis]);
+        if is_cut { (half[axis] / (SOFT_SHARE * cell)).min(1.0) } else { 1.0 }
+    })
+}
+
+/// Whether a wall cuts any of the boxes.
+#[inline(always)]
+pub(super) fn is_cut<V: Vector, const D: usize>(whole: &[V; D], half: &[V; D]) -> bool {
+    let mut is_cut = V::Mask::from_bits(0);
+    for axis in 0..D {
+        is_cut = is_cut | half[axis].lt(whole[axis]);
+    }
+    is_cut.any()
+}
+
+#[inline(never)]
+fn factors<V: Vector, const D: usize>(half: &[V; D], least: &[V; D]) -> [V; D] {
+    let mut factor = *half;
+    for axis in 0..D {
+        factor[axis] = (half[axis] / least[axis]).min(V::splat(1.0));
+    }
+    factor
+}
+
+/// Half widths of a batch, at most `greatest`, wherever the particles are.
+#[inline(always)]
+pub(super) fn whole_of_batch<V: Vector, const D: usize>(
+    tile: &[[f64; LANES]],
+    tags: &[u64],
+    batch: &Batch,
+    greatest: f64,
+    scheme: &Scheme,
+) -> [V; D] {
     let mut half = match scheme.boxes {
         BoxPolicy::Fixed => [batch.load(tile, Layout::<D>::HALF); D],
         BoxPolicy::Cell => {
@@ -115,9 +204,8 @@ pub(super) fn of_batch<V: Vector, const D: usize>(
             half
         }
     };
-    for axis in 0..D {
-        let wall = position[axis].min(V::splat(extent[axis]) - position[axis]);
-        half[axis] = half[axis].min(V::splat(greatest)).min(wall).max(V::splat(LEAST_SHARE * cell));
+    for half in &mut half {
+        *half = half.min(V::splat(greatest));
     }
     half
 }

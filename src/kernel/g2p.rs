@@ -15,7 +15,7 @@ use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
-use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
+use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
 /// Memory that is used from bin to bin, as it takes a while to set it up.
 pub struct Scratch<const D: usize> {
@@ -75,9 +75,16 @@ impl<const D: usize> Kernel for Gather<'_, D> {
         for batch in batches {
             let tile = batch.tile_mut::<D>(tiles, spare);
             let position: [V; D] = batch.positions(tile);
-            let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, extent, scheme);
+            let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
+            let half = domain::cut_at_walls(&whole, &position, cell, extent);
             weights.fill(frame, &position, &position, &half);
+            if let Some(factors) = domain::softening(&whole, &half, cell) {
+                weights.soften(&factors);
+            }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
+            if scheme.transfer == Transfer::Apic && domain::is_cut(&whole, &half) {
+                keep_affine_velocity(sums, &whole, &half, &position, dt, cell, extent);
+            }
             greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
@@ -105,6 +112,9 @@ pub fn gather_sub_boxes<const D: usize>(
         ));
         let (centre, half) = SubBox::lanes(parts);
         weights.fill(frame, &position, &centre, &half);
+        if let Some(factors) = SubBox::softening(parts) {
+            weights.soften(&factors);
+        }
         sums.gather::<Lanes>(weights, nodes, &batch, frame.cell, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
@@ -112,7 +122,7 @@ pub fn gather_sub_boxes<const D: usize>(
     }
 }
 
-/// Advances the particles of a list by `dt` with what they gathered. `cell` is the least edge of the cells that their
+/// Advances the particles of a list by `dt` with what they gathered, in a domain `[0, extent]`. `cell` is the least edge of the cells that their
 /// boxes overlap, m. Returns as [`gather`].
 pub fn advance_gathered<const D: usize>(
     scratch: &mut Scratch<D>,
@@ -122,6 +132,7 @@ pub fn advance_gathered<const D: usize>(
     scheme: &Scheme,
     dt: f64,
     cell: f64,
+    extent: &[f64; D],
     leavers: &mut Leavers<D>,
 ) -> f64 {
     let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -133,6 +144,11 @@ pub fn advance_gathered<const D: usize>(
         let position: [Lanes; D] = batch.positions(tile);
         for (lane, gathered) in gathered.iter().enumerate() {
             sums.set(lane, gathered);
+        }
+        let whole = domain::whole_of_batch(tile, tags, &batch, f64::INFINITY, scheme);
+        let half = domain::cut_at_walls(&whole, &position, cell, extent);
+        if scheme.transfer == Transfer::Apic && domain::is_cut(&whole, &half) {
+            keep_affine_velocity(sums, &whole, &half, &position, dt, cell, extent);
         }
         greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
         batch.put_back::<D>(tiles, spare);
@@ -162,6 +178,35 @@ pub fn interpolate<const D: usize>(
             let first = weights.first(lane);
             let row = mean(weights, lane, &velocity[first..]).to_array();
             each(batch.particle(lane), std::array::from_fn(|axis| row[axis]));
+        }
+    }
+}
+
+/// Reduces B of particles that move towards a wall which cuts their boxes, in proportion to their distance from it.
+///
+/// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept, C grows like `1/d`, and
+/// a particle that drifts to the wall would come with ever faster nodes and pass through.
+#[inline(never)]
+fn keep_affine_velocity<V: Vector, const D: usize>(
+    sums: &mut Sums<D>,
+    whole: &[V; D],
+    half: &[V; D],
+    position: &[V; D],
+    dt: f64,
+    cell: f64,
+    extent: &[f64; D],
+) {
+    let velocity = V::columns(&sums.velocity);
+    let mut moved = *position;
+    for axis in 0..D {
+        moved[axis] = velocity[axis].mul_add(V::splat(dt), position[axis]);
+    }
+    let next = domain::cut_at_walls(whole, &moved, cell, extent);
+    let one = V::splat(1.0);
+    for axis in 0..D {
+        let kept = half[axis].lt(whole[axis]).select((next[axis] / half[axis]).min(one), one).to_array();
+        for (row, kept) in sums.affine[axis].iter_mut().zip(kept) {
+            *row = *row * F64x4::splat(kept);
         }
     }
 }

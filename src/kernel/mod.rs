@@ -190,6 +190,8 @@ pub struct SubBox<const D: usize> {
     pub centre: [f64; D],
     /// Half widths of the part, m; at most half a cell of the block.
     pub half: [f64; D],
+    /// Factor of the slopes along each axis: below 1 for boxes that a near wall cuts (see [`domain::softening_at`]).
+    pub softening: [f64; D],
     /// Share of the particle that the part carries: 1 / number of parts.
     pub fraction: f64,
     /// D of the whole box, m² (see [`spread`]); the parts' own add up to it.
@@ -203,6 +205,12 @@ impl<const D: usize> SubBox<D> {
             std::array::from_fn(|axis| Self::lane(parts, |part| part.centre[axis])),
             std::array::from_fn(|axis| Self::lane(parts, |part| part.half[axis])),
         )
+    }
+
+    /// Factors of the slopes, if any is not 1.
+    fn softening(parts: &[Self]) -> Option<[Lanes; D]> {
+        let is_soft = parts.iter().any(|part| part.softening != [1.0; D]);
+        is_soft.then(|| std::array::from_fn(|axis| Self::lane(parts, |part| part.softening[axis])))
     }
 
     /// One value of up to a batch of parts.

@@ -138,8 +138,12 @@ fn scatter_all<V: Vector, const D: usize>(
         batches.look_up_pages();
         let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
         let position: [V; D] = batch.positions(tile);
-        let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
+        let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
+        let half = domain::cut_at_walls(&whole, &position, cell, &frame.extent);
         prepared.weights.fill(frame, &position, &position, &half);
+        if let Some(factors) = domain::softening(&whole, &half, cell) {
+            prepared.weights.soften(&factors);
+        }
         let mut spread = prepared.weights.spread;
         let (mut touched, mut hanging) = (0, 0);
         if let Some(moments) = &moments {
@@ -182,6 +186,9 @@ impl<const D: usize> Prepared<D> {
     fn fill_parts(&mut self, frame: &Frame<D>, position: &[Lanes; D], parts: &[SubBox<D>]) {
         let (centre, half) = SubBox::lanes(parts);
         self.weights.fill(frame, position, &centre, &half);
+        if let Some(factors) = SubBox::softening(parts) {
+            self.weights.soften(&factors);
+        }
     }
 
     /// Reads the particles' state; `spread` is D of [`Transfer::Apic`].

@@ -82,6 +82,16 @@ impl<const D: usize> Weights<D> {
         (base + V::splat(TWO_52)).store(&mut self.base);
     }
 
+    /// Multiplies slopes and arms along each axis by a factor.
+    #[inline(never)]
+    pub fn soften<V: Vector>(&mut self, factors: &[V; D]) {
+        for (axis, factor) in self.axis.iter_mut().zip(factors) {
+            for lanes in axis.slope.iter_mut().chain(&mut axis.arm) {
+                (V::load(lanes) * *factor).store(lanes);
+            }
+        }
+    }
+
     /// Index of the lowest node in the arena.
     #[inline(always)]
     pub fn first(&self, lane: usize) -> usize {

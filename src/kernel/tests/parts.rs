@@ -25,6 +25,7 @@ fn parts_equal_the_whole<const D: usize>() {
                 slot: p as u32,
                 centre: std::array::from_fn(|k| whole.position(p)[k] + side(k) * half[p][k]),
                 half: half[p].map(|h| 0.5 * h),
+                softening: [1.0; D],
                 fraction: 1.0 / (1 << D) as f64,
                 spread,
             });
@@ -64,6 +65,7 @@ fn parts_equal_the_whole<const D: usize>() {
         &scheme,
         DT,
         CELL,
+        &frame.extent,
         &mut Leavers::default(),
     );
     for column in 0..Layout::<D>::REALS {

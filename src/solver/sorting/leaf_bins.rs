@@ -15,6 +15,7 @@ use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
+use crate::kernel::domain::softening_at;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
@@ -266,8 +267,15 @@ impl<const D: usize> LeafBins<D> {
         }
         let slot = self.cut.len() as u32;
         self.cut.push(particle);
+        let roots = plan.tree.brick().roots;
+        let extent = roots.map(|roots| f64::from(roots) * plan.root_edge);
+        let softening = match given {
+            true => [1.0; D],
+            false => softening_at(&centre, &half, plan.cell(level), &extent),
+        };
         let (fraction, spread) = (1.0, [0.0; D]);
-        self.cut_box(plan, leaf, own, sides, SubBox { particle, slot, centre, half, fraction, spread })?;
+        let whole = SubBox { particle, slot, centre, half, softening, fraction, spread };
+        self.cut_box(plan, leaf, own, sides, whole)?;
         Ok(CUT)
     }
 

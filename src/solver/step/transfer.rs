@@ -309,8 +309,17 @@ impl<const D: usize> Solver<D> {
                     }
                     let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
                     let cell = plan.cell(finest.unwrap_or(0));
-                    let fastest =
-                        g2p::advance_gathered(kernel, chunk, cut, gathered, &scheme, dt, cell, leavers);
+                    let fastest = g2p::advance_gathered(
+                        kernel,
+                        chunk,
+                        cut,
+                        gathered,
+                        &scheme,
+                        dt,
+                        cell,
+                        &extent(plan),
+                        leavers,
+                    );
                     // Bins take them in turn.
                     leavers.found.sort_unstable();
                     signal.max(fastest)
