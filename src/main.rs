@@ -1,9 +1,14 @@
 //! The `agimp` program: maps what a command returns to an exit code.
 use agimp::cli::{Arguments, execute, unusable};
+use agimp::run::stop::StopRequest;
 use clap::Parser as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    // First of all, since a batch queue may send its signal while a run starts. An error is told when the run begins.
+    if std::env::args_os().nth(1).is_some_and(|command| command == "run") {
+        let _ = StopRequest::listen();
+    }
     agimp::memory::return_large_blocks();
     let done = Arguments::try_parse().map_err(unusable).and_then(|arguments| execute(arguments.command));
     match done {

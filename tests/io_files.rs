@@ -9,7 +9,7 @@ use std::process::Command;
 use agimp::io::hdf5_file::ParallelFile;
 use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
-use agimp::io::snapshot::directory::{checkpoint_path, find_latest, output_path};
+use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
 use agimp::io::snapshot::{self, Options, Outputs, PointField, Scalars, View};
 use agimp::particle::chunk::{Chunk, Layout, Tag};
 use partition::comm::{Comm, World, is_launched};
@@ -118,6 +118,7 @@ impl<const D: usize> Run<D> {
             materials: &self.materials,
             histories: &self.histories,
             job_digest: 0xfeed_face_dead_beef,
+            job_text: "title = \"a job\"\n",
             step: 120,
             time: 0.1 + 0.2,
             dt: 1e-5,
@@ -424,15 +425,26 @@ fn outputs_checkpoints_and_the_latest() {
         },
         |directory| {
             let directory = &directory.join("results");
-            let latest = find_latest(directory, "col", None).expect("listed").expect("found");
-            assert_eq!(latest.path, checkpoint_path(directory, "col", 30));
+            let latest = checkpoint_path(directory, "col", 30);
+            let found = candidates(directory, "col", None).expect("listed");
+            assert_eq!((&found.whole[0], found.damaged.len()), (&(latest.clone(), 30), 0));
             assert!(!checkpoint_path(directory, "col", 10).exists());
-            assert!(find_latest(directory, "co", None).expect("listed").is_none());
+            assert!(candidates(directory, "co", None).expect("listed").whole.is_empty());
+            let found = candidates(directory, "col", Some(1)).expect("listed");
+            assert!(found.whole.is_empty() && found.other.is_some(), "{found:?}");
+            assert_eq!(snapshot::job_text(&latest).as_deref(), Some("title = \"a job\"\n"));
+            let at_stake = |digest| at_stake(directory, "col", digest).expect("listed");
+            assert_eq!(at_stake(0xfeed_face_dead_beef), Some(AtStake::Checkpoint(latest.clone())));
             // A damaged newest file is passed over.
-            let whole = bytes(&latest.path);
-            std::fs::write(&latest.path, &whole[..whole.len() / 2]).expect("cut");
-            let before = find_latest(directory, "col", None).expect("listed").expect("found");
-            assert_eq!((before.header.step, before.damaged.len()), (20, 1));
+            let whole = bytes(&latest);
+            std::fs::write(&latest, &whole[..whole.len() / 2]).expect("cut");
+            let found = candidates(directory, "col", None).expect("listed");
+            assert_eq!((found.whole[0].1, found.damaged.len()), (20, 1));
+            for step in [20, 30] {
+                std::fs::remove_file(checkpoint_path(directory, "col", step)).expect("removed");
+            }
+            assert_eq!(at_stake(0xfeed_face_dead_beef), None);
+            assert_eq!(at_stake(1), Some(AtStake::OtherJob(output_path(directory, "col", 0))));
             let series = directory.join("col.hdf.series");
             let text = std::fs::read_to_string(&series).expect("series");
             assert!(text.contains("\"time\": 0.2") && !text.contains("000003"), "{text}");
@@ -480,17 +492,17 @@ fn files_named_by_earlier_versions_are_found_and_continued() {
                 earlier(output_path(directory, "old", 9)),
             )
             .expect("copied");
-            let latest = find_latest(directory, "old", None).expect("listed").expect("found");
-            assert_eq!(latest.path, earlier(checkpoint_path(directory, "old", 20)));
-            let back = snapshot::read::<2>(comm, &latest.path, None).expect("read");
+            let latest = candidates(directory, "old", None).expect("listed").whole.swap_remove(0).0;
+            assert_eq!(latest, earlier(checkpoint_path(directory, "old", 20)));
+            let back = snapshot::read::<2>(comm, &latest, None).expect("read");
             assert_eq!(back.header.step, 20);
 
             let mut outputs = Outputs::resume(comm, directory, "old", options(), 2, 0.1).expect("resumed");
             outputs.write(comm, &at(2)).expect("written");
             outputs.checkpoint(comm, &at(2), 1).expect("written");
             outputs.settle(comm).expect("on disk");
-            let latest = find_latest(directory, "old", None).expect("listed").expect("found");
-            assert_eq!(latest.path, checkpoint_path(directory, "old", 20), "of both names the new one");
+            let latest = candidates(directory, "old", None).expect("listed").whole.swap_remove(0).0;
+            assert_eq!(latest, checkpoint_path(directory, "old", 20), "of both names the new one");
             assert!(!earlier(checkpoint_path(directory, "old", 10)).exists(), "replaced by a later one");
             for series in ["old.hdf.series", "old.tree.hdf.series"] {
                 let text = std::fs::read_to_string(directory.join(series)).expect("index");

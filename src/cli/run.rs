@@ -1,5 +1,5 @@
 //! `agimp run`: runs a job, alone or on the ranks of `mpirun`.
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -18,11 +18,14 @@ pub struct Arguments {
     pub job: PathBuf,
     /// Go on from a file of this job, or from its newest complete one (`latest`).
     #[arg(long, value_name = "FILE|latest")]
-    pub restart: Option<String>,
+    pub restart: Option<OsString>,
+    /// Start anew even where that replaces checkpoints or the results of another job.
+    #[arg(long, conflicts_with = "restart")]
+    pub overwrite: bool,
     /// Threads of each rank; by default the cores of the machine shared out to its ranks.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// Print nothing but errors.
+    /// Print nothing but errors and warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -32,7 +35,10 @@ impl Arguments {
     fn words(&self) -> Vec<&OsStr> {
         let mut words = vec![OsStr::new("run"), self.job.as_os_str()];
         if let Some(from) = &self.restart {
-            words.extend([OsStr::new("--restart"), OsStr::new(from)]);
+            words.extend([OsStr::new("--restart"), from]);
+        }
+        if self.overwrite {
+            words.push(OsStr::new("--overwrite"));
         }
         words
     }
@@ -50,10 +56,11 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let problem = ranks::load(comm, &arguments.job)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;
     let options = Options {
-        restart: arguments.restart.as_deref().map(|from| match from {
-            "latest" => restart::From::Latest,
-            path => restart::From::File(path.into()),
+        restart: arguments.restart.as_deref().map(|from| match from.to_str() {
+            Some("latest") => restart::From::Latest,
+            _ => restart::From::File(from.into()),
         }),
+        overwrite: arguments.overwrite,
         speaks: comm.rank() == 0 && !arguments.quiet,
         threads,
     };
@@ -67,10 +74,15 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
 /// Tells how a finished run ended; anything else is a failure.
 fn conclude(outcome: Result<Outcome, RunError>, speaks: bool) -> Result<(), Failure> {
     match outcome {
-        Ok(Outcome::Finished(summary)) if speaks => Ok(print(&mut std::io::stdout().lock(), &summary)?),
-        Ok(Outcome::Finished(_)) => Ok(()),
+        Ok(Outcome::Finished(summary)) => {
+            if speaks {
+                // The run is complete and its results are on disk, whether somebody listens or not.
+                let _ = print(&mut std::io::stdout().lock(), &summary);
+            }
+            Ok(())
+        }
         Ok(Outcome::Stopped { checkpoint }) => Err(Failure::Stopped(checkpoint)),
-        Err(error @ RunError::Seed(_)) => Err(Failure::Usage(error.to_string())),
+        Err(error @ (RunError::Seed(_) | RunError::Refused(_))) => Err(Failure::Usage(error.to_string())),
         Err(error) => Err(Failure::Run(error.to_string())),
     }
 }

@@ -1,10 +1,9 @@
 //! `history.csv`: one row of scalars per reported step.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::hdf5_file::FileError;
+use super::lines::{Lines, Verdict};
 
 /// A column of the history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,54 +16,70 @@ pub struct Column<'a> {
 
 /// The open history file. Belongs to rank 0.
 ///
-/// The first column is the step. Numbers are written with the digits that bring back the same bits.
+/// The first column is the step, the second the time. Numbers are written with the digits that bring back the same bits.
 #[derive(Debug)]
 pub struct History {
-    file: File,
-    path: PathBuf,
+    lines: Lines,
     columns: usize,
     last: Option<u64>,
+}
+
+/// Rows of a file that a run goes on with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Rows up to this step stay.
+    pub to: u64,
+    /// Step of the last row that has to be there, where that is known.
+    pub expected: Option<u64>,
+}
+
+/// Rows that a damaged file has lost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// Time of the row before them, s; `None` if they were the first.
+    pub after: Option<f64>,
+    /// Time of the row behind them, s; `None` if they were the last.
+    pub before: Option<f64>,
 }
 
 impl History {
     /// Not collective. Starts a new file, replacing an old one.
     pub fn create(path: &Path, columns: &[Column<'_>]) -> Result<Self, FileError> {
-        let file = File::create(path).map_err(|source| system(path, "create", source))?;
-        let mut history = Self { file, path: path.into(), columns: columns.len(), last: None };
-        history.line(header(columns))?;
-        Ok(history)
+        let mut lines = Lines::create(path)?;
+        lines.append(&header(columns))?;
+        Ok(Self { lines, columns: columns.len(), last: None })
     }
 
-    /// Not collective. Opens the file of an earlier run that is restarted from `step`: rows of later
-    /// steps and a torn last line are cut off, so that the finished file equals that of an
-    /// uninterrupted run. Starts a new file if there is none.
-    pub fn resume(path: &Path, columns: &[Column<'_>], step: u64) -> Result<Self, FileError> {
-        if !path.exists() {
-            return Self::create(path, columns);
+    /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that the finished file
+    /// equals that of an uninterrupted run. What is damaged is cut out, and what is missing for that reason is told.
+    /// Starts a new file if there is none, or nothing of it is whole.
+    ///
+    /// # Errors
+    /// The file cannot be opened, or has other columns.
+    pub fn resume(path: &Path, columns: &[Column<'_>], kept: Kept) -> Result<(Self, Vec<Gap>), FileError> {
+        let expected = header(columns);
+        let mut seen = Seen::default();
+        let lines = match path.symlink_metadata() {
+            Ok(_) => Some(Lines::resume(path, |line| seen.judge(line, &expected, columns.len(), kept.to))?),
+            Err(_) => None,
+        };
+        if seen.has_other_columns {
+            let reason = "the columns are not those of this run; move the file away or restart elsewhere";
+            return Err(FileError::Refused { path: path.into(), reason: reason.into() });
         }
-        let failed = |source| system(path, "resume", source);
-        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
-        let mut lines = BufReader::new(&file);
-        let (mut line, mut kept, mut last) = (String::new(), 0, None);
-        loop {
-            line.clear();
-            let bytes = lines.read_line(&mut line).map_err(failed)?;
-            let whole = line.ends_with('\n');
-            if kept == 0 && (!whole || line != header(columns)) {
-                let reason = "the columns are not those of this run; move the file away or restart elsewhere";
-                return Err(FileError::Refused { path: path.into(), reason: reason.into() });
+        let history = match lines {
+            Some(lines) if seen.has_header => {
+                Self { lines, columns: columns.len(), last: seen.row.map(|(step, _)| step) }
             }
-            let row = line.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
-            let earlier = kept == 0 || row.is_some_and(|row| row <= step);
-            if !whole || !earlier {
-                break;
+            _ => {
+                seen = Seen::default();
+                Self::create(path, columns)?
             }
-            last = row;
-            kept += bytes as u64;
+        };
+        if kept.expected.is_some_and(|expected| seen.row.is_none_or(|(step, _)| step < expected)) {
+            seen.gaps.push(Gap { after: seen.row.map(|(_, time)| time), before: None });
         }
-        file.set_len(kept).map_err(failed)?;
-        file.seek(SeekFrom::End(0)).map_err(failed)?;
-        Ok(Self { file, path: path.into(), columns: columns.len(), last })
+        Ok((history, seen.gaps))
     }
 
     /// Step of the last row.
@@ -84,12 +99,62 @@ impl History {
         }
         row.push('\n');
         self.last = Some(step);
-        self.line(row)
+        self.lines.append(&row)
     }
 
-    fn line(&mut self, line: String) -> Result<(), FileError> {
-        self.file.write_all(line.as_bytes()).map_err(|source| system(&self.path, "write", source))
+    /// Not collective. Waits until all rows are on disk.
+    pub fn sync(&self) -> Result<(), FileError> {
+        self.lines.sync()
     }
+}
+
+/// What has been seen of a file that a run goes on with.
+#[derive(Default)]
+struct Seen {
+    has_header: bool,
+    has_other_columns: bool,
+    /// Something damaged stands behind the last good line.
+    is_damaged: bool,
+    /// Step and time of the last good row.
+    row: Option<(u64, f64)>,
+    gaps: Vec<Gap>,
+}
+
+impl Seen {
+    fn judge(&mut self, line: &[u8], header: &str, columns: usize, to: u64) -> Verdict {
+        if self.has_other_columns {
+            return Verdict::Keep;
+        }
+        if !self.has_header {
+            self.has_header = line == header.trim_end().as_bytes();
+            // A whole line of text is no damage. Nothing of such a file is changed.
+            self.has_other_columns = !self.has_header && line.starts_with(b"step,") && line.is_ascii();
+            return if self.has_header || self.has_other_columns { Verdict::Keep } else { Verdict::Stop };
+        }
+        let later = |step: u64| self.row.is_none_or(|(before, _)| step > before);
+        match row(line, columns) {
+            Some((step, _)) if step > to => Verdict::Stop,
+            Some((step, time)) if later(step) => {
+                if std::mem::take(&mut self.is_damaged) {
+                    self.gaps.push(Gap { after: self.row.map(|(_, time)| time), before: Some(time) });
+                }
+                self.row = Some((step, time));
+                Verdict::Keep
+            }
+            _ => {
+                self.is_damaged = true;
+                Verdict::Drop
+            }
+        }
+    }
+}
+
+/// Step and time of a whole row.
+fn row(line: &[u8], columns: usize) -> Option<(u64, f64)> {
+    let mut cells = std::str::from_utf8(line).ok()?.split(',');
+    let step = cells.next()?.parse().ok()?;
+    let values: Vec<f64> = cells.map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
+    (values.len() == columns).then(|| (step, values[0]))
 }
 
 fn header(columns: &[Column<'_>]) -> String {
@@ -98,10 +163,6 @@ fn header(columns: &[Column<'_>]) -> String {
         header.push_str(&if unit.is_empty() { format!(",{name}") } else { format!(",{name} [{unit}]") });
     }
     header + "\n"
-}
-
-fn system(path: &Path, action: &'static str, source: std::io::Error) -> FileError {
-    FileError::System { path: path.into(), action, source }
 }
 
 #[cfg(test)]
@@ -116,15 +177,38 @@ mod tests {
         }
     }
 
+    const fn up_to(step: u64) -> Kept {
+        Kept { to: step, expected: Some(step) }
+    }
+
+    fn path(dir: &tempfile::TempDir, name: &str) -> std::path::PathBuf {
+        dir.path().join(name)
+    }
+
+    fn append(path: &Path, bytes: &[u8]) {
+        let mut text = std::fs::read(path).unwrap();
+        text.extend_from_slice(bytes);
+        std::fs::write(path, text).unwrap();
+    }
+
+    /// Rows of the steps 0 to 19, written in one go.
+    fn whole() -> Vec<u8> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = path(&dir, "whole.csv");
+        write(&mut History::create(&path, &COLUMNS).unwrap(), 0..20);
+        std::fs::read(&path).unwrap()
+    }
+
     #[test]
     fn resumed_file_equals_an_uninterrupted_one() {
         let dir = tempfile::tempdir().unwrap();
-        let (whole, torn) = (dir.path().join("whole.csv"), dir.path().join("torn.csv"));
-        write(&mut History::create(&whole, &COLUMNS).unwrap(), 0..20);
+        let torn = path(&dir, "torn.csv");
         write(&mut History::create(&torn, &COLUMNS).unwrap(), 0..15);
-        OpenOptions::new().append(true).open(&torn).unwrap().write_all(b"15,0.3").unwrap();
-        write(&mut History::resume(&torn, &COLUMNS, 9).unwrap(), 10..20);
-        let text = std::fs::read_to_string(&whole).unwrap();
+        append(&torn, b"15,0.3");
+        let (mut history, gaps) = History::resume(&torn, &COLUMNS, up_to(9)).unwrap();
+        assert_eq!(gaps, []);
+        write(&mut history, 10..20);
+        let text = String::from_utf8(whole()).unwrap();
         assert_eq!(text, std::fs::read_to_string(&torn).unwrap());
         assert!(text.starts_with("step,time [s],particles\n0,0.0,1e30\n"), "{text}");
         let third = text.lines().nth(4).unwrap().split(',').nth(1).unwrap();
@@ -134,19 +218,73 @@ mod tests {
     #[test]
     fn torn_row_with_a_number_that_looks_whole_is_cut() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("h.csv");
+        let path = path(&dir, "h.csv");
         write(&mut History::create(&path, &COLUMNS).unwrap(), 0..3);
-        OpenOptions::new().append(true).open(&path).unwrap().write_all(b"3,0.3").unwrap();
-        drop(History::resume(&path, &COLUMNS, 100).unwrap());
+        append(&path, b"3,0.3");
+        drop(History::resume(&path, &COLUMNS, up_to(100)).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }
 
+    /// Whatever a crash leaves: what is whole stays, and what is missing is told.
     #[test]
-    fn other_columns_are_refused() {
+    fn damage_is_cut_out_and_told() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("h.csv");
-        drop(History::create(&path, &COLUMNS).unwrap());
-        let error = History::resume(&path, &COLUMNS[..1], 0).unwrap_err().to_string();
+        let path = path(&dir, "h.csv");
+        let (whole, row) = (whole(), |step: usize| format!("{step},{:?},1e30\n", step as f64 * 0.1));
+        let text = String::from_utf8(whole.clone()).unwrap();
+        let start_of = |step: usize| text.find(&row(step)).unwrap();
+        let gap = |after: Option<usize>, before: Option<usize>| Gap {
+            after: after.map(|step| step as f64 * 0.1),
+            before: before.map(|step| step as f64 * 0.1),
+        };
+        // Bytes from..to become what a crash leaves of them; then the rows that are gone.
+        let end = whole.len();
+        let cases: [(usize, usize, &[u8], Vec<Gap>); 9] = [
+            (0, end, b"", vec![gap(None, None)]),
+            (0, end, &[0; 500], vec![gap(None, None)]),
+            (10, end, b"", vec![gap(None, None)]),
+            (start_of(0), end, b"", vec![gap(None, None)]),
+            (start_of(7), end, b"", vec![gap(Some(6), None)]),
+            (start_of(7) + 3, end, b"", vec![gap(Some(6), None)]),
+            (start_of(7), end, b"\xff\xfe\n\xff", vec![gap(Some(6), None)]),
+            (start_of(7), start_of(9), b"\0\0\0\0\n", vec![gap(Some(6), Some(9))]),
+            (end, end, b"\0\0\0\0\0", vec![]),
+        ];
+        for (from, to, bytes, expected) in cases {
+            let damaged = [&whole[..from], bytes, &whole[to..]].concat();
+            std::fs::write(&path, &damaged).unwrap();
+            let (mut history, gaps) = History::resume(&path, &COLUMNS, up_to(15)).unwrap();
+            assert_eq!(gaps, expected, "{from}..{to}");
+            history.row(16, &[1.6, 1e30]).unwrap();
+            let mended = std::fs::read_to_string(&path).unwrap();
+            let steps: Vec<u64> =
+                mended.lines().skip(1).map(|row| row.split(',').next().unwrap().parse().unwrap()).collect();
+            let lost = |step: u64| {
+                let time = step as f64 * 0.1;
+                let is_inside =
+                    |gap: &Gap| gap.after.is_none_or(|t| time > t) && gap.before.is_none_or(|t| time < t);
+                expected.iter().any(is_inside)
+            };
+            let left: Vec<u64> = (0..16).filter(|&step| !lost(step)).chain([16]).collect();
+            assert_eq!(steps, left, "{from}..{to}");
+            assert!(mended.starts_with("step,time [s],particles\n"), "{mended}");
+        }
+    }
+
+    #[test]
+    fn a_missing_file_begins_where_the_run_goes_on() {
+        let dir = tempfile::tempdir().unwrap();
+        let (_, gaps) = History::resume(&path(&dir, "h.csv"), &COLUMNS, up_to(3)).unwrap();
+        assert_eq!(gaps, [Gap { after: None, before: None }]);
+    }
+
+    #[test]
+    fn other_columns_are_refused_and_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = path(&dir, "h.csv");
+        write(&mut History::create(&path, &COLUMNS).unwrap(), 0..3);
+        let error = History::resume(&path, &COLUMNS[..1], up_to(0)).unwrap_err().to_string();
         assert!(error.contains("columns"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }
 }

@@ -2,6 +2,7 @@
 //! telemetry, progress and pictures.
 pub mod hdf5_file;
 pub mod history;
+mod lines;
 pub mod picture;
 pub mod progress;
 pub mod series;

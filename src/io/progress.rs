@@ -120,6 +120,14 @@ impl Progress {
         }
     }
 
+    /// A message that is shown even if the user wants it quiet. On rank 0 only.
+    pub fn warning(&mut self, text: &str) {
+        match &mut self.display {
+            Display::Nothing => warn(text),
+            _ => self.message(&format!("agimp: warning: {text}")),
+        }
+    }
+
     /// The last state; the bar stays on the terminal.
     pub fn finish(&mut self, step: u64, time: f64, dt: f64) {
         self.show(step, time, dt);
@@ -127,6 +135,12 @@ impl Progress {
             bar.abandon();
         }
     }
+}
+
+/// Warns the user while no progress is shown. To be called on one rank.
+pub fn warn(text: &str) {
+    // In one piece, or `mpirun` may put its own words between pieces; if nobody listens, nobody is told.
+    let _ = std::io::stderr().write_all(format!("agimp: warning: {text}\n").as_bytes());
 }
 
 /// Wall time that is left when the part `done` took `elapsed`.

@@ -66,7 +66,7 @@ impl Series {
         let text = serde_json::to_string_pretty(&contents).map_err(std::io::Error::other);
         let part = self.path.with_added_extension("part");
         text.and_then(|text| {
-            let mut file = std::fs::File::create(&part)?;
+            let mut file = super::lines::create_new(&part)?;
             file.write_all(text.as_bytes())?;
             file.sync_all()?;
             std::fs::rename(&part, &self.path)

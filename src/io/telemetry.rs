@@ -1,14 +1,13 @@
 //! `telemetry.jsonl`: one JSON object per reported step, for machines to read.
 
-use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use partition::comm::{Comm, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
 use super::hdf5_file::FileError;
+use super::lines::{Lines, Verdict, system};
 use crate::grid::sums::census::Census;
 use crate::particle::chunk::Chunk;
 
@@ -285,44 +284,43 @@ pub fn resident_bytes() -> Option<u64> {
 
 /// The open file. Belongs to rank 0.
 #[derive(Debug)]
-pub struct Telemetry {
-    file: File,
-    path: PathBuf,
-}
+pub struct Telemetry(Lines);
 
 impl Telemetry {
     /// Not collective. Starts a new file, replacing an old one.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        let file = File::create(path).map_err(|source| failed(path, source))?;
-        Ok(Self { file, path: path.into() })
+        Ok(Self(Lines::create(path)?))
     }
 
-    /// Not collective. Goes on with the file of an earlier run, whose records stay; a torn last line
-    /// goes.
-    pub fn resume(path: &Path) -> Result<Self, FileError> {
-        let open = || -> std::io::Result<File> {
-            let mut options = OpenOptions::new();
-            let mut file = options.read(true).write(true).create(true).truncate(false).open(path)?;
-            let mut text = Vec::new();
-            file.read_to_end(&mut text)?;
-            let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
-            file.set_len(whole as u64)?;
-            file.seek(SeekFrom::End(0))?;
-            Ok(file)
+    /// Not collective. Goes on with the file of a run that goes on from `step`: its records stay; those of later steps and
+    /// what is damaged go. Starts a new file if there is none.
+    pub fn resume(path: &Path, step: u64) -> Result<Self, FileError> {
+        /// What is looked at of a record.
+        #[derive(Deserialize)]
+        struct Step {
+            step: u64,
+        }
+        if path.symlink_metadata().is_err() {
+            return Self::create(path);
+        }
+        let judge = |line: &[u8]| match serde_json::from_slice(line) {
+            Ok(Step { step: of }) if of <= step => Verdict::Keep,
+            _ => Verdict::Drop,
         };
-        Ok(Self { file: open().map_err(|source| failed(path, source))?, path: path.into() })
+        Ok(Self(Lines::resume(path, judge)?))
     }
 
     /// Not collective. Appends a record and hands it to the operating system.
     pub fn write(&mut self, record: &Record) -> Result<(), FileError> {
-        let line = serde_json::to_string(record).map_err(std::io::Error::other);
-        line.and_then(|line| self.file.write_all((line + "\n").as_bytes()))
-            .map_err(|source| failed(&self.path, source))
+        let line =
+            serde_json::to_string(record).map_err(|error| system(self.0.path(), "write", error.into()))?;
+        self.0.append(&(line + "\n"))
     }
-}
 
-fn failed(path: &Path, source: std::io::Error) -> FileError {
-    FileError::System { path: path.into(), action: "write", source }
+    /// Not collective. Waits until all records are on disk.
+    pub fn sync(&self) -> Result<(), FileError> {
+        self.0.sync()
+    }
 }
 
 #[cfg(test)]
@@ -330,7 +328,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn records_come_back_and_a_torn_line_goes() {
+    fn records_come_back_and_what_is_damaged_or_later_goes() {
         let spread = Spread { min: 0.1, mean: 0.2, max: 0.7 };
         let record = Record {
             step: 10,
@@ -367,8 +365,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("telemetry.jsonl");
         Telemetry::create(&path).unwrap().write(&record).unwrap();
-        OpenOptions::new().append(true).open(&path).unwrap().write_all(b"{\"step\":1").unwrap();
-        Telemetry::resume(&path).unwrap().write(&record).unwrap();
+        let mut damaged = std::fs::read(&path).unwrap();
+        damaged.extend_from_slice(b"\0\xff\n{\"step\":11}\n{\"step\":1");
+        std::fs::write(&path, damaged).unwrap();
+        Telemetry::resume(&path, 10).unwrap().write(&record).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let read: Vec<Record> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
         assert_eq!(read, [record.clone(), record]);

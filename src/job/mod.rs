@@ -4,10 +4,12 @@
 //! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a
 //! [`Problem`] of its dimension.
 mod convert;
+mod difference;
 mod parse;
 pub mod problem;
 pub mod schema;
 
+pub use difference::{Difference, differences};
 pub use parse::error::{Fault, FaultList, JobError};
 pub use problem::{AnyProblem, Problem};
 pub use schema::json::schema;
@@ -34,8 +36,11 @@ pub fn read(path: &Path) -> Result<Vec<u8>, JobError> {
 /// Checks the bytes of a job file. Nothing is read from `path`: its stem becomes the name of the job.
 ///
 /// # Errors
-/// The content is not a valid job; all faults that were found, with their places.
+/// The name is not UTF-8, or the content is not a valid job; all faults that were found, with their places.
 pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
+    if path.file_stem().is_some_and(|stem| stem.to_str().is_none()) {
+        return Err(JobError::Name { path: path.to_path_buf() });
+    }
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();

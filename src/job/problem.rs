@@ -56,6 +56,8 @@ pub struct Problem<const D: usize> {
     pub name: String,
     /// The job file, as given; for messages.
     pub path: PathBuf,
+    /// Text of the job file.
+    pub text: String,
     /// Title for people; may be empty.
     pub title: String,
     /// Checksum of everything that changes the state (not of outputs, checkpoints or the end time).
@@ -192,7 +194,7 @@ pub struct Body<const D: usize> {
 /// End and time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeSetup {
-    /// End of the run, s.
+    /// End of the run, s; it ends with the first step that reaches this time.
     pub end: f64,
     /// Courant number.
     pub cfl: f64,

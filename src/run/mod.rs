@@ -1,4 +1,5 @@
 //! A whole run: from a checked job to its last file.
+mod claim;
 pub mod history;
 pub mod record;
 pub mod report;
@@ -11,12 +12,14 @@ use std::time::Instant;
 
 use partition::comm::{Comm, Disagreement};
 
+use self::claim::Claim;
 use self::record::Recorder;
 use self::report::Collapse;
 use self::restart::From;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::hdf5_file::FileError;
+use crate::io::history::Kept;
 use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
@@ -29,6 +32,8 @@ use crate::solver::{Clock, Requests, Solver};
 pub struct Options {
     /// File to go on from; a new run without it.
     pub restart: Option<From>,
+    /// Whether a new run may replace the results of another job, or checkpoints.
+    pub overwrite: bool,
     /// Whether this process tells the user how the run goes on.
     pub speaks: bool,
     /// Threads of this rank.
@@ -90,14 +95,9 @@ pub enum RunError {
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is nothing to restart from.
-    #[error("no restart file of `{name}` in {directory}; start without --restart or name a file")]
-    NoRestart {
-        /// Name of the run.
-        name: String,
-        /// Where it was looked for.
-        directory: PathBuf,
-    },
+    /// What the run was asked for cannot be done, and nothing has been written.
+    #[error("{0}")]
+    Refused(String),
 }
 
 impl RunError {
@@ -126,7 +126,7 @@ pub fn run<const D: usize>(
     };
     let outcome = run.advance(stop).map_err(|error| error.after(run.solver.clock));
     // Also after an error: the checkpoint on its way to disk is what the next run can start from.
-    let settled = run.outputs.settle(comm);
+    let settled = run.settle(true);
     let outcome = outcome?;
     settled?;
     Ok(outcome)
@@ -144,17 +144,25 @@ struct Run<'a, const D: usize> {
     histories: Vec<String>,
     /// Step of the last output.
     output_step: Option<u64>,
+    /// Until the last file has its name.
+    _claim: Claim,
 }
 
 impl<'a, const D: usize> Run<'a, D> {
     /// Collective. A new run: directory, first output and first row of the history.
     fn start(comm: &'a Comm, problem: &'a Problem<D>, options: &Options) -> Result<Self, RunError> {
+        let mut claim = Claim::default();
+        claim.take(comm, problem)?;
+        if !options.overwrite {
+            claim::spare_results(comm, problem)?;
+        }
         let solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
-        let mut run = Self::with(comm, problem, options, solver, outputs, None)?;
+        claim.take(comm, problem)?;
+        let mut run = Self::with(comm, problem, options, solver, outputs, None, None, claim)?;
         run.recorder.write(comm, &mut run.solver, true, true)?;
-        run.write_output()?;
+        run.write_output(true)?;
         Ok(run)
     }
 
@@ -165,6 +173,8 @@ impl<'a, const D: usize> Run<'a, D> {
         options: &Options,
         from: &From,
     ) -> Result<Self, RunError> {
+        let mut claim = Claim::default();
+        claim.take(comm, problem)?;
         let (solver, scalars) = restart::solver(comm, problem, from)?;
         let next = scalars.count(restart::NEXT_OUTPUT).unwrap_or(0);
         let outputs = Outputs::resume(
@@ -176,8 +186,14 @@ impl<'a, const D: usize> Run<'a, D> {
             solver.clock.time,
         )?;
         let output_step = scalars.count(restart::OUTPUT_STEP);
-        let mut run = Self::with(comm, problem, options, solver, outputs, output_step)?;
-        if run.solver.clock.step == 0 {
+        let Clock { step, time, .. } = solver.clock;
+        claim.take(comm, problem)?;
+        let expected = scalars.count(restart::ROW_STEP);
+        // The row of the end stays where the end stays.
+        let to = expected.filter(|_| time < problem.time.end).unwrap_or(step);
+        let kept = (step > 0).then_some(Kept { to, expected });
+        let mut run = Self::with(comm, problem, options, solver, outputs, output_step, kept, claim)?;
+        if step == 0 {
             // The history starts anew as well.
             run.recorder.write(comm, &mut run.solver, true, true)?;
         }
@@ -191,8 +207,10 @@ impl<'a, const D: usize> Run<'a, D> {
         mut solver: Solver<D>,
         outputs: Outputs,
         output_step: Option<u64>,
+        kept: Option<Kept>,
+        claim: Claim,
     ) -> Result<Self, RunError> {
-        let mut recorder = Recorder::open(comm, problem, options, &mut solver)?;
+        let mut recorder = Recorder::open(comm, problem, options, &mut solver, kept)?;
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
         recorder.message(&format!(
             "{}: {} ranks x {} threads on {cores} cores, {} leaves",
@@ -218,10 +236,12 @@ impl<'a, const D: usize> Run<'a, D> {
             materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
             histories,
             output_step,
+            _claim: claim,
         })
     }
 
-    /// Collective. Steps to the end time, or until it is asked to stop.
+    /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to meet the
+    /// end, so that a run to a later end takes the same steps.
     fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
         while self.solver.clock.time < self.problem.time.end {
             let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
@@ -241,7 +261,7 @@ impl<'a, const D: usize> Run<'a, D> {
 
     fn step(&mut self, requests: Requests) -> Result<Requests, RunError> {
         let clock = self.solver.clock;
-        let report = self.solver.step(self.problem.time.end, requests);
+        let report = self.solver.step(f64::INFINITY, requests);
         Ok(report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })?.granted)
     }
 
@@ -254,10 +274,10 @@ impl<'a, const D: usize> Run<'a, D> {
         self.recorder.after_step(self.comm, &mut self.solver)?;
         let clock = self.solver.clock;
         if clock.step.is_multiple_of(self.problem.telemetry_every) {
-            self.outputs.try_settle(self.comm)?;
+            self.settle(false)?;
         }
         if self.schedule.output_due(self.outputs.next(), clock.time) {
-            self.write_output()?;
+            self.write_output(true)?;
         }
         if self.schedule.checkpoint_due(clock.step, clock.time) || checkpoint {
             self.checkpoint()?;
@@ -265,20 +285,19 @@ impl<'a, const D: usize> Run<'a, D> {
         Ok(())
     }
 
-    /// Collective. Last row, last output, picture, evaluation.
+    /// Collective. Last output, last row, picture, evaluation.
     fn finish(&mut self) -> Result<Summary, RunError> {
         let step = self.solver.clock.step;
-        // Only rank 0 knows.
-        let row = !self.comm.any(self.recorder.row_step() == Some(step));
-        self.recorder.write(self.comm, &mut self.solver, row, true)?;
-        // Unless it was due at this very step.
+        // State before row: a run with a later end has no row at this step, and can go on from here.
         if self.output_step != Some(step) {
-            self.write_output()?;
+            self.write_output(false)?;
         }
         if !self.problem.output.restart {
             // The end state, to compare it or to go on from with a later end time.
             self.checkpoint()?;
         }
+        let row = self.recorder.last_row() != Some(step);
+        self.recorder.write(self.comm, &mut self.solver, row, true)?;
         self.recorder.finish(&self.solver);
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
@@ -306,17 +325,31 @@ impl<'a, const D: usize> Run<'a, D> {
         Ok(Some(path))
     }
 
-    fn write_output(&mut self) -> Result<(), RunError> {
+    /// Collective. Writes the next output. One that `is_due` by its time keeps its number; any other is written because the
+    /// run ends here, and the next output of a run that goes on takes its place.
+    fn write_output(&mut self, is_due: bool) -> Result<(), RunError> {
         let start = Instant::now();
         let step = Some(self.solver.clock.step);
-        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next() + 1, step);
+        let next = self.outputs.next() + u64::from(is_due);
+        let scalars = self.scalars(next, step);
         let fields = self.leaf_fields();
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         let view = View { leaf_fields: &fields, ..view };
+        self.comm.agree(self.recorder.sync())?;
         self.outputs.write(self.comm, &view)?;
+        if !is_due {
+            self.outputs.give_back_number();
+        }
         self.output_step = step;
         self.solver.phases.book(Phase::Output, start.elapsed());
         Ok(())
+    }
+
+    /// Collective. What a state holds beside particles and tree.
+    fn scalars(&self, next_output: u64, output_step: Option<u64>) -> Scalars {
+        let mut scalars = restart::scalars(self.comm, &self.solver, next_output, output_step);
+        scalars.counts.extend(self.recorder.last_row().map(|step| (restart::ROW_STEP.into(), step)));
+        scalars
     }
 
     /// Collective. Fields of leaves for the file of the tree.
@@ -330,9 +363,22 @@ impl<'a, const D: usize> Run<'a, D> {
         })
     }
 
+    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it implies are
+    /// on disk before.
+    fn settle(&mut self, wait: bool) -> Result<(), RunError> {
+        if self.outputs.is_pending() && (wait || self.outputs.is_on_disk(self.comm)) {
+            let synced = self.comm.agree(self.recorder.sync());
+            // The checkpoint counts for more than rows: without them a run can still go on from it.
+            self.outputs.settle(self.comm)?;
+            synced?;
+        }
+        Ok(())
+    }
+
     fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
         let start = Instant::now();
-        let scalars = restart::scalars(self.comm, &self.solver, self.outputs.next(), self.output_step);
+        self.settle(true)?;
+        let scalars = self.scalars(self.outputs.next(), self.output_step);
         let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
         let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
         self.schedule.checkpoint_written(self.solver.clock.time);
@@ -348,7 +394,7 @@ fn available_cores() -> usize {
 
 /// The state of a run as files show it.
 fn view<'a, const D: usize>(
-    problem: &Problem<D>,
+    problem: &'a Problem<D>,
     solver: &'a Solver<D>,
     materials: &'a [String],
     histories: &'a [String],
@@ -364,6 +410,7 @@ fn view<'a, const D: usize>(
         materials,
         histories,
         job_digest: problem.digest,
+        job_text: &problem.text,
         step: solver.clock.step,
         time: solver.clock.time,
         dt: solver.clock.dt,

@@ -5,13 +5,13 @@ use partition::comm::{Comm, Traffic};
 
 use super::{Options, RunError, history};
 use crate::io::hdf5_file::FileError;
-use crate::io::history::{Column, History};
+use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
-use crate::solver::Solver;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::step::phases::Phase;
+use crate::solver::{Clock, Solver};
 
 /// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {
@@ -22,20 +22,31 @@ pub struct Recorder {
     origin: Vec<f64>,
     history_every: u64,
     telemetry_every: u64,
+    /// Step of the last row of the history; the same on all ranks.
+    last_row: Option<u64>,
     since: Instant,
     since_step: u64,
     since_traffic: Traffic,
 }
 
+/// Collective. What rank 0 knows.
+fn on_all_ranks(comm: &Comm, known: Option<u64>) -> Option<u64> {
+    let mut known = [known.map_or(0, |step| step + 1)];
+    comm.max_u64(&mut known);
+    known[0].checked_sub(1)
+}
+
 impl Recorder {
-    /// Collective. Opens the files; those of a run that goes on from a later step than 0 are continued.
+    /// Collective. Opens new files, or goes on with those that an earlier part of the run has left, with the rows of the
+    /// history that are `kept`.
     pub fn open<const D: usize>(
         comm: &Comm,
         problem: &Problem<D>,
         options: &Options,
         solver: &mut Solver<D>,
+        kept: Option<Kept>,
     ) -> Result<Self, RunError> {
-        let step = solver.clock.step;
+        let Clock { step, time, .. } = solver.clock;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
         let named = history::columns(
@@ -44,26 +55,41 @@ impl Recorder {
             solver.physics.adaptivity.is_some(),
         );
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
-        let files = match (comm.rank(), step) {
-            (0, 0) => History::create(&rows, &columns)
-                .and_then(|history| Ok(Some((history, Telemetry::create(&lines)?)))),
-            (0, _) => History::resume(&rows, &columns, step)
-                .and_then(|history| Ok(Some((history, Telemetry::resume(&lines)?)))),
+        let files = match (comm.rank(), kept) {
+            (0, None) => History::create(&rows, &columns)
+                .and_then(|history| Ok(Some(((history, Vec::new()), Telemetry::create(&lines)?)))),
+            (0, Some(kept)) => History::resume(&rows, &columns, kept)
+                .and_then(|history| Ok(Some((history, Telemetry::resume(&lines, step)?)))),
             _ => Ok(None),
         };
         let (history, telemetry) = comm.agree(files)?.unzip();
-        let time = solver.clock.time;
-        let recorder = Self {
+        let (history, gaps): (Option<History>, _) = history.unzip();
+        let last = history.as_ref().and_then(History::last_step);
+        let last_row = match kept {
+            // Even if it is missing: files shall not depend on damage to the history.
+            Some(Kept { to, expected }) if expected == Some(to) => expected,
+            _ => on_all_ranks(comm, last),
+        };
+        let mut recorder = Self {
             history,
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
             origin: problem.origin.to_vec(),
             history_every: problem.history_every,
             telemetry_every: problem.telemetry_every,
+            last_row,
             since: Instant::now(),
             since_step: step,
             since_traffic: solver.traffic(),
         };
+        for Gap { after, before } in gaps.into_iter().flatten() {
+            let from = after.map_or_else(|| "the start".into(), |time| format!("t = {time} s"));
+            let to = before.unwrap_or(time);
+            recorder.warning(&format!(
+                "{}: rows are missing from {from} to t = {to} s; the file was damaged, cut or moved",
+                rows.display()
+            ));
+        }
         recorder.prepare(solver);
         Ok(recorder)
     }
@@ -123,7 +149,16 @@ impl Recorder {
             }
         }
         comm.agree(written)?;
+        if row {
+            self.last_row = Some(solver.clock.step);
+        }
         Ok(())
+    }
+
+    /// Not collective. Brings what is written to disk: a state that gets its name now says which row was the last.
+    pub fn sync(&self) -> Result<(), FileError> {
+        self.history.as_ref().map_or(Ok(()), History::sync)?;
+        self.telemetry.as_ref().map_or(Ok(()), Telemetry::sync)
     }
 
     /// Collective. Sums over nodes and particles of the current state.
@@ -214,9 +249,16 @@ impl Recorder {
         record
     }
 
-    /// Not collective. Step of the last row of the history; known on rank 0 only.
-    pub fn row_step(&self) -> Option<u64> {
-        self.history.as_ref().and_then(History::last_step)
+    /// Not collective. Step of the last row of the history.
+    pub fn last_row(&self) -> Option<u64> {
+        self.last_row
+    }
+
+    /// Not collective. Warns the user, on rank 0 alone.
+    pub fn warning(&mut self, text: &str) {
+        if self.history.is_some() {
+            self.progress.warning(text);
+        }
     }
 
     /// Not collective. Shows a line to the user.

@@ -1,5 +1,7 @@
 //! Going on from a file.
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::os::unix::ffi::{OsStrExt as _, OsStringExt as _};
+use std::path::{Path, PathBuf};
 
 use partition::Forest;
 use partition::comm::Comm;
@@ -7,9 +9,11 @@ use partition::comm::Comm;
 use super::RunError;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
-use crate::io::hdf5_file::FileError;
-use crate::io::snapshot::{self, Scalars, directory};
-use crate::job::Problem;
+use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::progress::warn;
+use crate::io::snapshot::directory::{self, Candidates};
+use crate::io::snapshot::{self, Header, Scalars};
+use crate::job::{self, Problem};
 use crate::particle::Chunk;
 use crate::setup;
 use crate::solver::balance::rebalance::{cut_at, leaf_weight};
@@ -28,6 +32,8 @@ pub enum From {
 pub const NEXT_OUTPUT: &str = "next_output";
 /// Name of the counter that holds the step of the last output.
 pub const OUTPUT_STEP: &str = "output_step";
+/// Name of the counter that holds the step of the last row of the history.
+pub const ROW_STEP: &str = "row_step";
 const BOUND: &str = "time_step_bound";
 const DELETED: &str = "deleted";
 
@@ -165,21 +171,73 @@ fn restore_colliders<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
     Some(())
 }
 
-/// Collective. Reads the state and spreads it over the ranks.
+/// Collective. Reads the state and spreads it over the ranks. Of the files that `--restart latest` may mean, the latest is
+/// taken that is whole; what is passed over is told.
 ///
 /// # Errors
-/// There is no file, or it cannot be trusted; the same on all ranks.
+/// There is no file, or none that can be trusted, or the run ends before it; the same on all ranks.
 pub fn solver<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
     from: &From,
 ) -> Result<(Solver<D>, Scalars), RunError> {
-    let path = match from {
-        From::File(path) => path.clone(),
+    let paths = match from {
+        From::File(path) => vec![path.clone()],
         From::Latest => latest(comm, problem)?,
     };
-    let restored = snapshot::read::<D>(comm, &path, Some(problem.digest))?;
-    let mut forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves))?;
+    let mut refusal = format!(
+        "no restart file of `{}` in {}; start without --restart or name a file",
+        problem.name,
+        problem.output.directory.display()
+    );
+    let mut is_first = true;
+    for path in paths {
+        if !is_first && comm.rank() == 0 {
+            warn(&format!("passed over: {refusal}"));
+        }
+        is_first = false;
+        match restored(comm, problem, &path) {
+            Ok((solver, scalars)) => {
+                check_end(problem, &path, solver.clock)?;
+                return Ok((solver, scalars));
+            }
+            Err(reason) => refusal = reason,
+        }
+    }
+    Err(RunError::Refused(refusal))
+}
+
+/// A run to the end time of the job must be able to come by this state, or end with it.
+fn check_end<const D: usize>(problem: &Problem<D>, path: &Path, clock: Clock) -> Result<(), RunError> {
+    let Clock { step, time, dt, .. } = clock;
+    let end = problem.time.end;
+    // A run ends with the first step that reaches its end.
+    if step == 0 || time - dt < end {
+        return Ok(());
+    }
+    Err(RunError::Refused(format!(
+        "{}: the file is of t = {time} s (step {step}), which lies behind the end of the run; found time.end = {end}; \
+         expected a later end, or an earlier file",
+        path.display()
+    )))
+}
+
+/// Collective. The state in one file, or why there is none that can be trusted.
+fn restored<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    path: &Path,
+) -> Result<(Solver<D>, Scalars), String> {
+    let words = |error: FileError| match error {
+        // Which rank has found it does not matter.
+        FileError::Agreed(disagreement) => disagreement.message,
+        other => other.to_string(),
+    };
+    let refused = |reason: &str| format!("{}: {reason}", path.display());
+    check_job(comm, problem, path)?;
+    let restored = snapshot::read::<D>(comm, path, Some(problem.digest)).map_err(words)?;
+    let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));
+    let mut forest = forest.map_err(|disagreement| refused(&disagreement.message))?;
     let weights: Vec<u64> = restored.chunks.iter().map(leaf_weight).collect();
     let shipment = forest.partition(comm, &weights, cut_at(problem.adaptivity.as_ref()));
     let chunks = shipment.move_items(comm, restored.chunks, Chunk::append_to, Chunk::from_bytes);
@@ -191,43 +249,69 @@ pub fn solver<const D: usize>(
         bound: header.scalars.real(BOUND).unwrap_or(0.0),
     };
     let mut solver = Solver::new(comm, setup::physics(problem), forest, chunks, clock);
-    if restore_colliders(comm.rank(), &mut solver, &header.scalars).is_none() {
-        // Every rank has read the same header.
-        let reason = "the state of a collider is missing".into();
-        return Err(FileError::Refused { path, reason }.into());
-    }
-    if restore_loads(comm.rank(), &mut solver, &header.scalars).is_none() {
-        let reason = "the sums of a load are missing".into();
-        return Err(FileError::Refused { path, reason }.into());
-    }
-    if restore_books(comm.rank(), &mut solver, &header.scalars).is_none() {
-        let reason = "the books of splits and merges are missing".into();
-        return Err(FileError::Refused { path, reason }.into());
-    }
+    // Every rank has read the same header.
+    restore_colliders(comm.rank(), &mut solver, &header.scalars)
+        .ok_or_else(|| refused("the state of a collider is missing"))?;
+    restore_loads(comm.rank(), &mut solver, &header.scalars)
+        .ok_or_else(|| refused("the sums of a load are missing"))?;
+    restore_books(comm.rank(), &mut solver, &header.scalars)
+        .ok_or_else(|| refused("the books of splits and merges are missing"))?;
     if comm.rank() == 0 {
         solver.deleted = header.scalars.count(DELETED).unwrap_or(0);
     }
     Ok((solver, header.scalars))
 }
 
-/// Collective. The newest file of the run; rank 0 looks for it and tells the others.
-fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<PathBuf, RunError> {
+/// Collective. Refuses a file of another job, and tells which keys differ. What else may be wrong with the file is found
+/// when it is read.
+fn check_job<const D: usize>(comm: &Comm, problem: &Problem<D>, path: &Path) -> Result<(), String> {
+    let found = if comm.rank() == 0 { differing_job(problem, path) } else { None };
+    comm.agree(found.map_or(Ok(()), Err)).map_err(|disagreement| disagreement.message)
+}
+
+fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<String> {
+    let header = Header::read(&ParallelFile::open_alone(path).ok()?).ok()?;
+    if !header.restart || !snapshot::compatible(&header.program) || header.job_digest == problem.digest {
+        return None;
+    }
+    let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
+    let mut told: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
+    match found.len() {
+        0 => told.push("the texts agree, so defaults of the program have changed".into()),
+        all if all > MOST_KEYS => told.push(format!("and {} more", all - MOST_KEYS)),
+        _ => {}
+    }
+    Some(format!(
+        "{}: the file belongs to another job: {} (title, output, checkpoint, history, telemetry, report and time.end \
+         may differ, all else must not)",
+        path.display(),
+        told.join("; ")
+    ))
+}
+
+/// Keys that a message names.
+const MOST_KEYS: usize = 8;
+
+/// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and tells the others. If
+/// there is none, a file of another job stands for those: it tells why it cannot be used.
+fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathBuf>, RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {
-        0 if directory.is_dir() => directory::find_latest(directory, &problem.name, Some(problem.digest)),
-        _ => Ok(None),
+        0 if directory.is_dir() => directory::candidates(directory, &problem.name, Some(problem.digest)),
+        _ => Ok(Candidates::default()),
     };
-    let found = comm.agree(found)?;
-    let mut bytes = Vec::new();
-    if let Some(latest) = &found {
-        for damaged in &latest.damaged {
-            tracing::warn!("passed over: {damaged}");
-        }
-        bytes = latest.path.to_string_lossy().into_owned().into_bytes();
+    let Candidates { whole, mut damaged, other } = comm.agree(found)?;
+    let mut paths: Vec<PathBuf> = whole.into_iter().map(|(path, _)| path).collect();
+    if paths.is_empty() {
+        paths.extend(other.filter(|_| damaged.is_empty()));
     }
+    // The reason of one that is left alone is told as the error.
+    let only = if paths.is_empty() { damaged.pop() } else { None };
+    damaged.iter().for_each(|error| warn(&format!("passed over: {error}")));
+    comm.agree(only.map_or(Ok(()), Err)).map_err(|disagreement| RunError::Refused(disagreement.message))?;
+    let mut bytes =
+        paths.iter().map(|path| path.as_os_str()).collect::<Vec<_>>().join(OsStr::new("\0")).into_vec();
     comm.broadcast_bytes(0, &mut bytes);
-    match bytes.is_empty() {
-        true => Err(RunError::NoRestart { name: problem.name.clone(), directory: directory.clone() }),
-        false => Ok(PathBuf::from(String::from_utf8_lossy(&bytes).into_owned())),
-    }
+    let names = bytes.split(|&byte| byte == 0).filter(|name| !name.is_empty());
+    Ok(names.map(|name| PathBuf::from(OsStr::from_bytes(name))).collect())
 }

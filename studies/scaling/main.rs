@@ -112,7 +112,7 @@ fn run(block: &Block, name: &str, ranks: usize, threads: usize) -> Result<Vec<Va
             command
         }
     };
-    command.arg("run").arg(&job).args(["--quiet", "--threads", &threads.to_string()]);
+    command.arg("run").arg(&job).args(["--quiet", "--overwrite", "--threads", &threads.to_string()]);
     let output = command.output().map_err(|error| format!("{}: {error}", program.display()))?;
     if !output.status.success() {
         return Err(format!("{command:?} failed:\n{}", String::from_utf8_lossy(&output.stderr)));

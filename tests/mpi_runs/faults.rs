@@ -1,10 +1,11 @@
 //! When one rank fails, all end, soon and with one message; what is on disk stays good.
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::in_turn;
 use crate::launch::{
-    Outcome, Running, contents, file, is_alive, job, last_step, mpirun, run, signal, succeed, text,
+    Outcome, Running, agimp, contents, file, is_alive, job, last_step, mpirun, results, run, signal, succeed,
+    text, variant,
 };
 
 /// All ranks must have ended this long after one has failed or was killed.
@@ -36,9 +37,10 @@ fn killed_at_twenty_moments() {
     assert!(while_writing > 0, "no moment fell into the writing of a checkpoint; try another seed");
 }
 
-/// One rank killed.
+/// One kill.
 struct Kill {
-    rank: usize,
+    /// `None`: `mpirun` itself, or the only process.
+    rank: Option<usize>,
     ranks: usize,
     step: u64,
     while_writing: bool,
@@ -48,36 +50,43 @@ struct Kill {
 impl std::fmt::Display for Kill {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { rank, ranks, step, while_writing, ended_after } = self;
+        let victim = rank.map_or_else(|| "launcher".into(), |rank| format!("rank {rank}"));
         let doing = if *while_writing { ", while a file was written" } else { "" };
-        write!(f, "rank {rank} of {ranks} killed after step {step}{doing}; all ended after {ended_after:.1?}")
+        write!(f, "{victim} of {ranks} killed after step {step}{doing}; all ended after {ended_after:.1?}")
     }
 }
 
-/// Ranks are killed one after another, in a run that writes a checkpoint after every step; each time the run goes on
-/// from the latest. Besides, the directory holds the later checkpoints of an earlier run with other sand.
+/// Ranks or `mpirun` are killed one after another, in a run on 1 to 3 ranks that writes a checkpoint after every step and an
+/// output after every few; each time the run goes on from the latest. Besides, the directory holds the later checkpoints
+/// of an earlier run with other sand.
 fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
     let name = "collapse_2d";
     let home = tempfile::tempdir().expect("temporary directory");
     let directory = home.path();
     let other = variant(directory, "other", ("friction_angle = 29.5", "friction_angle = 35"));
-    let often = variant(directory, "often", ("every_steps = 20", "every_steps = 1"));
+    let outputs = "every = 0.02\n\n[checkpoint]\nevery_steps = 20";
+    let seldom = variant(directory, "seldom", (outputs, &outputs.replace("0.02", "0.004")));
+    let often = outputs.replace("0.02", "0.004").replace("= 20", "= 1");
+    let often = variant(directory, "often", (outputs, &often));
     succeed(&mut run(directory, 1, 2, &other, &["--quiet"]));
     let reference = tempfile::tempdir().expect("temporary directory");
-    succeed(&mut run(reference.path(), 1, 1, &job(name), &["--quiet"]));
+    succeed(&mut run(reference.path(), 1, 1, &seldom, &["--quiet"]));
 
     // Steps are counted in the history, which must not be that of the other sand.
     std::fs::remove_file(file(directory, name, ".history.csv")).expect("history");
     let mut random = Random(seed);
     for kill in 0..kills {
-        let ranks = 2 + random.below(3) as usize;
-        let (steps, victim) = (3 + random.below(15), random.below(ranks as u64) as usize);
-        let from: &[&str] = if kill == 0 { &["--quiet"] } else { &["--quiet", "--restart", "latest"] };
+        let ranks = 1 + random.below(3) as usize;
+        // One more than there are ranks: the launcher.
+        let (steps, victim) = (3 + random.below(15), random.below(ranks as u64 + 1) as usize);
+        let from: &[&str] =
+            if kill == 0 { &["--quiet", "--overwrite"] } else { &["--quiet", "--restart", "latest"] };
         let mut running = Running::start(&mut run(directory, ranks, 1, &often, from));
         running.wait_for_step(directory, name, last_step(directory, name) + steps);
         std::thread::sleep(Duration::from_micros(random.below(40_000)));
         let processes = running.ranks();
         assert_eq!(processes.len(), ranks);
-        signal(processes[victim], "KILL");
+        signal(processes.get(victim).copied().unwrap_or(running.launcher()), "KILL");
         let killed = Instant::now();
         let output = running.finish_within(SOON);
         assert!(!output.status.success(), "{}", text(&output));
@@ -85,8 +94,12 @@ fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
         let ended_after = killed.elapsed();
         assert!(ended_after < SOON, "ranks were there for {ended_after:?}");
         let left = contents(&directory.join("out").join(name));
+        for file in left.keys().filter(|file| file.ends_with(".hdf") && !file.contains(".tree.")) {
+            let path = directory.join("out").join(name).join(file);
+            succeed(agimp(directory).args(["info", "--verify"]).arg(path));
+        }
         tell(Kill {
-            rank: victim,
+            rank: (victim < ranks).then_some(victim),
             ranks,
             step: last_step(directory, name),
             while_writing: left.keys().any(|file| file.ends_with(".part")),
@@ -94,19 +107,15 @@ fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
         });
     }
     // To the end without so many checkpoints.
-    succeed(&mut run(directory, 2, 1, &job(name), &["--quiet", "--restart", "latest"]));
-    Outcome::read(directory, name)
-        .assert_same(&Outcome::read(reference.path(), name), "killed again and again");
-}
-
-/// The small collapse with one text of its job replaced, in a directory of its own.
-fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> PathBuf {
-    let text = std::fs::read_to_string(job("collapse_2d")).expect("job");
-    assert!(text.contains(from));
-    let path = directory.join(folder).join("collapse_2d.toml");
-    std::fs::create_dir_all(directory.join(folder)).expect("made");
-    std::fs::write(&path, text.replace(from, to)).expect("written");
-    path
+    succeed(&mut run(directory, 2, 1, &seldom, &["--quiet", "--restart", "latest"]));
+    let what = "killed again and again";
+    Outcome::read(directory, name).assert_same(&Outcome::read(reference.path(), name), what);
+    let outputs = |directory: &Path| {
+        let mut files = results(directory, name);
+        files.retain(|file, _| file.contains("hdf"));
+        files
+    };
+    assert!(outputs(directory) == outputs(reference.path()), "{what}: outputs");
 }
 
 /// SplitMix64.

@@ -14,6 +14,16 @@ pub fn job(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/jobs/runs/{name}.toml"))
 }
 
+/// The small collapse with one text of its job replaced, in a directory of its own.
+pub fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> PathBuf {
+    let text = std::fs::read_to_string(job("collapse_2d")).expect("job");
+    assert!(text.contains(from));
+    let path = directory.join(folder).join("collapse_2d.toml");
+    std::fs::create_dir_all(directory.join(folder)).expect("made");
+    std::fs::write(&path, text.replace(from, to)).expect("written");
+    path
+}
+
 /// The program, in a directory.
 pub fn agimp(directory: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_agimp"));
@@ -62,8 +72,16 @@ impl Running {
     /// Process identifiers of the ranks: the process itself, or what `mpirun` has started.
     pub fn ranks(&self) -> Vec<u32> {
         let launcher = self.child.id();
-        let found = children(launcher);
-        if found.is_empty() { vec![launcher] } else { found }
+        let is_rank = |process: &u32| {
+            std::fs::read_link(format!("/proc/{process}/exe"))
+                .is_ok_and(|program| program == Path::new(env!("CARGO_BIN_EXE_agimp")))
+        };
+        // A rank without `mpirun` may have a helper of MPI as its child.
+        if is_rank(&launcher) {
+            vec![launcher]
+        } else {
+            children(launcher).into_iter().filter(is_rank).collect()
+        }
     }
 
     pub fn launcher(&self) -> u32 {
@@ -177,6 +195,26 @@ pub fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(directory).expect("directory").flatten();
     let read = |path: PathBuf| std::fs::read(&path).expect("file");
     entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
+}
+
+/// What a run to the end leaves, but for times measured. Files with a state, which hold the text of the job too, stand
+/// there with their digests; of checkpoints the last counts.
+pub fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
+    let results = directory.join("out").join(name);
+    let mut files = contents(&results);
+    files.retain(|file, _| !file.contains("telemetry"));
+    let last = files.keys().rfind(|file| file.contains("checkpoint_")).cloned();
+    let mut kept = BTreeMap::new();
+    for (file, contents) in files {
+        let is_last = last.as_ref() == Some(&file);
+        if file.contains("checkpoint_") && !is_last {
+            continue;
+        }
+        let digest = agimp(&results).args(["digest", "--parts", &file]).output().expect("agimp starts");
+        let contents = if digest.status.success() { digest.stdout } else { contents };
+        kept.insert(if is_last { "the last checkpoint".into() } else { file }, contents);
+    }
+    kept
 }
 
 /// What has to be the same however a run was carried out.

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::in_turn;
-use crate::launch::{Outcome, Running, agimp, contents, file, job, run, signal, succeed, text};
+use crate::launch::{Outcome, Running, agimp, contents, file, job, results, run, signal, succeed, text};
 
 /// Exit code of a run that stopped on request.
 const STOPPED: i32 = 3;
@@ -46,6 +46,51 @@ fn stopped_twice_and_finished_on_other_ranks() {
     assert!(!second.exists() || first.exists(), "checkpoints beyond `keep` go, oldest first");
 }
 
+/// A run to a later end is the run to the end in one go: all states, tables and pictures, whether an output is due where it
+/// ends first or not.
+#[test]
+fn a_later_end_is_the_same_run() {
+    let _turn = in_turn();
+    let name = "collapse_2d";
+    let original = std::fs::read_to_string(job(name)).expect("job");
+    let original = original.replace("every_steps = 3", "every_steps = 7");
+    for (first_end, outputs, restart) in [("0.013", "every = 0.01", "true"), ("0.02", "", "false")] {
+        let home = tempfile::tempdir().expect("temporary directory");
+        let with_end = |end: &str| {
+            let outputs = format!("{outputs}\nrestart = {restart}");
+            let text =
+                original.replace("end = 0.05", &format!("end = {end}")).replace("every = 0.02", &outputs);
+            let path = home.path().join(format!("{name}.toml"));
+            std::fs::write(&path, text).expect("written");
+            path
+        };
+        let directory = |part: &str| {
+            let path = home.path().join(part);
+            std::fs::create_dir(&path).expect("made");
+            path
+        };
+        let go = |directory: &Path, ranks, end, arguments: &[&str]| {
+            succeed(&mut run(directory, ranks, 1, &with_end(end), &[&["--quiet"], arguments].concat()));
+        };
+        let whole = directory("whole");
+        go(&whole, 1, "0.03", &[]);
+        for (ranks_before, ranks_behind) in [(1, 2), (2, 1)] {
+            let parts = directory(&format!("parts_{ranks_before}"));
+            go(&parts, ranks_before, first_end, &[]);
+            // Once more to the same end: nothing is left to do.
+            let there = results(&parts, name);
+            go(&parts, 1, first_end, &["--restart", "latest"]);
+            assert!(results(&parts, name) == there, "the same end again");
+            go(&parts, ranks_behind, "0.03", &["--restart", "latest"]);
+            let (found, expected) = (results(&parts, name), results(&whole, name));
+            for (file, contents) in &expected {
+                assert!(found.get(file) == Some(contents), "{file} of a run that first ended at {first_end}");
+            }
+            assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+        }
+    }
+}
+
 /// A file that cannot be trusted, or is not of this job, is refused with the reason; nothing is touched.
 #[test]
 fn refused_with_the_reason() {
@@ -62,9 +107,10 @@ fn refused_with_the_reason() {
     let before = contents(&directory.join("out").join(name));
     let refused = |ranks: usize, name: &str, from: &Path, reason: &str| {
         let from = from.to_str().expect("path");
-        let output = Running::start(&mut run(directory, ranks, 1, &job(name), &["--restart", from])).finish();
+        let job = if name.ends_with(".toml") { directory.join(name) } else { job(name) };
+        let output = Running::start(&mut run(directory, ranks, 1, &job, &["--restart", from])).finish();
         let shown = text(&output);
-        assert_eq!(output.status.code(), Some(1), "{shown}");
+        assert_eq!(output.status.code(), Some(2), "{shown}");
         assert_eq!(shown.matches("agimp:").count(), 1, "one message: {shown}");
         assert!(shown.contains(reason) && shown.contains(from), "expected '{reason}': {shown}");
     };
@@ -78,10 +124,31 @@ fn refused_with_the_reason() {
     refused(1, name, &file(directory, name, "_000002.tree.hdf"), "holds no restart state");
     refused(2, "few_leaves", &good, "belongs to another job");
     refused(1, name, &directory.join("missing.hdf"), "No such file");
+    // Another job says which keys differ; what may differ is not among them.
+    let text_of_job = std::fs::read_to_string(job(name)).expect("job");
+    let changed = |changes: &[(&str, &str)]| {
+        let text = changes.iter().fold(text_of_job.clone(), |text, (from, to)| {
+            assert!(text.contains(from));
+            text.replace(from, to)
+        });
+        std::fs::write(directory.join("collapse_2d.toml"), text).expect("written");
+    };
+    changed(&[
+        ("friction_angle = 29.5", "friction_angle = 35"),
+        ("young = 3e5", "young = 4e5"),
+        ("every = 0.02", "every = 0.01"),
+    ]);
+    let keys = "another job: `materials[0].friction_angle` is 29.5 there and 35.0 here; \
+                `materials[0].young` is 300000.0 there and 400000.0 here (title, output";
+    refused(2, "collapse_2d.toml", &good, keys);
+    changed(&[("end = 0.05", "end = 0.03")]);
+    refused(2, "collapse_2d.toml", &good, "lies behind the end of the run; found time.end = 0.03");
+    std::fs::remove_file(directory.join("collapse_2d.toml")).expect("removed");
+
     let output =
         Running::start(&mut run(directory, 2, 1, &job("few_leaves"), &["--restart", "latest"])).finish();
     let shown = text(&output);
-    assert_eq!((output.status.code(), shown.matches("agimp:").count()), (Some(1), 1), "{shown}");
+    assert_eq!((output.status.code(), shown.matches("agimp:").count()), (Some(2), 1), "{shown}");
     assert!(shown.contains("no restart file of `few_leaves` in out/few_leaves"), "{shown}");
 
     assert!(contents(&directory.join("out").join(name)) == before, "a refused restart changed the results");

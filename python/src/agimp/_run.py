@@ -20,6 +20,7 @@ def run(
     ranks: int = 1,
     threads: int | None = None,
     restart: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
     where: str | os.PathLike[str] = ".",
     binary: str | os.PathLike[str] | None = None,
     launcher: Sequence[str] | None = None,
@@ -33,6 +34,7 @@ def run(
         ranks: ranks of MPI. With one, no launcher is used.
         threads: threads of each rank; by default the cores of the machine shared out to its ranks.
         restart: "latest" or a file of this job, from which to go on.
+        overwrite: whether a new run may replace checkpoints, or the results of another job of that name.
         where: directory in which the program is started; outputs go to `output.directory` of the job, relative to
             it, by default `out/NAME`.
         binary: the program; by default that of the environment variable AGIMP, or on the PATH.
@@ -69,6 +71,8 @@ def run(
         words += ["--threads", str(threads)]
     if restart is not None:
         words += ["--restart", os.fspath(restart)]
+    if overwrite:
+        words += ["--overwrite"]
     with saved:
         called = _program.call(words, where, echo=progress)
         if called.exit_code != 0:

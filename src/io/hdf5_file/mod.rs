@@ -6,6 +6,7 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_uint, c_void};
+use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Path, PathBuf};
 
 use hdf5_sys::h5::{H5open, herr_t};
@@ -147,7 +148,7 @@ impl ParallelFile {
                 H5Pset_coll_metadata_write(access, 1);
             }
         }
-        let name = c_text(&path.to_string_lossy());
+        let name = c_path(path);
         // SAFETY: `name` is a terminated string that outlives the calls; the new identifiers are checked
         // by `wrap`. The root group keeps no timestamps, like all other objects.
         let (transfer, create, file) = unsafe {
@@ -306,6 +307,12 @@ fn agreed<T>(comm: Option<&Comm>, result: Result<T, FileError>) -> Result<T, Fil
 /// A terminated copy; HDF5 names and our paths have no inner zero bytes, and one would end the name.
 fn c_text(text: &str) -> CString {
     CString::new(text.split('\0').next().unwrap_or_default()).unwrap_or_default()
+}
+
+/// A terminated copy of a path, which need not be UTF-8.
+fn c_path(path: &Path) -> CString {
+    let bytes = path.as_os_str().as_bytes();
+    CString::new(bytes.split(|&byte| byte == 0).next().unwrap_or_default()).unwrap_or_default()
 }
 
 /// The first bytes of the file are those of the format.

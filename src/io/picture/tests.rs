@@ -39,6 +39,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         materials: &[],
         histories: &[],
         job_digest: 0,
+        job_text: "",
         step: 0,
         time: 0.0,
         dt: 0.0,

@@ -50,86 +50,124 @@ pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
     directory.join(format!("{name}.checkpoint_{step:09}{ENDING}"))
 }
 
-/// What [`find_latest`] found.
-#[derive(Debug)]
-pub struct Latest {
-    /// The newest file that a run can restart from.
-    pub path: PathBuf,
-    /// Its header.
-    pub header: Header,
-    /// Files that were passed over, with the reason.
+/// Files that a run may go on from.
+#[derive(Debug, Default)]
+pub struct Candidates {
+    /// Those that hold a restart state and look whole, with their steps; the latest first.
+    pub whole: Vec<(PathBuf, u64)>,
+    /// Why others cannot be read.
     pub damaged: Vec<FileError>,
+    /// A file that is passed over since it is of another job.
+    pub other: Option<PathBuf>,
 }
 
-/// Not collective. The file of the latest step among the checkpoints and outputs of the run `name` that
-/// hold a restart state and look whole. `Ok(None)` if there is none and nothing was damaged.
+/// Not collective. The checkpoints and outputs of the run `name` that hold a restart state, as their headers tell.
 ///
 /// A directory may still hold files of an earlier run of that name. Outputs that the index of the run does not
 /// list are such files, as are files of a job with another digest if `job_digest` is given; neither counts.
-pub fn find_latest(
-    directory: &Path,
-    name: &str,
-    job_digest: Option<u64>,
-) -> Result<Option<Latest>, FileError> {
-    let mut best: Option<(PathBuf, Header)> = None;
-    let (mut damaged, mut other) = (Vec::new(), None);
+pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Result<Candidates, FileError> {
+    let mut found = Candidates::default();
     let listed = listed(&series_path(directory, name));
     let is_listed = |name: &str| {
         listed.as_ref().is_none_or(|entries: &Vec<Entry>| entries.iter().any(|entry| entry.name == name))
     };
-    for path in files(directory)? {
-        let Some(rest) = file_name(&path).strip_prefix(name) else { continue };
-        let number =
-            stem(rest).and_then(|rest| rest.strip_prefix(".checkpoint_").or_else(|| rest.strip_prefix('_')));
-        if !number.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())) {
+    for (kind, _, path) in results(directory, name)? {
+        if kind == Kind::Output && !is_listed(file_name(&path)) {
             continue;
         }
-        if rest.starts_with('_') && !is_listed(file_name(&path)) {
-            continue;
-        }
-        match ParallelFile::open_alone(&path).and_then(|file| Header::read(&file)) {
+        match header(&path) {
             Ok(header) if !header.restart => {}
             Ok(header) if job_digest.is_some_and(|ours| ours != header.job_digest) => {
-                other.get_or_insert((path, header));
+                found.other.get_or_insert(path);
             }
-            Ok(header) => {
-                if best.as_ref().is_none_or(|(_, found)| found.step < header.step) {
-                    best = Some((path, header));
-                }
-            }
-            Err(error) => damaged.push(error),
+            Ok(header) => found.whole.push((path, header.step)),
+            Err(error) => found.damaged.push(error),
         }
     }
-    // Only files of another job: reading one tells why it cannot be used.
-    match best.or(other.filter(|_| damaged.is_empty())) {
-        Some((path, header)) => Ok(Some(Latest { path, header, damaged })),
-        None => damaged.into_iter().next().map_or(Ok(None), Err),
-    }
+    found.whole.reverse();
+    found.whole.sort_by_key(|&(_, step)| std::cmp::Reverse(step));
+    Ok(found)
 }
 
-/// Not collective. Of the checkpoints of the run `name`, keeps the `keep` latest up to step `step`, which was just
-/// written. Those of later steps were left by an earlier run, and go too, as do temporary files of checkpoints
-/// that were never finished.
-pub fn remove_old_checkpoints(directory: &Path, name: &str, step: u64, keep: usize) -> Result<(), FileError> {
-    let prefix = format!("{name}.checkpoint_");
-    let mut finished: Vec<(u64, PathBuf)> = Vec::new();
-    let mut remove = Vec::new();
-    for path in files(directory)? {
-        let Some(rest) = file_name(&path).strip_prefix(&prefix) else { continue };
-        match stem(rest).and_then(|digits| digits.parse().ok()) {
-            Some(at) if at <= step => finished.push((at, path)),
-            Some(_) => remove.push(path),
-            None if rest.strip_suffix(".part").and_then(stem).is_some() => remove.push(path),
-            None => {}
-        }
+/// What a run that starts anew would destroy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AtStake {
+    /// Checkpoints, the latest of which is this one.
+    Checkpoint(PathBuf),
+    /// Outputs of another job, such as this one.
+    OtherJob(PathBuf),
+}
+
+/// Not collective. What a run `name` of the job with this digest would destroy if it started anew.
+pub fn at_stake(directory: &Path, name: &str, job_digest: u64) -> Result<Option<AtStake>, FileError> {
+    let results = results(directory, name)?;
+    let of = |wanted: Kind| results.iter().filter(move |(kind, ..)| *kind == wanted).map(|(.., path)| path);
+    if let Some(checkpoint) = of(Kind::Checkpoint).next_back() {
+        return Ok(Some(AtStake::Checkpoint(checkpoint.clone())));
     }
-    // Of two names for one step the present one is the later.
-    finished.sort_by_key(|(at, path)| (*at, file_name(path).ends_with(ENDING)));
-    let old = finished.len().saturating_sub(keep);
-    remove.extend(finished.into_iter().take(old).map(|(_, path)| path));
+    // A run replaces outputs from the first on, so if any are of another job, the first or the last is.
+    let is_other = |path: &&PathBuf| header(path).is_ok_and(|header| header.job_digest != job_digest);
+    let ends = of(Kind::Output).next().into_iter().chain(of(Kind::Output).next_back());
+    Ok(ends.into_iter().find(is_other).map(|path| AtStake::OtherJob(path.clone())))
+}
+
+/// Not collective. Of the checkpoints of the run `name` and the job with this digest, keeps the `keep` latest up to step
+/// `step`, which was just written. Those of later steps were left by an earlier run, and go too, as do temporary files of
+/// checkpoints that were never finished. Those of other jobs stay, as do those that cannot be read.
+pub fn remove_old_checkpoints(
+    directory: &Path,
+    name: &str,
+    job_digest: u64,
+    step: u64,
+    keep: usize,
+) -> Result<(), FileError> {
+    let prefix = format!("{name}.checkpoint_");
+    let is_part = |path: &PathBuf| {
+        let rest = file_name(path).strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".part"));
+        rest.and_then(stem).is_some()
+    };
+    let mut remove: Vec<PathBuf> = files(directory)?.into_iter().filter(is_part).collect();
+    let own = results(directory, name)?.into_iter().filter(|(kind, _, path)| {
+        *kind == Kind::Checkpoint && header(path).is_ok_and(|header| header.job_digest == job_digest)
+    });
+    let (earlier, later): (Vec<_>, Vec<_>) = own.partition(|&(_, at, _)| at <= step);
+    let old = earlier.len().saturating_sub(keep);
+    remove.extend(later.into_iter().chain(earlier.into_iter().take(old)).map(|(.., path)| path));
     remove.into_iter().try_for_each(|path| {
         std::fs::remove_file(&path).map_err(|source| FileError::System { path, action: "remove", source })
     })
+}
+
+/// What a file of a run is, by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Checkpoint,
+    Output,
+}
+
+/// Checkpoints and outputs of the run `name` with their numbers, in the order of these.
+fn results(directory: &Path, name: &str) -> Result<Vec<(Kind, u64, PathBuf)>, FileError> {
+    let result = |path: PathBuf| {
+        let number = stem(file_name(&path).strip_prefix(name)?)?;
+        let (kind, digits) = match number.strip_prefix(".checkpoint_") {
+            Some(digits) => (Kind::Checkpoint, digits),
+            None => (Kind::Output, number.strip_prefix('_')?),
+        };
+        let is_number = digits.bytes().all(|byte| byte.is_ascii_digit());
+        // A pipe of that name would never open.
+        (is_number && path.is_file()).then_some((kind, digits.parse().ok()?, path))
+    };
+    let mut found: Vec<_> = files(directory)?.into_iter().filter_map(result).collect();
+    // Of two names for one number the present one is the later.
+    found.sort_by_key(|(kind, number, path): &(Kind, u64, PathBuf)| {
+        (*kind, *number, file_name(path).ends_with(ENDING))
+    });
+    Ok(found)
+}
+
+/// The header of a file, read by this process alone.
+fn header(path: &Path) -> Result<Header, FileError> {
+    Header::read(&ParallelFile::open_alone(path)?)
 }
 
 fn file_name(path: &Path) -> &str {

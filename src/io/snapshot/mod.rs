@@ -49,6 +49,8 @@ pub struct View<'a, const D: usize> {
     pub histories: &'a [String],
     /// Digest of the job.
     pub job_digest: u64,
+    /// Text of the job file.
+    pub job_text: &'a str,
     /// Steps done.
     pub step: u64,
     /// Simulated time, s.
@@ -108,7 +110,7 @@ pub fn start_write<const D: usize>(
         let mut checked = Checked::new(Some(comm), file);
         // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
-            state::write(file, &mut checked, view, leaves, particles)?;
+            state::write(file, &mut checked, comm, view, leaves, particles)?;
         }
         vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
         checked.attach()
@@ -160,8 +162,25 @@ pub fn read<const D: usize>(
     Ok(restored)
 }
 
+/// Not collective. Text of the job file of the run that wrote a file with a restart state; `None` if it holds none, or none
+/// that can be read.
+pub fn job_text(path: &Path) -> Option<String> {
+    let file = ParallelFile::open_alone(path).ok()?;
+    if !file.exists(state::JOB) {
+        return None;
+    }
+    let (total, _) = file.shape(state::JOB).ok().filter(|(bytes, _)| *bytes <= LONGEST_JOB)?;
+    let mut checked = Checked::new(None, &file);
+    let text = checked.read::<u8>(state::JOB, Rows { offset: 0, count: total, total }, 0).ok()?;
+    checked.verify().ok()?;
+    String::from_utf8(text).ok()
+}
+
+/// Bytes of the longest job file that is read back.
+const LONGEST_JOB: u64 = 1 << 26;
+
 /// States are continued within one minor version below 1.0 and one major version from there on.
-fn compatible(program: &str) -> bool {
+pub(crate) fn compatible(program: &str) -> bool {
     let series = |version: &str| -> Option<(u64, u64)> {
         let mut parts = version.split('.').map(|part| part.parse().ok());
         let (major, minor) = (parts.next()??, parts.next()??);

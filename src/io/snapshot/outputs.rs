@@ -28,6 +28,7 @@ pub struct Outputs {
 #[derive(Debug)]
 struct Pending {
     file: Unnamed,
+    job_digest: u64,
     step: u64,
     keep: usize,
 }
@@ -115,9 +116,14 @@ impl Outputs {
         Ok(particles)
     }
 
+    /// The next output takes the number, and so the place, of the last one.
+    pub fn give_back_number(&mut self) {
+        self.next = self.next.saturating_sub(1);
+    }
+
     /// Collective. Writes a checkpoint and removes older ones but for the last `keep` (at least one,
-    /// with this), as well as those of later steps: they are of an earlier run. Returns the path that it will have when
-    /// it is on disk: see [`Outputs::settle`] and [`Outputs::try_settle`].
+    /// with this), as well as those of later steps: they are of an earlier run. Those of other jobs stay. Returns the path that it will have when
+    /// it is on disk: see [`Outputs::settle`].
     pub fn checkpoint<const D: usize>(
         &mut self,
         comm: &Comm,
@@ -133,27 +139,31 @@ impl Outputs {
             restart: true,
         };
         let file = start_write(comm, &path, view, &options)?;
-        self.pending = Some(Pending { file, step: view.step, keep });
+        self.pending = Some(Pending { file, job_digest: view.job_digest, step: view.step, keep });
         Ok(path)
     }
 
     /// Collective. Waits until the last checkpoint is on disk, and gives it its name.
     pub fn settle(&mut self, comm: &Comm) -> Result<(), FileError> {
-        let Some(Pending { file, step, keep }) = self.pending.take() else { return Ok(()) };
+        let Some(Pending { file, job_digest, step, keep }) = self.pending.take() else { return Ok(()) };
         file.finish(comm)?;
         let removed = match comm.rank() {
-            0 => remove_old_checkpoints(&self.directory, &self.name, step, keep.max(1)),
+            0 => remove_old_checkpoints(&self.directory, &self.name, job_digest, step, keep.max(1)),
             _ => Ok(()),
         };
         comm.agree(removed)?;
         Ok(())
     }
 
-    /// Collective. As [`Outputs::settle`] if nobody would have to wait.
-    pub fn try_settle(&mut self, comm: &Comm) -> Result<(), FileError> {
-        let Some(pending) = &self.pending else { return Ok(()) };
-        let mut ready = [u64::from(pending.file.is_on_disk())];
+    /// Whether a checkpoint is on its way to disk.
+    pub fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Collective. Whether nobody would have to wait in [`Outputs::settle`].
+    pub fn is_on_disk(&self, comm: &Comm) -> bool {
+        let mut ready = [u64::from(self.pending.as_ref().is_none_or(|pending| pending.file.is_on_disk()))];
         comm.min_u64(&mut ready);
-        if ready[0] == 1 { self.settle(comm) } else { Ok(()) }
+        ready[0] == 1
     }
 }

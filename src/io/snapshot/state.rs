@@ -48,6 +48,9 @@ pub(super) fn columns<const D: usize>() -> [Columns; 9] {
     columns
 }
 
+/// The data set with the text of the job file.
+pub(super) const JOB: &str = "state/job";
+
 /// Path of a data set of the state.
 pub(super) fn path(kind: &str, name: &str) -> String {
     format!("{GROUP}/{kind}/{name}")
@@ -57,10 +60,14 @@ pub(super) fn path(kind: &str, name: &str) -> String {
 pub(super) fn write<const D: usize>(
     file: &ParallelFile,
     checked: &mut Checked,
+    comm: &Comm,
     view: &View<D>,
     leaves: Rows,
     particles: Rows,
 ) -> Result<(), FileError> {
+    // Rank 0 writes all of it.
+    let text = if comm.rank() == 0 { view.job_text.as_bytes() } else { &[] };
+    checked.write(JOB, Rows::place(comm, text.len() as u64), 0, text)?;
     for kind in ["tree", "leaf", "particles"] {
         file.create_group(&format!("{GROUP}/{kind}"))?;
     }

@@ -25,7 +25,7 @@ mod adaptivity;
 mod colliders;
 mod loads;
 mod overlap;
-mod settings;
+pub(super) mod settings;
 mod shapes;
 
 /// Most leaves that a uniform tree of the base level may have.
@@ -120,6 +120,7 @@ fn problem<const D: usize>(
     let problem = Problem {
         name,
         path: path.to_path_buf(),
+        text: checks.text.to_owned(),
         title: file.title.clone(),
         digest: digest(file),
         origin,

@@ -146,8 +146,8 @@ pub(in crate::job) fn report<const D: usize>(
     Some(ReportSetup::ColumnCollapse { base, up, radius: *radius, height: *height, law: *law })
 }
 
-/// Checksum (64-bit FNV-1a) of what changes the state, from the file with all defaults filled in.
-pub(in crate::job) fn digest(file: &JobFile) -> u64 {
+/// The part of a job that decides the state.
+pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     let mut state = file.clone();
     state.title.clear();
     state.output = file::Output::default();
@@ -156,6 +156,12 @@ pub(in crate::job) fn digest(file: &JobFile) -> u64 {
     state.telemetry = file::Telemetry::default();
     state.report = None;
     state.time.end = 0.0;
+    state
+}
+
+/// Checksum (64-bit FNV-1a) of what changes the state, from the file with all defaults filled in.
+pub(in crate::job) fn digest(file: &JobFile) -> u64 {
+    let state = deciding(file);
     // Field order and shortest round-trip numbers make the text canonical.
     let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {

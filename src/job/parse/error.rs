@@ -28,6 +28,12 @@ pub enum JobError {
         /// Why.
         source: std::io::Error,
     },
+    /// Files of the run could not be named after the job.
+    #[error("{}: the name of the file is not UTF-8; expected one that is, since results take it over", path.display())]
+    Name {
+        /// The file.
+        path: PathBuf,
+    },
     /// The content is not a valid job.
     #[error(transparent)]
     Invalid(#[from] FaultList),

@@ -251,7 +251,7 @@ pub enum Spin {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    /// End of the run, s.
+    /// End of the run, s. It ends with the first step that reaches this time.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub end: f64,
     /// Courant number: the part of a cell that the fastest wave may cross in one step.

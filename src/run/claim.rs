@@ -1,0 +1,187 @@
+//! A run's claim on its directory: one run at a time, and no results destroyed that nobody has given up.
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use partition::comm::Comm;
+
+use super::RunError;
+use crate::io::hdf5_file::FileError;
+use crate::io::progress::warn;
+use crate::io::snapshot::directory::{AtStake, at_stake};
+use crate::job::Problem;
+
+/// How long a run waits for one that is ending: ranks that were killed need a moment.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The lock of a run, `JOB.lock` in its directory. Rank 0 holds it; other ranks have an empty one. It ends with the
+/// process, however that ends, so that a file left by a crash is in nobody's way.
+#[derive(Debug, Default)]
+pub struct Claim(Option<Held>);
+
+#[derive(Debug)]
+struct Held {
+    file: File,
+    path: PathBuf,
+}
+
+/// Why the lock was not taken.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    /// Another run has it.
+    #[error("{}: another run writes here ({holder}); wait until it has ended, or stop it", path.display())]
+    Taken { path: PathBuf, holder: String },
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+impl Claim {
+    /// Collective. Takes the lock unless this run has it already. Where the directory is not there yet, nothing is
+    /// made, and there is nothing to lock.
+    ///
+    /// # Errors
+    /// Another run has the lock, or its file cannot be written; the same on all ranks.
+    pub fn take<const D: usize>(&mut self, comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
+        let directory = &problem.output.directory;
+        let mut is_taken = false;
+        let mut taken = Ok(None);
+        if comm.rank() == 0 && self.0.is_none() && directory.is_dir() {
+            taken = lock(&directory.join(format!("{}.lock", problem.name))).map(Some);
+            is_taken = matches!(taken, Err(Refusal::Taken { .. }));
+        }
+        let is_taken = comm.any(is_taken);
+        match comm.agree(taken) {
+            Ok(held) => {
+                self.0 = self.0.take().or(held);
+                Ok(())
+            }
+            Err(disagreement) if is_taken => Err(RunError::Refused(disagreement.message)),
+            Err(disagreement) => Err(disagreement.into()),
+        }
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        // While it is locked, so that no other run has taken it. It may be gone with its directory; then nothing is left
+        // to do.
+        if is_at(&self.file, &self.path) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Locks the file and writes into it who has it.
+fn lock(path: &Path) -> Result<Held, Refusal> {
+    let failed = |action| move |source| FileError::System { path: path.into(), action, source };
+    let started = Instant::now();
+    loop {
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create(true).truncate(false).custom_flags(libc::O_NOFOLLOW);
+        let mut file = options.open(path).map_err(failed("create"))?;
+        match file.try_lock() {
+            // The run that had it may have removed it meanwhile; then another may lock the next file of that name.
+            Ok(()) if !is_at(&file, path) => continue,
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) if started.elapsed() < PATIENCE => {
+                std::thread::sleep(PATIENCE / 30);
+                continue;
+            }
+            Err(TryLockError::WouldBlock) => {
+                let mut holder = String::new();
+                // What cannot be read is not told.
+                let _ = file.take(200).read_to_string(&mut holder);
+                let holder = holder.trim().escape_debug().to_string();
+                return Err(Refusal::Taken { path: path.into(), holder });
+            }
+            // Some file systems of clusters have no locks.
+            Err(TryLockError::Error(error)) if cannot_lock(&error) => warn(&format!(
+                "{}: cannot be locked ({error}); see to it that no other run writes here",
+                path.display()
+            )),
+            Err(TryLockError::Error(error)) => return Err(failed("lock")(error).into()),
+        }
+        let holder = format!("process {} on host {}\n", std::process::id(), host());
+        let written = file.set_len(0).and_then(|()| file.rewind());
+        written.and_then(|()| file.write_all(holder.as_bytes())).map_err(failed("write"))?;
+        return Ok(Held { file, path: path.into() });
+    }
+}
+
+fn cannot_lock(error: &std::io::Error) -> bool {
+    error.kind() == ErrorKind::Unsupported
+        || matches!(error.raw_os_error(), Some(libc::ENOSYS | libc::ENOLCK | libc::EOPNOTSUPP))
+}
+
+/// Whether the open file is the one of that name.
+fn is_at(file: &File, path: &Path) -> bool {
+    let same = |a: std::fs::Metadata, b: std::fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    file.metadata().is_ok_and(|a| path.symlink_metadata().is_ok_and(|b| same(a, b)))
+}
+
+/// Name of this machine.
+fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    if name.trim().is_empty() { "(unknown)".into() } else { name.trim().to_owned() }
+}
+
+/// Collective. Refuses to start anew where that would destroy results which took long to get.
+///
+/// # Errors
+/// The directory holds checkpoints of this name, or outputs of another job; the same on all ranks.
+pub fn spare_results<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
+    let directory = &problem.output.directory;
+    let found = match comm.rank() {
+        0 if directory.is_dir() => at_stake(directory, &problem.name, problem.digest),
+        _ => Ok(None),
+    };
+    let refusal = match comm.agree(found)? {
+        None => Ok(()),
+        Some(AtStake::Checkpoint(path)) => Err(format!(
+            "{}: a checkpoint of an earlier run; go on from it with --restart latest, or start anew and replace its \
+             results with --overwrite",
+            path.display()
+        )),
+        Some(AtStake::OtherJob(path)) => Err(format!(
+            "{}: a result of another job (what decides the state has been changed); choose another \
+             output.directory, or replace its results with --overwrite",
+            path.display()
+        )),
+    };
+    comm.agree(refusal).map_err(|disagreement| RunError::Refused(disagreement.message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_holder_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.lock");
+        // As a process that was killed leaves it.
+        std::fs::write(&path, "process 1 on host gone, with a long name of its own\n").unwrap();
+        let held = lock(&path).unwrap();
+        let told = std::fs::read_to_string(&path).unwrap();
+        assert!(told.starts_with(&format!("process {} on host ", std::process::id())), "{told}");
+        let refusal = lock(&path).unwrap_err().to_string();
+        assert!(refusal.contains("another run writes here (process "), "{refusal}");
+        drop(held);
+        assert!(!path.exists());
+        drop(lock(&path).unwrap());
+    }
+
+    #[test]
+    fn the_lock_of_another_directory_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.lock");
+        let held = lock(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        std::fs::write(&path, "of somebody else").unwrap();
+        drop(held);
+        assert!(path.exists());
+    }
+}

@@ -1,0 +1,119 @@
+//! Signals of batch systems and terminals, and what nobody listens to.
+use std::fs::File;
+use std::os::unix::ffi::OsStrExt as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::in_turn;
+use crate::launch::{Running, agimp, job, run, signal, succeed, text};
+
+const NAME: &str = "collapse_2d";
+const SOON: Duration = Duration::from_secs(60);
+
+fn stops_with_a_checkpoint(running: Running, directory: &Path, what: &str) {
+    let output = running.finish_within(SOON);
+    let shown = text(&output);
+    assert_eq!(output.status.code(), Some(3), "{what}: {shown}");
+    let words = "agimp: stopped on request; go on with --restart ";
+    let checkpoint = shown.lines().find_map(|line| line.strip_prefix(words)).expect("message");
+    assert!(directory.join(checkpoint).exists(), "{what}: {shown}");
+}
+
+/// A lost terminal (HUP), queues (TERM, USR1, USR2), the limit on processor time (XCPU), Ctrl-C (INT).
+#[test]
+fn each_signal_stops_a_run_with_a_checkpoint() {
+    let _turn = in_turn();
+    for name in ["TERM", "USR1", "USR2", "XCPU", "HUP", "INT"] {
+        let home = tempfile::tempdir().expect("temporary directory");
+        let mut running = Running::start(&mut run(home.path(), 1, 1, &job(NAME), &["--quiet"]));
+        running.wait_for_step(home.path(), NAME, 9);
+        signal(running.launcher(), name);
+        stops_with_a_checkpoint(running, home.path(), name);
+    }
+    // `mpirun` hands on both.
+    for name in ["USR1", "USR2"] {
+        let home = tempfile::tempdir().expect("temporary directory");
+        let mut running = Running::start(&mut run(home.path(), 2, 1, &job(NAME), &["--quiet"]));
+        running.wait_for_step(home.path(), NAME, 9);
+        signal(running.launcher(), name);
+        stops_with_a_checkpoint(running, home.path(), name);
+    }
+}
+
+/// A signal that comes before MPI has started: the run begins, takes a step and stops.
+#[test]
+fn a_signal_at_the_very_start_is_not_lost() {
+    let _turn = in_turn();
+    for name in ["USR1", "TERM"] {
+        let home = tempfile::tempdir().expect("temporary directory");
+        let running = Running::start(&mut run(home.path(), 1, 1, &job(NAME), &["--quiet"]));
+        // Until then it is the loader of the operating system that runs.
+        while !catches(running.launcher(), 10) {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        signal(running.launcher(), name);
+        stops_with_a_checkpoint(running, home.path(), name);
+    }
+}
+
+/// Whether the process has a handler for the signal of this number.
+fn catches(process: u32, number: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("process");
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("mask");
+    u64::from_str_radix(mask.trim(), 16).expect("digits") >> (number - 1) & 1 == 1
+}
+
+/// `nohup` has the process ignore the hangup, and so it goes on.
+#[test]
+fn nohup_is_respected() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let mut command = Command::new("bash");
+    let script = "trap '' HUP; exec \"$0\" run \"$1\" --quiet --threads 1";
+    command.current_dir(home.path()).args(["-c", script, env!("CARGO_BIN_EXE_agimp")]).arg(job(NAME));
+    let mut running = Running::start(&mut command);
+    running.wait_for_step(home.path(), NAME, 9);
+    signal(running.launcher(), "HUP");
+    let output = running.finish();
+    assert!(output.status.success(), "{}", text(&output));
+}
+
+/// Whether anybody takes the last words of a complete run does not matter.
+#[test]
+fn nobody_needs_to_listen() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let full = File::options().write(true).open("/dev/full").expect("/dev/full");
+    let mut command = run(home.path(), 1, 1, &job("few_leaves"), &[]);
+    let status = command.stdout(full).stderr(Stdio::null()).status().expect("started");
+    assert_eq!(status.code(), Some(0), "no space for the last words");
+
+    let home = tempfile::tempdir().expect("temporary directory");
+    let mut command = run(home.path(), 1, 1, &job("few_leaves"), &[]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("started");
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().expect("child").code(), Some(0), "closed pipes");
+}
+
+/// Names that are no UTF-8: results cannot be named after such a job, but states may have any name.
+#[test]
+fn names_that_are_not_utf_8() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let named = |bytes: &[u8]| home.path().join(std::ffi::OsStr::from_bytes(bytes));
+    let bad = named(b"caf\xe9.toml");
+    std::fs::copy(job("few_leaves"), &bad).expect("copied");
+    let output = Running::start(&mut run(home.path(), 2, 1, &bad, &[])).finish_within(SOON);
+    let shown = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{shown}");
+    assert_eq!(shown.matches("the name of the file is not UTF-8").count(), 1, "{shown}");
+    assert!(!home.path().join("out").exists());
+
+    succeed(&mut run(home.path(), 1, 1, &job("few_leaves"), &["--quiet"]));
+    let state = named(b"\xe9tat.hdf");
+    std::fs::copy(home.path().join("out/few_leaves/few_leaves_000001.hdf"), &state).expect("copied");
+    succeed(agimp(home.path()).arg("info").arg(&state));
+    let mut command = run(home.path(), 2, 1, &job("few_leaves"), &["--quiet", "--restart"]);
+    succeed(command.arg(&state));
+}
