@@ -333,3 +333,33 @@ fn soft_plastic_impacts_are_stable() {
         assert!(failed.is_empty(), "{failed:#?}");
     });
 }
+
+/// Gravity a hundred thousand times that of the Earth takes no particle out of the domain in the first step: a disk falls its height
+/// in the time that the law of free fall says.
+#[test]
+fn great_gravity_is_resolved_from_the_first_step() {
+    on_ranks("great_gravity_is_resolved_from_the_first_step", &[1], |comm| {
+        let g = 1e6;
+        let text = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -{g:?}]\n[domain]\nsize = [1, 1]\nroot_edge = 1\n[tree]\nbase_level = 2\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e6\npoisson = 0.3\n\
+             [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = {{ kind = 'circle', centre = [0.5, 0.7], radius = 0.1 }}\n\
+             [time]\nend = 1e3\n[output]\nevery = 1e3\n"
+        );
+        let problem = parse(&text, "soak.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let problem = Problem::<2>::try_from(problem).unwrap_or_else(|_| panic!("another dimension"));
+        let mut solver: Solver<2> = setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"));
+        let start = solver.particle_totals();
+        let mut drop = 0.0;
+        while drop < 0.5 {
+            solver.step(1e3, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+            let totals = solver.particle_totals();
+            drop = (start.gravitational - totals.gravitational) / (start.mass * g);
+        }
+        let time = (2.0 * drop / g).sqrt();
+        let error = solver.clock.time / time - 1.0;
+        println!("same: {error:e} error of the time of fall after {} steps", solver.clock.step);
+        // First order in the step, of which there are few.
+        assert!(error.abs() < 0.2 && solver.clock.step > 3, "{error}");
+    });
+}

@@ -28,14 +28,23 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
-    /// the sum of wave speed and particle speed. Colliders bound it as well.
+    /// the sum of wave speed and particle speed; nor may gravity take a particle at rest further than that part of a cell,
+    /// `g Δt² ≤ cfl h`. Colliders bound the step as well.
     pub(in crate::solver) fn local_bound(&self) -> f64 {
         let plan = &self.grid.plan;
+        // Scaled, so that no square overflows.
+        let gravity = self.physics.gravity.at(self.clock.time);
+        let greatest = gravity.iter().fold(0.0, |greatest: f64, g| greatest.max(g.abs()));
+        let gravity = match greatest > 0.0 {
+            true => greatest * gravity.iter().map(|g| (g / greatest) * (g / greatest)).sum::<f64>().sqrt(),
+            false => 0.0,
+        };
         let particles = self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
             f64::INFINITY,
             |bound, (leaf, signal)| {
                 let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
-                bound.min(self.physics.control.cfl * plan.cell(finest.unwrap_or(0)) / signal)
+                let length = self.physics.control.cfl * plan.cell(finest.unwrap_or(0));
+                bound.min(length / signal).min((length / gravity).sqrt())
             },
         );
         particles.min(self.collider_bound())
