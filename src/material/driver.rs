@@ -1,6 +1,6 @@
 //! A material point driven along a prescribed path of deformation.
 use super::{HISTORIES, Material, State, Step};
-use crate::simd::{Lanes, Vector};
+use crate::simd::{LANES, Lanes, Vector};
 
 /// A 3×3 matrix, `m[i][j]` in row i and column j.
 pub type Matrix = [[f64; 3]; 3];
@@ -19,6 +19,10 @@ pub struct Point<'a> {
     pub work: f64,
     /// Bound of the wave speeds, m/s.
     pub wave_speed: f64,
+    /// Length of the steps to come, s; 0: nothing flows by its rate.
+    pub dt: f64,
+    /// Edge of the cells that softening is regularised with, m; 0: none.
+    pub size: f64,
 }
 
 impl<'a> Point<'a> {
@@ -31,6 +35,8 @@ impl<'a> Point<'a> {
             history: material.initial_history(),
             work: 0.0,
             wave_speed: 0.0,
+            dt: 0.0,
+            size: 0.0,
         };
         point.set_trial(point.elastic);
         point
@@ -67,7 +73,8 @@ impl<'a> Point<'a> {
         self.elastic = trial;
         let mut state = State::new(trial.map(Lanes::splat));
         state.history = self.history.map(Lanes::splat);
-        self.material.update(&mut state, &Step::rest(self.is_plane()));
+        let step = Step { dt: self.dt, size: [self.size; LANES], ..Step::rest(self.is_plane()) };
+        self.material.update(&mut state, &step);
         let scalar = |lanes: Lanes| lanes.to_array()[0];
         self.elastic = state.elastic.map(scalar);
         self.stress = state.stress.map(scalar);

@@ -8,14 +8,20 @@
 //! | `law.rs` | state, step, and the traits of a model |
 //! | `laws/` | the models, one file each, and the list of them |
 //! | `parameters/` | what models share of their parameters: elastic constants, checks, reading them from text |
+//! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
+//! | `hardening/` | strength as a function of plastic strain, rate and temperature |
+//! | `root.rs` | roots of scalar equations, lane by lane |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
 //! | `driver.rs` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
+mod coulomb;
 pub mod driver;
+mod hardening;
 mod law;
 pub mod laws;
 pub mod parameters;
+mod root;
 mod tensor;
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,7 @@ use super::problem::*;
 use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::{Aabb, Shape};
 use crate::load::Gravity;
+use crate::material::parameters::OutOfRange;
 use partition::{Brick, key::MAX_ROOTS};
 
 mod adaptivity;
@@ -301,6 +302,12 @@ fn names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &P
 
 fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> Vec<MaterialSetup> {
     names(checks, materials.iter().map(|material| material.name.as_str()), path);
+    for (i, material) in materials.iter().enumerate() {
+        if let Err(OutOfRange { key, value, range }) = material.model.check() {
+            let own = key.split('.').fold(path.index(i), |path, key| path.key(key.to_owned()));
+            checks.fault(&own, format!("found {value}; expected a number {range}"));
+        }
+    }
     materials
         .iter()
         .map(|m| MaterialSetup { name: m.name.clone(), density: m.density, model: m.model.clone() })

@@ -153,17 +153,19 @@ impl<'s> Checker<'s> {
             }
             return found.copied();
         }
-        // Different types.
+        // Different types; what has a definition of its own is a table.
         let found = options.iter().find(|option| {
-            matches!(
-                (option.get("type").and_then(Value::as_str), &node.value),
-                (Some("number"), Toml::Integer(_) | Toml::Float(_))
-                    | (Some("integer"), Toml::Integer(_))
-                    | (Some("array"), Toml::Array(_))
-                    | (Some("string"), Toml::Text(_))
-                    | (Some("object"), Toml::Table(_))
-                    | (Some("boolean"), Toml::Boolean(_))
-            )
+            let is_table = option.get("$ref").is_some() && matches!(node.value, Toml::Table(_));
+            is_table
+                || matches!(
+                    (option.get("type").and_then(Value::as_str), &node.value),
+                    (Some("number"), Toml::Integer(_) | Toml::Float(_))
+                        | (Some("integer"), Toml::Integer(_))
+                        | (Some("array"), Toml::Array(_))
+                        | (Some("string"), Toml::Text(_))
+                        | (Some("object"), Toml::Table(_))
+                        | (Some("boolean"), Toml::Boolean(_))
+                )
         });
         if found.is_none() {
             let words: Vec<String> = options

@@ -10,7 +10,9 @@
 //! | `fixed_corotated.rs` | fixed corotated elasticity |
 //! | `hencky.rs` | Hencky elasticity; elastic part of the plastic models |
 //! | `von_mises.rs` | metal: von Mises yield, isotropic hardening |
+//! | `tresca.rs` | metal, undrained clay: Tresca yield |
 //! | `drucker_prager.rs` | sand: Drucker-Prager yield |
+//! | `mohr_coulomb.rs` | soil, rock: Mohr-Coulomb yield |
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -21,7 +23,9 @@ use super::parameters::{OutOfRange, ranges};
 pub mod drucker_prager;
 pub mod fixed_corotated;
 pub mod hencky;
+pub mod mohr_coulomb;
 pub mod neo_hookean;
+pub mod tresca;
 pub mod von_mises;
 
 /// A constitutive model with the form of its parameters.
@@ -111,6 +115,10 @@ materials! {
     Hencky(hencky::Hencky),
     /// Von Mises plasticity.
     VonMises(von_mises::VonMises),
+    /// Tresca plasticity.
+    Tresca(tresca::Tresca),
     /// Drucker-Prager plasticity.
     DruckerPrager(drucker_prager::DruckerPrager),
+    /// Mohr-Coulomb plasticity.
+    MohrCoulomb(mohr_coulomb::MohrCoulomb),
 }

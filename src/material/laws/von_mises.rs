@@ -1,18 +1,27 @@
-//! Hencky elasticity with von Mises yield and linear isotropic hardening; radial return in logarithmic
-//! strains (Simo 1992).
+//! Metal: Hencky elasticity with von Mises yield, isotropic hardening and, if asked for, viscous overstress; radial return in
+//! logarithmic strains (Simo 1992).
 //!
-//! `f = |dev τ| - √(2/3) (σ_y + H κ)`, closed form: `Δγ = f / (2μ + 2H/3)`, `Δκ = √(2/3) Δγ`.
+//! `f = q - σ_y(κ)` with `q = √(3/2) |dev τ|` and `κ̇ = √(2/3) |d_p|`. Linear hardening has the closed form
+//! `Δκ = f / (3μ + H)`; otherwise `q - 3μ Δκ = σ_y(κ + Δκ, Δκ/Δt, T)` is solved for `Δκ`.
+//!
+//! Overstress (Perzyna 1966): `|dev τ| = √(2/3) σ_y + η |d_p|^h` while it flows.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
+use crate::material::hardening::{Curve, Flow, Hardening};
+use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;
-use crate::material::{Law, PLASTIC_STRAIN, State, Step};
+use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};
 
-/// Hencky elasticity with von Mises yield and linear isotropic hardening.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// History variable of the temperature, K.
+pub(super) const TEMPERATURE: usize = PLASTIC_VOLUME + 1;
+
+/// Hencky elasticity with von Mises yield, isotropic hardening and viscous overstress.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Young's modulus, Pa; above 0.
@@ -24,18 +33,63 @@ pub struct Parameters {
     /// Initial yield stress in uniaxial tension, Pa; above 0.
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub yield_stress: f64,
-    /// Linear hardening modulus, Pa; 0 is perfect plasticity.
+    /// How the yield stress changes with plastic strain: a number is the modulus of linear hardening, Pa; 0 is perfect plasticity.
+    #[serde(default)]
+    pub hardening: Hardening,
+    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |d_p|^h` (Perzyna 1966). 0: no overstress.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e13))]
-    pub hardening: f64,
+    pub viscosity: f64,
+    /// Exponent h of the rate in the overstress.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub rate_exponent: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Von Mises solid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct VonMises {
     solid: Hencky,
-    yield_stress: f64,
-    hardening: f64,
+    curve: Curve,
+    overstress: Option<Overstress>,
+}
+
+/// `η |d_p|^h`
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Overstress {
+    /// η, Pa s^h.
+    pub viscosity: f64,
+    /// h.
+    pub exponent: f64,
+}
+
+impl Overstress {
+    /// What there is, if anything: η, Pa s^h, and h.
+    pub fn new(viscosity: f64, exponent: f64) -> Option<Self> {
+        (viscosity > 0.0).then_some(Self { viscosity, exponent })
+    }
+
+    /// In a step of `dt` (s) with a plastic increment of this norm, above 0, and its derivative by the increment, Pa.
+    #[inline(always)]
+    pub fn of<V: Vector>(self, increment: V, dt: f64) -> [V; 2] {
+        let rate = increment * (1.0 / dt);
+        let value = match self.exponent {
+            1.0 => rate,
+            exponent => exp(ln(rate) * exponent),
+        } * self.viscosity;
+        [value, value * self.exponent / increment]
+    }
+}
+
+impl VonMises {
+    /// With these elastic constants, strength and overstress.
+    pub(super) fn of(solid: Hencky, curve: Curve, overstress: Option<Overstress>) -> Self {
+        Self { solid, curve, overstress }
+    }
 }
 
 impl Model for VonMises {
@@ -43,41 +97,48 @@ impl Model for VonMises {
 
     fn new(p: &Parameters, density: f64) -> Self {
         let solid = Hencky::of(p.young, p.poisson, density);
-        Self { solid, yield_stress: p.yield_stress, hardening: p.hardening }
+        let curve = Curve::new(&p.hardening, p.yield_stress, density);
+        Self::of(solid, curve, Overstress::new(p.viscosity, p.rate_exponent))
+    }
+
+    fn check(p: &Parameters) -> Result<(), OutOfRange> {
+        p.hardening.check(p.yield_stress)
     }
 
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3",
             "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 5e4, hardening = 1e5",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, hardening = {kind = 'none'}, viscosity = 20.0",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, viscosity = 30.0, rate_exponent = 0.5",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'voce', saturation = 5e3, rate = 10.0, modulus = 1e3}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'ludwik', modulus = 2e4, exponent = 0.3}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'swift', strain = 0.004, exponent = 0.22}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'table', points = [[0.01, 3e3], [0.05, 4e3], [0.2, 4.5e3]]}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 4e4, \
+             hardening = {kind = 'linear_softening', residual = 1e4, strain = 0.2}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 4e4, \
+             hardening = {kind = 'exponential_softening', residual = 1e4, strain = 0.1, length = 0.2}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'johnson_cook', modulus = 3e4, exponent = 0.31, rate_factor = 0.025, \
+             thermal_exponent = 1.09, melting_temperature = 1356.0, specific_heat = 383.0}",
         ]
     }
 }
 
 impl Law for VonMises {
-    const HISTORIES: usize = PLASTIC_STRAIN + 1;
+    const HISTORIES: usize = TEMPERATURE + 1;
 
     #[inline(always)]
     fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
-        let zero = V::splat(0.0);
-        let one = V::splat(1.0);
-        let root = (2.0_f64 / 3.0).sqrt();
-        let mu = self.solid.shear_modulus();
-        let trial = Strain::of(&state.elastic, step.plane);
-        let radius =
-            |kappa: V| kappa.mul_add(V::splat(root * self.hardening), V::splat(root * self.yield_stress));
-        let excess = trial.norm.mul_add(V::splat(2.0 * mu), -radius(state.history[PLASTIC_STRAIN]));
-        let flows = zero.lt(excess);
-        let mut kept = one;
-        state.work = zero;
-        if flows.any() {
-            let flow = excess * (1.0 / (2.0 * mu + 2.0 / 3.0 * self.hardening));
-            kept = flows.select(one - flow / trial.norm, one);
-            let kappa = flow.mul_add(V::splat(root), state.history[PLASTIC_STRAIN]);
-            state.history[PLASTIC_STRAIN] = flows.select(kappa, state.history[PLASTIC_STRAIN]);
-            state.work = flows.select(radius(kappa) * flow, zero);
+        match (self.curve.linear(), self.overstress) {
+            (Some(modulus), None) => self.return_linear(state, modulus, step.plane),
+            _ => self.return_curved(state, step),
         }
-        trial.finish(&self.solid, state, [trial.trace, kept], flows, V::Mask::from_bits(0), step.plane);
     }
 
     #[inline(always)]
@@ -94,6 +155,92 @@ impl Law for VonMises {
     }
 
     fn history_names(&self) -> &'static [&'static str] {
-        &["plastic_strain"]
+        match self.curve.temperature() {
+            Some(_) => &["plastic_strain", "plastic_volume", "temperature"],
+            None => &["plastic_strain"],
+        }
+    }
+
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        let mut history = [0.0; HISTORIES];
+        history[TEMPERATURE] = self.curve.temperature().unwrap_or(0.0);
+        history
+    }
+
+    fn softens(&self) -> bool {
+        self.curve.softens()
+    }
+}
+
+impl VonMises {
+    /// Closed form for linear hardening without overstress.
+    #[inline(always)]
+    fn return_linear<V: Vector>(&self, state: &mut State<V>, modulus: f64, plane: bool) {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
+        let root = (2.0_f64 / 3.0).sqrt();
+        let mu = self.solid.shear_modulus();
+        let trial = Strain::of(&state.elastic, plane);
+        let radius =
+            |kappa: V| kappa.mul_add(V::splat(root * modulus), V::splat(root * self.curve.initial()));
+        let excess = trial.norm.mul_add(V::splat(2.0 * mu), -radius(state.history[PLASTIC_STRAIN]));
+        let flows = zero.lt(excess);
+        let mut kept = one;
+        state.work = zero;
+        if flows.any() {
+            let flow = excess * (1.0 / (2.0 * mu + 2.0 / 3.0 * modulus));
+            kept = flows.select(one - flow / trial.norm, one);
+            let kappa = flow.mul_add(V::splat(root), state.history[PLASTIC_STRAIN]);
+            state.history[PLASTIC_STRAIN] = flows.select(kappa, state.history[PLASTIC_STRAIN]);
+            state.work = flows.select(radius(kappa) * flow, zero);
+        }
+        trial.finish(&self.solid, state, [trial.trace, kept], flows, V::Mask::from_bits(0), plane);
+    }
+
+    /// Any hardening and overstress.
+    #[inline(always)]
+    fn return_curved<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
+        let root = (1.5_f64).sqrt();
+        let three_mu = 3.0 * self.solid.shear_modulus();
+        let trial = Strain::of(&state.elastic, step.plane);
+        let stress = trial.norm * (2.0 * root * self.solid.shear_modulus());
+        let (strain, temperature) = (state.history[PLASTIC_STRAIN], state.history[TEMPERATURE]);
+        let still = Flow { increment: zero, temperature: [temperature, zero] };
+        let [strength, _] = self.curve.strength(strain, &still, step);
+        // Without a step nothing flows by its rate.
+        let mut flows = strength.lt(stress);
+        if self.overstress.is_some() && step.dt <= 0.0 {
+            flows = V::Mask::from_bits(0);
+        }
+        let mut kept = one;
+        state.work = zero;
+        if flows.any() {
+            let heat = self.curve.heat();
+            let excess = |increment: V| {
+                let left = increment.neg_mul_add(V::splat(three_mu), stress);
+                let gained = left * increment * heat;
+                let rise = (left - increment * three_mu) * heat;
+                let flow = Flow { increment, temperature: [temperature + gained, rise] };
+                let [mut strength, mut slope] = self.curve.strength(strain + increment, &flow, step);
+                if let Some(overstress) = self.overstress {
+                    let [value, change] = overstress.of(increment * root, step.dt);
+                    strength = value.mul_add(V::splat(root), strength);
+                    slope = change.mul_add(V::splat(1.5), slope);
+                }
+                [left - strength, -(slope + V::splat(three_mu))]
+            };
+            let high = stress * (1.0 / three_mu);
+            let guess = flows.select((stress - strength) * (1.0 / three_mu), high);
+            let increment = root::newton(excess, guess, high, stress * f64::EPSILON, flows);
+            let left = increment.neg_mul_add(V::splat(three_mu), stress);
+            let work = left * increment;
+            kept = flows.select(left / stress, one).max(zero);
+            state.history[PLASTIC_STRAIN] = flows.select(strain + increment, strain);
+            state.history[TEMPERATURE] = flows.select(work.mul_add(V::splat(heat), temperature), temperature);
+            state.work = flows.select(work, zero).max(zero);
+        }
+        trial.finish(&self.solid, state, [trial.trace, kept], flows, V::Mask::from_bits(0), step.plane);
     }
 }

@@ -86,6 +86,66 @@ impl<V: Vector> Strain<V> {
     }
 }
 
+/// `exp(2 ε)` of a strain with this trace and this deviator.
+#[inline(always)]
+pub fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: bool) -> Symmetric<V> {
+    let twice = TraceFree::new(each(*deviator, |component| component + component));
+    let near = twice.is_small();
+    let volumetric = exp(trace * (2.0 / 3.0));
+    let mut tensor = each(twice.exp(), |component| component * volumetric);
+    if !near.all() {
+        let (mut own, trace) = (cast(&tensor), Lanes::new(trace.to_array()));
+        far_tensor_of(&mut own, Mask::from_bits((!near).bits()), trace, &cast(deviator), plane);
+        tensor = cast(&own);
+    }
+    tensor
+}
+
+/// Takes these lanes of [`tensor_of`] from eigenvectors.
+#[cold]
+#[inline(never)]
+fn far_tensor_of(tensor: &mut Symmetric, lanes: Mask, trace: Lanes, deviator: &Symmetric, plane: bool) {
+    // Rotations want a positive definite matrix; unlike eigenvalues of b, those of a strain are needed to the same absolute
+    // accuracy.
+    let squares = each(*deviator, |component| component * component);
+    let shear = squares[3] + squares[4] + squares[5];
+    let shift = (squares[0] + squares[1] + squares[2] + shear + shear).sqrt() * 2.0 + Lanes::splat(1e-9);
+    let mut shifted = *deviator;
+    for c in 0..3 {
+        shifted[c] += shift;
+    }
+    let eigen = decompose(&shifted, plane);
+    let mean = trace * (1.0 / 3.0);
+    let value = each(eigen.value, |value| exp((value - shift + mean) * 2.0));
+    let own = eigen.compose(&value, plane);
+    for c in 0..6 {
+        tensor[c] = lanes.select(own[c], tensor[c]);
+    }
+}
+
+/// Writes the final state of a return that changes principal strains one by one: this trace and this deviator where
+/// `changed`, the trial ones elsewhere. Lanes that have not changed keep the bits of the trial tensor.
+#[inline(always)]
+pub fn finish<V: Vector>(
+    trial: &Strain<V>,
+    solid: &Hencky,
+    state: &mut State<V>,
+    (trace, deviator): (V, &Symmetric<V>),
+    changed: V::Mask,
+    plane: bool,
+) {
+    if !changed.any() {
+        return solid.load(state, trial.trace, &trial.deviator);
+    }
+    let elastic = tensor_of(trace, deviator, plane);
+    let mut own = trial.deviator;
+    for c in 0..6 {
+        state.elastic[c] = changed.select(elastic[c], state.elastic[c]);
+        own[c] = changed.select(deviator[c], own[c]);
+    }
+    solid.load(state, changed.select(trace, trial.trace), &own);
+}
+
 impl Far {
     /// Decomposes some lanes, and takes trace and deviator of their strains from that.
     #[inline(always)]

@@ -6,7 +6,8 @@ fn undeformed_particles_stay_undeformed_to_the_last_bit() {
     let materials = materials();
     let scheme = scheme(&materials, Transfer::Apic);
     let mut chunk = particles::<3>(3, 1, 1, None);
-    (0..chunk.len()).for_each(|p| set_matter(&mut chunk, p, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; 2]));
+    (0..chunk.len())
+        .for_each(|p| set_matter(&mut chunk, p, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]));
     split_all(&mut chunk, &setting(&scheme, 2));
     merge_all(&mut chunk, &setting(&scheme, 1), &OPEN);
     for p in 0..chunk.len() {
@@ -52,7 +53,7 @@ fn strains_count_whatever_the_stretch() {
     let materials = materials();
     let scheme = scheme(&materials, Transfer::Apic);
     let mut family = particles::<2>(4, 1, 1, Some(0)).gathered(&[0]);
-    set_matter(&mut family, 0, [2.0, 0.6, 1.1, 0.0, 0.0, 0.0], [0.0; 2]);
+    set_matter(&mut family, 0, [2.0, 0.6, 1.1, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
     split_all(&mut family, &setting(&scheme, 2));
     for strain in [1e-6, 0.01, 0.2, 0.7] {
         for (child, sign) in [(0, 1.0), (0, -1.0), (3, 1.0), (3, -1.0)] {
@@ -106,8 +107,8 @@ fn stretched_particles_split_once_and_do_not_merge_back() {
     let scheme = scheme(&materials, Transfer::Apic);
     let setting = setting::<2>(&scheme, 1);
     let mut chunk = particles::<2>(7, 1, 1, Some(0)).gathered(&[0, 1]);
-    set_matter(&mut chunk, 0, [1.8 * 1.8, 0.7, 1.0, 0.0, 0.0, 0.0], [0.0; 2]);
-    set_matter(&mut chunk, 1, [1.5 * 1.5, 0.7, 1.0, 0.0, 0.0, 0.0], [0.0; 2]);
+    set_matter(&mut chunk, 0, [1.8 * 1.8, 0.7, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
+    set_matter(&mut chunk, 1, [1.5 * 1.5, 0.7, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
     assert_eq!(needs_split(&chunk, &setting, Some(1.6)), Wanted { which: vec![0], refused: 0 });
     assert_eq!(needs_split(&chunk, &setting, None), Wanted::default());
     let spreads = spreads(&chunk, &setting, &[0]);
@@ -143,7 +144,7 @@ fn boxes_of_one_cell_do_not_put_children_on_each_other() {
     let materials = materials();
     let scheme = Scheme { boxes: BoxPolicy::Cell, ..scheme(&materials, Transfer::Apic) };
     let mut chunk = particles::<2>(9, 0, 1, Some(0)).gathered(&[0]);
-    set_matter(&mut chunk, 0, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; 2]);
+    set_matter(&mut chunk, 0, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
     let half = chunk.column(Layout::<2>::HALF)[0];
     split_all(&mut chunk, &setting(&scheme, 1));
     let distance = chunk.position(1)[0] - chunk.position(0)[0];
@@ -157,7 +158,7 @@ fn families_wait_for_siblings_beyond_a_face() {
     let scheme = scheme(&materials, Transfer::Apic);
     let setting = setting::<2>(&scheme, 1);
     let mut family = particles::<2>(10, 1, 1, Some(0)).gathered(&[0]);
-    set_matter(&mut family, 0, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; 2]);
+    set_matter(&mut family, 0, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
     let (x, parent) = (family.position(0), family.ids()[0]);
     split_all(&mut family, &Setting { level: 2, ..setting });
     let upper_leaf = ([x[0], 0.0], [x[0] + 1.0, EXTENT]);

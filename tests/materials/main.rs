@@ -1,8 +1,11 @@
 //! Constitutive models along strain paths, against closed forms computed by independent code
 //! (`tests/data/driver_*.json`).
 use agimp::material::driver::{Matrix, Point, increment};
-use agimp::material::{HISTORIES, Material, Parameters};
+use agimp::material::{HISTORIES, Material, PLASTIC_STRAIN, PLASTIC_VOLUME, Parameters};
 use serde_json::Value;
+
+mod friction;
+mod metal;
 
 const UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -43,6 +46,38 @@ fn deformed<'a>(material: &'a dyn Material, f: &Matrix) -> Point<'a> {
     let mut point = Point::new(material);
     point.deform(f);
     point
+}
+
+/// A state of principal strains reached in one step from the undeformed material with a history.
+fn stretched<'a>(
+    material: &'a dyn Material,
+    strain: &Value,
+    dt: f64,
+    history: impl FnOnce(&mut [f64; HISTORIES]),
+) -> Point<'a> {
+    let mut point = Point::new(material);
+    history(&mut point.history);
+    point.dt = dt;
+    point.stretch(numbers(strain));
+    point
+}
+
+/// Principal values along the axes agree with those of a reference, to 1e-10 of a scale.
+fn close_on_axes(found: &[f64; 6], expected: &Value, scale: f64, what: &Value) {
+    let expected: [f64; 3] = numbers(expected);
+    for k in 0..3 {
+        assert!((found[k] - expected[k]).abs() <= 1e-10 * scale, "{found:?} instead of {expected:?}: {what}");
+    }
+}
+
+/// Greatest magnitude in a list.
+fn greatest(values: &Value) -> f64 {
+    values.as_array().unwrap().iter().fold(0.0, |most, value| f64::max(most, number(value).abs()))
+}
+
+/// Elastic logarithmic strains along the axes.
+fn elastic_strain(point: &Point) -> [f64; 6] {
+    point.elastic.map(|b| 0.5 * b.ln())
 }
 
 /// A model with the elastic constants of a case and more keys.

@@ -1,0 +1,91 @@
+//! Metal and undrained clay: Hencky elasticity with Tresca yield, in Kirchhoff stress: `τ₁ - τ₃ ≤ σ_y`, associated flow; the
+//! limit of Mohr-Coulomb without friction, with cohesion `σ_y / 2`.
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Model;
+use super::mohr_coulomb::MohrCoulomb;
+use crate::material::hardening::{Curve, Hardening};
+use crate::material::parameters::OutOfRange;
+use crate::material::{HISTORIES, Law, State, Step};
+use crate::simd::Vector;
+
+/// Hencky elasticity with Tresca yield.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Young's modulus, Pa; above 0.
+    #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
+    pub young: f64,
+    /// Poisson's ratio; above -1 and below 0.5.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    pub poisson: f64,
+    /// Initial yield stress in uniaxial tension, twice the shear strength, Pa; above 0.
+    #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
+    pub yield_stress: f64,
+    /// How the yield stress changes with plastic strain: a number is the modulus of linear hardening, Pa.
+    #[serde(default)]
+    pub hardening: Hardening,
+}
+
+/// Tresca solid.
+#[derive(Clone, Debug)]
+pub struct Tresca(MohrCoulomb);
+
+impl Model for Tresca {
+    type Parameters = Parameters;
+
+    fn new(p: &Parameters, density: f64) -> Self {
+        let cohesion = Curve::new(&p.hardening, p.yield_stress, density).halved();
+        Self(MohrCoulomb::of(p.young, p.poisson, density, cohesion))
+    }
+
+    fn check(p: &Parameters) -> Result<(), OutOfRange> {
+        p.hardening.check(p.yield_stress)
+    }
+
+    fn examples() -> &'static [&'static str] {
+        &[
+            "model = 'tresca', young = 1e6, poisson = 0.3, yield_stress = 1e3",
+            "model = 'tresca', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'ludwik', modulus = 2e4, exponent = 0.5}",
+            "model = 'tresca', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
+             hardening = {kind = 'johnson_cook', modulus = 3e4, exponent = 0.31, rate_factor = 0.025, \
+             thermal_exponent = 1.09, melting_temperature = 1356.0, specific_heat = 383.0}",
+        ]
+    }
+}
+
+impl Law for Tresca {
+    const HISTORIES: usize = MohrCoulomb::HISTORIES;
+
+    #[inline(always)]
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        self.0.respond(state, step);
+    }
+
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
+        Law::energy(&self.0, state, plane)
+    }
+
+    fn density(&self) -> f64 {
+        Law::density(&self.0)
+    }
+
+    fn wave_speed(&self) -> f64 {
+        Law::wave_speed(&self.0)
+    }
+
+    fn history_names(&self) -> &'static [&'static str] {
+        Law::history_names(&self.0)
+    }
+
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        Law::initial_history(&self.0)
+    }
+
+    fn softens(&self) -> bool {
+        Law::softens(&self.0)
+    }
+}
