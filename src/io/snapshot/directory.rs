@@ -84,8 +84,8 @@ pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Resu
             Err(error) => found.damaged.push(error),
         }
     }
-    found.whole.reverse();
-    found.whole.sort_by_key(|&(_, step)| std::cmp::Reverse(step));
+    // Of one step, present names first, and checkpoints before outputs.
+    found.whole.sort_by_key(|(path, step)| (std::cmp::Reverse(*step), !file_name(path).ends_with(ENDING)));
     Ok(found)
 }
 
