@@ -15,7 +15,7 @@ use crate::run::record::Recorder;
 use crate::run::{Options, RunError};
 use crate::setup;
 use crate::solver::Requests;
-use crate::solver::step::phases::Phase;
+use crate::solver::state::phases::Phase;
 
 /// How much to measure.
 #[derive(Clone, Copy, Debug)]

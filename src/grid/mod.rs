@@ -7,6 +7,7 @@
 //! | room | what it holds, from the bottom up |
 //! |---|---|
 //! | [`mask`] | sets of nodes of a block as bits; offsets between blocks |
+//! | [`leaf_geometry`] | boxes of leaves, and the leaf of a position |
 //! | [`order`] | in which order the arenas that reach a node are added |
 //! | [`constraints`] | which nodes are parents of which, with which weights |
 //! | [`plan`] | bins and blocks of one tree and partition; what a rank needs of others |
@@ -16,6 +17,7 @@
 pub mod arenas;
 pub mod constraints;
 pub mod direct;
+pub mod leaf_geometry;
 pub mod mask;
 pub mod order;
 pub mod plan;

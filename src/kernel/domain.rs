@@ -257,3 +257,19 @@ pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -
     }
     (0..LANES).fold(0, |bits, lane| bits | u32::from(is_plastic(lane)) << lane)
 }
+
+/// A bound on the half widths of a chunk's boxes, m.
+pub fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    greatest_stretch(chunk) * chunk.column(Layout::<D>::HALF).greatest()
+}
+
+/// A bound on the widths of a chunk's boxes over their undeformed widths.
+pub fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+    // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
+    // them, no volume more than its power 3/2.
+    let elastic = (first..first + 3).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
+    let plastic = chunk.column(Layout::<D>::PLASTIC_VOLUME).greatest();
+    let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
+    elastic.sqrt().max(isotropic)
+}

@@ -1,12 +1,11 @@
 //! Rows of `history.csv`.
+use crate::adaptivity::resample::ledger::BooksTotal;
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::io::history::Column;
 use crate::load::Load;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
-use crate::solver::refinement::resample::BooksTotal;
-use crate::solver::step::contact::Reaction;
-use crate::solver::step::loads::LoadTotals;
+use crate::solver::state::bookings::{LoadTotals, Reaction};
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
     Column { name, unit }

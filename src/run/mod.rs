@@ -24,7 +24,7 @@ use crate::io::picture;
 use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
 use crate::setup;
-use crate::solver::step::phases::Phase;
+use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Requests, Solver};
 
 /// How a run is started.

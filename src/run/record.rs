@@ -10,7 +10,7 @@ use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
-use crate::solver::step::phases::Phase;
+use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 
 /// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.

@@ -16,7 +16,8 @@ use crate::io::snapshot::{self, Header, Scalars};
 use crate::job::{self, Problem};
 use crate::particle::Chunk;
 use crate::setup;
-use crate::solver::balance::rebalance::{cut_at, leaf_weight};
+use crate::solver::balance::rebalance::cut_at;
+use crate::solver::state::cost::leaf_weight;
 use crate::solver::{Clock, Solver};
 
 /// Where a run goes on from.

@@ -7,9 +7,9 @@ use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::solver::balance::rebalance::{cut_at, leaf_cost};
-use crate::solver::step::time_step::StepControl;
-use crate::solver::{Clock, Physics, Solver};
+use crate::solver::balance::rebalance::cut_at;
+use crate::solver::state::cost::leaf_cost;
+use crate::solver::{Clock, Physics, Solver, StepControl};
 
 pub mod estimate;
 pub mod seed;

@@ -4,8 +4,10 @@
 //!
 //! | room | what it holds, from the bottom up |
 //! |---|---|
+//! | [`physics`] | what is solved |
 //! | [`sorting`] | particles into bins |
 //! | [`migration`] | particles between leaves and ranks |
+//! | [`state`] | the solver and what it owns |
 //! | [`step`] | phases of a step |
 //! | [`refinement`] | the tree follows the material |
 //! | [`balance`] | load balance: measured costs, new partitions |
@@ -13,159 +15,30 @@
 pub mod balance;
 pub mod diagnostics;
 pub mod migration;
+pub mod physics;
 pub mod refinement;
 pub mod sorting;
+pub mod state;
 pub mod step;
+
+pub use physics::{Physics, StepControl};
+pub use state::{Clock, Requests, Solver, StepError, StepReport};
 
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
-use self::balance::cost::Costs;
-use self::balance::rebalance::LastPartition;
-use self::diagnostics::totals::Weighed;
 use self::migration::migrate::{MigrateError, Moved};
-use self::refinement::regrid::Recall;
-use self::refinement::resample::Books;
 use self::sorting::bins::BinMissing;
-use self::step::contact::Contacts;
-use self::step::grid::Grid;
-use self::step::loads::LoadBooks;
-use self::step::parts::Parts;
-use self::step::phases::{Phase, Phases, thread_time};
-use self::step::survey::Survey;
-use self::step::time_step::StepControl;
-use crate::adaptivity::Adaptivity;
-use crate::boundary::{Collider, FaceCondition, Leaving};
+use crate::adaptivity::resample::ledger::Books;
 use crate::grid::arenas::waves;
-use crate::kernel::{BoxPolicy, Transfer};
-use crate::load::{Gravity, Load};
-use crate::material::Material;
 use crate::particle::Chunk;
-use crate::particle::chunk::Place;
-
-/// What is solved: the same on every rank, constant over a run.
-pub struct Physics<const D: usize> {
-    /// Edge of a root octant, m.
-    pub root_edge: f64,
-    /// Whether neighbouring leaves differ by one level at most.
-    pub graded: bool,
-    /// Materials by index.
-    pub materials: Vec<Box<dyn Material>>,
-    /// Acceleration of gravity.
-    pub gravity: Gravity<D>,
-    /// Loads, in the order in which they act.
-    pub loads: Vec<Load<D>>,
-    /// Conditions on the lower and upper face of the domain along each axis.
-    pub faces: [[FaceCondition; 2]; D],
-    /// Rigid bodies that act on the material, in the order in which they act.
-    pub colliders: Vec<Collider<D>>,
-    /// Dynamic refinement; `None`: tree and particles keep their sizes.
-    pub adaptivity: Option<Adaptivity<D>>,
-    /// What happens to particles that leave the domain.
-    pub leaving: Leaving,
-    /// Transfer of velocities.
-    pub transfer: Transfer,
-    /// How particle boxes follow the deformation.
-    pub boxes: BoxPolicy,
-    /// Choice of the time step.
-    pub control: StepControl,
-}
-
-/// Why a step failed on this rank.
-#[derive(Debug, thiserror::Error)]
-pub enum StepError {
-    /// A particle left the domain or moved too far.
-    #[error(transparent)]
-    Migrate(#[from] MigrateError),
-    /// A particle's box cannot be transferred.
-    #[error(transparent)]
-    Bin(#[from] BinMissing),
-    /// The time step is not a positive number.
-    #[error("the time step became {dt} s; the run has become unstable")]
-    TimeStep {
-        /// The time step, s.
-        dt: f64,
-    },
-}
-
-/// The state of a run between two steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Clock {
-    /// Steps done.
-    pub step: u64,
-    /// Simulated time, s.
-    pub time: f64,
-    /// Length of the step done last, s; 0 before the first.
-    pub dt: f64,
-    /// Bound on the next step from the state of all particles, s.
-    pub bound: f64,
-}
-
-/// What a step did on this rank.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StepReport {
-    /// Particles that changed leaf.
-    pub moved: Moved,
-    /// What any rank asked for.
-    pub granted: Requests,
-}
-
-/// What a rank wants all ranks to do after a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Requests {
-    /// Stop.
-    pub stop: bool,
-    /// Write a checkpoint.
-    pub checkpoint: bool,
-}
-
-/// Particles, tree and clock of one rank, and what advances them.
-pub struct Solver<const D: usize> {
-    comm: Comm,
-    /// What is solved.
-    pub physics: Physics<D>,
-    /// The distributed tree.
-    pub forest: Forest<D>,
-    /// Particles of each own leaf.
-    pub chunks: Vec<Chunk<D>>,
-    /// Step and time.
-    pub clock: Clock,
-    /// Where the colliders are, and their reactions.
-    pub contacts: Contacts<D>,
-    /// What is booked of the loads.
-    pub load_books: LoadBooks,
-    /// Wall time by phase since the last report.
-    pub phases: Phases,
-    grid: Grid<D>,
-    /// Per own leaf, the greatest sum of wave speed and particle speed after the last step, m/s.
-    signal: Vec<f64>,
-    /// Particles that this rank deleted because they left the domain.
-    pub deleted: u64,
-    /// Splits and merges of particles so far.
-    pub books: Books,
-    /// Changes of the tree since the start of this process.
-    pub regrids: u64,
-    /// Where the time of regrids went since the start of this process.
-    pub parts: Parts,
-    /// What was noted of each own leaf in the last step.
-    surveys: Vec<Survey<D>>,
-    /// Where the columns of each own leaf were at the start of the last G2P.
-    places: Vec<Place>,
-    /// What regrids remember; nothing that a bit depends on.
-    recall: Recall<D>,
-    /// What grids of earlier trees and partitions have sent.
-    sent_before: Traffic,
-    /// Bytes of the last exchange of arenas.
-    arena_bytes: u64,
-    /// Least bytes that these nodes need, as of the last step that was weighed.
-    surface_bytes: u64,
-    costs: Costs,
-    partitioned: LastPartition,
-    /// New partitions since the start of this process.
-    pub partitions: u64,
-    is_to_weigh: bool,
-    weighed: Option<Weighed>,
-}
+use crate::solver::state::bookings::{Contacts, LoadBooks};
+use crate::solver::state::cost::Costs;
+use crate::solver::state::grid::Grid;
+use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::parts::Parts;
+use crate::solver::state::phases::{Phase, Phases, thread_time};
+use crate::solver::state::recall::Recall;
 
 impl<const D: usize> Solver<D> {
     /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state read

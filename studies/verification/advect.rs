@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use agimp::job::Problem;
 use agimp::particle::chunk::Layout;
 use agimp::setup;
-use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 
 use crate::page::Page;
+use agimp::solver::{Requests, Solver};
 
 /// Velocity of the block, m/s.
 const VELOCITY: [f64; 2] = [1.0, 0.125];

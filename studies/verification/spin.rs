@@ -3,12 +3,12 @@ use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem};
 use agimp::particle::chunk::Layout;
 use agimp::setup;
-use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 
 use crate::page::Page;
 use crate::plot::{Chart, Series};
 use crate::spinning::{CUBE, SQUARE};
+use agimp::solver::{Requests, Solver};
 
 /// The stiff and fast version of a set-up: E = 1 MPa, and ten times the angular velocity.
 fn fast(text: &str) -> String {

@@ -6,11 +6,11 @@
 use agimp::job::Problem;
 use agimp::particle::chunk::Layout;
 use agimp::setup;
-use agimp::solver::{Clock, Requests, Solver};
 use partition::comm::Comm;
 
 use crate::page::Page;
 use crate::plot::{Chart, Series};
+use agimp::solver::{Clock, Requests, Solver};
 
 /// Half length of the packet in standard deviations of its envelope.
 const CUT: f64 = 2.8;

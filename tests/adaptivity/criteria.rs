@@ -1,9 +1,9 @@
 //! Each criterion refines where it should, and only there; leaves become coarse again and do not flicker.
 use agimp::job::{AnyProblem, Problem};
-use agimp::solver::Solver;
 use partition::comm::Comm;
 
 use crate::state::{Filled, advance, filled, on_ranks, solver};
+use agimp::solver::Solver;
 
 /// A job on 2 m x 1 m with leaves of 0.25 m on level 0.
 fn job(every: u64, criterion: &str, bodies: &str, rest: &str) -> String {

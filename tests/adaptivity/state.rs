@@ -2,10 +2,10 @@
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::{Layout, Tag};
 use agimp::setup;
-use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
 
 use crate::relaunch::{ran_if_launched, relaunch};
+use agimp::solver::{Requests, Solver};
 
 /// Runs `body` on each number of ranks. MPI starts once per process, so each is a process group of its own.
 pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
@@ -87,7 +87,7 @@ pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
     let leaves = solver.forest.leaves().iter().zip(&solver.chunks).filter(|(_, chunk)| !chunk.is_empty());
     leaves
         .map(|(leaf, chunk)| {
-            let (lower, upper) = agimp::solver::migration::migrate::leaf_box(leaf, solver.physics.root_edge);
+            let (lower, upper) = agimp::grid::leaf_geometry::leaf_box(leaf, solver.physics.root_edge);
             let plastic = chunk.column(Layout::<D>::HISTORY).iter().copied().fold(0.0, f64::max);
             let body = Tag::unpack(chunk.tags()[0]).body;
             Filled { level: leaf.level, lower, upper, body, plastic_strain: plastic }

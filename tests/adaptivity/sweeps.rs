@@ -2,10 +2,10 @@
 use std::fmt::Write;
 
 use agimp::job::{AnyProblem, Problem};
-use agimp::solver::Solver;
 use partition::comm::Comm;
 
 use crate::state::{advance, count, on_ranks, one_body, solver};
+use agimp::solver::Solver;
 
 /// Length of all time steps, s.
 const STEP: f64 = 3e-4;

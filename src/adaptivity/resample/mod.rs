@@ -7,8 +7,10 @@
 use crate::kernel::{BoxPolicy, Scheme, Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
+pub mod cell_fit;
 pub mod family;
 pub mod ids;
+pub mod ledger;
 mod merge;
 mod mix;
 mod numbered;

@@ -179,6 +179,11 @@ impl<const D: usize> GridPlan<D> {
         plan
     }
 
+    /// Upper corner of the domain, m.
+    pub fn extent(&self) -> [f64; D] {
+        self.tree.brick().roots.map(|n| f64::from(n) * self.root_edge)
+    }
+
     /// Edge of a cell of `level`, m.
     pub fn cell(&self, level: u8) -> f64 {
         self.root_edge / f64::from(4u32 << level)

@@ -1,3 +1,3 @@
 //! Load balance.
-pub mod cost;
+mod leaf_costs;
 pub mod rebalance;

@@ -4,16 +4,17 @@
 //! that the present ones have lost since they were made reaches what a new partition takes. While imbalance grows
 //! evenly, that is the interval with the least sum of both. The partition with which a run starts is a guess; it is
 //! replaced as soon as costs are measured, if that takes away half of the imbalance.
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use partition::{CutAt, Cuts};
 
-pub use super::cost::{leaf_cost, leaf_weight};
 use crate::adaptivity::Adaptivity;
 use crate::particle::Chunk;
-use crate::solver::Solver;
-use crate::solver::step::parts::Part;
-use crate::solver::step::phases::{Phase, thread_time};
+use crate::solver::state::Solver;
+pub use crate::solver::state::cost::{leaf_cost, leaf_weight};
+use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::parts::Part;
+use crate::solver::state::phases::{Phase, thread_time};
 
 /// Steps between looks at the imbalance.
 const LOOK_EVERY: u64 = 10;
@@ -51,32 +52,6 @@ impl Prospect {
         let helps = self.then - 1.0 <= 0.5 * (self.now - 1.0);
         let at_any_price = self.is_guess || self.now > CEILING;
         self.then < self.now && (self.lost > self.price || at_any_price && helps)
-    }
-}
-
-/// What the current partition has cost, in seconds of processor time.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::solver) struct LastPartition {
-    /// Of making it; at first of building the grid.
-    price: f64,
-    /// Lost to its imbalance so far.
-    lost: f64,
-    /// Time of the last look.
-    looked: Duration,
-    /// Whether it was made before costs were measured.
-    is_guess: bool,
-}
-
-impl LastPartition {
-    /// The partition with which a run starts or goes on, made since `start`.
-    pub fn at_start(start: Duration) -> Self {
-        Self { is_guess: true, ..Self::since(start) }
-    }
-
-    /// One made since `start`.
-    fn since(start: Duration) -> Self {
-        let now = thread_time();
-        Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now, is_guess: false }
     }
 }
 

@@ -7,19 +7,19 @@ use partition::{Forest, MAX_LEVEL};
 
 use crate::boundary::{FaceCondition, Leaving};
 use crate::grid::constraints::constraint::node_coord;
+use crate::grid::leaf_geometry::position_key;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::Gravity;
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
-use crate::solver::migration::migrate::position_key;
+use crate::solver::physics::{Physics, StepControl};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
-use crate::solver::sorting::leaf_bins::values;
-use crate::solver::step::time_step::StepControl;
-use crate::solver::step::transfer::{extent, sort_with};
+use crate::solver::state::{Clock, Solver};
+use crate::solver::step::transfer::sort_with;
 use crate::solver::step::update::update_velocity;
-use crate::solver::{Clock, Physics, Solver};
 
 /// A particle with its box. Lengths in m, relative to the domain's lower corner.
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +112,7 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn place(&mut self, particles: &[GivenParticle<D>]) {
         let (forest, root_edge) = (&self.solver.forest, self.solver.physics.root_edge);
         let roots = forest.brick().roots;
-        let extent = extent(&self.solver.grid.plan);
+        let extent = self.solver.grid.plan.extent();
         self.solver.chunks = vec![Chunk::new(); forest.leaves().len()];
         self.halves.halves = particles
             .iter()

@@ -10,8 +10,9 @@ use crate::grid::mask::{bits, block_nodes};
 use crate::material::State;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{LANES, Lanes, Mask, Vector, VectorMask};
-use crate::solver::step::phases::Phase;
-use crate::solver::{Physics, Solver, StepError};
+use crate::solver::physics::Physics;
+use crate::solver::state::phases::Phase;
+use crate::solver::state::{Solver, StepError, Weighed};
 
 /// Components of a torque or angular momentum, for both dimensions.
 const AXES: [(usize, usize); 3] = [(1, 2), (2, 0), (0, 1)];
@@ -27,10 +28,6 @@ pub struct GridTotals {
     /// kg m²/s; in plane strain only the last component.
     pub angular_momentum: [f64; 3],
 }
-
-/// Mass on the real nodes and of the particles in one step, on one rank.
-#[derive(Clone, Debug)]
-pub(in crate::solver) struct Weighed([ExactSum; 2]);
 
 /// Sums over all particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

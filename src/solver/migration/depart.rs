@@ -2,15 +2,16 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
-use super::migrate::{MigrateError, leaf_box, position_key};
+use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
+use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::boundary::Leaving;
+use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::lanes::{list_lanes, positions};
 use crate::simd::VectorMask;
-use crate::solver::refinement::resample::{Resampling, Splits};
-use crate::solver::sorting::leaf_bins::{list_lanes, positions};
 
 /// Where a particle goes.
 #[derive(Clone, Copy)]

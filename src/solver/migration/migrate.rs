@@ -4,15 +4,14 @@
 //! Ranks hold contiguous segments of the curve, so appending the messages of lower ranks, then the own moves, then the
 //! messages of higher ranks gives that order on every partition.
 use partition::comm::{Comm, NeighbourExchange, Traffic};
-use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use super::depart::{Borders, Departed, outside};
 use super::records::{append_all, record_words};
+use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
 use crate::particle::chunk::{Chunk, Layout};
-use crate::solver::refinement::resample::{Resampling, Splits};
 
 const TAG: u16 = 12;
 
@@ -171,23 +170,6 @@ fn of_messages<'a, const D: usize>(
         let leaf = tree.locate(record[0]).and_then(|known| tree.local(known))?;
         Some((leaf as u32, record))
     })
-}
-
-/// Key of the finest-level octant that contains a position inside the domain. Leaf membership of particles
-/// is defined by this function alone.
-pub fn position_key<const D: usize>(position: [f64; D], roots: [u32; D], root_edge: f64) -> u64 {
-    let scale = f64::from(1u32 << MAX_LEVEL) / root_edge;
-    let coord: [u32; D] = std::array::from_fn(|axis| {
-        let last = (roots[axis] << MAX_LEVEL) - 1;
-        ((position[axis] * scale) as u32).min(last)
-    });
-    Octant { level: MAX_LEVEL, coord }.key()
-}
-
-/// Lower and upper corner of a leaf relative to the domain's lower corner, m.
-pub fn leaf_box<const D: usize>(leaf: &Octant<D>, root_edge: f64) -> ([f64; D], [f64; D]) {
-    let edge = root_edge / f64::from(1u32 << leaf.level);
-    (leaf.coord.map(|c| f64::from(c) * edge), leaf.coord.map(|c| f64::from(c + 1) * edge))
 }
 
 /// The error of a particle whose new leaf belongs to a rank that is no neighbour.

@@ -5,19 +5,19 @@
 use partition::Octant;
 use rayon::prelude::*;
 
-use super::surroundings::{MassRange, Surroundings};
 use crate::adaptivity::{Criterion, Kind, Value};
 use crate::boundary::ColliderState;
 use crate::geometry::Aabb;
+use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{bits, block_nodes, offset_count, product};
 use crate::grid::plan::NO_BLOCK;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::{Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::solver::migration::migrate::leaf_box;
-use crate::solver::step::survey::Survey;
-use crate::solver::step::transfer::extent;
-use crate::solver::{Physics, Solver};
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
+use crate::solver::state::surroundings::{MassRange, Surroundings};
+use crate::solver::state::survey::Survey;
 
 /// What the values follow from: the state of one rank after a step.
 #[derive(Clone, Copy)]
@@ -136,7 +136,7 @@ impl<const D: usize> State<'_, D> {
         let cell = plan.cell(self.leaves[leaf].level);
         let mut halves = Vec::new();
         let scheme = self.physics.scheme();
-        domain::full_half_widths(chunk, Select::All, cell, &extent(plan), &scheme, &mut halves);
+        domain::full_half_widths(chunk, Select::All, cell, &plan.extent(), &scheme, &mut halves);
         let undeformed = chunk.column(Layout::<D>::HALF);
         let stretches = halves.iter().zip(undeformed).flat_map(|(half, own)| half.map(|half| half / own));
         stretches.fold(0.0, f64::max)

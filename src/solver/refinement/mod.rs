@@ -5,7 +5,6 @@
 //! | [`regrid`] | one regrid |
 //! | `pace` | which occasions for a regrid are passed over |
 //! | `indicators` | values of criteria |
-//! | `surroundings` | masses around a leaf |
 //! | [`resample`] | splitting and merging |
 //! | `reunion` | families that a face cuts in two |
 mod indicators;
@@ -13,4 +12,3 @@ mod pace;
 pub mod regrid;
 pub mod resample;
 mod reunion;
-mod surroundings;

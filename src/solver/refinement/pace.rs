@@ -1,7 +1,6 @@
 //! How often the tree may change: rarely while nothing goes far.
 use crate::adaptivity::Kind;
-use crate::solver::Solver;
-use crate::solver::step::transfer::extent;
+use crate::solver::state::Solver;
 
 /// Most occasions from one change of the tree to the next: what has come to rest shall become coarse soon.
 const RAREST: u64 = 4;
@@ -42,7 +41,7 @@ impl<const D: usize> Solver<D> {
                 let state = &self.contacts.states[*index];
                 self.physics.colliders[*index].greatest_speed(
                     state,
-                    &extent(&self.grid.plan),
+                    &self.grid.plan.extent(),
                     self.clock.time,
                 )
             }

@@ -5,15 +5,16 @@ use partition::comm::Disagreement;
 use partition::{Forest, MAX_LEVEL, Mark, Octant, Region, correspondence};
 use rayon::prelude::*;
 
-use super::surroundings::Surroundings;
 use crate::adaptivity::{Adaptivity, Value};
 use crate::geometry::Aabb;
+use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::particle::Chunk;
-use crate::solver::migration::migrate::{MigrateError, Moved, leaf_box, position_key};
-use crate::solver::step::parts::Part;
-use crate::solver::step::phases::Phase;
-use crate::solver::step::survey::Survey;
-use crate::solver::{Solver, StepError};
+use crate::solver::migration::migrate::{MigrateError, Moved};
+use crate::solver::state::parts::Part;
+use crate::solver::state::phases::Phase;
+use crate::solver::state::recall::{Settled, Wish};
+use crate::solver::state::survey::{Survey, Watch};
+use crate::solver::state::{Solver, StepError};
 
 /// A region with the level that all leaves which meet it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
@@ -21,40 +22,6 @@ type Request<const D: usize> = (Region<D>, u32);
 /// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What creeps at
 /// rest shall not refine its surroundings.
 const CREEP: f64 = 0.025;
-
-/// What a leaf wants for itself and the leaves around.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Wish<const D: usize> {
-    /// Levels, a bit each; each has its own width of buffer.
-    levels: u32,
-    /// Way that the material can go down and up along each axis until the tree changes next, in edges of the finest
-    /// leaves that the job can have. Fractions would not change which leaves it meets.
-    way: [[u32; D]; 2],
-}
-
-impl<const D: usize> Wish<D> {
-    const NONE: Self = Self { levels: 0, way: [[0; D]; 2] };
-}
-
-/// What regrids remember from one time to the next. It saves work and changes no bit.
-#[derive(Clone, Debug, Default)]
-pub(in crate::solver) struct Recall<const D: usize> {
-    /// See there.
-    pub surroundings: Surroundings,
-    /// With what the tree stays as it is.
-    settled: Option<Settled<D>>,
-}
-
-/// What was wanted when nothing came of it.
-#[derive(Clone, Debug)]
-struct Settled<const D: usize> {
-    /// Revision of the forest.
-    revision: u64,
-    /// Wishes of own leaves.
-    wishes: Vec<Wish<D>>,
-    /// What requests from everywhere meant for them.
-    marks: Vec<Mark>,
-}
 
 /// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
 /// overlap it.
@@ -73,6 +40,16 @@ pub struct Refinement {
     pub urgency: Vec<f64>,
     /// Level that the criteria want for the leaf itself; 0 if none does.
     pub wanted: Vec<f64>,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Notes the state as it is now; rates stay.
+    pub(in crate::solver) fn survey_now(&mut self) {
+        let Some(adaptivity) = &self.physics.adaptivity else { return };
+        let watch = Watch::after_step(adaptivity, 0);
+        self.surveys.resize(self.chunks.len(), Survey::default());
+        self.surveys.iter_mut().zip(&self.chunks).for_each(|(survey, chunk)| watch.look(chunk, survey));
+    }
 }
 
 impl<const D: usize> Solver<D> {

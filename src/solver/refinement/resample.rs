@@ -1,174 +1,17 @@
 //! Splitting and merging of particles in a run, and the books about it.
 use partition::Octant;
-use partition::comm::Comm;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
+use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::adaptivity::resample::patience::{self, Look, Turn};
-use crate::adaptivity::resample::{Merged, Setting, ids, merge, needs_split, split};
-use crate::exact_sum::ExactSum;
-use crate::kernel::{BoxPolicy, Scheme};
+use crate::adaptivity::resample::{Merged, ids, merge};
+use crate::grid::leaf_geometry::leaf_box;
+use crate::kernel::BoxPolicy;
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Tag};
-use crate::solver::migration::migrate::leaf_box;
-use crate::solver::step::grid::reach_of_width;
-use crate::solver::step::survey::widest;
-use crate::solver::{Physics, Solver};
-
-/// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
-#[derive(Clone, Debug, Default)]
-pub struct Books {
-    /// Particles that were split.
-    pub splits: u64,
-    /// Particles that could not be split: their identifiers have no room for another generation.
-    pub refused: u64,
-    /// Particles that stand for several that were merged.
-    pub merges: u64,
-    /// Particles that went away in merges.
-    pub removed: u64,
-    /// Kinetic energy that splits took out of affine velocities, J.
-    pub split_energy: ExactSum,
-    /// Kinetic energy that merges removed, J.
-    pub merge_energy: ExactSum,
-    /// The first root that no particle's identifier has had; the same on all ranks.
-    pub next_root: u64,
-}
-
-/// The books of all ranks together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BooksTotal {
-    /// See [`Books::splits`].
-    pub splits: u64,
-    /// See [`Books::refused`].
-    pub refused: u64,
-    /// See [`Books::merges`].
-    pub merges: u64,
-    /// See [`Books::removed`].
-    pub removed: u64,
-    /// See [`Books::split_energy`].
-    pub split_energy: f64,
-    /// See [`Books::merge_energy`].
-    pub merge_energy: f64,
-}
-
-impl Books {
-    /// Collective. Counts of all ranks and the words of the two energies, as a checkpoint needs them.
-    pub fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
-        let mut counts = [self.splits, self.refused, self.merges, self.removed];
-        comm.sum_u64(&mut counts);
-        let mut energies = [self.split_energy.clone(), self.merge_energy.clone()];
-        ExactSum::sum_over_ranks(comm, &mut energies);
-        (counts, energies)
-    }
-
-    /// Collective. Totals of all ranks; energies are exact before they are rounded once.
-    pub fn total(&self, comm: &Comm) -> BooksTotal {
-        let ([splits, refused, merges, removed], [split_energy, merge_energy]) = self.gather(comm);
-        let (split_energy, merge_energy) = (split_energy.to_f64(), merge_energy.to_f64());
-        BooksTotal { splits, refused, merges, removed, split_energy, merge_energy }
-    }
-
-    fn book_split(&mut self, done: &Splits) {
-        self.splits += done.split;
-        self.refused += done.refused;
-        done.energies.iter().for_each(|&energy| self.split_energy.add(energy));
-    }
-}
-
-/// Splits in one leaf.
-#[derive(Clone, Debug, Default)]
-pub(in crate::solver) struct Splits {
-    split: u64,
-    refused: u64,
-    energies: Vec<f64>,
-}
-
-/// How particles follow the size of cells.
-#[derive(Clone, Copy)]
-pub(in crate::solver) struct Resampling<'a, const D: usize> {
-    scheme: &'a Scheme<'a>,
-    extent: [f64; D],
-    nominal: &'a [f64],
-    stretch: Option<f64>,
-}
-
-impl<'a, const D: usize> Resampling<'a, D> {
-    /// For a domain with its upper corner at `extent` (m); `None` if the job wants particles left alone.
-    pub fn new(physics: &'a Physics<D>, scheme: &'a Scheme<'a>, extent: [f64; D]) -> Option<Self> {
-        let adaptivity = physics.adaptivity.as_ref()?;
-        let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
-        Some(Self { scheme, extent, nominal, stretch })
-    }
-
-    fn setting(&self, level: u8) -> Setting<'a, D> {
-        let (scheme, extent, nominal) = (self.scheme, self.extent, self.nominal);
-        Setting { scheme, extent, level, nominal, turn: Turn::ALL }
-    }
-
-    /// For merges in a leaf of a level.
-    pub(super) fn setting_at(&self, level: u8, turn: Turn) -> Setting<'a, D> {
-        Setting { turn, ..self.setting(level) }
-    }
-
-    /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
-    pub fn split(&self, chunk: &mut Chunk<D>, which: &[u32], level: u8, done: &mut Splits) {
-        let cell = self.scheme.root_cell / f64::from(1u32 << level);
-        let spreads: Vec<[f64; D]> = which
-            .iter()
-            .map(|&p| {
-                let half = chunk.column(Layout::<D>::HALF)[p as usize];
-                chunk.position(p as usize).map(|x| spread_on_lattice(x, half, cell))
-            })
-            .collect();
-        let report = split(chunk, &self.setting(level), which, &spreads, &mut |e| done.energies.push(e));
-        done.split += report.split;
-        done.refused += report.refused;
-    }
-
-    /// Splits particles of a leaf that are too large for it until none is. Their affine state comes from cells of
-    /// level `from`.
-    fn fit(&self, chunk: &mut Chunk<D>, level: u8, from: u8) -> Splits {
-        let mut done = Splits::default();
-        loop {
-            let stretch = self.stretch.filter(|&stretch| self.may_exceed(widest(chunk), level, stretch));
-            let wanted = needs_split(chunk, &self.setting(level), stretch);
-            if wanted.which.is_empty() {
-                done.refused += wanted.refused;
-                return done;
-            }
-            self.split(chunk, &wanted.which, from, &mut done);
-        }
-    }
-
-    /// Whether boxes up to `width` (m) may be wider than `stretch` times that of an undeformed particle of a level.
-    fn may_exceed(&self, width: f64, level: u8, stretch: f64) -> bool {
-        let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
-        width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
-    }
-
-    /// Whether particle `p` is to be split where it enters a leaf of a level: it was made for a coarser one.
-    pub fn splits_in(&self, chunk: &Chunk<D>, p: usize, level: u8) -> bool {
-        Tag::unpack(chunk.tags()[p]).level < level && ids::generation(chunk.ids()[p]) < ids::GENERATIONS
-    }
-}
-
-/// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d
-/// is the distance to the node below, m². The first part is that of the box, the second that of linear
-/// interpolation between two nodes.
-fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
-    let inside = |y: f64| y - cell * (y / cell).floor();
-    let box_part = half * half / 3.0;
-    if half < 1e-4 * cell {
-        let d = inside(x);
-        return f64::mul_add(d, cell - d, box_part).max(f64::MIN_POSITIVE);
-    }
-    // Integral of d (h - d) from 0, each whole cell h³/6.
-    let integral = |y: f64| {
-        let d = inside(y);
-        (y / cell).floor() * cell.powi(3) / 6.0 + d * d * (cell / 2.0 - d / 3.0)
-    };
-    box_part + ((integral(x + half) - integral(x - half)) / (2.0 * half)).max(0.0)
-}
+use crate::particle::chunk::Tag;
+use crate::solver::state::Solver;
+use crate::solver::step::exchange::reach_of_width;
 
 impl<const D: usize> Solver<D> {
     /// Not collective. How the particles of each own leaf fit it.
@@ -209,14 +52,14 @@ impl<const D: usize> Solver<D> {
     /// the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any was split.
     pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> Vec<bool> {
         let scheme = self.physics.scheme();
-        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
+        let extent = self.grid.plan.extent();
+        let Some(resampling) = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, extent) else {
             return Vec::new();
         };
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.surveys).enumerate();
         let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), survey))| {
             let too_wide = |stretch| resampling.may_exceed(survey.width, leaf.level, stretch);
-            let is_wanted = looks[number].coarser || resampling.stretch.is_some_and(too_wide);
+            let is_wanted = looks[number].coarser || resampling.stretch().is_some_and(too_wide);
             let from = from.map_or(leaf.level, |from| from[number]);
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
         });
@@ -225,7 +68,7 @@ impl<const D: usize> Solver<D> {
         // A refusal is told again at each regrid, so the count is that of now.
         books.refused = 0;
         done.iter().flatten().for_each(|done| books.book_split(done));
-        done.iter().map(|done| done.as_ref().is_some_and(|done| done.split > 0)).collect()
+        done.iter().map(|done| done.as_ref().is_some_and(Splits::is_any)).collect()
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
@@ -236,8 +79,8 @@ impl<const D: usize> Solver<D> {
         is_wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<Merged> {
         let scheme = self.physics.scheme();
-        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
-        let resampling = Resampling::new(&self.physics, &scheme, extent);
+        let extent = self.grid.plan.extent();
+        let resampling = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, extent);
         let limits = self.physics.adaptivity.as_ref().and_then(|a| a.merge);
         let Some((resampling, limits)) = resampling.zip(limits) else { return Vec::new() };
         let (turns, root_edge) = (self.turns(), self.physics.root_edge);
@@ -330,31 +173,5 @@ impl<const D: usize> Solver<D> {
     /// Books of splits on the way to other leaves.
     pub(in crate::solver) fn book_entries(&mut self, splits: &[Splits]) {
         splits.iter().for_each(|done| self.books.book_split(done));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Against the sums over nodes and points of a fine quadrature.
-    #[test]
-    fn spread_is_the_second_moment_of_the_weights() {
-        let cell = 0.2;
-        for (x, half) in [(0.53, 0.05), (0.6, 0.1), (0.47, 0.1), (0.71, 0.02), (0.65, 0.25), (0.55, 1e-7)] {
-            let (mut sum, points) = (0.0, 20_000);
-            for i in 0..points {
-                let y: f64 = x + half * (2.0 * (f64::from(i) + 0.5) / f64::from(points) - 1.0);
-                let below = (y / cell).floor();
-                let share = y / cell - below;
-                let squared = |node: f64| (node * cell - x) * (node * cell - x);
-                sum += (1.0 - share) * squared(below) + share * squared(below + 1.0);
-            }
-            approx::assert_relative_eq!(
-                spread_on_lattice(x, half, cell),
-                sum / f64::from(points),
-                max_relative = 1e-6
-            );
-        }
     }
 }

@@ -2,12 +2,13 @@
 use partition::comm::Disagreement;
 use rayon::prelude::*;
 
-use super::resample::Resampling;
+use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::adaptivity::resample::family::separated;
 use crate::adaptivity::resample::patience::{self, Look};
+use crate::grid::leaf_geometry::leaf_box;
 use crate::particle::Chunk;
-use crate::solver::migration::migrate::{Moved, leaf_box};
-use crate::solver::{Solver, StepError};
+use crate::solver::migration::migrate::Moved;
+use crate::solver::state::{Solver, StepError};
 
 impl<const D: usize> Solver<D> {
     /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go
@@ -21,8 +22,8 @@ impl<const D: usize> Solver<D> {
         let Some(limits) = adaptivity.merge else { return Ok(false) };
         let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
         let scheme = self.physics.scheme();
-        let extent = crate::solver::step::transfer::extent(&self.grid.plan);
-        let Some(resampling) = Resampling::new(&self.physics, &scheme, extent) else {
+        let extent = self.grid.plan.extent();
+        let Some(resampling) = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, extent) else {
             return Ok(false);
         };
         let (turns, root_edge) = (self.turns(), self.physics.root_edge);

@@ -6,7 +6,6 @@
 //! leaves around.
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
-use std::ops::Range;
 
 use super::bins::{BinMissing, BoxWidths};
 use super::members::Members;
@@ -17,6 +16,7 @@ use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::kernel::domain::softening_at;
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
 /// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
@@ -362,24 +362,6 @@ impl<const D: usize> LeafBins<D> {
     }
 }
 
-/// Appends to a list those of some particles whose bits are set in what `lanes` gives for the batch from some particle on;
-/// bits behind the last particle are of no use.
-#[inline(always)]
-pub(in crate::solver) fn list_lanes(
-    particles: Range<usize>,
-    list: &mut Vec<u32>,
-    lanes: impl Fn(usize) -> u32,
-) {
-    for first in particles.clone().step_by(LANES) {
-        let members = LANES.min(particles.end - first);
-        let mut left = lanes(first) & ((1 << members) - 1);
-        while left != 0 {
-            list.push(first as u32 + left.trailing_zeros());
-            left &= left - 1;
-        }
-    }
-}
-
 /// Positions of up to [`LANES`] particles, at least one; lanes behind the last repeat it.
 #[inline(always)]
 fn positions_of<const D: usize>(chunk: &Chunk<D>, particles: &[u32]) -> [Lanes; D] {
@@ -388,17 +370,6 @@ fn positions_of<const D: usize>(chunk: &Chunk<D>, particles: &[u32]) -> [Lanes; 
         let last = particles.len() - 1;
         Lanes::new(std::array::from_fn(|lane| column[particles[last.min(lane)] as usize]))
     })
-}
-
-/// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no use.
-#[inline(always)]
-pub(in crate::solver) fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
-    Lanes::new(chunk.values(column, first))
-}
-
-/// Positions, as [`values`] gives them.
-pub(in crate::solver) fn positions<const D: usize>(chunk: &Chunk<D>, first: usize) -> [Lanes; D] {
-    std::array::from_fn(|axis| values(chunk, Layout::<D>::POSITION + axis, first))
 }
 
 /// Whether a box fits into the stencil of cells of edge `cell`. Rounding in the half widths must not

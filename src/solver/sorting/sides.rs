@@ -7,10 +7,10 @@ use std::cmp::Ordering;
 use partition::Octant;
 
 use crate::grid::KnownTree;
+use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{offset, offset_count, offset_index};
 use crate::grid::plan::Bin;
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
-use crate::solver::migration::migrate::leaf_box;
 
 /// A leaf near a leaf.
 #[derive(Clone, Copy, Debug)]

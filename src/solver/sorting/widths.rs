@@ -1,13 +1,12 @@
 //! Widths of boxes, as sorting needs them.
 use super::bins::BoxWidths;
-use super::leaf_bins::{list_lanes, values};
 use crate::grid::GridPlan;
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
+use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
-use crate::solver::Physics;
-use crate::solver::step::transfer::extent;
+use crate::solver::physics::Physics;
 
 /// Half widths as the kernels compute them.
 pub(in crate::solver) struct Widths<'a, const D: usize> {
@@ -19,7 +18,7 @@ pub(in crate::solver) struct Widths<'a, const D: usize> {
 impl<const D: usize> Physics<D> {
     /// Half widths of boxes in the domain of a plan.
     pub(in crate::solver) fn widths(&self, plan: &GridPlan<D>) -> Widths<'_, D> {
-        Widths { scheme: self.scheme(), extent: extent(plan) }
+        Widths { scheme: self.scheme(), extent: plan.extent() }
     }
 }
 

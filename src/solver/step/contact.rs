@@ -1,8 +1,6 @@
 //! Colliders in a step: their condition on nodes, their reactions and their motion.
 use rayon::prelude::*;
 
-use super::phases::Phase;
-use super::transfer::extent;
 use crate::boundary::collider::cross;
 use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState};
@@ -12,41 +10,9 @@ use crate::grid::mask::{block_nodes, node_of_bit};
 use crate::grid::plan::Block;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
-use crate::solver::{Physics, Solver};
-
-/// Components of an impulse and of an angular impulse.
-pub const SUMS: usize = 6;
-
-/// Force and torque that the material exerts on a collider.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reaction {
-    /// Force, N; in plane strain per metre of thickness, and without a third component.
-    pub force: [f64; 3],
-    /// Torque about the reference point, N m; in plane strain only the third component.
-    pub torque: [f64; 3],
-}
-
-/// States of the colliders and what has been summed up of their reactions.
-#[derive(Clone, Debug)]
-pub struct Contacts<const D: usize> {
-    /// State of each collider; the same on all ranks.
-    pub states: Vec<ColliderState<D>>,
-    /// Per collider, impulse and angular impulse from the nodes of this rank since [`Contacts::since`].
-    pub sums: Vec<[ExactSum; SUMS]>,
-    /// Time of the last row of the history, s.
-    pub since: f64,
-}
-
-impl<const D: usize> Contacts<D> {
-    /// The colliders at a time, nothing summed.
-    pub(in crate::solver) fn new(physics: &Physics<D>, time: f64) -> Self {
-        Self {
-            states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
-            sums: vec![std::array::from_fn(|_| ExactSum::new()); physics.colliders.len()],
-            since: time,
-        }
-    }
-}
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::{Reaction, SUMS};
+use crate::solver::state::phases::Phase;
 
 /// What one node gives to a collider.
 struct Touch<const D: usize> {
@@ -199,7 +165,7 @@ impl<const D: usize> Solver<D> {
     pub(super) fn collider_bound(&self) -> f64 {
         let mut bound = f64::INFINITY;
         let (plan, time) = (&self.grid.plan, self.clock.time);
-        let extent = extent(plan);
+        let extent = plan.extent();
         for (collider, state) in self.physics.colliders.iter().zip(&self.contacts.states) {
             let speed = collider.greatest_speed(state, &extent, time);
             if speed == 0.0 {

@@ -10,29 +10,12 @@
 //! more exchange, so FLIP pays for one and XPIC(m) for m beside the usual one; APIC and TPIC pay nothing.
 use rayon::prelude::*;
 
-use super::phases::Phase;
 use super::update::{apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
-use crate::memory::Block;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
-use crate::solver::Solver;
-
-/// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Increments {
-    /// What is taken off the new velocity to get what particles take: v_0 (FLIP), or `-Σ v_k` over k from 1 (XPIC).
-    base: Block<Row>,
-    /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
-    pub rows: Block<Row>,
-}
-
-impl Increments {
-    /// Heap bytes held.
-    pub fn heap_bytes(&self) -> usize {
-        size_of_val(&*self.base) + size_of_val(&*self.rows)
-    }
-}
+use crate::solver::state::Solver;
+use crate::solver::state::phases::Phase;
 
 /// `to -= from`.
 fn subtract(to: &mut [Row], from: &[Row]) {

@@ -3,18 +3,8 @@ use rayon::prelude::*;
 
 use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};
-use crate::solver::{Physics, Solver};
-
-/// Limits on the time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepControl {
-    /// Courant number: share of a cell that a wave may cross in a step.
-    pub cfl: f64,
-    /// Longest step, s.
-    pub dt_max: Option<f64>,
-    /// Most that a step may exceed the one before, as a factor.
-    pub growth: f64,
-}
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.

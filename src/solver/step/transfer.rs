@@ -1,11 +1,8 @@
 //! The phases of a step between particles and nodes, in parallel over bins and leaves.
 use rayon::prelude::*;
 
-use super::contact::SUMS;
-use super::grid::Grid;
-use super::phases::{Phase, Phases};
-use super::survey::{Survey, Watch};
 use super::update::{apply_faces, update_velocity};
+use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
@@ -16,25 +13,21 @@ use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
 use crate::kernel::p2g::MomentSums;
-use crate::kernel::{Frame, Row, Scheme, Select, SubBox, Transfer, arena_nodes, g2p, p2g, spread};
+use crate::kernel::{Frame, Row, Select, SubBox, Transfer, arena_nodes, g2p, p2g, spread};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place};
 use crate::simd::prefetch;
 use crate::solver::migration::depart::Departed;
-use crate::solver::refinement::resample::Resampling;
 use crate::solver::sorting::bins::{BinMissing, BoxWidths, window_of};
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
-use crate::solver::{Physics, Solver};
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::Grid;
+use crate::solver::state::phases::{Phase, Phases};
+use crate::solver::state::survey::{Survey, Watch};
 
 /// Lines of an arena that are asked for ahead of time: all in 2D; in 3D the processor foresees the rest.
 const READ_AHEAD: usize = 25;
-
-impl<const D: usize> Physics<D> {
-    /// What the kernels need to know.
-    pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
-        Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)
-    }
-}
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -59,15 +52,10 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// Upper corner of the domain, m.
-pub(in crate::solver) fn extent<const D: usize>(plan: &GridPlan<D>) -> [f64; D] {
-    plan.tree.brick().roots.map(|n| f64::from(n) * plan.root_edge)
-}
-
 /// The block of cells of a bin.
 fn frame<const D: usize>(plan: &GridPlan<D>, bin: &Bin<D>) -> Frame<D> {
     let cell = plan.cell(bin.block.level);
-    Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: extent(plan) }
+    Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: plan.extent() }
 }
 
 /// Constrained nodes in the arena of a bin, if there are any.
@@ -246,7 +234,7 @@ impl<const D: usize> Solver<D> {
     /// leaves, in their order, to be handed to [`Solver::arrive`]: particles are taken out while they are in the cache.
     pub(in crate::solver) fn gather(&mut self, dt: f64) -> Vec<Departed> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
+        let resampling = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, self.grid.plan.extent());
         let resampling = resampling.as_ref();
         let widths = self.physics.widths(&self.grid.plan);
         let borders = &self.grid.migration.borders;
@@ -317,7 +305,7 @@ impl<const D: usize> Solver<D> {
                         &scheme,
                         dt,
                         cell,
-                        &extent(plan),
+                        &plan.extent(),
                         leavers,
                     );
                     // Bins take them in turn.

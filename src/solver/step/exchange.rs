@@ -1,101 +1,19 @@
 //! What lives on the grid for one tree and one partition, and the exchanges of a step.
-use partition::Forest;
-use partition::comm::{Comm, Pending, Traffic};
+use partition::comm::{Pending, Traffic};
 use rayon::prelude::*;
 
-use super::increment::Increments;
-use super::phases::Phase;
-use super::transfer::extent;
-use crate::grid::arenas::Arenas;
-use crate::grid::plan::known::Allowance;
+use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::grid::sums::census::{Census, surface_bytes};
-use crate::grid::sums::exchange::ReceivedSums;
-use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
-use crate::memory::Block;
 use crate::solver::migration::depart::Departed;
-use crate::solver::migration::migrate::{MigrateError, Migration, Moved};
-use crate::solver::refinement::resample::{Resampling, Splits};
-use crate::solver::sorting::bins::{BinLists, BoxWidths};
-use crate::solver::{Physics, Solver};
+use crate::solver::migration::migrate::{MigrateError, Moved};
+use crate::solver::sorting::bins::BoxWidths;
+use crate::solver::state::Solver;
+use crate::solver::state::grid::Grid;
+use crate::solver::state::phases::Phase;
 
 /// By how much boxes may widen until the tree changes next without a new grid in between. A grid for boxes wider than a cell has
 /// bins of every leaf in those around it and takes three times as long to make.
 const GROWTH: f64 = 1.1;
-
-/// Plan, arenas, fields and exchanges.
-pub struct Grid<const D: usize> {
-    /// Blocks, bins and constraints.
-    pub plan: GridPlan<D>,
-    pub(in crate::solver) arenas: Arenas<D>,
-    pub(in crate::solver) fields: NodeFields<D>,
-    pub(super) increments: Increments,
-    pub(in crate::solver) exchange: ArenaExchange<D>,
-    pub(in crate::solver) received: ReceivedSums<D>,
-    pub(in crate::solver) migration: Migration<D>,
-    pub(in crate::solver) lists: BinLists<D>,
-    pub(super) seam: Seam,
-}
-
-impl<const D: usize> Grid<D> {
-    /// Collective. The grid for the current tree and partition.
-    ///
-    /// `reach` is the greatest half width of boxes in cells of their leaf where wider than a cell, as
-    /// [`reach_of_width`] gives it.
-    pub(in crate::solver) fn build(
-        comm: &Comm,
-        forest: &Forest<D>,
-        physics: &Physics<D>,
-        reach: u32,
-    ) -> Self {
-        let allowance = Allowance { reach, graded: physics.graded };
-        let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
-        let (exchange, received) = ArenaExchange::new(comm, &plan);
-        let neighbours = exchange.neighbours().to_vec();
-        Self {
-            arenas: Arenas::default(),
-            fields: NodeFields::new(&plan),
-            increments: Increments::default(),
-            migration: Migration::new(comm, &plan, neighbours, physics.leaving),
-            lists: BinLists::new(&plan),
-            seam: exchange.seam(&plan),
-            exchange,
-            received,
-            plan,
-        }
-    }
-
-    /// Gives back the memory of what the next step fills anew.
-    pub(in crate::solver) fn clear(&mut self) {
-        self.arenas = Arenas::default();
-        self.increments = Increments::default();
-        self.fields.rows = Block::default();
-        self.fields.moments = Block::default();
-    }
-
-    /// What the particles scattered last.
-    pub fn arenas(&self) -> &Arenas<D> {
-        &self.arenas
-    }
-
-    /// In how many waves bins scatter.
-    pub(in crate::solver) fn waves(&self) -> usize {
-        self.arenas.waves().count()
-    }
-
-    /// Heap bytes held.
-    pub fn heap_bytes(&self) -> usize {
-        self.plan.heap_bytes()
-            + self.arenas.heap_bytes()
-            + self.fields.heap_bytes()
-            + self.increments.heap_bytes()
-    }
-
-    /// Messages and bytes that this rank has sent since the grid was built.
-    pub fn traffic(&self) -> Traffic {
-        let (arenas, particles) = (self.exchange.traffic(), self.migration.traffic());
-        Traffic { messages: arenas.messages + particles.messages, bytes: arenas.bytes + particles.bytes }
-    }
-}
 
 /// Reach that boxes of a half width need, which is given in cells.
 pub(in crate::solver) fn reach_of_width(cells: f64) -> u32 {
@@ -203,7 +121,7 @@ impl<const D: usize> Solver<D> {
         may_stray: impl Fn(usize) -> bool + Sync,
     ) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
-        let resampling = Resampling::new(&self.physics, &scheme, extent(&self.grid.plan));
+        let resampling = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, self.grid.plan.extent());
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {

@@ -9,8 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
-use crate::solver::Solver;
-use crate::solver::step::phases::{Phase, thread_time};
+use crate::solver::state::phases::thread_time;
 
 /// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
 /// processor time takes as long as several particles.
@@ -18,7 +17,7 @@ const MEASURE_EVERY: u64 = 32;
 /// A leaf without particles costs one such part of what a leaf with particles costs beside them.
 const EMPTY: u64 = 8;
 /// Unit of measured costs, s.
-const UNIT: f64 = 1e-11;
+pub(in crate::solver) const UNIT: f64 = 1e-11;
 /// A class needs so many measured particles to have a cost of its own.
 const FEW: u64 = 500;
 
@@ -33,11 +32,11 @@ pub enum Kind {
     Cut,
 }
 
-const KINDS: usize = 3;
+pub(in crate::solver) const KINDS: usize = 3;
 
 /// What the arena of a leaf with so many particles costs in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter
 /// in sand that has a free surface, and 24 in 2D; less where few particles touch a part of it.
-fn arena_cost(d: usize, particles: u64) -> u64 {
+pub(in crate::solver) fn arena_cost(d: usize, particles: u64) -> u64 {
     particles.min(if d == 2 { 24 } else { 64 })
 }
 
@@ -54,16 +53,16 @@ pub struct Costs {
     /// Cost of a leaf with particles beside them.
     leaf: u64,
     /// Measured nanoseconds per own leaf.
-    nanoseconds: Vec<AtomicU64>,
+    pub(in crate::solver) nanoseconds: Vec<AtomicU64>,
     /// Steps since the last agreement, the one under way included.
-    steps: Range<u64>,
+    pub(in crate::solver) steps: Range<u64>,
     /// Whether particles are transferred for a step, not for a row of the history.
     is_step: bool,
     /// Step at which this process began.
     first_step: u64,
     /// Steps and seconds of node work up to the last agreement.
-    agreed_step: u64,
-    agreed_seconds: f64,
+    pub(in crate::solver) agreed_step: u64,
+    pub(in crate::solver) agreed_seconds: f64,
 }
 
 /// Cost of a leaf in particles, as long as no time is measured.
@@ -87,7 +86,7 @@ impl Costs {
     }
 
     /// Whether time has been taken of all leaves.
-    pub(super) fn are_measured(&self) -> bool {
+    pub(in crate::solver) fn are_measured(&self) -> bool {
         self.agreed_step - self.first_step >= MEASURE_EVERY
     }
 
@@ -124,7 +123,7 @@ impl Costs {
     }
 
     /// Cost of a leaf.
-    fn of<const D: usize>(&self, chunk: &Chunk<D>, kind: Kind) -> u64 {
+    pub(in crate::solver) fn of<const D: usize>(&self, chunk: &Chunk<D>, kind: Kind) -> u64 {
         if self.particle.is_empty() {
             return leaf_weight(chunk);
         }
@@ -143,7 +142,7 @@ fn is_measured(leaf: usize, end: u64) -> bool {
 }
 
 /// In how many of some steps time was taken of a leaf.
-fn measurements(leaf: usize, steps: &Range<u64>) -> u64 {
+pub(in crate::solver) fn measurements(leaf: usize, steps: &Range<u64>) -> u64 {
     let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
     before(steps.end) - before(steps.start)
 }
@@ -159,7 +158,7 @@ fn counts<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
 }
 
 /// As [`counts`], with the leaf's arena shared out to the materials. The chunk is not empty.
-fn loads<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
+pub(in crate::solver) fn loads<const D: usize>(chunk: &Chunk<D>, materials: usize) -> Vec<u64> {
     let (mut loads, len) = (counts(chunk, materials), chunk.len() as u64);
     loads.iter_mut().for_each(|count| *count += arena_cost(D, len) * *count / len);
     loads
@@ -175,60 +174,9 @@ fn per_particle(units: u64, particles: u64) -> Option<u64> {
     (particles >= FEW).then(|| (units / particles).max(1))
 }
 
-impl<const D: usize> Solver<D> {
-    /// How the boxes of an own leaf were transferred last, or will be next where that is known.
-    fn kind(&self, leaf: usize) -> Kind {
-        let grid = &self.grid;
-        if grid.plan.revision != self.forest.revision() {
-            // The tree has just changed; nothing was transferred on it yet.
-            return Kind::Plain;
-        }
-        match grid.lists.of_leaf(leaf) {
-            Some(bins) if !bins.cut.is_empty() => Kind::Cut,
-            Some(_) => Kind::Jump,
-            None if grid.plan.bins[grid.plan.leaf_bins(leaf).start].touched.is_some() => Kind::Jump,
-            None => Kind::Plain,
-        }
-    }
-
-    /// Not collective. Costs of the own leaves in a step, in units that are the same on all ranks.
-    pub(super) fn leaf_costs(&self) -> Vec<u64> {
-        let leaves = self.chunks.iter().enumerate();
-        leaves.map(|(leaf, chunk)| self.costs.of(chunk, self.kind(leaf))).collect()
-    }
-
-    /// Collective. Turns what all ranks have measured since the last call into costs.
-    pub(super) fn agree_on_costs(&mut self) {
-        let materials = self.physics.materials.len();
-        let seconds = self.phases.running_time(&[Phase::Sort, Phase::Sum, Phase::Nodes]);
-        let steps = self.clock.step - self.costs.agreed_step;
-        let units = |seconds: f64| (seconds / UNIT) as u64;
-        // By material and kind: time, particles; then time and number of leaves in node work.
-        let mut sums = vec![0u64; 2 * KINDS * materials + 2];
-        let (times, rest) = sums.split_at_mut(KINDS * materials);
-        let (particles, nodes) = rest.split_at_mut(KINDS * materials);
-        for (leaf, chunk) in self.chunks.iter().enumerate().filter(|(_, chunk)| !chunk.is_empty()) {
-            nodes[1] += steps;
-            let (kind, len) = (self.kind(leaf) as usize, chunk.len() as u64);
-            let time = self.costs.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
-            for (material, load) in loads(chunk, materials).into_iter().enumerate() {
-                let share = time as f64 * load as f64 / (len + arena_cost(D, len)) as f64;
-                times[KINDS * material + kind] += units(share * 1e-9);
-                particles[KINDS * material + kind] += load * measurements(leaf, &self.costs.steps);
-            }
-        }
-        let threads = rayon::current_num_threads() as f64;
-        nodes[0] = units((seconds - self.costs.agreed_seconds).max(0.0) * threads);
-        (self.costs.agreed_seconds, self.costs.agreed_step) = (seconds, self.clock.step);
-        self.costs.forget(self.chunks.len());
-        self.comm.sum_u64(&mut sums);
-        self.costs.take_in(&sums, materials);
-    }
-}
-
 impl Costs {
     /// Takes in sums over all ranks, as [`Solver::agree_on_costs`] lays them out.
-    fn take_in(&mut self, sums: &[u64], materials: usize) {
+    pub(in crate::solver) fn take_in(&mut self, sums: &[u64], materials: usize) {
         let (times, rest) = sums.split_at(KINDS * materials);
         let (particles, nodes) = rest.split_at(KINDS * materials);
         let Some(mean) = per_particle(times.iter().sum(), particles.iter().sum()) else { return };

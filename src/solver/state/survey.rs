@@ -3,8 +3,8 @@
 //! changes nothing.
 use crate::adaptivity::resample::patience::Levels;
 use crate::adaptivity::{Adaptivity, Kind};
+use crate::kernel::domain;
 use crate::particle::chunk::{Chunk, Layout};
-use crate::solver::Solver;
 
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.
@@ -40,7 +40,7 @@ impl<const D: usize> Default for Survey<D> {
 
 /// What to note.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Watch {
+pub(in crate::solver) struct Watch {
     /// Velocities and tags.
     velocity: bool,
     /// Greatest plastic strain.
@@ -82,7 +82,7 @@ impl Watch {
     }
 
     /// What follows from the state alone.
-    fn look<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
+    pub(in crate::solver) fn look<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
         if self.velocity {
             let ranges: [[f64; 2]; D] =
                 std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis).range());
@@ -93,34 +93,8 @@ impl Watch {
             survey.plastic_strain = chunk.column(Layout::<D>::PLASTIC_STRAIN).greatest();
         }
         if self.width {
-            survey.stretch = greatest_stretch(chunk);
+            survey.stretch = domain::greatest_stretch(chunk);
             survey.width = survey.stretch * chunk.column(Layout::<D>::HALF).greatest();
         }
-    }
-}
-
-/// A bound on the half widths of a chunk's boxes, m.
-pub(in crate::solver) fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    greatest_stretch(chunk) * chunk.column(Layout::<D>::HALF).greatest()
-}
-
-/// A bound on the widths of a chunk's boxes over their undeformed widths.
-fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    let first = Layout::<D>::LEFT_CAUCHY_GREEN;
-    // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
-    // them, no volume more than its power 3/2.
-    let elastic = (first..first + 3).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
-    let plastic = chunk.column(Layout::<D>::PLASTIC_VOLUME).greatest();
-    let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);
-    elastic.sqrt().max(isotropic)
-}
-
-impl<const D: usize> Solver<D> {
-    /// Not collective. Notes the state as it is now; rates stay.
-    pub(in crate::solver) fn survey_now(&mut self) {
-        let Some(adaptivity) = &self.physics.adaptivity else { return };
-        let watch = Watch::after_step(adaptivity, 0);
-        self.surveys.resize(self.chunks.len(), Survey::default());
-        self.surveys.iter_mut().zip(&self.chunks).for_each(|(survey, chunk)| watch.look(chunk, survey));
     }
 }

@@ -1,0 +1,66 @@
+//! Books about splits and merges.
+use partition::comm::Comm;
+
+use crate::adaptivity::resample::cell_fit::Splits;
+use crate::exact_sum::ExactSum;
+
+/// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
+#[derive(Clone, Debug, Default)]
+pub struct Books {
+    /// Particles that were split.
+    pub splits: u64,
+    /// Particles that could not be split: their identifiers have no room for another generation.
+    pub refused: u64,
+    /// Particles that stand for several that were merged.
+    pub merges: u64,
+    /// Particles that went away in merges.
+    pub removed: u64,
+    /// Kinetic energy that splits took out of affine velocities, J.
+    pub split_energy: ExactSum,
+    /// Kinetic energy that merges removed, J.
+    pub merge_energy: ExactSum,
+    /// The first root that no particle's identifier has had; the same on all ranks.
+    pub next_root: u64,
+}
+
+/// The books of all ranks together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BooksTotal {
+    /// See [`Books::splits`].
+    pub splits: u64,
+    /// See [`Books::refused`].
+    pub refused: u64,
+    /// See [`Books::merges`].
+    pub merges: u64,
+    /// See [`Books::removed`].
+    pub removed: u64,
+    /// See [`Books::split_energy`].
+    pub split_energy: f64,
+    /// See [`Books::merge_energy`].
+    pub merge_energy: f64,
+}
+
+impl Books {
+    /// Collective. Counts of all ranks and the words of the two energies, as a checkpoint needs them.
+    pub fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
+        let mut counts = [self.splits, self.refused, self.merges, self.removed];
+        comm.sum_u64(&mut counts);
+        let mut energies = [self.split_energy.clone(), self.merge_energy.clone()];
+        ExactSum::sum_over_ranks(comm, &mut energies);
+        (counts, energies)
+    }
+
+    /// Collective. Totals of all ranks; energies are exact before they are rounded once.
+    pub fn total(&self, comm: &Comm) -> BooksTotal {
+        let ([splits, refused, merges, removed], [split_energy, merge_energy]) = self.gather(comm);
+        let (split_energy, merge_energy) = (split_energy.to_f64(), merge_energy.to_f64());
+        BooksTotal { splits, refused, merges, removed, split_energy, merge_energy }
+    }
+
+    /// Books what was split in one leaf.
+    pub fn book_split(&mut self, done: &Splits) {
+        self.splits += done.split;
+        self.refused += done.refused;
+        done.energies.iter().for_each(|&energy| self.split_energy.add(energy));
+    }
+}

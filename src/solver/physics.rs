@@ -1,0 +1,52 @@
+//! What is solved.
+use crate::adaptivity::Adaptivity;
+use crate::boundary::{Collider, FaceCondition, Leaving};
+use crate::kernel::{BoxPolicy, Scheme, Transfer};
+use crate::load::{Gravity, Load};
+use crate::material::Material;
+
+/// What is solved: the same on every rank, constant over a run.
+pub struct Physics<const D: usize> {
+    /// Edge of a root octant, m.
+    pub root_edge: f64,
+    /// Whether neighbouring leaves differ by one level at most.
+    pub graded: bool,
+    /// Materials by index.
+    pub materials: Vec<Box<dyn Material>>,
+    /// Acceleration of gravity.
+    pub gravity: Gravity<D>,
+    /// Loads, in the order in which they act.
+    pub loads: Vec<Load<D>>,
+    /// Conditions on the lower and upper face of the domain along each axis.
+    pub faces: [[FaceCondition; 2]; D],
+    /// Rigid bodies that act on the material, in the order in which they act.
+    pub colliders: Vec<Collider<D>>,
+    /// Dynamic refinement; `None`: tree and particles keep their sizes.
+    pub adaptivity: Option<Adaptivity<D>>,
+    /// What happens to particles that leave the domain.
+    pub leaving: Leaving,
+    /// Transfer of velocities.
+    pub transfer: Transfer,
+    /// How particle boxes follow the deformation.
+    pub boxes: BoxPolicy,
+    /// Choice of the time step.
+    pub control: StepControl,
+}
+
+/// Limits on the time step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepControl {
+    /// Courant number: share of a cell that a wave may cross in a step.
+    pub cfl: f64,
+    /// Longest step, s.
+    pub dt_max: Option<f64>,
+    /// Most that a step may exceed the one before, as a factor.
+    pub growth: f64,
+}
+
+impl<const D: usize> Physics<D> {
+    /// What the kernels need to know.
+    pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
+        Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)
+    }
+}

@@ -1,0 +1,29 @@
+//! What the current partition has cost.
+use crate::solver::state::phases::thread_time;
+use std::time::Duration;
+
+/// What the current partition has cost, in seconds of processor time.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct LastPartition {
+    /// Of making it; at first of building the grid.
+    pub(in crate::solver) price: f64,
+    /// Lost to its imbalance so far.
+    pub(in crate::solver) lost: f64,
+    /// Time of the last look.
+    pub(in crate::solver) looked: Duration,
+    /// Whether it was made before costs were measured.
+    pub(in crate::solver) is_guess: bool,
+}
+
+impl LastPartition {
+    /// The partition with which a run starts or goes on, made since `start`.
+    pub fn at_start(start: Duration) -> Self {
+        Self { is_guess: true, ..Self::since(start) }
+    }
+
+    /// One made since `start`.
+    pub fn since(start: Duration) -> Self {
+        let now = thread_time();
+        Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now, is_guess: false }
+    }
+}

@@ -1,0 +1,138 @@
+//! The solver and what it owns.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
+//! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
+//! | `survey` | bounds on the particles of each leaf |
+//! | `recall`, `surroundings` | what regrids remember |
+//! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
+//! | [`phases`], [`parts`] | timers |
+use partition::Forest;
+use partition::comm::{Comm, Traffic};
+
+use self::grid::Grid;
+use super::migration::migrate::{MigrateError, Moved};
+use super::sorting::bins::BinMissing;
+use crate::adaptivity::resample::ledger::Books;
+use crate::exact_sum::ExactSum;
+use crate::particle::Chunk;
+use crate::particle::chunk::Place;
+use crate::solver::physics::Physics;
+use crate::solver::state::bookings::{Contacts, LoadBooks};
+use crate::solver::state::cost::Costs;
+use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::parts::Parts;
+use crate::solver::state::phases::Phases;
+use crate::solver::state::recall::Recall;
+use crate::solver::state::survey::Survey;
+
+pub mod bookings;
+pub mod cost;
+pub mod grid;
+pub(super) mod last_partition;
+pub mod parts;
+pub mod phases;
+pub(super) mod recall;
+pub(super) mod surroundings;
+pub(super) mod survey;
+
+/// Why a step failed on this rank.
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    /// A particle left the domain or moved too far.
+    #[error(transparent)]
+    Migrate(#[from] MigrateError),
+    /// A particle's box cannot be transferred.
+    #[error(transparent)]
+    Bin(#[from] BinMissing),
+    /// The time step is not a positive number.
+    #[error("the time step became {dt} s; the run has become unstable")]
+    TimeStep {
+        /// The time step, s.
+        dt: f64,
+    },
+}
+
+/// The state of a run between two steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clock {
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Length of the step done last, s; 0 before the first.
+    pub dt: f64,
+    /// Bound on the next step from the state of all particles, s.
+    pub bound: f64,
+}
+
+/// What a step did on this rank.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepReport {
+    /// Particles that changed leaf.
+    pub moved: Moved,
+    /// What any rank asked for.
+    pub granted: Requests,
+}
+
+/// What a rank wants all ranks to do after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Requests {
+    /// Stop.
+    pub stop: bool,
+    /// Write a checkpoint.
+    pub checkpoint: bool,
+}
+
+/// Mass on the real nodes and of the particles in one step, on one rank.
+#[derive(Clone, Debug)]
+pub(in crate::solver) struct Weighed(pub(in crate::solver) [ExactSum; 2]);
+
+/// Particles, tree and clock of one rank, and what advances them.
+pub struct Solver<const D: usize> {
+    pub(super) comm: Comm,
+    /// What is solved.
+    pub physics: Physics<D>,
+    /// The distributed tree.
+    pub forest: Forest<D>,
+    /// Particles of each own leaf.
+    pub chunks: Vec<Chunk<D>>,
+    /// Step and time.
+    pub clock: Clock,
+    /// Where the colliders are, and their reactions.
+    pub contacts: Contacts<D>,
+    /// What is booked of the loads.
+    pub load_books: LoadBooks,
+    /// Wall time by phase since the last report.
+    pub phases: Phases,
+    pub(super) grid: Grid<D>,
+    /// Per own leaf, the greatest sum of wave speed and particle speed after the last step, m/s.
+    pub(super) signal: Vec<f64>,
+    /// Particles that this rank deleted because they left the domain.
+    pub deleted: u64,
+    /// Splits and merges of particles so far.
+    pub books: Books,
+    /// Changes of the tree since the start of this process.
+    pub regrids: u64,
+    /// Where the time of regrids went since the start of this process.
+    pub parts: Parts,
+    /// What was noted of each own leaf in the last step.
+    pub(super) surveys: Vec<Survey<D>>,
+    /// Where the columns of each own leaf were at the start of the last G2P.
+    pub(super) places: Vec<Place>,
+    /// What regrids remember; nothing that a bit depends on.
+    pub(super) recall: Recall<D>,
+    /// What grids of earlier trees and partitions have sent.
+    pub(super) sent_before: Traffic,
+    /// Bytes of the last exchange of arenas.
+    pub(super) arena_bytes: u64,
+    /// Least bytes that these nodes need, as of the last step that was weighed.
+    pub(super) surface_bytes: u64,
+    pub(super) costs: Costs,
+    pub(super) partitioned: LastPartition,
+    /// New partitions since the start of this process.
+    pub partitions: u64,
+    pub(super) is_to_weigh: bool,
+    pub(super) weighed: Option<Weighed>,
+}

@@ -1,0 +1,37 @@
+//! What regrids remember from one time to the next.
+use crate::solver::state::surroundings::Surroundings;
+use partition::Mark;
+
+/// What a leaf wants for itself and the leaves around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::solver) struct Wish<const D: usize> {
+    /// Levels, a bit each; each has its own width of buffer.
+    pub(in crate::solver) levels: u32,
+    /// Way that the material can go down and up along each axis until the tree changes next, in edges of the finest
+    /// leaves that the job can have. Fractions would not change which leaves it meets.
+    pub(in crate::solver) way: [[u32; D]; 2],
+}
+
+impl<const D: usize> Wish<D> {
+    pub(in crate::solver) const NONE: Self = Self { levels: 0, way: [[0; D]; 2] };
+}
+
+/// What regrids remember from one time to the next. It saves work and changes no bit.
+#[derive(Clone, Debug, Default)]
+pub(in crate::solver) struct Recall<const D: usize> {
+    /// See there.
+    pub surroundings: Surroundings,
+    /// With what the tree stays as it is.
+    pub(in crate::solver) settled: Option<Settled<D>>,
+}
+
+/// What was wanted when nothing came of it.
+#[derive(Clone, Debug)]
+pub(in crate::solver) struct Settled<const D: usize> {
+    /// Revision of the forest.
+    pub(in crate::solver) revision: u64,
+    /// Wishes of own leaves.
+    pub(in crate::solver) wishes: Vec<Wish<D>>,
+    /// What requests from everywhere meant for them.
+    pub(in crate::solver) marks: Vec<Mark>,
+}
