@@ -18,3 +18,4 @@ pub mod run;
 pub mod setup;
 pub mod simd;
 pub mod solver;
+pub mod text;

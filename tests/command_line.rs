@@ -137,3 +137,180 @@ fn material_refuses_what_it_cannot_use_with_exit_code_2() {
         assert!(message.contains(words), "{words:?} is not in {message:?}");
     }
 }
+
+/// A directory with a finished run whose files show the velocity and no more, and one whose files carry the state.
+fn finished_run() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let job = |directory: &str, output: &str| {
+        format!(
+            "version = 1\ndimension = 2\ngravity = [0, -10]\n\
+             domain = {{ size = [1, 1], root_edge = 1 }}\ntree = {{ base_level = 1 }}\n\
+             materials = [{{ name = \"m\", density = 1000, model = \"hencky\", young = 1e6, poisson = 0.25 }}]\n\
+             time = {{ end = 2e-3 }}\n\
+             bodies = [{{ name = \"b\", material = \"m\", velocity = [3, 4], \
+             shape = {{ kind = \"box\", min = [0, 0], max = [0.5, 0.5] }} }}]\n\
+             output = {{ directory = \"{directory}\", picture = false, {output} }}\n"
+        )
+    };
+    let bare = "restart = false, fields = [\"velocity\"]";
+    for (name, output) in [("bare", bare), ("full", "fields = []")] {
+        let path = directory.path().join(format!("{name}.toml"));
+        std::fs::write(&path, job(name, output)).unwrap();
+        printed(&agimp(directory.path(), &["run", path.to_str().unwrap(), "--quiet"]));
+    }
+    directory
+}
+
+#[test]
+fn plot_draws_what_follows_from_the_fields_or_the_state_of_a_file() {
+    let directory = finished_run();
+    let plot = |file: &str, option: &str, name: &str| {
+        let out = directory.path().join("picture.png");
+        let _ = std::fs::remove_file(&out);
+        let output = agimp(directory.path(), &["plot", file, option, name, "--out", "picture.png"]);
+        let drawn = out.exists();
+        assert_eq!(output.status.code() == Some(0), drawn, "{}", String::from_utf8_lossy(&output.stderr));
+        (drawn, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let file = |name: &str| {
+        let entries = std::fs::read_dir(directory.path().join(name)).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.retain(|file| file.starts_with(&format!("{name}_000000")) && !file.contains("tree"));
+        assert_eq!(names.len(), 1, "{names:?}");
+        format!("{name}/{}", names[0])
+    };
+    let (bare, full) = (file("bare"), file("full"));
+    for name in ["speed", "velocity", "velocity_y", "x"] {
+        assert!(plot(&bare, "--colour", name).0, "{name}");
+    }
+    for name in [
+        "speed",
+        "density",
+        "pressure",
+        "von_mises",
+        "stress",
+        "stress_xy",
+        "stress_1",
+        "stress_3",
+        "max_shear",
+        "stress_i1",
+        "stress_j2",
+        "plastic_strain",
+        "volume_ratio",
+        "body",
+        "leaf_level",
+        "mass",
+    ] {
+        assert!(plot(&full, "--color", name).0, "{name}");
+    }
+    let (drawn, message) = plot(&bare, "--colour", "sped");
+    assert!(!drawn && message.contains("did you mean speed?"), "{message}");
+    assert!(message.contains("velocity_x") && !message.contains("pressure"), "{message}");
+    let (drawn, message) = plot(&bare, "--colour", "pressure");
+    assert!(!drawn && message.contains("found no quantity pressure"), "{message}");
+}
+
+#[test]
+fn new_without_a_name_lists_the_templates() {
+    let directory = tempfile::tempdir().unwrap();
+    let (plain, listed) = (agimp(directory.path(), &["new"]), agimp(directory.path(), &["new", "--list"]));
+    assert_eq!(printed(&plain), printed(&listed));
+    assert!(printed(&plain).contains("elastic_cubes"));
+    let output = agimp(directory.path(), &["new", "elastic_cube"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean \"elastic_cubes\"?"));
+}
+
+/// As in `agimp schema | head -1`.
+#[test]
+fn who_stops_reading_ends_the_program_quietly() {
+    for arguments in [vec!["schema"], vec!["schema", "--markdown"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_agimp"));
+        command.args(arguments).stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+    }
+}
+
+const JOB: &str = "version = 1\ndimension = 2\ntitle = \"TITLE\"\ndomain = { size = [1, 1], root_edge = 1 }\n\
+    materials = [{ name = \"MATERIAL\", density = 1000, model = \"hencky\", young = 1e6, poisson = 0.25 }]\n\
+    time = { end = 2e-3 }\n\
+    bodies = [{ name = \"BODY\", material = \"MATERIAL\", shape = { kind = \"box\", min = [0, 0], max = [0.5, 0.5] } }]\n";
+
+/// What `agimp check` says of a text: exit code, standard output and standard error.
+fn check(text: &str) -> (i32, String, String) {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("job.toml"), text).unwrap();
+    let output = agimp(directory.path(), &["check", "job.toml"]);
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn text_of_a_job_controls_no_terminal() {
+    let escape = r"\u001b]0;owned\u0007\u202e\nparticles 0";
+    let job = JOB.replace("TITLE", escape).replace("MATERIAL", escape).replace("BODY", escape);
+    let (code, out, _) = check(&job);
+    assert_eq!(code, 0);
+    let clean = |text: &str| !text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}');
+    assert!(clean(&out), "{out:?}");
+    assert!(!out.lines().any(|line| line.starts_with("particles 0")), "{out}");
+    // In the names that a message quotes, and in the lines of the file that it shows.
+    let wrong = [
+        JOB.replace("material = \"MATERIAL\"", &format!("material = \"{escape}\"")),
+        JOB.replace("time = {", "time = { \u{9b}31m"),
+        format!("{JOB}titel = 1 # \u{1b}[31m \u{202e}\n"),
+        format!("{JOB}\"ti\\u001b[31m\" = 1\n"),
+    ];
+    for text in wrong {
+        let (code, _, message) = check(&text);
+        assert!(code == 2 && clean(&message), "{message:?}");
+    }
+}
+
+#[test]
+fn messages_are_bounded() {
+    let names = (0..60_000).map(|i| format!("[[materials]]\nname = \"m{i}\"\nx = 1\n")).collect::<String>();
+    let corners: Vec<String> = (0..100_000).map(|i| format!("[0.1, {i}]")).collect();
+    let polygon = format!("shape = {{ kind = \"polygon\", points = [{}] }}", corners.join(","));
+    let cases = [
+        format!("{JOB}output = {{ fields = [{}] }}\n", vec!["1"; 200_000].join(",")),
+        (0..20_000).map(|i| format!("k{i} = 1\n")).collect::<String>() + JOB,
+        format!("{}{names}", JOB.replace("materials = ", "ignored = ")),
+        JOB.replace("shape = { kind = \"box\", min = [0, 0], max = [0.5, 0.5] }", &polygon),
+        JOB.replace("material = \"MATERIAL\"", &format!("material = \"{}\"", "x".repeat(1_000_000))),
+        format!("{} = 1\n{JOB}", "k".repeat(1_000_000)),
+    ];
+    for text in cases {
+        let start = std::time::Instant::now();
+        let (code, _, message) = check(&text);
+        let head = message.chars().take(300).collect::<String>();
+        assert_eq!(code, 2, "{head}");
+        // Twenty faults, each with a message, three lines of the file and their frame.
+        assert!(message.len() < 60_000, "{} bytes: {head}", message.len());
+        assert!(message.lines().all(|line| line.chars().count() < 700), "{head}");
+        assert!(start.elapsed().as_secs_f64() < 20.0, "{:?}: {head}", start.elapsed());
+    }
+}
+
+#[test]
+fn shapes_and_words_of_the_other_dimension_are_not_offered() {
+    let (code, _, message) = check(&JOB.replace("\"box\"", "\"cirle\""));
+    assert_eq!(code, 2);
+    assert!(message.contains("did you mean \"circle\"?") && !message.contains("sphere"), "{message}");
+    let (_, _, message) =
+        check(&JOB.replace("\"box\"", "\"spher\"").replace("dimension = 2", "dimension = 3"));
+    assert!(message.contains("did you mean \"sphere\"?") && !message.contains("polygon"), "{message}");
+    let (_, _, message) = check(&format!("{JOB}boundaries = {{ wall = {{ kind = \"slip\" }} }}\n"));
+    assert!(message.contains("`y_max`") && !message.contains("`z_max`"), "{message}");
+}
+
+#[test]
+fn a_key_that_is_not_there_is_named_missing() {
+    let (code, _, message) = check(&JOB.replace("density = 1000, ", ""));
+    assert_eq!(code, 2);
+    assert!(message.contains("materials[0].density: missing key `density`: Density of"), "{message}");
+    let (_, _, message) = check(&JOB.replace("end = 2e-3", "end = 2e-3, clf = 0.3"));
+    assert!(message.contains("unknown key `clf`; did you mean `cfl`?"), "{message}");
+}

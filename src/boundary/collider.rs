@@ -5,6 +5,7 @@
 //! the material is what the material gives to the collider: its force and torque.
 use super::motion::{Free, Motion, Pose, Rate, length};
 use crate::geometry::{Aabb, Shape};
+use crate::text::{number, quantity};
 
 /// What a collider does to material that it touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -203,17 +204,22 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
         match self.contact {
             Contact::Sticky => write!(f, "sticky, ")?,
             Contact::Slip => write!(f, "slip, ")?,
-            Contact::Separating { friction } => write!(f, "separating with friction {friction}, ")?,
+            Contact::Separating { friction } => {
+                write!(f, "separating with friction {}, ", number(friction, 4))?
+            }
         }
-        let speeds = |rate: &Rate<D>| format!("{:.4} m/s, {:.4} rad/s", length(&rate.velocity), rate.spin);
+        let both = |speed: f64, spin: f64| format!("{}, {}", quantity(speed, "m/s"), quantity(spin, "rad/s"));
+        let speeds = |rate: &Rate<D>| both(length(&rate.velocity), rate.spin);
         match &self.motion {
             Motion::Fixed => write!(f, "fixed"),
             Motion::Steady(rate) => write!(f, "steady with {}", speeds(rate)),
             Motion::Table(knots) => {
                 let (speed, spin) = self.motion.greatest_speeds(f64::NEG_INFINITY);
-                write!(f, "by a table of {} rows, at most {speed:.4} m/s, {spin:.4} rad/s", knots.len())
+                write!(f, "by a table of {} rows, at most {}", knots.len(), both(speed, spin))
             }
-            Motion::Free(free) => write!(f, "free, {} kg, at first {}", free.mass, speeds(&free.start)),
+            Motion::Free(free) => {
+                write!(f, "free, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))
+            }
         }
     }
 }

@@ -6,10 +6,11 @@ use partition::comm::{Comm, World};
 
 use super::message::together;
 use super::run::start_threads;
-use super::{Failure, grouped, ranks};
+use super::{Failure, ranks};
 use crate::bench::jobs::{BenchJob, JOBS};
 use crate::bench::machine::Machine;
 use crate::bench::{Extent, Figures, measure};
+use crate::text::count;
 
 /// Arguments of `agimp bench`.
 #[derive(Debug, clap::Args)]
@@ -162,7 +163,7 @@ fn row(out: &mut impl Write, figures: &Figures) -> std::io::Result<()> {
         out,
         "{:15} {:>10} {:>6} {:>6.2} {:>6.2} {:>7.1} {:>6.1} {:>6.1} {:>8.1} {:>7.1} {:>9.1} {:>4.0}% {:>4.0}% {:>6.0} {:>4.0}% {:>5.1}% {:>4.0}%",
         figures.job,
-        grouped(figures.particles),
+        count(figures.particles),
         figures.levels,
         figures.rate * 1e-6,
         figures.best_rate * 1e-6,

@@ -1,6 +1,6 @@
 //! `agimp check`: the size and cost of a job, without running it.
 use super::message::{launched, together};
-use super::{Failure, bytes, grouped, ranks};
+use super::{Failure, ranks};
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::Motion;
 use crate::job::{self, AnyProblem, Problem};
@@ -8,6 +8,7 @@ use crate::particle::chunk::Tag;
 use crate::setup;
 use crate::setup::estimate::{Estimate, LevelCount, estimate};
 use crate::setup::seed::check_counts;
+use crate::text::{bytes, count as grouped, excerpt, number, quantity};
 use partition::MAX_LEVEL;
 use partition::comm::World;
 use std::ffi::OsStr;
@@ -70,6 +71,9 @@ fn report<const D: usize>(
     Ok(())
 }
 
+/// Longest name that is printed, in characters.
+const NAME: usize = 60;
+
 /// Particles up to which a job with criteria is set up, since these look at the particles themselves.
 const MOST: u64 = 2_000_000;
 
@@ -108,9 +112,9 @@ fn write<const D: usize>(
     is_refined: bool,
 ) -> std::io::Result<()> {
     if !problem.title.is_empty() {
-        writeln!(out, "{}", problem.title)?;
+        writeln!(out, "{}", excerpt(&problem.title, 200))?;
     }
-    let size: Vec<String> = problem.size().iter().map(|edge| format!("{edge}")).collect();
+    let size: Vec<String> = problem.size().iter().map(|edge| number(*edge, 7)).collect();
     let roots: Vec<String> = problem.brick.roots.iter().map(u32::to_string).collect();
     writeln!(out, "domain       {} m, {} root octants", size.join(" x "), roots.join(" x "))?;
     writeln!(out, "particles    {}", grouped(estimate.total_particles()))?;
@@ -118,9 +122,9 @@ fn write<const D: usize>(
         writeln!(
             out,
             "  {:18} {:>14}  {}",
-            body.name,
+            excerpt(&body.name, NAME),
             grouped(*count),
-            problem.materials[body.material].name
+            excerpt(&problem.materials[body.material].name, NAME)
         )?;
     }
     if !problem.colliders.is_empty() {
@@ -130,13 +134,13 @@ fn write<const D: usize>(
         }
     }
     writeln!(out, "leaves       {}", grouped(estimate.total_leaves()))?;
-    writeln!(out, "  level   cell edge, m         leaves         filled          cells      particles")?;
+    writeln!(out, "  level      cell edge         leaves         filled          cells      particles")?;
     let cells_per_leaf = 4_u64.pow(D as u32);
     for (level, count) in estimate.levels.iter().enumerate().filter(|(_, count)| count.leaves > 0) {
         writeln!(
             out,
-            "  {level:5}   {:12.6} {:>14} {:>14} {:>14} {:>14}",
-            problem.cell_edge(level as u8),
+            "  {level:5}   {:>12} {:>14} {:>14} {:>14} {:>14}",
+            quantity(problem.cell_edge(level as u8), "m"),
             grouped(count.leaves),
             grouped(count.filled),
             grouped(count.leaves * cells_per_leaf),
@@ -152,8 +156,9 @@ fn write<const D: usize>(
         bytes(estimate.memory_per_rank(arguments.ranks)),
         plural(arguments.ranks)
     )?;
-    writeln!(out, "time step    about {:.3e} s", estimate.time_step)?;
-    writeln!(out, "steps        about {:.0} to {} s", estimate.steps, problem.time.end)?;
+    writeln!(out, "time step    about {}", quantity(estimate.time_step, "s"))?;
+    let (steps, end) = (number(estimate.steps, 4), quantity(problem.time.end, "s"));
+    writeln!(out, "steps        about {steps} to {end}")?;
     writeln!(
         out,
         "outputs      {} of about {} each",
@@ -187,7 +192,7 @@ fn write_refinement<const D: usize>(
         writeln!(
             out,
             "  tree               every {twice} or {four_times} while nothing goes {} edges of a finest leaf in so many",
-            adaptivity.travel
+            number(adaptivity.travel, 4)
         )?;
     }
     for criterion in &adaptivity.criteria {
@@ -204,20 +209,24 @@ fn write_refinement<const D: usize>(
 /// A criterion in words.
 fn words<const D: usize>(problem: &Problem<D>, criterion: &Criterion<D>) -> String {
     let (refine, coarsen) = (criterion.refine, criterion.coarsen);
-    let near = |what: &str| format!("within {refine} m of {what}, until {coarsen} m from it");
-    let above =
-        |what: &str, unit: &str| format!("{what} from {refine}{unit} on, until below {coarsen}{unit}");
+    let amount = |value: f64, unit: &str| quantity(value, unit);
+    let near = |what: &str| {
+        format!("within {} of {what}, until {} from it", amount(refine, "m"), amount(coarsen, "m"))
+    };
+    let above = |what: &str, unit: &str| {
+        format!("{what} from {} on, until below {}", amount(refine, unit), amount(coarsen, unit))
+    };
     match &criterion.kind {
         Kind::Region { motion: Motion::Fixed, .. } => near("a region"),
         Kind::Region { .. } => near("a region that moves"),
         Kind::Collider(index) => near(&format!("collider {}", problem.colliders[*index].name)),
         Kind::FreeSurface => "at free surfaces".into(),
-        Kind::VelocityGradient => above("velocity gradient", " 1/s"),
+        Kind::VelocityGradient => above("velocity gradient", "1/s"),
         Kind::PlasticStrain => above("plastic strain", ""),
-        Kind::PlasticStrainRate => above("plastic strain rate", " 1/s"),
+        Kind::PlasticStrainRate => above("plastic strain rate", "1/s"),
         Kind::Stretch => above("stretch of particles", ""),
         Kind::Material(index) => {
-            format!("where there is {}", problem.materials[usize::from(*index)].name)
+            format!("where there is {}", excerpt(&problem.materials[usize::from(*index)].name, NAME))
         }
     }
 }

@@ -1,7 +1,8 @@
 //! `agimp info`: what is in an output or checkpoint file.
-use super::{Failure, bytes, grouped};
+use super::Failure;
 use crate::io::hdf5_file::{FileError, ParallelFile};
 use crate::io::snapshot::{Header, PointField, compare};
+use crate::text::{bytes, count as grouped, number, printable, quantity_to};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
@@ -64,30 +65,33 @@ fn read(arguments: &Arguments) -> Result<Contents, FileError> {
 fn write(out: &mut impl Write, contents: &Contents) -> std::io::Result<()> {
     let Contents { header, size, fields, levels } = contents;
     let size = bytes(*size as f64);
-    writeln!(out, "written by       agimp {} (format {}), {size}", header.program, header.format)?;
+    let program = printable(&header.program);
+    writeln!(out, "written by       agimp {program} (format {}), {size}", header.format)?;
     writeln!(out, "job digest       {:016x}", header.job_digest)?;
     writeln!(out, "restart          {}", if header.restart { "possible" } else { "not from this file" })?;
-    let high: Vec<f64> = (header.origin.iter().zip(&header.roots))
-        .map(|(low, &roots)| low + header.root_edge * roots as f64)
-        .collect();
-    writeln!(out, "domain           {}D, {:?} to {high:?} m", header.dimension, header.origin)?;
+    let point = |x: &mut dyn Iterator<Item = f64>| x.map(|c| number(c, 7)).collect::<Vec<_>>().join(", ");
+    let low = point(&mut header.origin.iter().copied());
+    let edges = header.origin.iter().zip(&header.roots);
+    let high = point(&mut edges.map(|(low, &roots)| low + header.root_edge * roots as f64));
+    writeln!(out, "domain           {}D, [{low}] to [{high}] m", header.dimension)?;
     writeln!(out, "step             {}", header.step)?;
-    writeln!(out, "time             {:?} s (last step {:?} s)", header.time, header.dt)?;
+    let (time, dt) = (quantity_to(header.time, "s", 7), quantity_to(header.dt, "s", 4));
+    writeln!(out, "time             {time} (last step {dt})")?;
     writeln!(out, "particles        {}", grouped(header.particles))?;
     writeln!(out, "leaves           {}", grouped(header.leaves))?;
     for (level, (leaves, particles)) in levels {
         let (leaves, particles) = (grouped(*leaves), grouped(*particles));
         writeln!(out, "  level {level:<2}       {leaves} leaves, {particles} particles")?;
     }
-    writeln!(out, "materials        {}", header.materials.join(", "))?;
+    writeln!(out, "materials        {}", printable(&header.materials.join(", ")))?;
     if !fields.is_empty() {
         writeln!(out, "fields           {}", fields.join(", "))?;
     }
     for (name, value) in &header.scalars.reals {
-        writeln!(out, "scalar           {name} = {value:?}")?;
+        writeln!(out, "scalar           {} = {value:?}", printable(name))?;
     }
     for (name, value) in &header.scalars.counts {
-        writeln!(out, "counter          {name} = {value}")?;
+        writeln!(out, "counter          {} = {value}", printable(name))?;
     }
     Ok(())
 }

@@ -1,11 +1,13 @@
 //! How failures are told: once, whatever the number of ranks.
 use std::io::{IsTerminal as _, Write as _};
 
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, Report};
 use partition::comm::{Comm, World, is_launched};
 
 use super::Failure;
+use super::quote::Quote;
 use crate::job::{FaultList, JobError};
+use crate::text::printable;
 
 impl Failure {
     /// Tells the user, unless that is done.
@@ -15,7 +17,7 @@ impl Failure {
             Self::Told(_) => {}
             // If nobody listens, nobody is told.
             Self::Arguments(error) => drop(error.print()),
-            other => tell(&format!("agimp: {other}")),
+            other => tell(&format!("agimp: {}", visible(&other.to_string()))),
         }
     }
 }
@@ -55,6 +57,11 @@ pub fn unusable(error: clap::Error) -> Failure {
     }
 }
 
+/// A message whose own line breaks stay, while what it quotes controls no terminal.
+fn visible(message: &str) -> String {
+    message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
+}
+
 /// Writes a message in one piece: `mpirun` may put its own words between pieces. If nobody listens, nobody is told.
 fn tell(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
@@ -65,13 +72,13 @@ fn explain_faults(list: &FaultList) {
     let theme =
         if std::io::stderr().is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
     let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
-    for fault in &list.faults {
+    for fault in list.told() {
+        let source = Quote::of(list, fault);
         let mut diagnostic = MietteDiagnostic::new(list.headline(fault))
-            .with_label(LabeledSpan::at(fault.span.clone(), "here"));
+            .with_label(LabeledSpan::at(source.label.clone(), "here"));
         if let Some(help) = &fault.help {
             diagnostic = diagnostic.with_help(help.clone());
         }
-        let source = NamedSource::new(list.path.display().to_string(), list.text.clone());
         let report = Report::new(diagnostic).with_source_code(source);
         let mut text = String::new();
         match handler.render_report(&mut text, report.as_ref()) {
@@ -80,7 +87,7 @@ fn explain_faults(list: &FaultList) {
             Err(_) => tell(&list.headline(fault)),
         }
     }
-    if list.faults.len() > 1 {
-        tell(&format!("agimp: {} faults in {}", list.faults.len(), list.path.display()));
+    if let Some(summary) = list.summary() {
+        tell(&format!("agimp: {summary}"));
     }
 }

@@ -14,6 +14,7 @@ mod message;
 pub use message::unusable;
 mod new;
 mod plot;
+mod quote;
 mod ranks;
 mod run;
 mod schema;
@@ -97,9 +98,14 @@ impl Failure {
     }
 }
 
+/// Of writing to standard output.
 impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
-        Self::Run(format!("cannot write: {error}"))
+        match error.kind() {
+            // Whoever listened has heard enough, as in `agimp schema | head`.
+            std::io::ErrorKind::BrokenPipe => Self::Told(0),
+            _ => Self::Run(format!("cannot write: {error}")),
+        }
     }
 }
 
@@ -120,41 +126,5 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::Material(arguments) => material::execute(&arguments),
         Command::Weights(arguments) => weights::execute(&arguments),
         Command::Bench(arguments) => bench::execute(&arguments),
-    }
-}
-
-/// A count with its thousands set apart: `1 234 567`.
-fn grouped(count: u64) -> String {
-    let digits = count.to_string();
-    let mut out = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(' ');
-        }
-        out.push(digit);
-    }
-    out
-}
-
-/// Bytes in the largest unit that leaves a number of at least 1.
-fn bytes(count: f64) -> String {
-    let units = ["B", "kB", "MB", "GB", "TB", "PB"];
-    let power = (0..units.len() - 1).find(|&power| count < 1000_f64.powi(power as i32 + 1));
-    let power = power.unwrap_or(units.len() - 1);
-    let value = count / 1000_f64.powi(power as i32);
-    if power == 0 { format!("{value:.0} B") } else { format!("{value:.1} {}", units[power]) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_for_people() {
-        assert_eq!(grouped(0), "0");
-        assert_eq!(grouped(1_234_567), "1 234 567");
-        assert_eq!(bytes(999.0), "999 B");
-        assert_eq!(bytes(54_400_000.0), "54.4 MB");
-        assert_eq!(bytes(2e18), "2000.0 PB");
     }
 }

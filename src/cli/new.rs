@@ -1,5 +1,6 @@
 //! `agimp new`: a commented job file to start from.
 use super::Failure;
+use crate::text::{excerpt, nearest};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
@@ -18,12 +19,11 @@ const TEMPLATES: [(&str, &str); 7] = [
 /// Arguments of `agimp new`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Name of the template.
-    #[arg(required_unless_present = "list")]
+    /// Name of the template; without it, the list of templates.
     template: Option<String>,
     /// File to write; TEMPLATE.toml by default. A file that exists is left alone.
     file: Option<PathBuf>,
-    /// List the templates instead.
+    /// List the templates, and write nothing.
     #[arg(long)]
     list: bool,
 }
@@ -42,8 +42,11 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     let Some((_, text)) = TEMPLATES.iter().find(|(known, _)| *known == name) else {
         let known: Vec<&str> = TEMPLATES.iter().map(|(known, _)| *known).collect();
+        let meant = nearest(name, known.iter().copied());
+        let guess = meant.map_or(String::new(), |meant| format!("; did you mean \"{meant}\"?"));
         return Err(Failure::Usage(format!(
-            "found the template \"{name}\"; expected one of {}",
+            "found the template \"{}\"; expected one of {}{guess}",
+            excerpt(name, 60),
             known.join(", ")
         )));
     };

@@ -1,7 +1,6 @@
 //! `agimp plot`: a picture of the particles in an output file.
 use super::Failure;
 use crate::io::picture::{Settings, draw_file};
-use crate::io::snapshot::PointField;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -10,9 +9,10 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Output or checkpoint file.
     file: PathBuf,
-    /// Field that gives the colours.
-    #[arg(long, default_value = "leaf_level", value_parser = field)]
-    colour: PointField,
+    /// Quantity that gives the colours: a field of the file or what follows from it, such as speed, pressure,
+    /// stress_xy, stress_1 (greatest principal stress) or max_shear. An unknown name lists what there is.
+    #[arg(long, alias = "color", default_value = "leaf_level")]
+    colour: String,
     /// Value of the first colour; without it, as found.
     #[arg(long, requires = "to", allow_negative_numbers = true)]
     from: Option<f64>,
@@ -33,25 +33,18 @@ pub struct Arguments {
     height: u32,
 }
 
-/// A field by its name.
-fn field(name: &str) -> Result<PointField, String> {
-    PointField::from_name(name).ok_or_else(|| {
-        let names: Vec<&str> = PointField::ALL.into_iter().map(PointField::name).collect();
-        format!("expected one of {}", names.join(", "))
-    })
-}
-
 /// Draws the picture.
 ///
 /// # Errors
-/// The file cannot be read or does not show the field, or the picture cannot be written.
+/// The file cannot be read or does not offer the quantity, or the picture cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-    let mut settings = Settings::new(arguments.title.as_deref().unwrap_or(&name), arguments.colour);
+    let mut settings = Settings::new(arguments.title.as_deref().unwrap_or(&name));
     (settings.width, settings.height) = (arguments.width as usize, arguments.height as usize);
     settings.range = arguments.from.zip(arguments.to).map(|(from, to)| [from, to]);
     let out = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension("png"));
-    draw_file(&arguments.file, &settings, &out).map_err(|error| Failure::Usage(error.to_string()))?;
+    draw_file(&arguments.file, &arguments.colour, &settings, &out)
+        .map_err(|error| Failure::Usage(error.to_string()))?;
     writeln!(std::io::stdout(), "{}", out.display())?;
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::telemetry::Record;
+use crate::text::{bytes, count, number, quantity, quantity_to};
 
 /// Time between lines where there is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
@@ -55,14 +56,14 @@ impl Progress {
         let levels: Vec<String> =
             record.levels.iter().map(|level| format!("{}:{}", level.level, level.leaves)).collect();
         let resampled = record.resampled.map_or_else(String::new, |r| {
-            format!(", {} regrids, {} splits, {} merges", r.regrids, grouped(r.splits), grouped(r.merges))
+            format!(", {} regrids, {} splits, {} merges", r.regrids, count(r.splits), count(r.merges))
         });
         self.tree = format!(
-            "{} particles, leaves {}, imbalance {:.2}, {:.2} GB/rank{resampled}",
-            grouped(record.particles),
+            "{} particles, leaves {}, imbalance {}, {}/rank{resampled}",
+            count(record.particles),
             levels.join(" "),
-            record.imbalance,
-            record.memory.max / 1e9
+            number(record.imbalance, 3),
+            bytes(record.memory.max)
         );
     }
 
@@ -102,8 +103,8 @@ impl Progress {
 
     fn text(&self, step: u64, time: f64, dt: f64, done: f64, left: Option<Duration>) -> String {
         let left = left.map_or_else(|| "?".to_owned(), clock);
-        let mut text =
-            format!("{:5.1} %  step {step}  t = {time:.6} s  dt = {dt:.2e} s  ETA {left}", 100.0 * done);
+        let (time, dt) = (quantity_to(time, "s", 5), quantity(dt, "s"));
+        let mut text = format!("{:5.1} %  step {step}  t = {time}  dt = {dt}  ETA {left}", 100.0 * done);
         if !self.tree.is_empty() {
             text.push_str("  ");
             text.push_str(&self.tree);
@@ -155,17 +156,6 @@ fn clock(duration: Duration) -> String {
     format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
-/// Digits in groups of three.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let groups: Vec<&str> = (0..digits.len())
-        .rev()
-        .filter(|i| (digits.len() - i).is_multiple_of(3) || *i == 0)
-        .scan(digits.len(), |end, start| Some(&digits[start..std::mem::replace(end, start)]))
-        .collect();
-    groups.into_iter().rev().collect::<Vec<_>>().join(",")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,13 +173,7 @@ mod tests {
         let done = progress.done(1.5);
         let left = remaining(Duration::from_secs(60), done);
         let text = progress.text(12, 1.5, 1e-4, done, left);
-        assert_eq!(text, " 25.0 %  step 12  t = 1.500000 s  dt = 1.00e-4 s  ETA 0:03:00  1 particles");
+        assert_eq!(text, " 25.0 %  step 12  t = 1.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
         assert_eq!(remaining(Duration::from_secs(1), 0.0), None);
-    }
-
-    #[test]
-    fn numbers_in_groups() {
-        let shown = [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped);
-        assert_eq!(shown, ["0", "12", "123", "1,234", "123,456", "1,234,567"]);
     }
 }

@@ -257,6 +257,7 @@ pub enum ReportSetup<const D: usize> {
 #[serde(rename_all = "snake_case")]
 pub enum CollapseLaw {
     /// Cylinders: Lube, Huppert, Sparks, Hallworth, J. Fluid Mech. 508 (2004).
+    #[schemars(extend("x-dimension" = 3))]
     Axisymmetric,
     /// Columns between walls: Lube, Huppert, Sparks, Freundt, Phys. Rev. E 72 (2005).
     Planar,

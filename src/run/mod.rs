@@ -73,7 +73,7 @@ pub enum RunError {
     #[error(transparent)]
     Rank(#[from] Disagreement),
     /// A step failed.
-    #[error("step {step}, time {time} s: {source}")]
+    #[error("step {step}, time {}: {source}", crate::text::quantity_to(*time, "s", 7))]
     Step {
         /// Number of the step.
         step: u64,
@@ -83,7 +83,7 @@ pub enum RunError {
         source: Disagreement,
     },
     /// Something failed after a step, while files were written.
-    #[error("step {step}, time {time} s: {source}")]
+    #[error("step {step}, time {}: {source}", crate::text::quantity_to(*time, "s", 7))]
     After {
         /// Number of steps done.
         step: u64,
@@ -320,7 +320,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let path = problem.output.directory.join(format!("{}.png", problem.name));
         let scalars = Scalars::default();
         let view = view(problem, &self.solver, &self.materials, &self.histories, &scalars);
-        picture::draw(self.comm, &view, &picture::Settings::new(title, field), &path)
+        picture::draw(self.comm, &view, field, &picture::Settings::new(title), &path)
             .map_err(|error| error.to_string())?;
         Ok(Some(path))
     }

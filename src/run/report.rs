@@ -3,6 +3,7 @@ use partition::comm::Comm;
 
 use crate::job::problem::{CollapseLaw, ReportSetup};
 use crate::particle::Chunk;
+use crate::text::{number, quantity};
 
 /// Bins of the deposit's profile over the initial radius.
 const BINS_PER_RADIUS: f64 = 25.0;
@@ -112,17 +113,20 @@ fn fits(law: CollapseLaw, a: f64, radius: f64, height: f64) -> (Option<f64>, Opt
 impl std::fmt::Display for Collapse {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let published = |value: Option<f64>| {
-            value.map_or_else(|| "no published fit".into(), |value| format!("published fit {value:.4} m"))
+            value.map_or_else(
+                || "no published fit".into(),
+                |value| format!("published fit {}", quantity(value, "m")),
+            )
         };
-        writeln!(f, "column collapse, aspect ratio {:.3}", self.aspect)?;
+        writeln!(f, "column collapse, aspect ratio {}", number(self.aspect, 4))?;
         writeln!(
             f,
-            "  run-out radius  {:.4} m (98 % of the mass)   {}",
-            self.front,
+            "  run-out radius  {} (98 % of the mass)   {}",
+            quantity(self.front, "m"),
             published(self.law_edge)
         )?;
-        writeln!(f, "  outer edge      {:.4} m (connected deposit)", self.edge)?;
-        write!(f, "  final height    {:.4} m   {}", self.height, published(self.law_height))
+        writeln!(f, "  outer edge      {} (connected deposit)", quantity(self.edge, "m"))?;
+        write!(f, "  final height    {}   {}", quantity(self.height, "m"), published(self.law_height))
     }
 }
 

@@ -11,13 +11,16 @@ use super::hdf5_file::{FileError, ParallelFile};
 use super::snapshot::fields::Values;
 use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
+use crate::text::{number, quantity};
 
 mod canvas;
 mod colour;
+mod derived;
 mod font;
 mod scene;
 
 use canvas::Canvas;
+use derived::{Source, is_class, magnitude};
 use scene::{Bounds, Camera, Raster, Splat};
 
 /// How a picture looks.
@@ -29,16 +32,31 @@ pub struct Settings {
     pub height: usize,
     /// First line.
     pub title: String,
-    /// Field that gives the colours; of vectors the magnitude.
-    pub field: PointField,
     /// Values of the first and the last colour; `None`: as found, without the outermost half percents.
     pub range: Option<[f64; 2]>,
 }
 
 impl Settings {
-    /// A picture of usual size, coloured by `field`.
-    pub fn new(title: &str, field: PointField) -> Self {
-        Self { width: 1280, height: 800, title: title.into(), field, range: None }
+    /// A picture of usual size.
+    pub fn new(title: &str) -> Self {
+        Self { width: 1280, height: 800, title: title.into(), range: None }
+    }
+}
+
+/// What the colours of a picture mean.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Tint {
+    /// Name of the quantity.
+    name: String,
+    /// Its unit, empty for pure numbers.
+    unit: String,
+    /// Whether its values are numbers of something rather than amounts.
+    classes: bool,
+}
+
+impl Tint {
+    fn of(field: PointField) -> Self {
+        Self { name: field.name().into(), unit: field.unit().into(), classes: is_class(field.name()) }
     }
 }
 
@@ -54,18 +72,20 @@ struct Drawing<'a> {
     domain: Bounds,
     /// Values are not yet scaled.
     splats: Vec<Splat>,
+    tint: Tint,
     caption: String,
 }
 
-/// Collective. Draws the particles of a run and writes the picture as PNG on rank 0.
+/// Collective. Draws the particles of a run, coloured by `field` (of vectors the magnitude), and writes the picture as PNG on rank 0.
 pub fn draw<const D: usize>(
     comm: &Comm,
     view: &View<D>,
+    field: PointField,
     settings: &Settings,
     path: &Path,
 ) -> Result<(), FileError> {
     let domain = domain(&view.origin, view.root_edge, &view.brick.roots.map(u64::from));
-    let values = scalars(settings.field.values(view));
+    let values = scalars(field.values(view));
     let mut values = values.into_iter();
     let mut splats = Vec::with_capacity(values.len());
     for chunk in view.chunks {
@@ -79,31 +99,23 @@ pub fn draw<const D: usize>(
     let mut particles = [view.chunks.iter().map(|chunk| chunk.len() as u64).sum()];
     comm.sum_u64(&mut particles);
     let caption = caption(view.time, view.step, particles[0]);
-    let drawing = Drawing { comm: Some(comm), flat: D == 2, domain, splats, caption };
+    let drawing = Drawing { comm: Some(comm), flat: D == 2, domain, splats, tint: Tint::of(field), caption };
     let canvas = drawing.compose(settings);
     let saved = if comm.rank() == 0 { canvas.save(path) } else { Ok(()) };
     Ok(comm.agree(saved)?)
 }
 
-/// Not collective. Draws the particles of an output file, coloured by a field that the file shows.
-pub fn draw_file(source: &Path, settings: &Settings, path: &Path) -> Result<(), FileError> {
+/// Not collective. Draws the particles of an output file, coloured by the quantity of this name: a field that the file
+/// shows, or what follows from its fields or its state.
+///
+/// # Errors
+/// The file cannot be read or does not offer the quantity, or the picture cannot be written.
+pub fn draw_file(source: &Path, name: &str, settings: &Settings, path: &Path) -> Result<(), FileError> {
     let file = ParallelFile::open_alone(source)?;
     let header = Header::read(&file)?;
-    let dataset = |name: &str| format!("VTKHDF/PointData/{name}");
-    let field = settings.field.name();
-    if !file.exists("VTKHDF/PointData") || !file.exists(&dataset(field)) {
-        let shown: Vec<&str> = PointField::ALL
-            .map(PointField::name)
-            .into_iter()
-            .filter(|name| file.exists(&dataset(name)))
-            .collect();
-        let shown = if shown.is_empty() { "nothing (is it a tree file?)".into() } else { shown.join(", ") };
-        return Err(file.refuse(format!("the file does not show {field}; it shows {shown}")));
-    }
     let n = header.particles;
+    let (tint, values) = Source::new(&file, &header).quantity(name)?;
     let points: Vec<f64> = file.read_slab("VTKHDF/Points", 0, n)?;
-    let (_, components) = file.shape(&dataset(field))?;
-    let values = scalars(Values::Real(file.read_slab(&dataset(field), 0, n)?, components));
     let domain = domain(&header.origin, header.root_edge, &header.roots);
     let radii = radii(&file, &header)?;
     let splats = points.chunks_exact(3).zip(values).zip(radii);
@@ -115,7 +127,8 @@ pub fn draw_file(source: &Path, settings: &Settings, path: &Path) -> Result<(), 
         })
         .collect();
     let caption = caption(header.time, header.step, n);
-    Drawing { comm: None, flat: header.dimension == 2, domain, splats, caption }.compose(settings).save(path)
+    let flat = header.dimension == 2;
+    Drawing { comm: None, flat, domain, splats, tint, caption }.compose(settings).save(path)
 }
 
 /// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
@@ -143,9 +156,7 @@ fn scalars(values: Values) -> Vec<f64> {
             scalars(Values::Real(values.into_iter().map(f64::from).collect(), components))
         }
         Values::Real(values, 0 | 1) => values,
-        Values::Real(values, components) => {
-            values.chunks_exact(components).map(|row| row.iter().map(|v| v * v).sum::<f64>().sqrt()).collect()
-        }
+        Values::Real(values, components) => values.chunks_exact(components).map(magnitude).collect(),
     }
 }
 
@@ -159,7 +170,8 @@ fn domain(origin: &[f64], root_edge: f64, roots: &[u64]) -> Bounds {
 }
 
 fn caption(time: f64, step: u64, particles: u64) -> String {
-    format!("t = {time:.4} s   step {step}   {particles} particles")
+    let particles = crate::text::count(particles);
+    format!("t = {}   step {step}   {particles} particles", quantity(time, "s"))
 }
 
 impl Drawing<'_> {
@@ -225,10 +237,7 @@ impl Drawing<'_> {
 
     /// Collective on a shared drawing. The picture; whole on rank 0.
     fn compose(mut self, settings: &Settings) -> Canvas {
-        let classes = matches!(
-            settings.field,
-            PointField::Material | PointField::Body | PointField::ParticleLevel | PointField::LeafLevel
-        );
+        let classes = self.tint.classes;
         let frame = self.frame();
         let [low, high] = self.range(settings, classes);
         let (width, height) = (settings.width as f64, settings.height as f64);
@@ -261,7 +270,7 @@ impl Drawing<'_> {
         if self.flat {
             axes(&mut canvas, &camera, &frame, spacing);
         } else {
-            let note = format!("grid {} m", short(spacing));
+            let note = format!("grid {}", quantity(spacing, "m"));
             canvas.text(24, settings.height as i64 - 36, 2, &note, INK);
         }
         raster.paint(&camera, &mut canvas, !self.flat, |value| {
@@ -274,9 +283,9 @@ impl Drawing<'_> {
         canvas.text(24, 20, 3, &settings.title, INK);
         canvas.text(24, 60, 2, &self.caption, INK);
         if classes {
-            legend(&mut canvas, settings.field, low as usize..=high as usize);
+            legend(&mut canvas, &self.tint, low as usize..=high as usize);
         } else {
-            colour_bar(&mut canvas, settings.field, [low, high]);
+            colour_bar(&mut canvas, &self.tint, [low, high]);
         }
         canvas
     }
@@ -307,18 +316,18 @@ fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
 }
 
 /// Name and unit of a field beside the drawing; the row below it.
-fn heading(canvas: &mut Canvas, field: PointField) -> (i64, i64) {
+fn heading(canvas: &mut Canvas, tint: &Tint) -> (i64, i64) {
     let x = canvas.width as i64 - 185;
-    let name = field.name().replace('_', " ");
-    canvas.text(x, 110, 2, name.get(..14).unwrap_or(&name), INK);
-    if !field.unit().is_empty() {
-        canvas.text(x, 134, 2, &format!("[{}]", field.unit()), INK);
+    let name: String = tint.name.replace('_', " ").chars().take(14).collect();
+    canvas.text(x, 110, 2, &name, INK);
+    if !tint.unit.is_empty() {
+        canvas.text(x, 134, 2, &format!("[{}]", tint.unit), INK);
     }
     (x, 164)
 }
 
-fn colour_bar(canvas: &mut Canvas, field: PointField, [low, high]: [f64; 2]) {
-    let (x, top) = heading(canvas, field);
+fn colour_bar(canvas: &mut Canvas, tint: &Tint, [low, high]: [f64; 2]) {
+    let (x, top) = heading(canvas, tint);
     let length = (canvas.height as i64 - top - 80).max(10);
     for row in 0..length {
         let value = 1.0 - row as f64 / (length - 1) as f64;
@@ -332,8 +341,8 @@ fn colour_bar(canvas: &mut Canvas, field: PointField, [low, high]: [f64; 2]) {
     }
 }
 
-fn legend(canvas: &mut Canvas, field: PointField, numbers: std::ops::RangeInclusive<usize>) {
-    let (x, top) = heading(canvas, field);
+fn legend(canvas: &mut Canvas, tint: &Tint, numbers: std::ops::RangeInclusive<usize>) {
+    let (x, top) = heading(canvas, tint);
     for (line, number) in numbers.take(16).enumerate() {
         let row = top + 30 * line as i64;
         canvas.fill(x, row, 24, 20, colour::class(number));
@@ -350,18 +359,9 @@ fn nice(length: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&x| x <= length).unwrap_or(power)
 }
 
-/// A number with three digits.
+/// A number for a scale.
 fn short(value: f64) -> String {
-    if value.abs() < 1e-12 {
-        return "0".into();
-    }
-    let digits = value.abs().log10().floor() as i32;
-    if (-3..5).contains(&digits) {
-        let text = format!("{value:.*}", (2 - digits).max(0) as usize);
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-    } else {
-        format!("{value:.1e}")
-    }
+    number(if value.abs() < 1e-12 { 0.0 } else { value }, 3)
 }
 
 #[cfg(test)]

@@ -50,8 +50,8 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         .map(|(p, value)| Splat { position: chunk.position(p), radius: 0.0125, value })
         .collect();
     let domain = domain(&[0.0; 3], 1.0, &[1; 3]);
-    Drawing { comm: None, flat: false, domain, splats, caption: caption(0.0, 0, 1) }
-        .compose(&Settings::new("pile", field))
+    Drawing { comm: None, flat: false, domain, splats, tint: Tint::of(field), caption: caption(0.0, 0, 1) }
+        .compose(&Settings::new("pile"))
 }
 
 #[test]
@@ -82,6 +82,14 @@ fn nothing_to_draw_is_no_error() {
 #[test]
 fn numbers_are_short() {
     let shown = [0.0, 0.05, 1.0, 1234.5, -0.25, 1e7, 2.5e-6].map(short);
-    assert_eq!(shown, ["0", "0.05", "1", "1234", "-0.25", "1.0e7", "2.5e-6"]);
+    assert_eq!(shown, ["0", "0.05", "1", "1234", "-0.25", "1e7", "2.5e-6"]);
     assert_eq!([0.7, 3.0, 5.1, 0.023].map(nice), [0.5, 2.0, 5.0, 0.02]);
+}
+
+#[test]
+fn microseconds_are_no_zero_seconds() {
+    assert_eq!(caption(1.25e-5, 120, 4000), "t = 12.5 µs   step 120   4 000 particles");
+    // The font has what units need.
+    let unknown = font::glyph('\u{fffd}');
+    assert!("12.5 µs kg/m³ m² J/kg".chars().all(|c| font::glyph(c) != unknown));
 }

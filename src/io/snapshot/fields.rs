@@ -101,7 +101,7 @@ impl PointField {
             Self::Velocity | Self::Speed => "m/s",
             Self::Pressure | Self::VonMises | Self::Stress => "Pa",
             Self::Mass => "kg",
-            Self::Density => "kg/m3",
+            Self::Density => "kg/m³",
             _ => "",
         }
     }
@@ -199,12 +199,17 @@ fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 
     [at(0), at(1), at(2), at(3), yz, xz]
 }
 
+fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let elastic = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+    det_f(elastic, chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
+}
+
 /// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
 /// variable (0 where a model has none).
-fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    let [xx, yy, zz, xy, yz, xz] = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+pub(crate) fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = elastic;
     let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    determinant.sqrt() * libm::exp(chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
+    determinant.sqrt() * libm::exp(plastic_volume)
 }
 
 /// σ = τ / det F.
@@ -213,12 +218,13 @@ fn cauchy_stress<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
     symmetric(chunk, Layout::<D>::STRESS, p).map(|component| component / ratio)
 }
 
-fn mean(stress: &[f64; 6]) -> f64 {
+/// A third of the trace.
+pub(crate) fn mean(stress: &[f64; 6]) -> f64 {
     (stress[0] + stress[1] + stress[2]) / 3.0
 }
 
 /// √(3/2 s:s) with the deviator s.
-fn von_mises(stress: &[f64; 6]) -> f64 {
+pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
     let mean = mean(stress);
     let diagonal: f64 = stress[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
     let shear: f64 = stress[3..].iter().map(|s| s * s).sum();

@@ -3,11 +3,12 @@ use super::{Checks, Space};
 use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::{Knot, Motion};
-use crate::job::parse::error::alternatives;
+use crate::job::parse::error::{QUOTED, names as listed};
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, BoxPolicy, TreeSetup};
 use crate::job::schema::adaptivity::{Criterion as Written, Way};
 use crate::job::schema::job_file::JobFile;
+use crate::text::{excerpt, written as number};
 
 /// What the conversion needs of the rest of the job.
 pub(super) struct Context<'a, const D: usize> {
@@ -32,8 +33,9 @@ pub(in crate::job) fn adaptivity<const D: usize>(
             checks.fault(
                 &path.key("split_stretch"),
                 format!(
-                    "found {}; expected at most {max_stretch}, the upper bound of numerics.box_stretch",
-                    written.split_stretch
+                    "found {}; expected at most {}, the upper bound of numerics.box_stretch",
+                    number(written.split_stretch),
+                    number(max_stretch)
                 ),
             );
         }
@@ -42,7 +44,8 @@ pub(in crate::job) fn adaptivity<const D: usize>(
                 &path.key("merge").key("stretch"),
                 format!(
                     "found {}; expected less than adaptivity.split_stretch = {}, or merges would undo splits",
-                    merge.stretch, written.split_stretch
+                    number(merge.stretch),
+                    number(written.split_stretch)
                 ),
             );
         }
@@ -121,7 +124,11 @@ fn criterion<const D: usize>(
         let side = if is_distance { "least" } else { "most" };
         checks.fault(
             &path.key("coarsen"),
-            format!("found {coarsen}; expected at {side} {key} = {refine}, or leaves would flicker"),
+            format!(
+                "found {}; expected at {side} {key} = {}, or leaves would flicker",
+                number(coarsen),
+                number(refine)
+            ),
         );
     }
     Some(Criterion { kind, level, refine, coarsen })
@@ -137,7 +144,8 @@ fn named<'a, I: Iterator<Item = &'a str>>(
 ) -> Option<usize> {
     let index = known().position(|other| other == name);
     if index.is_none() {
-        let list = if known().next().is_some() { alternatives(known()) } else { "there is none".into() };
+        let list = if known().next().is_some() { listed(known()) } else { "there is none".into() };
+        let name = excerpt(name, QUOTED);
         checks.fault(path, format!("found \"{name}\"; expected the name of a {what}: {list}"));
     }
     index
@@ -152,7 +160,11 @@ fn ways<const D: usize>(checks: &mut Checks, ways: &[Way], path: &Path) -> Optio
     for (i, way) in ways.iter().enumerate() {
         let here = path.index(i);
         if let Some(before) = knots.last().filter(|before| before.time >= way.time) {
-            let message = format!("found {}; expected more than {} of the row before", way.time, before.time);
+            let message = format!(
+                "found {}; expected more than {} of the row before",
+                number(way.time),
+                number(before.time)
+            );
             checks.fault(&here.key("time"), message);
         }
         let translation = checks.vector(&way.translation, &here.key("translation"))?;

@@ -6,6 +6,7 @@ use crate::geometry::Aabb;
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{Contact as WrittenContact, Motion as Written, Row};
 use crate::job::schema::job_file::{self as file, AxisName, Spin};
+use crate::text::written;
 
 /// Most colliders of a job: what a checkpoint's header has room for.
 const MAX_COLLIDERS: usize = 16;
@@ -20,6 +21,7 @@ pub(in crate::job) fn colliders<const D: usize>(
 ) -> Option<Vec<Collider<D>>> {
     if colliders.len() > MAX_COLLIDERS {
         checks.fault(path, format!("found {} colliders; expected at most {MAX_COLLIDERS}", colliders.len()));
+        return None;
     }
     let mut all = Vec::new();
     for (i, written) in colliders.iter().enumerate() {
@@ -117,7 +119,8 @@ fn motion<const D: usize>(
             let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"))?;
             let velocity: [f64; D] = velocity?;
             for a in (0..D).filter(|&a| !along[a] && velocity[a] != 0.0) {
-                let message = format!("found {}; expected 0 along an axis that is not in along", velocity[a]);
+                let message =
+                    format!("found {}; expected 0 along an axis that is not in along", written(velocity[a]));
                 checks.fault(&path.key("velocity").index(a), message);
             }
             let start = Rate { velocity, spin: *angular_velocity };
@@ -144,7 +147,11 @@ fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Opti
     for (i, row) in rows.iter().enumerate() {
         let here = path.index(i);
         if i > 0 && row.time <= rows[i - 1].time {
-            let message = format!("found {}; expected more than the {} before", row.time, rows[i - 1].time);
+            let message = format!(
+                "found {}; expected more than the {} before",
+                written(row.time),
+                written(rows[i - 1].time)
+            );
             checks.fault(&here.key("time"), message);
         }
         let translation = optional(checks, row.translation.as_ref(), &here.key("translation"));

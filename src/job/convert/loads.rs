@@ -4,6 +4,7 @@ use crate::job::parse::source::Path;
 use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity};
 use crate::load::{Kind, Load};
 use crate::quantity::{Expression, Quantity, Table};
+use crate::text::written as number;
 
 /// Most exact sums of colliders (six each) and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
@@ -22,6 +23,7 @@ pub(super) fn loads<const D: usize>(
             path,
             format!("found {} loads; expected at most {most} beside {colliders} colliders", loads.len()),
         );
+        return None;
     }
     let mut all = Vec::new();
     for (i, written) in loads.iter().enumerate() {
@@ -40,7 +42,8 @@ fn load<const D: usize>(
 ) -> Option<Load<D>> {
     let until = written.until.unwrap_or(f64::INFINITY);
     if until <= written.from {
-        let message = format!("found {until} s; expected a time after from = {} s", written.from);
+        let message =
+            format!("found {} s; expected a time after from = {} s", number(until), number(written.from));
         checks.fault(&path.key("until"), message);
     }
     let region = match &written.shape {
@@ -75,7 +78,7 @@ fn load<const D: usize>(
             if let Quantity::Constant(value) = rate
                 && value < 0.0
             {
-                checks.fault(&path.key("rate"), format!("found {value}; expected 0 or more (1/s)"));
+                checks.fault(&path.key("rate"), format!("found {}; expected 0 or more (1/s)", number(value)));
             }
             Kind::Damping(rate)
         }
@@ -90,7 +93,7 @@ pub(super) fn vector<const D: usize>(
     path: &Path,
 ) -> Option<[Quantity; D]> {
     if written.len() != D {
-        checks.fault(path, format!("found {} components; expected {D}", written.len()));
+        checks.fault(path, format!("found {} components; expected {D} in a {D}D job", written.len()));
         return None;
     }
     let mut all = Vec::new();

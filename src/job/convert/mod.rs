@@ -13,14 +13,16 @@ use self::adaptivity::{Context, adaptivity};
 use self::colliders::colliders;
 use self::loads::{loads, vector};
 use self::settings::{digest, faces, numerics, output, report};
-use super::parse::error::{Fault, alternatives, nearest, position};
+use super::parse::error::{Fault, Lines, MOST, QUOTED, names as listed};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::{Aabb, Shape};
 use crate::load::Gravity;
 use crate::material::parameters::OutOfRange;
+use crate::text::{excerpt, nearest, number, written};
 use partition::{Brick, key::MAX_ROOTS};
+use rustc_hash::FxHashMap;
 
 mod adaptivity;
 mod colliders;
@@ -39,7 +41,7 @@ pub(super) fn convert(
     text: &str,
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
-    let mut checks = Checks { tree, text, faults: Vec::new() };
+    let mut checks = Checks { tree, lines: Lines::of(text), faults: Vec::new() };
     let problem = if file.dimension == 2 {
         problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
@@ -57,13 +59,21 @@ pub(super) fn convert(
 /// Collects faults; knows where the keys of the file stand.
 pub(super) struct Checks<'t> {
     tree: &'t Node,
-    text: &'t str,
+    lines: Lines<'t>,
     faults: Vec<Fault>,
 }
 
 impl Checks<'_> {
+    /// Whether there are so many faults that it is no use to look for more.
+    pub fn is_full(&self) -> bool {
+        self.faults.len() > MOST
+    }
+
     /// Notes a fault of the value at `path`.
     pub fn fault(&mut self, path: &Path, message: String) {
+        if self.is_full() {
+            return;
+        }
         let span = self.tree.locate(path);
         self.faults.push(Fault { key: path.to_string(), message, span, help: None });
     }
@@ -72,8 +82,10 @@ impl Checks<'_> {
     pub fn column_name<'a>(&mut self, name: &str, mut before: impl Iterator<Item = &'a str>, path: &Path) {
         let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(allowed) {
+            let name = excerpt(name, QUOTED);
             self.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
         } else if before.any(|other| other == name) {
+            let name = excerpt(name, QUOTED);
             self.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
         }
     }
@@ -121,7 +133,7 @@ fn problem<const D: usize>(
     let problem = Problem {
         name,
         path: path.to_path_buf(),
-        text: checks.text.to_owned(),
+        text: checks.lines.text.to_owned(),
         title: file.title.clone(),
         digest: digest(file),
         origin,
@@ -160,7 +172,7 @@ fn problem<const D: usize>(
         report,
     };
     for overlap in overlap::find(&problem) {
-        let [first, second] = overlap.bodies.map(|body| &problem.bodies[body].name);
+        let [first, second] = overlap.bodies.map(|body| excerpt(&problem.bodies[body].name, QUOTED));
         let point = space.words(&overlap.point);
         checks.fault(
             &root.key("bodies").index(overlap.bodies[1]).key("shape"),
@@ -178,7 +190,7 @@ pub(super) struct Space<const D: usize> {
 
 impl<const D: usize> Space<D> {
     fn words(&self, x: &[f64; D]) -> String {
-        let components: Vec<String> = (0..D).map(|a| format!("{:.6}", x[a] + self.origin[a])).collect();
+        let components: Vec<String> = (0..D).map(|a| number(x[a] + self.origin[a], 7)).collect();
         format!("[{}]", components.join(", "))
     }
 }
@@ -217,18 +229,22 @@ fn domain<const D: usize>(
         let edge = domain.root_edge;
         if whole < 1.0 || (count - whole).abs() > 1e-9 * whole {
             let (below, above) = (count.floor().max(1.0) * edge, (count.floor() + 1.0).max(1.0) * edge);
-            let near = if below < above { format!("{below} or {above}") } else { format!("{above}") };
-            checks.fault(
-                &here,
-                format!(
-                    "found {}; expected a whole multiple of domain.root_edge = {edge}, such as {near}",
-                    size[a]
-                ),
+            // Twelve digits: within what counts as whole.
+            let [below, above] = [below, above].map(|size| number(size, 12));
+            let near = if below == above { above } else { format!("{below} or {above}") };
+            let (found, edge) = (written(size[a]), written(edge));
+            let message = format!(
+                "found {found}; expected a whole multiple of domain.root_edge = {edge}, such as {near}"
             );
+            checks.fault(&here, message);
         } else if whole > f64::from(MAX_ROOTS) {
             checks.fault(
                 &here,
-                format!("found {whole} root octants along {}; expected at most {MAX_ROOTS}: a larger domain.root_edge", AXES[a]),
+                format!(
+                    "found {} root octants along {}; expected at most {MAX_ROOTS}: a larger domain.root_edge",
+                    written(whole),
+                    AXES[a]
+                ),
             );
         } else {
             roots[a] = whole as u32;
@@ -283,20 +299,22 @@ fn tree<const D: usize>(
 
 /// Faults for names that are empty or taken.
 fn names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &Path) {
-    let mut seen: Vec<&str> = Vec::new();
+    let mut seen = rustc_hash::FxHashSet::default();
+    let mut count = 0;
     for (i, name) in names.enumerate() {
+        count += 1;
         let here = path.index(i).key("name");
         if name.trim().is_empty() {
             checks.fault(&here, "found an empty name; expected at least one letter".into());
-        } else if seen.contains(&name) {
+        } else if !seen.insert(name) {
+            let name = excerpt(name, QUOTED);
             checks.fault(&here, format!("found \"{name}\" a second time; expected a name that is not taken"));
         }
-        seen.push(name);
     }
-    if seen.is_empty() {
+    if count == 0 {
         checks.fault(path, "found an empty array; expected at least one element".into());
-    } else if seen.len() > usize::from(u16::MAX) {
-        checks.fault(path, format!("found {} elements; expected at most {}", seen.len(), u16::MAX));
+    } else if count > usize::from(u16::MAX) {
+        checks.fault(path, format!("found {count} elements; expected at most {}", u16::MAX));
     }
 }
 
@@ -321,11 +339,16 @@ fn bodies<const D: usize>(
     path: &Path,
 ) -> Option<Vec<Body<D>>> {
     names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
-    let bodies: Vec<Body<D>> = file
-        .bodies
-        .iter()
-        .enumerate()
-        .filter_map(|(i, body)| self::body(checks, body, &file.materials, space, &path.index(i)))
+    // Of equal names the first counts, as everywhere.
+    let mut numbers = FxHashMap::default();
+    for (number, material) in file.materials.iter().enumerate() {
+        numbers.entry(material.name.as_str()).or_insert(number);
+    }
+    let bodies: Vec<Body<D>> = (file.bodies.iter().enumerate())
+        .map_while(|(i, body)| {
+            (!checks.is_full()).then(|| self::body(checks, body, &numbers, file, space, &path.index(i)))
+        })
+        .flatten()
         .collect();
     (bodies.len() == file.bodies.len()).then_some(bodies)
 }
@@ -333,23 +356,19 @@ fn bodies<const D: usize>(
 fn body<const D: usize>(
     checks: &mut Checks,
     body: &file::Body,
-    materials: &[file::Material],
+    materials: &FxHashMap<&str, usize>,
+    file: &JobFile,
     space: &Space<D>,
     path: &Path,
 ) -> Option<Body<D>> {
-    let material = materials.iter().position(|material| material.name == body.material);
+    let material = materials.get(body.material.as_str()).copied();
     if material.is_none() {
-        let known = || materials.iter().map(|material| material.name.as_str());
-        let guess =
-            nearest(&body.material, known()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
-        checks.fault(
-            &path.key("material"),
-            format!(
-                "found \"{}\"; expected the name of a material: {}{guess}",
-                body.material,
-                alternatives(known())
-            ),
-        );
+        let known = || file.materials.iter().map(|material| material.name.as_str());
+        let guess = nearest(&body.material, known());
+        let guess = guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
+        let (found, known) = (excerpt(&body.material, QUOTED), listed(known()));
+        let message = format!("found \"{found}\"; expected the name of a material: {known}{guess}");
+        checks.fault(&path.key("material"), message);
     }
     let velocity = match &body.velocity {
         Some(velocity) => checks.vector(velocity, &path.key("velocity")),
@@ -383,11 +402,12 @@ fn body<const D: usize>(
         let above = high.is_finite() && high > space.size[a] + slack;
         if below || above || low >= space.size[a] || high <= 0.0 {
             let o = space.origin[a];
+            let [low, high, least, most] = [low + o, high + o, o, o + space.size[a]].map(|x| number(x, 7));
+            let (name, axis) = (excerpt(&body.name, QUOTED), AXES[a]);
             checks.fault(
                 &here,
                 format!(
-                    "found the body \"{}\" from {axis} = {:.6} to {:.6}; expected it inside the domain, from {axis} = {:.6} to {:.6}",
-                    body.name, low + o, high + o, o, o + space.size[a], axis = AXES[a],
+                    "found the body \"{name}\" from {axis} = {low} to {high}; expected it inside the domain, from {axis} = {least} to {most}"
                 ),
             );
             return None;
@@ -395,7 +415,7 @@ fn body<const D: usize>(
     }
     Some(Body {
         name: body.name.clone(),
-        place: position(checks.text, checks.tree.locate(&here).start),
+        place: checks.lines.position(checks.tree.locate(&here).start),
         centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
         shape,
         material: material?,

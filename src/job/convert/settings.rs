@@ -3,6 +3,7 @@ use super::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
+use crate::text::{number, written};
 
 /// Most output files of one run.
 const MAX_OUTPUTS: f64 = 100_000.0;
@@ -65,7 +66,11 @@ pub(in crate::job) fn numerics(
     if min_stretch <= 0.0 || min_stretch > 1.0 || !(1.0..=8.0).contains(&max_stretch) {
         checks.fault(
             &here,
-            format!("found [{min_stretch}, {max_stretch}]; expected a lower bound above 0 and at most 1 and an upper one from 1 to 8"),
+            format!(
+                "found [{}, {}]; expected a lower bound above 0 and at most 1 and an upper one from 1 to 8",
+                written(min_stretch),
+                written(max_stretch)
+            ),
         );
     }
     let boxes = match numerics.boxes {
@@ -94,8 +99,10 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         checks.fault(
             &path.key("every"),
             format!(
-                "found {every}; expected at least {:e}, for at most {MAX_OUTPUTS} outputs until time.end",
-                file.time.end / MAX_OUTPUTS
+                "found {}; expected at least {}, for at most {MAX_OUTPUTS} outputs until time.end",
+                written(every),
+                // Rounded, but not down.
+                number(1.001 * file.time.end / MAX_OUTPUTS, 4)
             ),
         );
     }

@@ -4,6 +4,7 @@ use crate::geometry::{Aabb, Frustum, Placement, Shape, rotation};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::Vector;
 use crate::job::schema::shape::Shape as Written;
+use crate::text::written;
 
 impl Checks<'_> {
     /// The shape in coordinates relative to the domain's lower corner.
@@ -18,7 +19,8 @@ impl Checks<'_> {
                 let lower = self.point(min, space, &path.key("min"))?;
                 let upper = self.point(max, space, &path.key("max"))?;
                 if let Some(a) = (0..D).find(|&a| lower[a] >= upper[a]) {
-                    let message = format!("found {}; expected more than min[{a}] = {}", max.0[a], min.0[a]);
+                    let (found, least) = (written(max.0[a]), written(min.0[a]));
+                    let message = format!("found {found}; expected more than min[{a}] = {least}");
                     self.fault(&path.key("max").index(a), message);
                     return None;
                 }
@@ -130,12 +132,15 @@ impl Checks<'_> {
 
     fn direction<const D: usize>(&mut self, direction: &Vector, path: &Path) -> Option<[f64; D]> {
         let direction: [f64; D] = self.vector(direction, path)?;
-        let length = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if length == 0.0 {
+        // Lengths of any size: squares of components may be too small or too large for a number.
+        let greatest = direction.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+        let scaled = direction.map(|c| c / greatest);
+        let length = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if !length.is_finite() {
             self.fault(path, "found a vector of length 0; expected a direction".into());
             return None;
         }
-        Some(direction.map(|c| c / length))
+        Some(scaled.map(|c| c / length))
     }
 
     fn axis<const D: usize>(&mut self, axis: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
@@ -203,14 +208,31 @@ fn first_crossing(corners: &[[f64; 2]]) -> Option<usize> {
             || (u == 0.0 && within(c, d, a))
             || (v == 0.0 && within(c, d, b))
     };
-    (0..n).find(|&i| {
-        let (a, b) = (corners[i], corners[(i + 1) % n]);
-        let next = corners[(i + 2) % n];
-        let folds = turn(a, b, next) == 0.0
-            && (next[0] - b[0]) * (b[0] - a[0]) + (next[1] - b[1]) * (b[1] - a[1]) <= 0.0;
-        folds
-            || (0..n)
-                .filter(|&j| j != i && (j + 1) % n != i && (i + 1) % n != j)
-                .any(|j| meet(a, b, corners[j], corners[(j + 1) % n]))
-    })
+    let edge = |i: usize| (corners[i], corners[(i + 1) % n]);
+    let folds = |i: usize| {
+        let ((a, b), next) = (edge(i), corners[(i + 2) % n]);
+        turn(a, b, next) == 0.0 && (next[0] - b[0]) * (b[0] - a[0]) + (next[1] - b[1]) * (b[1] - a[1]) <= 0.0
+    };
+    // Along x: an edge can meet those only that begin before it ends.
+    let reach = |i: usize| {
+        let (a, b) = edge(i);
+        (a[0].min(b[0]), a[0].max(b[0]))
+    };
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&i, &j| reach(i).0.total_cmp(&reach(j).0).then(i.cmp(&j)));
+    let mut first = (0..n).find(|&i| folds(i));
+    for (place, &i) in order.iter().enumerate() {
+        let ((a, b), end) = (edge(i), reach(i).1);
+        for &j in order[place + 1..].iter().take_while(|&&j| reach(j).0 <= end) {
+            let apart = (j + 1) % n != i && (i + 1) % n != j;
+            let lower = i.min(j);
+            if apart && first.is_none_or(|first| lower < first) {
+                let (c, d) = edge(j);
+                if meet(a, b, c, d) {
+                    first = Some(lower);
+                }
+            }
+        }
+    }
+    first
 }

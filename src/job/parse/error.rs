@@ -3,6 +3,8 @@ use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
 
+use crate::text::{excerpt, printable};
+
 /// One fault of a job file: where it is, what was found and what would be right.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}{}{message}", if key.is_empty() { "" } else { ": " })]
@@ -39,7 +41,20 @@ pub enum JobError {
     Invalid(#[from] FaultList),
 }
 
-/// All faults found in one job file, in the order of the file; at least one.
+/// Faults of a file that are told; the rest are counted.
+const TOLD: usize = 20;
+/// Faults after which no more are looked for.
+pub(in crate::job) const MOST: usize = 1000;
+/// Longest message, in characters. What it quotes of the file is shorter; only lists of what is possible come near.
+const LONGEST: usize = 500;
+/// Longest key of a message, in characters.
+const LONGEST_KEY: usize = 100;
+/// Names of the file that a message lists as possible.
+const NAMES: usize = 12;
+/// Longest text of the file that a message quotes, in characters.
+pub(in crate::job) const QUOTED: usize = 60;
+
+/// The faults found in one job file, in the order of the file; at least one, and not many more than a thousand.
 #[derive(Clone, Debug, thiserror::Error)]
 pub struct FaultList {
     /// Name of the file as given.
@@ -56,42 +71,91 @@ impl FaultList {
         position(&self.text, byte)
     }
 
-    /// `file:line:column: key: message` of one fault.
+    /// `file:line:column: key: message` of one fault, without characters that control a terminal.
     pub fn headline(&self, fault: &Fault) -> String {
         let (line, column) = self.position(fault.span.start);
-        format!("{}:{line}:{column}: {fault}", self.path.display())
+        let path = self.path.display().to_string();
+        let key = excerpt(&fault.key, LONGEST_KEY);
+        let separator = if key.is_empty() { "" } else { ": " };
+        let message = excerpt(&fault.message, LONGEST);
+        format!("{}:{line}:{column}: {key}{separator}{message}", printable(&path))
+    }
+
+    /// The faults to tell: the first ones of the file.
+    pub fn told(&self) -> &[Fault] {
+        &self.faults[..self.faults.len().min(TOLD)]
+    }
+
+    /// How many there are, if that is worth a line: `3 faults in job.toml`.
+    pub fn summary(&self) -> Option<String> {
+        let (count, path) = (self.faults.len(), self.path.display().to_string());
+        let path = printable(&path);
+        match count {
+            0 | 1 => None,
+            _ if count > MOST => Some(format!("the first {TOLD} of more than {MOST} faults in {path}")),
+            _ if count > TOLD => Some(format!("the first {TOLD} of {count} faults in {path}")),
+            _ => Some(format!("{count} faults in {path}")),
+        }
     }
 }
 
 impl fmt::Display for FaultList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, fault) in self.faults.iter().enumerate() {
+        for (i, fault) in self.told().iter().enumerate() {
             if i > 0 {
                 writeln!(f)?;
             }
             f.write_str(&self.headline(fault))?;
         }
-        Ok(())
+        match self.summary() {
+            Some(summary) if self.faults.len() > TOLD => write!(f, "\n{summary}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Places in a text that is asked about often.
+pub(in crate::job) struct Lines<'t> {
+    /// All of it.
+    pub(in crate::job) text: &'t str,
+    /// First byte of each line.
+    starts: Vec<usize>,
+}
+
+impl<'t> Lines<'t> {
+    pub(in crate::job) fn of(text: &'t str) -> Self {
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+        Self { text, starts: std::iter::once(0).chain(breaks).collect() }
+    }
+
+    /// Line and column, both from 1, of a byte position; columns count characters.
+    pub(in crate::job) fn position(&self, byte: usize) -> (usize, usize) {
+        let byte = self.text.floor_char_boundary(byte);
+        let line = self.starts.partition_point(|start| *start <= byte);
+        (line, self.text[self.starts[line - 1]..byte].chars().count() + 1)
     }
 }
 
 /// Line and column, both from 1, of a byte position; columns count characters.
-pub(in crate::job) fn position(text: &str, byte: usize) -> (usize, usize) {
+fn position(text: &str, byte: usize) -> (usize, usize) {
     // A place inside a character belongs to its start; one behind the end, to the end.
     let before = &text[..text.floor_char_boundary(byte)];
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// The known word nearest to `word`, if it is near enough to be meant.
-pub(in crate::job) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
-        .min_by_key(|&(distance, _)| distance)
-        // A third of the letters may differ; shorter words than three letters have to be right.
-        .filter(|&(distance, candidate)| distance <= word.len().max(candidate.len()).div_ceil(3))
-        .map(|(_, candidate)| candidate)
+/// [`alternatives`] of names that stand in the file: the first ones of many, each cut to what can be read.
+pub(in crate::job) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut names = names.into_iter();
+    let first: Vec<_> = names.by_ref().take(NAMES).map(|name| excerpt(name, QUOTED)).collect();
+    let first = first.iter().map(AsRef::as_ref);
+    match names.count() {
+        0 => alternatives(first),
+        more => format!(
+            "{} or one of {more} more",
+            first.map(|name: &str| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+        ),
+    }
 }
 
 /// `"a", "b" or "c"`.
@@ -112,13 +176,9 @@ mod tests {
     fn columns_count_characters() {
         assert_eq!(position("a = 1\nµ = \"é\" # x", 16), (2, 9));
         assert_eq!(position("", 5), (1, 1));
-    }
-
-    #[test]
-    fn nearest_word_is_near() {
-        let known = ["density", "name", "young"];
-        assert_eq!(nearest("denisty", known), Some("density"));
-        assert_eq!(nearest("Young", known), Some("young"));
-        assert_eq!(nearest("wobble", known), None);
+        let text = "a = 1\nµ = \"é\" # x\n\n";
+        for byte in 0..=text.len() + 1 {
+            assert_eq!(Lines::of(text).position(byte), position(text, byte));
+        }
     }
 }

@@ -1,4 +1,6 @@
 //! The text of a job file as a tree of values that know where they stand.
+use super::error::QUOTED;
+use crate::text::{excerpt, written};
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -57,8 +59,8 @@ impl std::fmt::Display for Path {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         for (i, step) in self.0.iter().enumerate() {
             match step {
-                Step::Key(key) if i == 0 => f.write_str(key)?,
-                Step::Key(key) => write!(f, ".{key}")?,
+                Step::Key(key) if i == 0 => f.write_str(&excerpt(key, QUOTED))?,
+                Step::Key(key) => write!(f, ".{}", excerpt(key, QUOTED))?,
                 Step::Index(index) => write!(f, "[{index}]")?,
             }
         }
@@ -106,9 +108,9 @@ impl Node {
     pub fn describe(&self) -> String {
         let mut words = String::new();
         let written = match &self.value {
-            Value::Text(text) => write!(words, "the text \"{text}\""),
+            Value::Text(text) => write!(words, "the text \"{}\"", excerpt(text, QUOTED)),
             Value::Integer(number) => write!(words, "{number}"),
-            Value::Float(number) => write!(words, "{number}"),
+            Value::Float(number) => words.write_str(&written(*number)),
             Value::Boolean(flag) => write!(words, "{flag}"),
             Value::Time(time) => write!(words, "the date {time}"),
             Value::Array(elements) if elements.is_empty() => write!(words, "an empty array"),
@@ -141,12 +143,20 @@ fn from_value(spanned: Spanned<DeValue<'_>>, key_span: Option<Range<usize>>) -> 
         DeValue::Integer(digits) => match i64::from_str_radix(digits.as_str(), digits.radix()) {
             Ok(number) => Value::Integer(number),
             Err(_) => {
-                return Err((span, format!("found the integer {digits}; expected one of at most 63 bits")));
+                return Err((
+                    span,
+                    format!(
+                        "found the integer {}; expected one of at most 63 bits",
+                        excerpt(digits.as_str(), QUOTED)
+                    ),
+                ));
             }
         },
         DeValue::Float(digits) => match digits.as_str().parse() {
             Ok(number) => Value::Float(number),
-            Err(_) => return Err((span, format!("found {digits}; expected a number"))),
+            Err(_) => {
+                return Err((span, format!("found {}; expected a number", excerpt(digits.as_str(), QUOTED))));
+            }
         },
         DeValue::Boolean(flag) => Value::Boolean(flag),
         DeValue::Datetime(time) => Value::Time(time.to_string()),

@@ -2,13 +2,21 @@
 //!
 //! Working from the schema rather than from the parser's errors finds all faults at once, knows where
 //! each stands, and can say what a key means.
-use super::error::{Fault, alternatives, nearest};
+use super::error::{Fault, MOST, QUOTED, alternatives};
 use super::source::{Node, Path, Value as Toml};
+use crate::text::{excerpt, nearest};
 use serde_json::Value;
 
-/// All faults of form in the file, in its order.
+/// Keyword of the schema for keys and words that only jobs of one dimension have.
+const DIMENSION: &str = "x-dimension";
+
+/// The faults of form in the file, in its order; of very many the first ones found.
 pub(in crate::job) fn check(file: &Node, schema: &Value) -> Vec<Fault> {
-    let mut checker = Checker { root: schema, faults: Vec::new() };
+    let dimension = match file.get("dimension").map(|node| &node.value) {
+        Some(Toml::Integer(dimension @ 2..=3)) => Some(*dimension),
+        _ => None,
+    };
+    let mut checker = Checker { root: schema, dimension, faults: Vec::new() };
     checker.value(file, schema, &Path::default());
     let mut faults = checker.faults;
     faults.sort_by_key(|fault| fault.span.start);
@@ -17,6 +25,8 @@ pub(in crate::job) fn check(file: &Node, schema: &Value) -> Vec<Fault> {
 
 struct Checker<'s> {
     root: &'s Value,
+    /// Dimension of the job, if the file says so.
+    dimension: Option<i64>,
     faults: Vec<Fault>,
 }
 
@@ -52,7 +62,7 @@ impl<'s> Layers<'s> {
         self.keyword(keyword).and_then(Value::as_f64)
     }
 
-    fn properties(&self) -> impl Iterator<Item = (&'s str, &'s Value)> {
+    fn properties(&self) -> impl Iterator<Item = (&'s str, &'s Value)> + Clone {
         let maps = self.schemas.iter().filter_map(|schema| schema.get("properties")?.as_object());
         maps.flatten().map(|(key, schema)| (key.as_str(), schema))
     }
@@ -79,7 +89,16 @@ impl<'s> Layers<'s> {
 }
 
 impl<'s> Checker<'s> {
+    /// Whether jobs of this dimension have the key or word.
+    fn fits(&self, schema: &Value) -> bool {
+        let only = schema.get(DIMENSION).and_then(Value::as_i64);
+        only.is_none() || self.dimension.is_none() || only == self.dimension
+    }
+
     fn value(&mut self, node: &Node, schema: &'s Value, path: &Path) {
+        if self.faults.len() > MOST {
+            return;
+        }
         let mut layers = Layers::default();
         layers.add(self.root, schema);
         while let Some(options) = layers.choices.pop() {
@@ -114,15 +133,16 @@ impl<'s> Checker<'s> {
         }
         // Words, such as "slip".
         if options.iter().all(|option| option.get("const").is_some()) {
-            let words = || options.iter().filter_map(|option| option.get("const")?.as_str());
+            let fitting = || options.iter().filter(|option| self.fits(option));
+            let words: Vec<&str> = fitting().filter_map(|option| option.get("const")?.as_str()).collect();
             let Toml::Text(word) = &node.value else {
-                self.mismatch(node, &alternatives(words()), layers, path);
+                self.mismatch(node, &alternatives(words), layers, path);
                 return None;
             };
             let found =
                 options.iter().find(|option| option.get("const") == Some(&Value::from(word.as_str())));
             if found.is_none() {
-                self.unknown_word(node, word, words(), layers, path);
+                self.unknown_word(node, word, &words, layers, path);
             }
             return found.copied();
         }
@@ -133,23 +153,20 @@ impl<'s> Checker<'s> {
                 return None;
             }
             let word_of = |option: &'s Value| option.get("properties")?.get(tag)?.get("const")?.as_str();
-            let words = || options.iter().filter_map(|option| word_of(option));
+            let fitting = options.iter().filter(|option| self.fits(option));
+            let words: Vec<&str> = fitting.filter_map(|option| word_of(option)).collect();
             let Some(kind) = node.get(tag) else {
-                self.fault(
-                    node,
-                    path,
-                    format!("found no key \"{tag}\"; expected {tag} = {}", alternatives(words())),
-                    layers,
-                );
+                let message = format!("missing key `{tag}`; expected {tag} = {}", alternatives(words));
+                self.fault(node, path, message, layers);
                 return None;
             };
             let Toml::Text(word) = &kind.value else {
-                self.mismatch(kind, &alternatives(words()), layers, &path.key(tag.to_owned()));
+                self.mismatch(kind, &alternatives(words), layers, &path.key(tag.to_owned()));
                 return None;
             };
             let found = options.iter().find(|option| word_of(option) == Some(word));
             if found.is_none() {
-                self.unknown_word(kind, word, words(), layers, &path.key(tag.to_owned()));
+                self.unknown_word(kind, word, &words, layers, &path.key(tag.to_owned()));
             }
             return found.copied();
         }
@@ -193,17 +210,22 @@ impl<'s> Checker<'s> {
             layers.required().filter(|key| !entries.iter().any(|(given, _)| given == key)).collect();
         missing.dedup();
         for (key, inner) in unknown {
+            if self.faults.len() > MOST {
+                return;
+            }
             // A key that is missing is what a misspelt one was most likely meant to be.
-            let free = layers.properties().map(|(known, _)| known).filter(|known| node.get(known).is_none());
+            let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
+            let free = keys.clone().filter(|known| node.get(known).is_none());
             let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, free));
+            let quoted = excerpt(key, QUOTED);
             let message = match meant {
                 Some(meant) => {
                     missing.retain(|other| *other != meant);
-                    format!("found the unknown key \"{key}\"; did you mean \"{meant}\"?")
+                    format!("unknown key `{quoted}`; did you mean `{meant}`?")
                 }
                 None => {
-                    let known = alternatives(layers.properties().map(|(known, _)| known));
-                    format!("found the unknown key \"{key}\"; expected {known}")
+                    let known: Vec<String> = keys.map(|known| format!("`{known}`")).collect();
+                    format!("unknown key `{quoted}`; expected one of {}", known.join(", "))
                 }
             };
             let help = layers.properties().find(|(known, _)| Some(*known) == meant);
@@ -222,7 +244,7 @@ impl<'s> Checker<'s> {
             let meaning = wanted.description().map_or(String::new(), |text| format!(": {text}"));
             self.faults.push(Fault {
                 key: path.key(key.to_owned()).to_string(),
-                message: format!("found nothing; expected the key \"{key}\"{meaning}"),
+                message: format!("missing key `{key}`{meaning}"),
                 span: node.span.clone(),
                 help: None,
             });
@@ -235,6 +257,10 @@ impl<'s> Checker<'s> {
         let count = elements.len() as f64;
         if count < least || count > most {
             self.mismatch(node, &type_words("array", layers), layers, path);
+            // One fault says it all if there are far too many.
+            if count > 10.0 * most {
+                return;
+            }
         }
         if let Some(items) = layers.keyword("items") {
             for (i, element) in elements.iter().enumerate() {
@@ -256,17 +282,11 @@ impl<'s> Checker<'s> {
         }
     }
 
-    fn unknown_word<'a>(
-        &mut self,
-        node: &Node,
-        word: &str,
-        words: impl Iterator<Item = &'a str> + Clone,
-        layers: &Layers<'s>,
-        path: &Path,
-    ) {
-        let guess =
-            nearest(word, words.clone()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
-        let message = format!("found \"{word}\"; expected {}{guess}", alternatives(words));
+    fn unknown_word(&mut self, node: &Node, word: &str, words: &[&str], layers: &Layers<'s>, path: &Path) {
+        let known = || words.iter().copied();
+        let guess = nearest(word, known()).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
+        let message =
+            format!("found \"{}\"; expected {}{guess}", excerpt(word, QUOTED), alternatives(known()));
         self.fault(node, path, message, layers);
     }
 
@@ -304,6 +324,7 @@ fn type_words(name: &str, layers: &Layers<'_>) -> String {
                 (Some(least), Some(most)) if least == most => format!("an array of {least} {kind}"),
                 (Some(least), Some(most)) => format!("an array of {least} to {most} {kind}"),
                 (Some(least), None) => format!("an array of at least {least} {kind}"),
+                (None, Some(most)) => format!("an array of at most {most} {kind}"),
                 _ => format!("an array of {kind}"),
             }
         }

@@ -63,6 +63,7 @@ pub enum Motion {
     Table {
         /// Axis of the rotations, any length; 3D only, z by default.
         #[serde(default)]
+        #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
         /// Rows with increasing times; at least two.
         rows: Vec<Row>,
@@ -86,6 +87,7 @@ pub enum Motion {
         inertia: Option<f64>,
         /// Axis about which it turns, fixed, any length; 3D only, z by default.
         #[serde(default)]
+        #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
         /// Angular velocity about the axis at the start, rad/s; 0 by default.
         #[serde(default)]

@@ -119,9 +119,11 @@ pub struct Boundaries {
     pub y_max: Option<Face>,
     /// Lower face along z; 3D only.
     #[serde(default)]
+    #[schemars(extend("x-dimension" = 3))]
     pub z_min: Option<Face>,
     /// Upper face along z; 3D only.
     #[serde(default)]
+    #[schemars(extend("x-dimension" = 3))]
     pub z_max: Option<Face>,
     /// What happens to particles that leave the domain.
     #[serde(default)]
@@ -336,6 +338,7 @@ pub enum AxisName {
     X,
     /// Second axis.
     Y,
-    /// Third axis.
+    /// Third axis; 3D only.
+    #[schemars(extend("x-dimension" = 3))]
     Z,
 }

@@ -15,6 +15,7 @@ pub enum Shape {
         max: Vector,
     },
     /// A disc; 2D only.
+    #[schemars(extend("x-dimension" = 2))]
     Circle {
         /// Centre, m.
         centre: Vector,
@@ -23,6 +24,7 @@ pub enum Shape {
         radius: f64,
     },
     /// A ball; 3D only.
+    #[schemars(extend("x-dimension" = 3))]
     Sphere {
         /// Centre, m.
         centre: Vector,
@@ -31,6 +33,7 @@ pub enum Shape {
         radius: f64,
     },
     /// A circular cylinder; 3D only.
+    #[schemars(extend("x-dimension" = 3))]
     Cylinder {
         /// Centre of one end, m.
         base: Vector,
@@ -45,6 +48,7 @@ pub enum Shape {
         radius: f64,
     },
     /// A circular cone, possibly truncated; 3D only.
+    #[schemars(extend("x-dimension" = 3))]
     Cone {
         /// Centre of the wide end, m.
         base: Vector,
@@ -70,8 +74,10 @@ pub enum Shape {
         normal: Vector,
     },
     /// A simple polygon; 2D only.
+    #[schemars(extend("x-dimension" = 2))]
     Polygon {
         /// Corners in order, m; at least three.
+        #[schemars(length(max = 10_000))]
         points: Vec<Vector>,
     },
     /// A shape turned about a point.
@@ -82,6 +88,7 @@ pub enum Shape {
         centre: Vector,
         /// Axis of the rotation, any length; 3D only, z by default.
         #[serde(default)]
+        #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
         /// Angle, degrees, counter-clockwise seen against the axis.
         #[schemars(range(min = -360.0, max = 360.0))]
