@@ -10,6 +10,9 @@ fn main() -> ExitCode {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();
+    // Without it such a write ends the program, which says nothing.
+    let _ = agimp::io::cause::tell_size_limits();
+    agimp::io::hdf5_file::prepare();
     let done = Arguments::try_parse().map_err(unusable).and_then(|arguments| execute(arguments.command));
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,14 +3,15 @@
 #[path = "common/mpirun.rs"]
 mod mpirun;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use agimp::io::hdf5_file::ParallelFile;
+use agimp::io::hdf5_file::Writer;
 use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
-use agimp::io::snapshot::{self, Options, Outputs, PointField, Scalars, View};
+use agimp::io::snapshot::{self, Limits, Options, Outputs, PointField, Scalars, View};
 use agimp::particle::chunk::{Chunk, Layout, Tag};
 use partition::comm::{Comm, World, is_launched};
 use partition::{Brick, Octant};
@@ -67,6 +68,8 @@ struct Run<const D: usize> {
 }
 
 const ORIGIN: f64 = -0.375;
+const ROOT_EDGE: f64 = 0.5;
+const LIMITS: Limits = Limits { materials: 2, bodies: 2 };
 
 impl<const D: usize> Run<D> {
     /// The leaves from `first` to `end` of a made-up run with `leaves` leaves.
@@ -81,9 +84,14 @@ impl<const D: usize> Run<D> {
                 let id = (i as u64) << 8 | k;
                 let tag = Tag { material: (id % 2) as u16, body: 1, level: 3 };
                 let p = chunk.push_zeroed(id, tag);
+                let (leaf, edge) = (octant(i), ROOT_EDGE / f64::from(1 << octant(i).level));
                 for column in 0..Layout::<D>::REALS {
                     let value = (scramble(id, column as u64) >> 11) as f64 / (1_u64 << 53) as f64;
-                    chunk.column_mut(column)[p] = value - 0.25;
+                    chunk.column_mut(column)[p] = match column {
+                        axis if axis < D => (f64::from(leaf.coord[axis]) + value) * edge,
+                        column if column == Layout::<D>::MASS || column == Layout::<D>::HALF => value + 0.25,
+                        _ => value - 0.25,
+                    };
                 }
                 // A stress-free shape with a positive volume.
                 for component in 0..3 {
@@ -113,7 +121,7 @@ impl<const D: usize> Run<D> {
             chunks: &self.chunks,
             leaf_fields: &self.leaf_fields,
             origin: [ORIGIN; D],
-            root_edge: 0.5,
+            root_edge: ROOT_EDGE,
             brick: Brick { roots: [1; D] },
             materials: &self.materials,
             histories: &self.histories,
@@ -165,7 +173,7 @@ fn write_read_write<const D: usize>(comm: &Comm, directory: &Path) {
 
     // Back from the file that the first launch has written, on this number of ranks.
     let source = directory.join(format!("run{D}_1.hdf"));
-    let back = snapshot::read::<D>(comm, &source, Some(0xfeed_face_dead_beef)).expect("read");
+    let back = snapshot::read::<D>(comm, &source, Some(0xfeed_face_dead_beef), LIMITS).expect("read");
     let names = (back.header.materials.clone(), back.header.histories.clone());
     let again = Run {
         leaves: back.leaves,
@@ -244,7 +252,7 @@ fn a_step_without_particles_or_leaves() {
                 let path = directory.join(format!("{kind}_{}.hdf", comm.size()));
                 snapshot::write(comm, &path, &run.view(), &options()).expect("written");
                 snapshot::write_tree(comm, &path.with_extension("tree.hdf"), &run.view()).expect("written");
-                let back = snapshot::read::<2>(comm, &path, None).expect("read");
+                let back = snapshot::read::<2>(comm, &path, None, LIMITS).expect("read");
                 assert_eq!(back.header.leaves, leaves as u64);
                 assert_eq!(back.header.particles, 0);
             }
@@ -281,7 +289,7 @@ fn damaged_and_foreign_files_are_refused() {
             }
             let refused = |file: &str, job, reason: &str| {
                 let path = directory.join(file);
-                let error = snapshot::read::<3>(comm, &path, job).expect_err(file).to_string();
+                let error = snapshot::read::<3>(comm, &path, job, LIMITS).expect_err(file).to_string();
                 assert!(error.contains(reason) && error.contains(file), "{file}: {error}");
             };
             refused("missing.hdf", None, "No such file");
@@ -291,21 +299,22 @@ fn damaged_and_foreign_files_are_refused() {
             refused("flipped.hdf", None, "wrong checksum of state/particles/position");
             refused("flipped_header.hdf", None, "");
             refused("flipped_mark.hdf", None, "");
-            let file = ParallelFile::create(comm, &directory.join("format.hdf")).expect("created");
+            let file = Writer::create(comm, &directory.join("format.hdf")).expect("created");
             file.create_group("state").expect("group");
             file.set_text("state", "magic", "agimp state").expect("text");
             file.set_text("state", "program", "7.0.0").expect("text");
             file.set_attribute("state", "format", &[99_u64]).expect("number");
             file.close().expect("closed");
             refused("format.hdf", None, "written in format 99 by agimp 7.0.0");
-            let file = ParallelFile::create(comm, &directory.join("foreign.hdf")).expect("created");
+            let file = Writer::create(comm, &directory.join("foreign.hdf")).expect("created");
             file.close().expect("closed");
             refused("foreign.hdf", None, "not a file of agimp");
             refused("light.hdf", None, "no restart state");
             refused("good.hdf", Some(7), "belongs to another job");
-            let error = snapshot::read::<2>(comm, &path, None).expect_err("dimension").to_string();
+            let error = snapshot::read::<2>(comm, &path, None, LIMITS).expect_err("dimension").to_string();
             assert!(error.contains("3D run, the job is 2D"), "{error}");
-            snapshot::read::<3>(comm, &path, Some(0xfeed_face_dead_beef)).expect("the whole file is read");
+            snapshot::read::<3>(comm, &path, Some(0xfeed_face_dead_beef), LIMITS)
+                .expect("the whole file is read");
         },
         |_| {},
     );
@@ -366,6 +375,8 @@ fn a_failing_rank_leaves_no_file() {
 fn a_full_disk_leaves_the_old_file() {
     const NAME: &str = "a_full_disk_leaves_the_old_file";
     if let Some(directory) = std::env::var_os("AGIMP_TEST_DIRECTORY").map(PathBuf::from) {
+        // As the program does, which survives files that cannot be closed.
+        agimp::io::hdf5_file::prepare();
         let world = World::init().expect("MPI starts");
         let comm = world.comm();
         let path = directory.join("kept.hdf");
@@ -375,11 +386,15 @@ fn a_full_disk_leaves_the_old_file() {
         comm.barrier();
         let large = Run::<3>::example(share(comm, 400, 0), 200);
         let error = snapshot::write(comm, &path, &large.view(), &options()).expect_err("too large");
-        assert!(error.to_string().contains("kept.hdf.part"), "{error}");
+        assert!(
+            error.to_string().contains("kept.hdf.part: cannot write: no space left on device"),
+            "{error}"
+        );
         comm.barrier();
         assert!(bytes(&path) == before, "the old file is untouched");
         assert!(!path.with_added_extension("part").exists());
         snapshot::write(comm, &path, &small.view(), &options()).expect("small enough, again");
+        full_at_any_point(comm, &directory);
         return;
     }
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -401,6 +416,42 @@ fn a_full_disk_leaves_the_old_file() {
     let output = launch(&mpirun).expect("unshare starts");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}");
+}
+
+/// Room for none, some and all but the last page of a file: wherever it fails, all ranks get the reason, and nothing stays.
+fn full_at_any_point(comm: &Comm, directory: &Path) {
+    const PAGE: u64 = 4096;
+    let (path, ballast) = (directory.join("later.hdf"), directory.join("ballast"));
+    let run = Run::<3>::example(share(comm, 40, 0b010), 30);
+    snapshot::write(comm, &path, &run.view(), &options()).expect("small enough");
+    let whole = bytes(&path).len().next_multiple_of(PAGE as usize) as u64;
+    comm.barrier();
+    if comm.rank() == 0 {
+        std::fs::remove_file(&path).expect("removed");
+    }
+    for room in [0, PAGE, 2 * PAGE, whole / 2, whole - 3 * PAGE, whole - 2 * PAGE, whole - PAGE] {
+        let room = room / PAGE * PAGE;
+        if comm.rank() == 0 {
+            // As much as the disk holds, then less by the room.
+            let filler = std::fs::File::create(&ballast).expect("created");
+            let mut held = 0;
+            while (&filler).write_all(&[1; PAGE as usize]).is_ok() {
+                held += PAGE;
+            }
+            filler.set_len(held - room).expect("shortened");
+        }
+        comm.barrier();
+        let written = snapshot::write(comm, &path, &run.view(), &options());
+        let error = written.expect_err("one page is missing at least").to_string();
+        assert!(error.contains("no space left on device"), "{room} of {whole}: {error}");
+        comm.barrier();
+        if comm.rank() == 0 {
+            assert!(!path.exists() && !path.with_added_extension("part").exists(), "{room} of {whole}");
+            std::fs::remove_file(&ballast).expect("removed");
+        }
+        comm.barrier();
+    }
+    snapshot::write(comm, &path, &run.view(), &options()).expect("small enough");
 }
 
 #[test]
@@ -494,7 +545,7 @@ fn files_named_by_earlier_versions_are_found_and_continued() {
             .expect("copied");
             let latest = candidates(directory, "old", None).expect("listed").whole.swap_remove(0).0;
             assert_eq!(latest, earlier(checkpoint_path(directory, "old", 20)));
-            let back = snapshot::read::<2>(comm, &latest, None).expect("read");
+            let back = snapshot::read::<2>(comm, &latest, None, LIMITS).expect("read");
             assert_eq!(back.header.step, 20);
 
             let mut outputs = Outputs::resume(comm, directory, "old", options(), 2, 0.1).expect("resumed");
@@ -527,13 +578,16 @@ fn differences_are_named() {
             let column = Layout::<2>::STRESS + 1;
             run.chunks[leaf].column_mut(column)[1] += 1.0;
             run.chunks[leaf].ids_mut()[0] = 1 << 40;
+            snapshot::write(comm, &directory.join("c.hdf"), &run.view(), &options()).expect("written");
             run.leaves[3].level += 1;
             snapshot::write(comm, &directory.join("b.hdf"), &run.view(), &options()).expect("written");
         },
         |directory| {
-            let paths = ["a.hdf", "b.hdf"].map(|name| directory.join(name));
+            let paths = ["a.hdf", "b.hdf", "c.hdf"].map(|name| directory.join(name));
             let found = diff(&paths[0], &paths[1]).expect("compared");
-            assert_ne!(digest(&paths[0]).expect("digest"), digest(&paths[1]).expect("digest"));
+            assert_ne!(digest(&paths[0]).expect("digest"), digest(&paths[2]).expect("digest"));
+            let error = digest(&paths[1]).expect_err("a leaf has shrunk").to_string();
+            assert!(error.contains("is not in its leaf of level"), "{error}");
             assert!(matches!(found[0], Difference::Tree { leaf: 3, .. }), "{found:?}");
             assert!(matches!(found[1], Difference::Missing { only_in: 0, count: 1, .. }), "{found:?}");
             assert!(matches!(found[2], Difference::Missing { only_in: 1, id: 0x100_0000_0000, count: 1 }));
@@ -658,7 +712,7 @@ fn speed_of_checkpoints() {
                 if comm.rank() == 0 {
                     let size = bytes(&path).len() as f64 / 1e6;
                     println!(
-                        "speed: {} ranks, {size:.1} MB: {:.1} ms to hand over, {:.1} ms until on disk",
+                        "\nspeed: {} ranks, {size:.1} MB: {:.1} ms to hand over, {:.1} ms until on disk",
                         comm.size(),
                         1e3 * least(&handed),
                         1e3 * least(&on_disk)

@@ -1,6 +1,6 @@
 //! `agimp info`: what is in an output or checkpoint file.
 use super::Failure;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::{Header, PointField, compare};
 use crate::text::{bytes, count as grouped, number, printable, quantity_to};
 use std::collections::BTreeMap;
@@ -36,30 +36,35 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     write(&mut out, &contents)?;
     if arguments.verify {
-        let digest = compare::digest(&arguments.file).map_err(failed)?;
-        writeln!(out, "checksums        all right; digest {:016x}", digest.whole)?;
+        let sets = compare::verify(&arguments.file).map_err(failed)?;
+        write!(out, "checksums        all right ({sets} data sets)")?;
+        if contents.header.restart {
+            let digest = compare::digest(&arguments.file).map_err(failed)?;
+            write!(out, "; digest {:016x}", digest.whole)?;
+        }
+        writeln!(out)?;
     }
     Ok(())
 }
 
 fn read(arguments: &Arguments) -> Result<Contents, FileError> {
-    let file = ParallelFile::open_alone(&arguments.file)?;
+    let file = Reader::open_alone(&arguments.file)?;
     let header = Header::read(&file)?;
     let size = std::fs::metadata(&arguments.file).map_or(0, |data| data.len());
     let shown = |field: &&PointField| file.exists(&format!("VTKHDF/PointData/{}", field.name()));
     let fields = PointField::ALL.iter().filter(shown).map(|field| field.name()).collect();
-    let mut levels: BTreeMap<u8, (u64, u64)> = BTreeMap::new();
-    for group in ["state/tree", "VTKHDF/CellData"] {
-        let (level, particles) = (format!("{group}/level"), format!("{group}/particles"));
-        if levels.is_empty() && file.exists(&level) {
-            let counts = file.read_slab::<u64>(&particles, 0, header.leaves)?;
-            for (level, count) in file.read_slab::<u8>(&level, 0, header.leaves)?.into_iter().zip(counts) {
-                let entry = levels.entry(level).or_default();
-                *entry = (entry.0 + 1, entry.1 + count);
-            }
-        }
-    }
+    let levels = levels(&file, &header)?;
     Ok(Contents { header, size, fields, levels })
+}
+
+/// Leaves and particles by level, of the restart state or of a tree file.
+fn levels(file: &Reader, header: &Header) -> Result<BTreeMap<u8, (u64, u64)>, FileError> {
+    let mut levels: BTreeMap<u8, (u64, u64)> = BTreeMap::new();
+    for (level, count) in compare::leaves(file, header)? {
+        let entry = levels.entry(level).or_default();
+        *entry = (entry.0 + 1, entry.1.saturating_add(count));
+    }
+    Ok(levels)
 }
 
 fn write(out: &mut impl Write, contents: &Contents) -> std::io::Result<()> {

@@ -1,5 +1,6 @@
-//! Files: parallel HDF5 output that ParaView opens and a run restarts from, scalar histories,
+//! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, scalar histories,
 //! telemetry, progress and pictures.
+pub mod cause;
 pub mod hdf5_file;
 pub mod history;
 mod lines;

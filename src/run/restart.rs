@@ -9,7 +9,7 @@ use partition::comm::Comm;
 use super::RunError;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
 use crate::io::snapshot::{self, Header, Scalars};
@@ -236,7 +236,8 @@ fn restored<const D: usize>(
     };
     let refused = |reason: &str| format!("{}: {reason}", path.display());
     check_job(comm, problem, path)?;
-    let restored = snapshot::read::<D>(comm, path, Some(problem.digest)).map_err(words)?;
+    let limits = snapshot::Limits { materials: problem.materials.len(), bodies: problem.bodies.len() };
+    let restored = snapshot::read::<D>(comm, path, Some(problem.digest), limits).map_err(words)?;
     let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));
     let mut forest = forest.map_err(|disagreement| refused(&disagreement.message))?;
     let weights: Vec<u64> = restored.chunks.iter().map(leaf_weight).collect();
@@ -271,7 +272,7 @@ fn check_job<const D: usize>(comm: &Comm, problem: &Problem<D>, path: &Path) -> 
 }
 
 fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<String> {
-    let header = Header::read(&ParallelFile::open_alone(path).ok()?).ok()?;
+    let header = Header::read(&Reader::open_alone(path).ok()?).ok()?;
     if !header.restart || !snapshot::compatible(&header.program) || header.job_digest == problem.digest {
         return None;
     }

@@ -1,5 +1,5 @@
 //! The quantities for which a scene is computed.
-use agimp::io::hdf5_file::{FileError, ParallelFile};
+use agimp::io::hdf5_file::{FileError, Reader};
 use agimp::io::snapshot::Header;
 use toml::{Table, Value};
 
@@ -61,7 +61,7 @@ impl Headline {
 
 /// The particles at the end of a run.
 fn grains(run: &Run) -> Result<Vec<Grain>, FileError> {
-    let file = ParallelFile::open_alone(&run.last_output)?;
+    let file = Reader::open_alone(&run.last_output)?;
     let count = Header::read(&file)?.particles;
     let points = file.read_slab::<f64>("VTKHDF/Points", 0, count)?;
     let mass = file.read_slab::<f32>("VTKHDF/PointData/mass", 0, count)?;

@@ -206,6 +206,35 @@ fn an_unwritable_directory_ends_all_ranks() {
     assert!(shown.contains("out/few_leaves: cannot create the directory"), "{shown}");
 }
 
+/// One rank alone cannot write on, as with a quota, a full disk of one node or a failing client. Without the trap the
+/// system would end that rank without a word.
+#[test]
+fn a_rank_that_cannot_write_ends_all_with_the_reason() {
+    let _turn = in_turn();
+    let agimp = env!("CARGO_BIN_EXE_agimp");
+    for (limited, trap) in [(1, ""), (1, "trap '' XFSZ;"), (0, "")] {
+        let home = tempfile::tempdir().expect("temporary directory");
+        let directory = home.path();
+        let often = variant(directory, "often", ("every_steps = 20", "every_steps = 1"));
+        let often = often.to_str().expect("path");
+        let free = format!("exec {agimp} run {often} --quiet --threads 1");
+        let bound = format!("ulimit -f 300; {trap} {free}");
+        let [first, second] = if limited == 0 { [&bound, &free] } else { [&free, &bound] };
+        let mut command = mpirun(directory, 1);
+        command.args(["bash", "-c", first, ":", "-n", "1", "bash", "-c", second]);
+        let output = Running::start(&mut command).finish_within(4 * SOON);
+        let shown = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{shown}");
+        assert_eq!(shown.matches("agimp: ").count(), 1, "one message: {shown}");
+        let message = shown.lines().find(|line| line.starts_with("agimp:")).expect("message");
+        for part in [&format!("rank {limited}: "), "cannot write", "ulimit -f"] {
+            assert!(message.contains(part), "'{part}' is missing: {message}");
+        }
+        let left = contents(&directory.join("out/collapse_2d"));
+        assert!(!left.keys().any(|name| name.ends_with(".part")), "{:?}", left.keys());
+    }
+}
+
 /// Nobody takes the message of rank 0 for three seconds; `mpirun` leaves others one second once a rank has ended.
 #[test]
 fn ranks_end_after_the_message_has_gone_out() {

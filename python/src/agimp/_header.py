@@ -125,6 +125,15 @@ def read_header(path: Path, file: Any) -> Header:
     )
 
 
+def checksums(path: Path, file: Any) -> list[tuple[str, int]]:
+    """Names of all data sets of an open file, with the CRC-32 of their contents."""
+    attributes = file[GROUP].attrs
+    if "data_sets_crc32" not in attributes:
+        raise FileRefused(f"{path}: the header has no checksums; an older program wrote it")
+    names = text(attributes["data_sets"]).split("\n")
+    return list(zip(names, np.ravel(attributes["data_sets_crc32"]).tolist(), strict=True))
+
+
 def _job_text(file: Any) -> str:
     group = file[GROUP]
     if "job" in group:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _fields, _frames, _meshes, _paths
 from ._errors import FileRefused
-from ._header import Header, opened, read_header, text
+from ._header import checksums, Header, opened, read_header, text
 from ._tree import Tree
 
 if TYPE_CHECKING:
@@ -158,13 +158,12 @@ class Output:
     def verify(self) -> None:
         """Reads the whole file and compares the checksums of its data sets; raises `FileRefused` if one differs."""
 
-        def check(name: str, item: Any) -> None:
-            expected = item.attrs.get("crc32")
-            if expected is not None and zlib.crc32(np.ascontiguousarray(item[()]).tobytes()) != int(np.ravel(expected)[0]):
-                raise FileRefused(f"{self.path}: wrong checksum of {name}: the file is damaged")
-
         with opened(self.path) as file:
-            file.visititems(check)
+            for name, expected in checksums(self.path, file):
+                if name not in file:
+                    raise FileRefused(f"{self.path}: data set {name} is missing")
+                if zlib.crc32(np.ascontiguousarray(file[name][()]).tobytes()) != expected:
+                    raise FileRefused(f"{self.path}: wrong checksum of {name}: the file is damaged")
 
     def _known(self, field: str) -> _fields.Field:
         if field not in self._info:

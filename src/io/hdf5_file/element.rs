@@ -1,35 +1,91 @@
 //! Number types of data sets and attributes.
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5t::{
-    H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT, H5T_NATIVE_INT32, H5T_NATIVE_INT64,
-    H5T_NATIVE_UINT8, H5T_NATIVE_UINT32, H5T_NATIVE_UINT64, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_U8LE,
-    H5T_STD_U32LE, H5T_STD_U64LE,
+    H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_U8LE, H5T_STD_U32LE, H5T_STD_U64LE,
+    H5Tequal,
 };
+
+/// The number types that a data set or an attribute can hold. All are little-endian in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Unsigned, 1 byte.
+    U8,
+    /// Signed, 4 bytes.
+    I32,
+    /// Unsigned, 4 bytes.
+    U32,
+    /// Signed, 8 bytes.
+    I64,
+    /// Unsigned, 8 bytes.
+    U64,
+    /// IEEE 754, 4 bytes.
+    F32,
+    /// IEEE 754, 8 bytes.
+    F64,
+}
+
+impl Kind {
+    const ALL: [Self; 7] = [Self::U8, Self::I32, Self::U32, Self::I64, Self::U64, Self::F32, Self::F64];
+
+    /// Bytes of one number.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// The library's type, in the file and, on a little-endian machine, in memory.
+    pub(super) fn library_type(self) -> hid_t {
+        match self {
+            Self::U8 => *H5T_STD_U8LE,
+            Self::I32 => *H5T_STD_I32LE,
+            Self::U32 => *H5T_STD_U32LE,
+            Self::I64 => *H5T_STD_I64LE,
+            Self::U64 => *H5T_STD_U64LE,
+            Self::F32 => *H5T_IEEE_F32LE,
+            Self::F64 => *H5T_IEEE_F64LE,
+        }
+    }
+
+    /// The kind of an open type of a file; `None` for any type that this program does not write.
+    pub(super) fn of_type(id: hid_t) -> Option<Self> {
+        // SAFETY: `id` is an open type, as are those of the library.
+        Self::ALL.into_iter().find(|kind| unsafe { H5Tequal(id, kind.library_type()) } > 0)
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let kind = match self {
+            Self::U8 | Self::U32 | Self::U64 => "unsigned integers",
+            Self::I32 | Self::I64 => "integers",
+            Self::F32 | Self::F64 => "real numbers",
+        };
+        write!(f, "{kind} of {} bytes", self.bytes())
+    }
+}
 
 /// A number type that a data set or an attribute can hold.
 pub trait Element: bytemuck::Pod {
-    /// HDF5 type in memory.
-    #[doc(hidden)]
-    fn memory_type() -> hid_t;
-    /// HDF5 type in the file: little-endian on every machine.
-    #[doc(hidden)]
-    fn file_type() -> hid_t;
+    /// Which one it is.
+    const KIND: Kind;
 }
 
 macro_rules! element {
-    ($($type:ty, $memory:ident, $file:ident;)*) => {$(
+    ($($type:ty, $kind:ident;)*) => {$(
         impl Element for $type {
-            fn memory_type() -> hid_t { *$memory }
-            fn file_type() -> hid_t { *$file }
+            const KIND: Kind = Kind::$kind;
         }
     )*};
 }
 element! {
-    u8, H5T_NATIVE_UINT8, H5T_STD_U8LE;
-    i32, H5T_NATIVE_INT32, H5T_STD_I32LE;
-    u32, H5T_NATIVE_UINT32, H5T_STD_U32LE;
-    i64, H5T_NATIVE_INT64, H5T_STD_I64LE;
-    u64, H5T_NATIVE_UINT64, H5T_STD_U64LE;
-    f32, H5T_NATIVE_FLOAT, H5T_IEEE_F32LE;
-    f64, H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE;
+    u8, U8;
+    i32, I32;
+    u32, U32;
+    i64, I64;
+    u64, U64;
+    f32, F32;
+    f64, F64;
 }

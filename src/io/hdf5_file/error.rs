@@ -3,6 +3,8 @@ use std::path::PathBuf;
 
 use partition::comm::Disagreement;
 
+use crate::io::cause::explain;
+
 /// Why a file could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
@@ -33,7 +35,7 @@ pub enum FileError {
         path: PathBuf,
     },
     /// The operating system refused.
-    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    #[error("{path}: cannot {action}: {reason}", path = path.display(), reason = explain(path, source))]
     System {
         /// The file.
         path: PathBuf,

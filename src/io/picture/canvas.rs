@@ -1,12 +1,12 @@
 //! An image to write and draw on, and its file.
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::Write as _;
 use std::path::Path;
 
 use super::colour::Rgb;
 use super::font;
 use crate::io::hdf5_file::FileError;
+use crate::io::lines::create_new;
 
 /// An image.
 pub struct Canvas {
@@ -64,13 +64,15 @@ impl Canvas {
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let part = path.with_added_extension("part");
         let save = || -> std::io::Result<()> {
-            let file = BufWriter::new(File::create(&part)?);
-            let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+            // In memory first, as a writer with a buffer tells no error of its last piece.
+            let mut bytes = Vec::new();
+            let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
             encoder.set_color(png::ColorType::Rgb);
             encoder.set_depth(png::BitDepth::Eight);
             let mut writer = encoder.write_header()?;
             writer.write_image_data(&self.pixels)?;
             writer.finish()?;
+            create_new(&part)?.write_all(&bytes)?;
             std::fs::rename(&part, path)
         };
         save().map_err(|source| FileError::System { path: path.into(), action: "write the picture", source })

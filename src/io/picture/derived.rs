@@ -1,7 +1,8 @@
 //! What the particles of a file can be coloured by: the fields that it shows, and what follows from them or from its state.
 
-use super::Tint;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use super::{Tint, source};
+use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::snapshot::checked::Checked;
 use crate::io::snapshot::fields::{det_f, mean, von_mises};
 use crate::io::snapshot::{Header, PointField};
 use crate::material::{PLASTIC_STRAIN, PLASTIC_VOLUME};
@@ -75,12 +76,12 @@ const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "y
 
 /// A file whose particles are to be drawn.
 pub(super) struct Source<'f> {
-    file: &'f ParallelFile,
+    file: &'f Reader,
     header: &'f Header,
 }
 
 impl<'f> Source<'f> {
-    pub(super) fn new(file: &'f ParallelFile, header: &'f Header) -> Self {
+    pub(super) fn new(file: &'f Reader, header: &'f Header) -> Self {
         Self { file, header }
     }
 
@@ -159,7 +160,7 @@ impl<'f> Source<'f> {
             return match path.as_str() {
                 TAG => Some(3),
                 LEVEL => Some(1),
-                _ => self.file.shape(&path).ok().map(|(_, components)| components.max(1)),
+                _ => self.file.stored(&path).ok().map(|stored| stored.components.max(1)),
             };
         }
         self.rule(name).map(|rule| rule.components)
@@ -196,16 +197,17 @@ impl<'f> Source<'f> {
 
     fn read(&self, path: &str) -> Result<Table, FileError> {
         let n = self.header.particles;
+        let mut checked = Checked::new(None, self.file, self.header);
         match path {
             TAG => {
-                let tags: Vec<u64> = self.file.read_slab(path, 0, n)?;
+                let tags: Vec<u64> = checked.read_all(path, n, 0)?;
                 let parts = tags.into_iter().map(Tag::unpack);
                 let values = parts.flat_map(|tag| [tag.material, tag.body, tag.level.into()].map(f64::from));
                 Ok(Table { components: 3, values: values.collect() })
             }
             LEVEL => {
-                let levels: Vec<u8> = self.file.read_slab(path, 0, self.header.leaves)?;
-                let counts: Vec<u64> = self.file.read_slab("state/tree/particles", 0, self.header.leaves)?;
+                let levels: Vec<u8> = checked.read_all(path, self.header.leaves, 0)?;
+                let counts: Vec<u64> = checked.read_all("state/tree/particles", self.header.leaves, 0)?;
                 let mut values = Vec::with_capacity(self.len());
                 for (level, count) in levels.into_iter().zip(counts) {
                     let left = self.len() - values.len();
@@ -215,8 +217,8 @@ impl<'f> Source<'f> {
                 Ok(Table { components: 1, values })
             }
             _ => {
-                let (_, components) = self.file.shape(path)?;
-                Ok(Table { components: components.max(1), values: self.file.read_slab(path, 0, n)? })
+                let (values, components) = source::numbers(self.file, self.header, path)?;
+                Ok(Table { components, values })
             }
         }
     }

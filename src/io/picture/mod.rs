@@ -7,7 +7,7 @@ use std::path::Path;
 
 use partition::comm::Comm;
 
-use super::hdf5_file::{FileError, ParallelFile};
+use super::hdf5_file::{FileError, Reader};
 use super::snapshot::fields::Values;
 use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
@@ -18,6 +18,7 @@ mod colour;
 mod derived;
 mod font;
 mod scene;
+mod source;
 
 use canvas::Canvas;
 use derived::{Source, is_class, magnitude};
@@ -62,6 +63,8 @@ impl Tint {
 
 /// Free space beside the drawing: left, right, top, bottom, in pixels.
 const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
+/// No axis has more ticks.
+const MOST_TICKS: f64 = 100.0;
 const PAPER: colour::Rgb = [250, 250, 248];
 const INK: colour::Rgb = [40, 40, 44];
 
@@ -110,14 +113,14 @@ pub fn draw<const D: usize>(
 ///
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
-pub fn draw_file(source: &Path, name: &str, settings: &Settings, path: &Path) -> Result<(), FileError> {
-    let file = ParallelFile::open_alone(source)?;
+pub fn draw_file(from: &Path, name: &str, settings: &Settings, path: &Path) -> Result<(), FileError> {
+    let file = Reader::open_alone(from)?;
     let header = Header::read(&file)?;
     let n = header.particles;
     let (tint, values) = Source::new(&file, &header).quantity(name)?;
-    let points: Vec<f64> = file.read_slab("VTKHDF/Points", 0, n)?;
+    let points = source::points(&file, &header)?;
     let domain = domain(&header.origin, header.root_edge, &header.roots);
-    let radii = radii(&file, &header)?;
+    let radii = source::radii(&file, &header)?;
     let splats = points.chunks_exact(3).zip(values).zip(radii);
     let splats = splats
         .map(|((point, value), half)| Splat {
@@ -129,22 +132,6 @@ pub fn draw_file(source: &Path, name: &str, settings: &Settings, path: &Path) ->
     let caption = caption(header.time, header.step, n);
     let flat = header.dimension == 2;
     Drawing { comm: None, flat, domain, splats, tint, caption }.compose(settings).save(path)
-}
-
-/// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
-/// root octants where the file does not tell.
-fn radii(file: &ParallelFile, header: &Header) -> Result<Vec<f64>, FileError> {
-    const CELLS: f64 = 4.0;
-    let n = header.particles;
-    let (state, level) = ("state/particles/half_width", "VTKHDF/PointData/leaf_level");
-    if file.exists(state) {
-        return file.read_slab(state, 0, n);
-    }
-    let quarter = |level: i32| header.root_edge / f64::from(1_u32 << level.clamp(0, 31)) / CELLS / 4.0;
-    if file.exists(level) {
-        return Ok(file.read_slab::<i32>(level, 0, n)?.into_iter().map(quarter).collect());
-    }
-    Ok(vec![quarter(3); n as usize])
 }
 
 /// One number per particle: scalars as they are, of vectors the magnitude.
@@ -298,7 +285,10 @@ fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
     canvas.fill(left, bottom, right - left + 1, 2, INK);
     canvas.fill(left - 2, top, 2, bottom - top + 2, INK);
     let ticks = |low: f64, high: f64| {
-        ((low / spacing).ceil() as i64..=(high / spacing).floor() as i64).map(move |n| n as f64 * spacing)
+        let (first, last) = ((low / spacing).ceil(), (high / spacing).floor());
+        // More than there is room for where the frame is no length at all.
+        let count = if last - first < MOST_TICKS { (last - first) as i64 + 1 } else { 0 };
+        (0..count).map(move |n| (first + n as f64) * spacing)
     };
     for x in ticks(frame.low[0], frame.high[0]) {
         let column = camera.project([x, 0.0, 0.0])[0] as i64;

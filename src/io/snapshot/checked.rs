@@ -1,11 +1,12 @@
 //! Data sets with a checksum over all ranks, and this rank's place in them.
+//!
+//! The header holds the names of all data sets of its file with their checksums, under a checksum of its own. So no data set can
+//! be lost, changed or take the place of another without notice.
 
 use partition::comm::Comm;
 
-use crate::io::hdf5_file::{Element, FileError, ParallelFile};
-
-/// Attribute that holds the CRC-32 of a data set's bytes in file order.
-const CHECKSUM: &str = "crc32";
+use super::header::Header;
+use crate::io::hdf5_file::{Element, FileError, Reader, Stored, Writer};
 
 /// The rows of this rank among those of all ranks, in rank order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,22 +39,40 @@ impl Rows {
     }
 }
 
-/// Checksums of the data sets of one file, collected while they are written or read.
-pub(super) struct Checked<'a> {
-    comm: Option<&'a Comm>,
-    file: &'a ParallelFile,
-    parts: Vec<(String, u32, u64)>,
+/// CRC-32 of this rank's part of a data set, and its bytes.
+fn part<T: Element>(values: &[T]) -> [u64; 2] {
+    let bytes: &[u8] = bytemuck::cast_slice(values);
+    [u64::from(crc32fast::hash(bytes)), bytes.len() as u64]
 }
 
-impl<'a> Checked<'a> {
-    /// Starts to collect for a file, shared by `comm` or opened alone.
-    pub fn new(comm: Option<&'a Comm>, file: &'a ParallelFile) -> Self {
-        Self { comm, file, parts: Vec::new() }
-    }
+/// Collective with a communicator. The CRC-32 of whole data sets, in file order.
+fn combine(comm: Option<&Comm>, parts: &[[u64; 2]]) -> Vec<u32> {
+    let mine = parts.as_flattened();
+    let all = comm.map_or_else(|| mine.to_vec(), |comm| comm.all_gather_u64(mine));
+    let crc = |i: usize| {
+        let mut whole = crc32fast::Hasher::new();
+        for rank in all.chunks_exact(mine.len()) {
+            whole.combine(&crc32fast::Hasher::new_with_initial_len(rank[2 * i] as u32, rank[2 * i + 1]));
+        }
+        whole.finalize()
+    };
+    (0..parts.len()).map(crc).collect()
+}
 
-    fn note<T: Element>(&mut self, dataset: &str, values: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.parts.push((dataset.to_owned(), crc32fast::hash(bytes), bytes.len() as u64));
+/// Writes the data sets of a new file and collects their checksums.
+pub(super) struct Recorded<'a> {
+    comm: &'a Comm,
+    file: &'a Writer,
+    names: Vec<String>,
+    parts: Vec<[u64; 2]>,
+    /// Second names: the first one, the second.
+    links: Vec<(String, String)>,
+}
+
+impl<'a> Recorded<'a> {
+    /// Starts to collect.
+    pub fn new(comm: &'a Comm, file: &'a Writer) -> Self {
+        Self { comm, file, names: Vec::new(), parts: Vec::new(), links: Vec::new() }
     }
 
     /// Collective. Writes this rank's rows of a new data set.
@@ -65,76 +84,103 @@ impl<'a> Checked<'a> {
         values: &[T],
     ) -> Result<(), FileError> {
         debug_assert_eq!(values.len() as u64, rows.count * components.max(1) as u64);
-        self.note(dataset, values);
+        self.names.push(dataset.to_owned());
+        self.parts.push(part(values));
         self.file.write_slab(dataset, rows.total, components, rows.offset, values)
     }
 
+    /// Collective. Gives a data set a second name.
+    pub fn link(&mut self, dataset: &str, new: &str) -> Result<(), FileError> {
+        self.links.push((dataset.to_owned(), new.to_owned()));
+        self.file.hard_link(dataset, new)
+    }
+
+    /// Collective. The checksums of all data sets, under all their names.
+    pub fn checksums(self) -> Vec<(String, u32)> {
+        let crcs = combine(Some(self.comm), &self.parts);
+        let mut sums: Vec<(String, u32)> = self.names.into_iter().zip(crcs).collect();
+        for (dataset, new) in self.links {
+            let crc = sums.iter().find(|(name, _)| *name == dataset).map(|&(_, crc)| crc);
+            sums.extend(crc.map(|crc| (new, crc)));
+        }
+        sums
+    }
+}
+
+/// Reads data sets, each of which must have the checksum that the header has for it.
+pub(in crate::io) struct Checked<'a> {
+    comm: Option<&'a Comm>,
+    file: &'a Reader,
+    header: &'a Header,
+    sums: Vec<(String, u32)>,
+}
+
+impl<'a> Checked<'a> {
+    /// For a file that is opened on all ranks of `comm`, or alone.
+    pub fn new(comm: Option<&'a Comm>, file: &'a Reader, header: &'a Header) -> Self {
+        Self { comm, file, header, sums: Vec::new() }
+    }
+
     /// Collective on a shared file. Reads this rank's rows. The ranks' parts must follow each other
-    /// and cover the data set, or the checksum cannot be compared.
-    pub fn read<T: Element>(
+    /// and cover the data set, or its checksum cannot be compared.
+    pub(super) fn read<T: Element>(
         &mut self,
         dataset: &str,
         rows: Rows,
         components: usize,
     ) -> Result<Vec<T>, FileError> {
-        let shape = self.file.shape(dataset).and_then(|shape| {
-            let bytes = self.file.element_bytes(dataset)?;
-            if shape == (rows.total, components) && bytes == size_of::<T>() {
+        let expected = (rows.total, components, T::KIND);
+        let shape = self.file.stored(dataset).and_then(|stored| {
+            let Stored { rows, components, kind, .. } = stored;
+            if (rows, components, kind) == expected {
                 return Ok(());
             }
+            let (total, numbers, wanted) = expected;
             Err(self.file.refuse(format!(
-                "{dataset} has {} rows of {} numbers of {bytes} bytes; the header says {} rows of {components} of {}",
-                shape.0,
-                shape.1,
-                rows.total,
-                size_of::<T>()
+                "{dataset} has {rows} rows of {} {kind}; expected {total} rows of {} {wanted}",
+                components.max(1),
+                numbers.max(1),
             )))
         });
         self.file.agree(shape)?;
         let values = self.file.read_slab(dataset, rows.offset, rows.count)?;
-        self.note(dataset, &values);
+        let crc = combine(self.comm, &[part(&values)])[0];
+        self.file.agree(compare(self.file, self.header, dataset, crc))?;
+        self.sums.push((dataset.to_owned(), crc));
         Ok(values)
     }
 
-    /// Collective on a shared file. The checksums over all ranks, in file order.
-    pub fn combine(&mut self) -> Vec<(String, u32)> {
-        let mine: Vec<u64> = self.parts.iter().flat_map(|&(_, crc, bytes)| [u64::from(crc), bytes]).collect();
-        let all = match self.comm {
-            Some(comm) => comm.all_gather_u64(&mine),
-            None => mine,
-        };
-        let stride = (2 * self.parts.len()).max(1);
-        let names = std::mem::take(&mut self.parts);
-        let crc = |i: usize| {
-            let mut whole = crc32fast::Hasher::new();
-            for part in all.chunks_exact(stride) {
-                whole.combine(&crc32fast::Hasher::new_with_initial_len(part[2 * i] as u32, part[2 * i + 1]));
-            }
-            whole.finalize()
-        };
-        names.into_iter().enumerate().map(|(i, (name, ..))| (name, crc(i))).collect()
+    /// Not collective, for a file opened alone. Reads a whole data set of as many rows as the header says.
+    pub fn read_all<T: Element>(
+        &mut self,
+        dataset: &str,
+        rows: u64,
+        components: usize,
+    ) -> Result<Vec<T>, FileError> {
+        self.read(dataset, Rows { offset: 0, count: rows, total: rows }, components)
     }
 
-    /// Collective on a shared file. Attaches the checksums to the data sets written.
-    pub fn attach(&mut self) -> Result<(), FileError> {
-        for (dataset, crc) in self.combine() {
-            self.file.set_attribute(&dataset, CHECKSUM, &[u64::from(crc)])?;
-        }
-        Ok(())
+    /// Names and checksums of the data sets read, in their order.
+    pub fn into_sums(self) -> Vec<(String, u32)> {
+        self.sums
     }
+}
 
-    /// Collective on a shared file. Compares the checksums of the data sets read with those attached
-    /// and returns them.
-    pub fn verify(&mut self) -> Result<Vec<(String, u32)>, FileError> {
-        let combined = self.combine();
-        let compare = |(dataset, crc): &(String, u32)| {
-            let attached = self.file.attribute::<u64>(dataset, CHECKSUM)?;
-            if attached == [u64::from(*crc)] {
-                return Ok(());
-            }
-            Err(self.file.refuse(format!("wrong checksum of {dataset}: the file is damaged")))
-        };
-        let compared = combined.iter().try_for_each(compare);
-        self.file.agree(compared.map(|()| combined))
+/// Refuses a data set whose checksum is not the one in the header.
+fn compare(file: &Reader, header: &Header, dataset: &str, crc: u32) -> Result<(), FileError> {
+    match header.checksum(dataset) {
+        Some(expected) if expected == crc => Ok(()),
+        Some(_) => Err(file.refuse(format!("wrong checksum of {dataset}: the file is damaged"))),
+        None => Err(file.refuse(format!("{dataset} has no checksum in the header"))),
     }
+}
+
+/// Not collective. Goes over all data sets that the header lists. Returns their number.
+pub(super) fn verify_all(file: &Reader, header: &Header) -> Result<usize, FileError> {
+    for (dataset, _) in &header.checksums {
+        let mut crc = crc32fast::Hasher::new();
+        file.for_bytes(dataset, |bytes| crc.update(bytes))?;
+        compare(file, header, dataset, crc.finalize())?;
+    }
+    Ok(header.checksums.len())
 }

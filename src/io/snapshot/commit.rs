@@ -9,8 +9,7 @@ use std::thread::JoinHandle;
 
 use partition::comm::Comm;
 
-use super::header::Header;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Writer};
 
 /// A file that is written but has no name of its own yet.
 #[derive(Debug)]
@@ -27,23 +26,19 @@ impl Unnamed {
     pub fn write(
         comm: &Comm,
         path: &Path,
-        fill: impl FnOnce(&ParallelFile) -> Result<(), FileError>,
+        fill: impl FnOnce(&Writer) -> Result<(), FileError>,
     ) -> Result<Self, FileError> {
         let part = path.with_added_extension("part");
-        let written = ParallelFile::create(comm, &part).and_then(|file| {
-            let filled = fill(&file).and_then(|()| Header::mark_complete(&file));
-            if filled.is_err() && comm.rank() == 0 {
-                // On a full disk the library could not even close the file, and would crash at the end of
-                // the program; so give the space back first. If that fails too, the first error matters.
-                let _ = File::options().write(true).open(&part).and_then(|file| file.set_len(0));
+        let written = Writer::create(comm, &part).and_then(|file| match fill(&file) {
+            Ok(()) => file.close(),
+            Err(error) => {
+                file.abandon();
+                Err(error)
             }
-            comm.barrier();
-            filled.and_then(|()| file.close())
         });
         match written {
-            Ok(()) => {
-                let file = part.clone();
-                let on_disk = std::thread::spawn(move || File::open(file)?.sync_all());
+            Ok(rows) => {
+                let on_disk = std::thread::spawn(move || rows.sync_all());
                 Ok(Self { part, path: path.into(), on_disk })
             }
             Err(error) => {

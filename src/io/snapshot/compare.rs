@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::checked::{Checked, Rows};
+use super::checked::{Checked, verify_all};
 use super::header::Header;
-use super::state::{columns, path};
-use crate::io::hdf5_file::{Element, FileError, ParallelFile};
+use super::sane::{self, Limits};
+use super::state::{check_tree, columns, octants, path};
+use crate::io::hdf5_file::{Element, FileError, Reader};
 
 /// What identifies the state in a file, whatever the ranks that wrote it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,9 +17,34 @@ pub struct Digest {
     pub parts: Vec<(String, u32)>,
 }
 
-/// Not collective. Reads the whole state, verifies its checksums and digests it.
+/// Not collective. Compares the checksums of all data sets of a file, with or without a state. Returns their number.
+pub fn verify(path: &Path) -> Result<usize, FileError> {
+    let file = Reader::open_alone(path)?;
+    let header = Header::read(&file)?;
+    verify_all(&file, &header)
+}
+
+/// Not collective. Level and particles of each leaf, where the file holds the tree.
+pub fn leaves(file: &Reader, header: &Header) -> Result<Vec<(u8, u64)>, FileError> {
+    let rows = header.leaves;
+    let (state, shown) = (path("tree", "level"), "VTKHDF/CellData/level");
+    let (levels, counts): (Vec<u8>, Vec<u64>) = if file.exists(&state) {
+        let counts = read_all(file, header, &path("tree", "particles"), rows, 0)?;
+        (read_all(file, header, &state, rows, 0)?, counts)
+    } else if file.exists(shown) {
+        let counts = read_all::<i64>(file, header, "VTKHDF/CellData/particles", rows, 0)?;
+        let counts = counts.into_iter().map(i64::unsigned_abs).collect();
+        (read_all(file, header, shown, rows, 0)?, counts)
+    } else {
+        return Ok(Vec::new());
+    };
+    Ok(levels.into_iter().zip(counts).collect())
+}
+
+/// Not collective. Reads the whole state, verifies its checksums and digests it. Refuses a state that no run can have
+/// written.
 pub fn digest(path: &Path) -> Result<Digest, FileError> {
-    let file = ParallelFile::open_alone(path)?;
+    let file = Reader::open_alone(path)?;
     let header = restartable(&file)?;
     match header.dimension {
         2 => digest_in::<2>(&file, &header),
@@ -27,32 +53,38 @@ pub fn digest(path: &Path) -> Result<Digest, FileError> {
     }
 }
 
-fn restartable(file: &ParallelFile) -> Result<Header, FileError> {
+fn restartable(file: &Reader) -> Result<Header, FileError> {
     let header = Header::read(file)?;
     if header.restart { Ok(header) } else { Err(file.refuse("the file holds no restart state")) }
 }
 
-fn all(total: u64) -> Rows {
-    Rows { offset: 0, count: total, total }
-}
-
-fn digest_in<const D: usize>(file: &ParallelFile, header: &Header) -> Result<Digest, FileError> {
+fn digest_in<const D: usize>(file: &Reader, header: &Header) -> Result<Digest, FileError> {
     let mut parts = vec![("header".to_owned(), header.state_checksum())];
-    let (leaves, particles) = (all(header.leaves), all(header.particles));
-    let mut checked = Checked::new(None, file);
-    checked.read::<u8>(&path("tree", "level"), leaves, 0)?;
-    checked.read::<u32>(&path("tree", "coord"), leaves, D)?;
-    checked.read::<u64>(&path("tree", "particles"), leaves, 0)?;
+    let (leaves, particles) = (header.leaves, header.particles);
+    let mut checked = Checked::new(None, file, header);
+    let levels = checked.read_all::<u8>(&path("tree", "level"), leaves, 0)?;
+    let coords = checked.read_all::<u32>(&path("tree", "coord"), leaves, D)?;
+    let counts = checked.read_all::<u64>(&path("tree", "particles"), leaves, 0)?;
+    let octants = octants::<D>(&levels, &coords);
+    let sum = counts.iter().fold(0, |sum: u64, &count| sum.saturating_add(count));
+    check_tree(file, header, &octants, sum)?;
     for name in &header.leaf_fields {
-        checked.read::<f64>(&path("leaf", name), leaves, 0)?;
+        checked.read_all::<f64>(&path("leaf", name), leaves, 0)?;
     }
+    let sane = |result: Result<(), String>| result.map_err(|reason| file.refuse(reason));
     for set in columns::<D>() {
-        checked.read::<f64>(&path("particles", set.name), particles, set.components())?;
+        let values = checked.read_all(&path("particles", set.name), particles, set.components())?;
+        sane(sane::reals(set.name, &values, set.count))?;
+        if set.name == "position" {
+            sane(sane::positions(header, &octants, &counts, &values))?;
+        }
     }
-    for name in ["id", "tag"] {
-        checked.read::<u64>(&path("particles", name), particles, 0)?;
-    }
-    parts.extend(checked.verify()?);
+    sane(sane::identifiers(&checked.read_all(&path("particles", "id"), particles, 0)?))?;
+    let tags = checked.read_all(&path("particles", "tag"), particles, 0)?;
+    // The bodies are in the job only.
+    let limits = Limits { materials: header.materials.len(), bodies: usize::MAX };
+    sane(sane::tags(&tags, limits))?;
+    parts.extend(checked.into_sums());
     // FNV-1a over the names and checksums.
     let whole = parts.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, (name, crc)| {
         name.bytes()
@@ -138,7 +170,7 @@ impl std::fmt::Display for Difference {
 /// Not collective. Where the states of two files differ, fields in the order of the particle layout,
 /// particles by identifier. Empty if they are the same bit for bit.
 pub fn diff(a: &Path, b: &Path) -> Result<Vec<Difference>, FileError> {
-    let files = [ParallelFile::open_alone(a)?, ParallelFile::open_alone(b)?];
+    let files = [Reader::open_alone(a)?, Reader::open_alone(b)?];
     let headers = [restartable(&files[0])?, restartable(&files[1])?];
     match headers.each_ref().map(|header| header.dimension) {
         [2, 2] => diff_in::<2>(&files, &headers),
@@ -147,10 +179,7 @@ pub fn diff(a: &Path, b: &Path) -> Result<Vec<Difference>, FileError> {
     }
 }
 
-fn diff_in<const D: usize>(
-    files: &[ParallelFile; 2],
-    headers: &[Header; 2],
-) -> Result<Vec<Difference>, FileError> {
+fn diff_in<const D: usize>(files: &[Reader; 2], headers: &[Header; 2]) -> Result<Vec<Difference>, FileError> {
     let mut found = Vec::new();
     for (name, value) in [
         ("job digest", (|h: &Header| format!("{:016x}", h.job_digest)) as fn(&Header) -> String),
@@ -168,7 +197,8 @@ fn diff_in<const D: usize>(
     }
     found.extend(diff_trees::<D>(files, headers)?);
 
-    let read = |i: usize, name| read_all::<u64>(&files[i], "particles", name);
+    let rows = headers.each_ref().map(|header| header.particles);
+    let read = |i: usize, name| read_all::<u64>(&files[i], &headers[i], &path("particles", name), rows[i], 0);
     let ids = [read(0, "id")?, read(1, "id")?];
     let order = ids.each_ref().map(|ids| {
         let mut order: Vec<usize> = (0..ids.len()).collect();
@@ -183,7 +213,9 @@ fn diff_in<const D: usize>(
         }
     }
     for set in columns::<D>() {
-        let values = [0, 1].map(|i| read_all::<f64>(&files[i], "particles", set.name));
+        let dataset = path("particles", set.name);
+        let values =
+            [0, 1].map(|i| read_all::<f64>(&files[i], &headers[i], &dataset, rows[i], set.components()));
         let [a, b] = values;
         found.extend(diff_field(set.name, set.count, &pairs, &ids[0], &[a?, b?]));
     }
@@ -193,20 +225,26 @@ fn diff_in<const D: usize>(
     Ok(found)
 }
 
-fn read_all<T: Element>(file: &ParallelFile, kind: &str, name: &str) -> Result<Vec<T>, FileError> {
-    let dataset = path(kind, name);
-    let rows = file.shape(&dataset)?.0;
-    file.read_slab(&dataset, 0, rows)
+/// A whole data set with the right checksum.
+fn read_all<T: Element>(
+    file: &Reader,
+    header: &Header,
+    dataset: &str,
+    rows: u64,
+    components: usize,
+) -> Result<Vec<T>, FileError> {
+    Checked::new(None, file, header).read_all(dataset, rows, components)
 }
 
 fn diff_trees<const D: usize>(
-    files: &[ParallelFile; 2],
+    files: &[Reader; 2],
     headers: &[Header; 2],
 ) -> Result<Option<Difference>, FileError> {
-    let level = |i: usize| read_all::<u8>(&files[i], "tree", "level");
-    let coord = |i: usize| read_all::<u32>(&files[i], "tree", "coord");
+    let rows = headers.each_ref().map(|header| header.leaves);
+    let level = |i: usize| read_all::<u8>(&files[i], &headers[i], &path("tree", "level"), rows[i], 0);
+    let coord = |i: usize| read_all::<u32>(&files[i], &headers[i], &path("tree", "coord"), rows[i], D);
     let (levels, coords) = ([level(0)?, level(1)?], [coord(0)?, coord(1)?]);
-    let most = headers[0].leaves.max(headers[1].leaves) as usize;
+    let most = levels[0].len().max(levels[1].len());
     let octant = |i: usize, leaf: usize| {
         levels[i]
             .get(leaf)

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::header::Header;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::series::{Entry, Series};
 
 /// How names of files in ParaView's format end. Every ParaView that reads the format (5.11 and newer) opens `.hdf`;
@@ -167,7 +167,7 @@ fn results(directory: &Path, name: &str) -> Result<Vec<(Kind, u64, PathBuf)>, Fi
 
 /// The header of a file, read by this process alone.
 fn header(path: &Path) -> Result<Header, FileError> {
-    Header::read(&ParallelFile::open_alone(path)?)
+    Header::read(&Reader::open_alone(path)?)
 }
 
 fn file_name(path: &Path) -> &str {

@@ -1,14 +1,16 @@
 //! What a file says about itself: who wrote it, of which job, when, and how much is in it.
 
-use partition::Octant;
+use partition::{MAX_LEVEL, Octant};
 
 use super::View;
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Reader, Writer};
 
 /// Version of the layout of the state. A file of another one is refused.
-pub const FORMAT: u64 = 1;
+pub const FORMAT: u64 = 2;
 /// First attribute of every file of ours.
 const MAGIC: &str = "agimp state";
+/// Steps are counted in real numbers too, which hold whole numbers up to this.
+const MOST_STEPS: u64 = 1 << 53;
 /// The group with the header and, in files that a run can restart from, the state.
 pub(super) const GROUP: &str = "state";
 
@@ -81,6 +83,8 @@ pub struct Header {
     pub leaf_fields: Vec<String>,
     /// Scalars to be restored.
     pub scalars: Scalars,
+    /// CRC-32 of the data sets of the file, under all their names.
+    pub checksums: Vec<(String, u32)>,
 }
 
 /// One attribute of the header.
@@ -92,7 +96,7 @@ enum Value {
 }
 
 impl Header {
-    /// The header of a view with these totals.
+    /// The header of a view with these totals; checksums are not yet known.
     pub(super) fn new<const D: usize>(view: &View<D>, leaves: u64, particles: u64, restart: bool) -> Self {
         Self {
             format: FORMAT,
@@ -112,7 +116,13 @@ impl Header {
             histories: view.histories.to_vec(),
             leaf_fields: view.leaf_fields.iter().map(|(name, _)| name.clone()).collect(),
             scalars: view.scalars.clone(),
+            checksums: Vec::new(),
         }
+    }
+
+    /// The checksum of a data set.
+    pub fn checksum(&self, dataset: &str) -> Option<u32> {
+        self.checksums.iter().find(|(name, _)| name == dataset).map(|&(_, crc)| crc)
     }
 
     /// Edge of an octant, m.
@@ -155,11 +165,17 @@ impl Header {
                 Value::Count(s.exact.iter().map(|(_, words)| words.len() as u64).collect()),
             ),
             (false, "exact", Value::Integer(s.exact.iter().flat_map(|(_, words)| words.clone()).collect())),
+            (false, "data_sets", names(self.checksums.iter().map(|(name, _)| name).collect())),
+            (
+                false,
+                "data_sets_crc32",
+                Value::Count(self.checksums.iter().map(|&(_, crc)| u64::from(crc)).collect()),
+            ),
         ]
     }
 
     /// CRC-32 of the names and values of the attributes.
-    fn checksum(&self, only_state: bool) -> u32 {
+    fn crc(&self, only_state: bool) -> u32 {
         let mut crc = crc32fast::Hasher::new();
         for (of_state, name, value) in self.entries() {
             if only_state && !of_state {
@@ -178,12 +194,16 @@ impl Header {
 
     /// CRC-32 of what tells one state from another: not the program, and not the bookkeeping of a run.
     pub fn state_checksum(&self) -> u32 {
-        self.checksum(true)
+        self.crc(true)
     }
 
-    /// Collective on a shared file. Writes the group with the header.
-    pub(super) fn write(&self, file: &ParallelFile) -> Result<(), FileError> {
-        file.create_group(GROUP)?;
+    /// Collective. Makes the group of the header, before all else.
+    pub(super) fn make_group(file: &Writer) -> Result<(), FileError> {
+        file.create_group(GROUP)
+    }
+
+    /// Collective. Writes the header, with the mark that the file is whole: after all else.
+    pub(super) fn write(&self, file: &Writer) -> Result<(), FileError> {
         for (_, name, value) in self.entries() {
             match value {
                 Value::Text(text) => file.set_text(GROUP, name, &text)?,
@@ -192,20 +212,16 @@ impl Header {
                 Value::Real(values) => file.set_attribute(GROUP, name, &values)?,
             }
         }
-        file.set_attribute(GROUP, "header_crc32", &[u64::from(self.checksum(false))])
-    }
-
-    /// Collective on a shared file. The mark that the file is whole; written last.
-    pub(super) fn mark_complete(file: &ParallelFile) -> Result<(), FileError> {
+        file.set_attribute(GROUP, "header_crc32", &[u64::from(self.crc(false))])?;
         file.set_attribute(GROUP, "complete", &[1_u64])
     }
 
     /// Collective on a shared file. Reads the header and refuses what this program cannot trust.
-    pub fn read(file: &ParallelFile) -> Result<Self, FileError> {
+    pub fn read(file: &Reader) -> Result<Self, FileError> {
         file.agree(Self::read_here(file))
     }
 
-    fn read_here(file: &ParallelFile) -> Result<Self, FileError> {
+    fn read_here(file: &Reader) -> Result<Self, FileError> {
         if !file.exists(GROUP) || file.text(GROUP, "magic").ok().as_deref() != Some(MAGIC) {
             return Err(file.refuse("not a file of agimp (no group 'state' with its mark)"));
         }
@@ -218,7 +234,8 @@ impl Header {
         let (format, program) = (one("format")?, file.text(GROUP, "program")?);
         if format != FORMAT {
             return Err(file.refuse(format!(
-                "written in format {format} by agimp {program}; this is agimp {}, which reads format {FORMAT}",
+                "written in format {format} by agimp {program}; this is agimp {}, which reads format {FORMAT}: use the \
+                 program that wrote it, or run the job anew",
                 env!("CARGO_PKG_VERSION")
             )));
         }
@@ -254,15 +271,51 @@ impl Header {
             histories: names("histories")?,
             leaf_fields: names("leaf_fields")?,
             scalars,
+            checksums: names("data_sets")?
+                .into_iter()
+                .zip(file.attribute::<u64>(GROUP, "data_sets_crc32")?)
+                .map(|(name, crc)| (name, crc as u32))
+                .collect(),
         };
-        if one("header_crc32")? != u64::from(header.checksum(false)) {
+        if one("header_crc32")? != u64::from(header.crc(false)) {
             return Err(file.refuse("wrong checksum of the header: the file is damaged"));
         }
+        header.check().map_err(|reason| file.refuse(reason))?;
         Ok(header)
+    }
+
+    /// What no run can have written is refused, even if its checksum is right.
+    fn check(&self) -> Result<(), String> {
+        let Self { dimension, origin, root_edge, roots, time, dt, step, .. } = self;
+        if !(2..=3).contains(dimension) {
+            return Err(format!("the header says {dimension} dimensions; expected 2 or 3"));
+        }
+        if origin.len() != *dimension || roots.len() != *dimension {
+            return Err(format!("the header's domain has not {dimension} axes"));
+        }
+        let most = u64::from(u32::MAX >> MAX_LEVEL);
+        if let Some(count) = roots.iter().find(|&&count| count == 0 || count > most) {
+            return Err(format!("the header says {count} root octants along an axis; expected 1 to {most}"));
+        }
+        if !(origin.iter().all(|x| x.is_finite()) && root_edge.is_finite() && *root_edge > 0.0) {
+            return Err(format!("the header's domain is at {origin:?} m with roots of {root_edge:?} m"));
+        }
+        for (name, value) in [("time", time), ("last step", dt)] {
+            if !(value.is_finite() && *value >= 0.0) {
+                return Err(format!("the header says a {name} of {value:?} s; expected 0 or more"));
+            }
+        }
+        if *step > MOST_STEPS {
+            return Err(format!("the header says {step} steps; no run makes more than {MOST_STEPS}"));
+        }
+        if let Some((name, _)) = self.scalars.reals.iter().find(|(_, value)| value.is_nan()) {
+            return Err(format!("the scalar {name} is not a number"));
+        }
+        Ok(())
     }
 }
 
-fn only<T: Copy>(file: &ParallelFile, name: &str, values: Vec<T>) -> Result<T, FileError> {
+fn only<T: Copy>(file: &Reader, name: &str, values: Vec<T>) -> Result<T, FileError> {
     match values[..] {
         [value] => Ok(value),
         _ => Err(file.refuse(format!("attribute {name} has {} values, not one", values.len()))),

@@ -9,24 +9,26 @@ use std::path::Path;
 use partition::comm::Comm;
 use partition::{Brick, Octant};
 
-use super::hdf5_file::{FileError, ParallelFile};
+use super::hdf5_file::{FileError, Reader, Writer};
 use crate::particle::chunk::Chunk;
 
-mod checked;
+pub(in crate::io) mod checked;
 pub mod commit;
 pub mod compare;
 pub mod directory;
 pub(crate) mod fields;
 pub mod header;
 pub mod outputs;
+mod sane;
 mod state;
 mod vtkhdf;
 
-use checked::{Checked, Rows};
+use checked::{Checked, Recorded, Rows};
 use commit::Unnamed;
 pub use fields::PointField;
 pub use header::{Header, Scalars};
 pub use outputs::Outputs;
+pub use sane::Limits;
 
 /// The run as a file shows it: borrowed, this rank's part.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +88,8 @@ pub struct Restored<const D: usize> {
 }
 
 /// Collective. Writes particles, and the state if `options` ask for it, to `path`. After an error on any rank
-/// all ranks have it, and no file of that name has been made or changed.
+/// all ranks have it, and no file of that name has been made or changed; a state with numbers that are not finite is such
+/// an error.
 pub fn write<const D: usize>(
     comm: &Comm,
     path: &Path,
@@ -104,16 +107,19 @@ pub fn start_write<const D: usize>(
     view: &View<D>,
     options: &Options,
 ) -> Result<Unnamed, FileError> {
+    let finite = sane::finite(view).map_err(|reason| FileError::Refused { path: path.into(), reason });
+    comm.agree(finite)?;
     Unnamed::write(comm, path, |file| {
         let (leaves, particles) = totals(comm, file, view)?;
-        Header::new(view, leaves.total, particles.total, options.restart).write(file)?;
-        let mut checked = Checked::new(Some(comm), file);
+        Header::make_group(file)?;
+        let mut recorded = Recorded::new(comm, file);
         // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
-            state::write(file, &mut checked, comm, view, leaves, particles)?;
+            state::write(file, &mut recorded, comm, view, leaves, particles)?;
         }
-        vtkhdf::write_particles(file, &mut checked, comm, view, particles, options)?;
-        checked.attach()
+        vtkhdf::write_particles(file, &mut recorded, comm, view, particles, options)?;
+        let header = Header::new(view, leaves.total, particles.total, options.restart);
+        Header { checksums: recorded.checksums(), ..header }.write(file)
     })
 }
 
@@ -121,22 +127,25 @@ pub fn start_write<const D: usize>(
 pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> Result<(), FileError> {
     let written = Unnamed::write(comm, path, |file| {
         let (leaves, particles) = totals(comm, file, view)?;
-        Header::new(view, leaves.total, particles.total, false).write(file)?;
-        let mut checked = Checked::new(Some(comm), file);
-        vtkhdf::write_leaves(file, &mut checked, comm, view, leaves)?;
-        checked.attach()
+        Header::make_group(file)?;
+        let mut recorded = Recorded::new(comm, file);
+        vtkhdf::write_leaves(file, &mut recorded, comm, view, leaves)?;
+        let header = Header::new(view, leaves.total, particles.total, false);
+        Header { checksums: recorded.checksums(), ..header }.write(file)
     });
     written?.finish(comm)
 }
 
 /// Collective. Reads a file for a restart on any number of ranks. Refuses, with the reason, a file that is
-/// damaged, cut short, of another format or dimension, without the restart state, or of another job.
+/// damaged, cut short, of another format or dimension, without the restart state, of another job, or with particles
+/// that cannot be.
 pub fn read<const D: usize>(
     comm: &Comm,
     path: &Path,
     job_digest: Option<u64>,
+    limits: Limits,
 ) -> Result<Restored<D>, FileError> {
-    let file = ParallelFile::open(comm, path)?;
+    let file = Reader::open(comm, path)?;
     let header = Header::read(&file)?;
     let reason = if !header.restart {
         Some("the file holds no restart state (output with `restart = false`, or a tree)".to_owned())
@@ -157,22 +166,22 @@ pub fn read<const D: usize>(
     if let Some(reason) = reason {
         return Err(file.refuse(reason));
     }
-    let restored = state::read(&file, comm, header)?;
-    file.close()?;
-    Ok(restored)
+    state::read(&file, comm, &header, limits)
 }
 
 /// Not collective. Text of the job file of the run that wrote a file with a restart state; `None` if it holds none, or none
 /// that can be read.
 pub fn job_text(path: &Path) -> Option<String> {
-    let file = ParallelFile::open_alone(path).ok()?;
+    let file = Reader::open_alone(path).ok()?;
+    let header = Header::read(&file).ok()?;
     if !file.exists(state::JOB) {
         return None;
     }
-    let (total, _) = file.shape(state::JOB).ok().filter(|(bytes, _)| *bytes <= LONGEST_JOB)?;
-    let mut checked = Checked::new(None, &file);
-    let text = checked.read::<u8>(state::JOB, Rows { offset: 0, count: total, total }, 0).ok()?;
-    checked.verify().ok()?;
+    let bytes = file.stored(state::JOB).ok()?.rows;
+    if bytes > LONGEST_JOB {
+        return None;
+    }
+    let text = Checked::new(None, &file, &header).read_all::<u8>(state::JOB, bytes, 0).ok()?;
     String::from_utf8(text).ok()
 }
 
@@ -190,11 +199,7 @@ pub(crate) fn compatible(program: &str) -> bool {
 }
 
 /// Collective. Places of this rank's leaves and particles; refuses a view that does not fit together.
-fn totals<const D: usize>(
-    comm: &Comm,
-    file: &ParallelFile,
-    view: &View<D>,
-) -> Result<(Rows, Rows), FileError> {
+fn totals<const D: usize>(comm: &Comm, file: &Writer, view: &View<D>) -> Result<(Rows, Rows), FileError> {
     let lengths = view.leaf_fields.iter().map(|(_, values)| values.len()).chain([view.chunks.len()]);
     let fits = lengths.into_iter().all(|length| length == view.leaves.len());
     file.agree(if fits {

@@ -3,10 +3,11 @@
 use partition::comm::Comm;
 use partition::{MAX_LEVEL, Octant};
 
-use super::checked::{Checked, Rows};
+use super::checked::{Checked, Recorded, Rows};
 use super::header::{GROUP, Header};
+use super::sane::{self, Limits};
 use super::{Restored, View};
-use crate::io::hdf5_file::{FileError, ParallelFile};
+use crate::io::hdf5_file::{FileError, Reader, Writer};
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// One data set of particle columns.
@@ -20,7 +21,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Components as [`ParallelFile::write_slab`] counts them: 0 for a plain list.
+    /// Components as [`Writer::write_slab`] counts them: 0 for a plain list.
     pub fn components(&self) -> usize {
         if self.count == 1 { 0 } else { self.count }
     }
@@ -58,8 +59,8 @@ pub(super) fn path(kind: &str, name: &str) -> String {
 
 /// Collective. Writes tree and particles below the header's group.
 pub(super) fn write<const D: usize>(
-    file: &ParallelFile,
-    checked: &mut Checked,
+    file: &Writer,
+    recorded: &mut Recorded,
     comm: &Comm,
     view: &View<D>,
     leaves: Rows,
@@ -67,18 +68,18 @@ pub(super) fn write<const D: usize>(
 ) -> Result<(), FileError> {
     // Rank 0 writes all of it.
     let text = if comm.rank() == 0 { view.job_text.as_bytes() } else { &[] };
-    checked.write(JOB, Rows::place(comm, text.len() as u64), 0, text)?;
+    recorded.write(JOB, Rows::place(comm, text.len() as u64), 0, text)?;
     for kind in ["tree", "leaf", "particles"] {
         file.create_group(&format!("{GROUP}/{kind}"))?;
     }
     let levels: Vec<u8> = view.leaves.iter().map(|leaf| leaf.level).collect();
-    checked.write(&path("tree", "level"), leaves, 0, &levels)?;
+    recorded.write(&path("tree", "level"), leaves, 0, &levels)?;
     let coords: Vec<u32> = view.leaves.iter().flat_map(|leaf| leaf.coord).collect();
-    checked.write(&path("tree", "coord"), leaves, D, &coords)?;
+    recorded.write(&path("tree", "coord"), leaves, D, &coords)?;
     let counts: Vec<u64> = view.chunks.iter().map(|chunk| chunk.len() as u64).collect();
-    checked.write(&path("tree", "particles"), leaves, 0, &counts)?;
+    recorded.write(&path("tree", "particles"), leaves, 0, &counts)?;
     for (name, values) in view.leaf_fields {
-        checked.write(&path("leaf", name), leaves, 0, values)?;
+        recorded.write(&path("leaf", name), leaves, 0, values)?;
     }
     for set in columns::<D>() {
         let Columns { name, first, count } = set;
@@ -88,23 +89,24 @@ pub(super) fn write<const D: usize>(
                 values.extend(chunk.tile_of(p)[first..first + count].iter().map(|line| line[p % TILE]));
             }
         }
-        checked.write(&path("particles", name), particles, set.components(), &values)?;
+        recorded.write(&path("particles", name), particles, set.components(), &values)?;
     }
     let ids: Vec<u64> = view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect();
-    checked.write(&path("particles", "id"), particles, 0, &ids)?;
+    recorded.write(&path("particles", "id"), particles, 0, &ids)?;
     let tags: Vec<u64> = view.chunks.iter().flat_map(|chunk| chunk.tags()).copied().collect();
-    checked.write(&path("particles", "tag"), particles, 0, &tags)
+    recorded.write(&path("particles", "tag"), particles, 0, &tags)
 }
 
 /// Collective. Reads tree and particles; each rank gets a contiguous share of the curve with about
-/// the same number of particles.
+/// the same number of particles. Refuses a state that no run can have written.
 pub(super) fn read<const D: usize>(
-    file: &ParallelFile,
+    file: &Reader,
     comm: &Comm,
-    header: Header,
+    header: &Header,
+    limits: Limits,
 ) -> Result<Restored<D>, FileError> {
-    let mut checked = Checked::new(Some(comm), file);
-    let leaves = balanced_share(&mut checked, comm, &header)?;
+    let mut checked = Checked::new(Some(comm), file, header);
+    let leaves = balanced_share(file, &mut checked, comm, header)?;
     let levels: Vec<u8> = checked.read(&path("tree", "level"), leaves, 0)?;
     let coords: Vec<u32> = checked.read(&path("tree", "coord"), leaves, D)?;
     let counts: Vec<u64> = checked.read(&path("tree", "particles"), leaves, 0)?;
@@ -112,15 +114,11 @@ pub(super) fn read<const D: usize>(
     for name in &header.leaf_fields {
         leaf_fields.push((name.clone(), checked.read::<f64>(&path("leaf", name), leaves, 0)?));
     }
-    // Before the counts are trusted with memory.
-    checked.verify()?;
-    let octants: Vec<Octant<D>> = levels
-        .iter()
-        .zip(coords.chunks_exact(D))
-        .map(|(&level, coord)| Octant { level, coord: std::array::from_fn(|axis| coord[axis]) })
-        .collect();
-    let particles = Rows::place(comm, counts.iter().sum());
-    file.agree(check_tree(file, &header, &octants, particles.total))?;
+    let octants: Vec<Octant<D>> = octants(&levels, &coords);
+    // Not more than the header says in any part, as `balanced_share` has seen.
+    let particles = Rows::place(comm, counts.iter().fold(0, |sum: u64, &count| sum.saturating_add(count)));
+    file.agree(check_tree(file, header, &octants, particles.total))?;
+    let sane = |result: Result<(), String>| file.agree(result.map_err(|reason| file.refuse(reason)));
 
     let mut chunks: Vec<Chunk<D>> = counts
         .iter()
@@ -133,6 +131,10 @@ pub(super) fn read<const D: usize>(
     for set in columns::<D>() {
         let Columns { name, first, count } = set;
         let values: Vec<f64> = checked.read(&path("particles", name), particles, set.components())?;
+        sane(sane::reals(name, &values, count))?;
+        if name == "position" {
+            sane(sane::positions(header, &octants, &counts, &values))?;
+        }
         let mut rows = values.chunks_exact(count);
         for chunk in &mut chunks {
             let len = chunk.len();
@@ -143,6 +145,7 @@ pub(super) fn read<const D: usize>(
     }
     let ids: Vec<u64> = checked.read(&path("particles", "id"), particles, 0)?;
     let tags: Vec<u64> = checked.read(&path("particles", "tag"), particles, 0)?;
+    sane(sane::tags(&tags, limits).and_then(|()| sane::identifiers(&ids)))?;
     let mut next = 0;
     for chunk in &mut chunks {
         let range = next..next + chunk.len();
@@ -150,21 +153,25 @@ pub(super) fn read<const D: usize>(
         chunk.ids_mut().copy_from_slice(&ids[range.clone()]);
         chunk.tags_mut().copy_from_slice(&tags[range]);
     }
-    checked.verify()?;
-    Ok(Restored { header, leaves: octants, chunks, leaf_fields })
+    Ok(Restored { header: header.clone(), leaves: octants, chunks, leaf_fields })
 }
 
 /// Collective. Cuts the curve so that each rank gets about the same number of particles (a leaf counts
 /// as one more). Every rank looks at an equal part of the list of leaves, so none sees all of it.
-fn balanced_share(checked: &mut Checked, comm: &Comm, header: &Header) -> Result<Rows, FileError> {
+fn balanced_share(
+    file: &Reader,
+    checked: &mut Checked,
+    comm: &Comm,
+    header: &Header,
+) -> Result<Rows, FileError> {
     let (rank, ranks) = (comm.rank() as u64, comm.size() as u64);
     let total = header.leaves;
     let even = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(ranks)) as u64;
     let part = Rows { offset: even(rank), count: even(rank + 1) - even(rank), total };
     let counts: Vec<u64> = checked.read(&path("tree", "particles"), part, 0)?;
-    checked.verify()?;
+    file.agree(bounded(file, header, &counts))?;
     let mut before = comm.exclusive_sum_u64(counts.iter().map(|count| count + 1).sum());
-    let whole = u128::from(header.particles + total);
+    let whole = u128::from(header.particles) + u128::from(total);
     // Cut k comes behind the leaf with which the sum reaches k/P of the whole; one rank finds it.
     let mut cuts = vec![0; ranks as usize + 1];
     let shares = |sum: u64| (u128::from(sum) * u128::from(ranks) / whole.max(1)) as usize;
@@ -181,9 +188,29 @@ fn balanced_share(checked: &mut Checked, comm: &Comm, header: &Header) -> Result
     Ok(Rows { offset: start, count: end.saturating_sub(start), total })
 }
 
-/// Octants inside the brick, in curve order, and the number of particles that the header says.
-fn check_tree<const D: usize>(
-    file: &ParallelFile,
+/// Leaves by their levels and coordinates.
+pub(super) fn octants<const D: usize>(levels: &[u8], coords: &[u32]) -> Vec<Octant<D>> {
+    let octant =
+        |(&level, coord): (&u8, &[u32])| Octant { level, coord: std::array::from_fn(|axis| coord[axis]) };
+    levels.iter().zip(coords.chunks_exact(D)).map(octant).collect()
+}
+
+/// Particles of leaves, which together are no more than the file holds.
+fn bounded(file: &Reader, header: &Header, counts: &[u64]) -> Result<(), FileError> {
+    let held = file.stored(&path("particles", "id"))?.rows;
+    let sum = counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
+    match sum {
+        Some(sum) if sum <= header.particles && header.particles <= held => Ok(()),
+        _ => Err(file.refuse(format!(
+            "the leaves hold more than the {} particles that the header says, or the file's {held}",
+            header.particles
+        ))),
+    }
+}
+
+/// Octants inside the brick, and the number of particles that the header says.
+pub(super) fn check_tree<const D: usize>(
+    file: &Reader,
     header: &Header,
     octants: &[Octant<D>],
     particles: u64,

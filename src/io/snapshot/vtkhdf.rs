@@ -4,11 +4,11 @@
 use partition::Octant;
 use partition::comm::Comm;
 
-use super::checked::{Checked, Rows};
+use super::checked::{Recorded, Rows};
 use super::fields::{PointField, Values};
 use super::state::path;
-use super::{Options, View};
-use crate::io::hdf5_file::{Element, FileError, ParallelFile};
+use super::{Options, View, sane};
+use crate::io::hdf5_file::{Element, FileError, Writer};
 use crate::particle::chunk::Chunk;
 
 const GROUP: &str = "VTKHDF";
@@ -20,27 +20,26 @@ const VOXEL: u8 = 11;
 const FAR: f64 = 8.0;
 
 /// Collective. The group with its attributes and the time.
-fn start(file: &ParallelFile, checked: &mut Checked, comm: &Comm, time: f64) -> Result<(), FileError> {
+fn start(file: &Writer, recorded: &mut Recorded, comm: &Comm, time: f64) -> Result<(), FileError> {
     file.create_group(GROUP)?;
     file.set_attribute(GROUP, "Version", &[1_i64, 0])?;
     file.set_text(GROUP, "Type", "UnstructuredGrid")?;
     for group in ["PointData", "CellData", "FieldData"] {
         file.create_group(&format!("{GROUP}/{group}"))?;
     }
-    single(checked, comm, "FieldData/TimeValue", time)
+    single(recorded, comm, "FieldData/TimeValue", time)
 }
 
 /// Collective. A data set of one value, written by rank 0.
-fn single<T: Element>(checked: &mut Checked, comm: &Comm, name: &str, value: T) -> Result<(), FileError> {
+fn single<T: Element>(recorded: &mut Recorded, comm: &Comm, name: &str, value: T) -> Result<(), FileError> {
     let mine: &[T] = if comm.rank() == 0 { &[value] } else { &[] };
     let rows = Rows::place(comm, mine.len() as u64);
-    checked.write(&format!("{GROUP}/{name}"), rows, 0, mine)
+    recorded.write(&format!("{GROUP}/{name}"), rows, 0, mine)
 }
 
 /// Collective. Cells: cell `i` has the `corners` points from `corners * i`.
 fn grid(
-    file: &ParallelFile,
-    checked: &mut Checked,
+    recorded: &mut Recorded,
     comm: &Comm,
     cells: Rows,
     corners: u64,
@@ -52,54 +51,54 @@ fn grid(
         ("NumberOfCells", cells.total),
         ("NumberOfConnectivityIds", connectivity.total),
     ] {
-        single(checked, comm, name, value as i64)?;
+        single(recorded, comm, name, value as i64)?;
     }
     let numbers = |rows: Rows, step: u64| -> Vec<i64> {
         (rows.offset..rows.offset + rows.count).map(|i| (i * step) as i64).collect()
     };
     let (ends, offsets, list) =
         (cells.and_one(comm), format!("{GROUP}/Offsets"), format!("{GROUP}/Connectivity"));
-    checked.write(&offsets, ends, 0, &numbers(ends, corners))?;
+    recorded.write(&offsets, ends, 0, &numbers(ends, corners))?;
     if corners == 1 {
         // 0, 1, 2 and so on as well; readers take as many entries as the number above says.
-        file.hard_link(&offsets, &list)?;
+        recorded.link(&offsets, &list)?;
     } else {
-        checked.write(&list, connectivity, 0, &numbers(connectivity, 1))?;
+        recorded.write(&list, connectivity, 0, &numbers(connectivity, 1))?;
     }
-    checked.write(&format!("{GROUP}/Types"), cells, 0, &vec![cell_type; cells.count as usize])
+    recorded.write(&format!("{GROUP}/Types"), cells, 0, &vec![cell_type; cells.count as usize])
 }
 
 /// Collective. An array of the group.
-fn field(checked: &mut Checked, name: &str, rows: Rows, values: &Values) -> Result<(), FileError> {
+fn field(recorded: &mut Recorded, name: &str, rows: Rows, values: &Values) -> Result<(), FileError> {
     let dataset = format!("{GROUP}/{name}");
     match values {
-        Values::Id(values) => checked.write(&dataset, rows, 0, values),
-        Values::Integer(values) => checked.write(&dataset, rows, 0, values),
-        Values::Real(values, components) => checked.write(&dataset, rows, *components, values),
-        Values::Single(values, components) => checked.write(&dataset, rows, *components, values),
+        Values::Id(values) => recorded.write(&dataset, rows, 0, values),
+        Values::Integer(values) => recorded.write(&dataset, rows, 0, values),
+        Values::Real(values, components) => recorded.write(&dataset, rows, *components, values),
+        Values::Single(values, components) => recorded.write(&dataset, rows, *components, values),
     }
 }
 
 /// Collective. Writes the particles with the chosen fields.
 pub(super) fn write_particles<const D: usize>(
-    file: &ParallelFile,
-    checked: &mut Checked,
+    file: &Writer,
+    recorded: &mut Recorded,
     comm: &Comm,
     view: &View<D>,
     particles: Rows,
     options: &Options,
 ) -> Result<(), FileError> {
-    start(file, checked, comm, view.time)?;
+    start(file, recorded, comm, view.time)?;
     let extent = view.brick.roots.iter().fold(0.0, |most: f64, &n| most.max(f64::from(n))) * view.root_edge;
     let near = view.origin.iter().all(|x| x.abs() <= FAR * extent);
-    grid(file, checked, comm, particles, 1, VERTEX)?;
+    grid(recorded, comm, particles, 1, VERTEX)?;
     let is_at_zero = view.origin.iter().all(|&x| x == 0.0);
     if options.restart && D == 3 && is_at_zero {
-        file.hard_link(&path("particles", "position"), &format!("{GROUP}/Points"))?;
+        recorded.link(&path("particles", "position"), &format!("{GROUP}/Points"))?;
     } else {
         let points = Values::Real(positions(view), 3);
         field(
-            checked,
+            recorded,
             "Points",
             particles,
             &if options.single && near { points.into_single() } else { points },
@@ -110,11 +109,13 @@ pub(super) fn write_particles<const D: usize>(
         if options.restart
             && let Some(set) = in_state::<D>(*chosen)
         {
-            file.hard_link(&path("particles", set), &format!("{GROUP}/{name}"))?;
+            recorded.link(&path("particles", set), &format!("{GROUP}/{name}"))?;
             continue;
         }
         let values = chosen.values(view);
-        field(checked, &name, particles, &if options.single { values.into_single() } else { values })?;
+        let values = if options.single { values.into_single() } else { values };
+        file.agree(sane::finite_field(view, *chosen, &values).map_err(|reason| file.refuse(reason)))?;
+        field(recorded, &name, particles, &values)?;
     }
     Ok(())
 }
@@ -144,24 +145,24 @@ fn positions<const D: usize>(view: &View<D>) -> Vec<f64> {
 
 /// Collective. Writes the leaves of the tree as cells with their level and number of particles.
 pub(super) fn write_leaves<const D: usize>(
-    file: &ParallelFile,
-    checked: &mut Checked,
+    file: &Writer,
+    recorded: &mut Recorded,
     comm: &Comm,
     view: &View<D>,
     leaves: Rows,
 ) -> Result<(), FileError> {
-    start(file, checked, comm, view.time)?;
+    start(file, recorded, comm, view.time)?;
     let corners = 1 << D;
     let cell_type = if D == 2 { PIXEL } else { VOXEL };
     let points = view.leaves.iter().flat_map(|leaf| leaf_corners(view, leaf)).flatten().collect();
-    grid(file, checked, comm, leaves, corners, cell_type)?;
-    field(checked, "Points", leaves.times(corners), &Values::Real(points, 3))?;
+    grid(recorded, comm, leaves, corners, cell_type)?;
+    field(recorded, "Points", leaves.times(corners), &Values::Real(points, 3))?;
     let levels: Vec<u8> = view.leaves.iter().map(|leaf| leaf.level).collect();
-    checked.write(&format!("{GROUP}/CellData/level"), leaves, 0, &levels)?;
+    recorded.write(&format!("{GROUP}/CellData/level"), leaves, 0, &levels)?;
     let counts: Vec<i64> = view.chunks.iter().map(|chunk| chunk.len() as i64).collect();
-    checked.write(&format!("{GROUP}/CellData/particles"), leaves, 0, &counts)?;
+    recorded.write(&format!("{GROUP}/CellData/particles"), leaves, 0, &counts)?;
     for (name, values) in view.leaf_fields {
-        checked.write(&format!("{GROUP}/CellData/{name}"), leaves, 0, values)?;
+        recorded.write(&format!("{GROUP}/CellData/{name}"), leaves, 0, values)?;
     }
     Ok(())
 }

@@ -1,0 +1,281 @@
+//! An existing file, opened by each rank for itself.
+use std::fs::{File, OpenOptions};
+use std::io::Read;
+use std::mem::MaybeUninit;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use hdf5_sys::h5::herr_t;
+use hdf5_sys::h5d::{
+    H5D_CONTIGUOUS, H5Dclose, H5Dget_create_plist, H5Dget_offset, H5Dget_space, H5Dget_type, H5Dopen2,
+};
+use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5Fclose, H5Fopen};
+use hdf5_sys::h5i::hid_t;
+#[allow(deprecated)] // In 1.12 and later; the newer call is not in 1.10.
+use hdf5_sys::h5l::H5Lget_info1;
+use hdf5_sys::h5l::{H5L_TYPE_HARD, H5L_info1_t, H5Lexists};
+use hdf5_sys::h5p::{H5P_DEFAULT, H5Pclose, H5Pget_external_count, H5Pget_layout, H5Pget_nfilters};
+use hdf5_sys::h5s::{H5Sclose, H5Sget_simple_extent_dims, H5Sget_simple_extent_ndims};
+use hdf5_sys::h5t::H5Tclose;
+use partition::comm::Comm;
+
+use super::{Complaint, Element, FileError, Handle, Kind, agreed, c_path, c_text, check, library};
+
+/// No data set of this program has more numbers in a row.
+const MOST_COMPONENTS: u64 = 1 << 10;
+/// Bytes that are looked at together when a data set is gone through.
+const PIECE: u64 = 1 << 20;
+
+/// An existing file, opened for reading. What it declares is not believed: only groups and data sets of the file itself
+/// are looked at, only contiguous ones without filters, and none that would be longer than the file.
+pub struct Reader {
+    path: PathBuf,
+    comm: Option<Comm>,
+    layout: Handle,
+    /// The way to the rows.
+    rows: File,
+    /// Bytes of the file.
+    size: u64,
+}
+
+/// A data set as the file describes it. It lies within the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stored {
+    /// Rows.
+    pub rows: u64,
+    /// Numbers of a row; 0 for a plain list, which has one.
+    pub components: usize,
+    /// Its numbers.
+    pub kind: Kind,
+    /// First byte.
+    place: u64,
+    /// Bytes.
+    bytes: u64,
+}
+
+impl Reader {
+    /// Collective. Opens the file on all ranks.
+    pub fn open(comm: &Comm, path: &Path) -> Result<Self, FileError> {
+        // One rank looks first: a file that is missing or foreign is opened once.
+        let seen = if comm.rank() == 0 { look_at(path).map(drop) } else { Ok(()) };
+        agreed(Some(comm), seen)?;
+        agreed(Some(comm), Self::open_here(Some(comm), path))
+    }
+
+    /// Not collective. Opens the file for this process alone; needs no MPI.
+    pub fn open_alone(path: &Path) -> Result<Self, FileError> {
+        Self::open_here(None, path)
+    }
+
+    fn open_here(comm: Option<&Comm>, path: &Path) -> Result<Self, FileError> {
+        let (rows, size) = look_at(path)?;
+        let _turn = library();
+        let name = c_path(path);
+        // SAFETY: a terminated name; the identifier is checked.
+        let opened = Handle::new(unsafe { H5Fopen(name.as_ptr(), H5F_ACC_RDONLY, H5P_DEFAULT) }, H5Fclose);
+        let layout = opened.map_err(|words| match words {
+            Complaint { words: reason, .. } if reason.contains("truncated") => {
+                FileError::CutShort { path: path.into(), reason }
+            }
+            words => words.into_error(path, "open", "the file"),
+        })?;
+        Ok(Self { path: path.into(), comm: comm.cloned(), layout, rows, size })
+    }
+
+    /// The file's name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn id(&self) -> hid_t {
+        self.layout.id
+    }
+
+    /// An error of this file that lies in its contents.
+    pub fn refuse(&self, reason: impl Into<String>) -> FileError {
+        FileError::Refused { path: self.path.clone(), reason: reason.into() }
+    }
+
+    /// Collective on a shared file. The same result on all ranks.
+    pub fn agree<T>(&self, result: Result<T, FileError>) -> Result<T, FileError> {
+        agreed(self.comm.as_ref(), result)
+    }
+
+    pub(super) fn wrap(
+        &self,
+        id: hid_t,
+        close: unsafe extern "C" fn(hid_t) -> herr_t,
+        object: &str,
+    ) -> Result<Handle, FileError> {
+        Handle::new(id, close).map_err(|words| words.into_error(&self.path, "read", object))
+    }
+
+    pub(super) fn check(&self, code: herr_t, object: &str) -> Result<(), FileError> {
+        check(code, &self.path, "read", object)
+    }
+
+    /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it; returns its
+    /// bytes. To be asked before memory is taken whose size the file tells.
+    pub(super) fn held_bytes(&self, object: &str, count: u64, element: usize) -> Result<u64, FileError> {
+        match count.checked_mul(element as u64) {
+            Some(bytes) if bytes <= self.size && usize::try_from(bytes).is_ok() => Ok(bytes),
+            _ => Err(self.refuse(format!(
+                "{object} has {count} elements of {element} bytes, more than the file of {} bytes holds",
+                self.size
+            ))),
+        }
+    }
+
+    /// Not collective. True when the object and all groups above it exist in this file.
+    pub fn exists(&self, object: &str) -> bool {
+        matches!(self.leads_to(object), Ok(true))
+    }
+
+    /// Not collective. Whether a path leads to an object. One that leads through a link to another place or file is
+    /// refused, and not followed.
+    pub(super) fn leads_to(&self, object: &str) -> Result<bool, FileError> {
+        let _turn = library();
+        let object = object.trim_matches('/');
+        let ends = object.match_indices('/').map(|(at, _)| at).chain([object.len()]);
+        for end in ends {
+            let name = c_text(&object[..end]);
+            // SAFETY: open file, terminated name. The library fills the record when it succeeds; its kind is looked at as
+            // the number that it is in C, since links of user-defined kinds have numbers without a name.
+            #[allow(deprecated)]
+            let is_hard = unsafe {
+                if H5Lexists(self.id(), name.as_ptr(), H5P_DEFAULT) <= 0 {
+                    return Ok(false);
+                }
+                let mut info = MaybeUninit::<H5L_info1_t>::zeroed();
+                self.check(H5Lget_info1(self.id(), name.as_ptr(), info.as_mut_ptr(), H5P_DEFAULT), object)?;
+                let kind = (&raw const (*info.as_ptr()).type_).cast::<std::ffi::c_int>();
+                kind.read() == H5L_TYPE_HARD as std::ffi::c_int
+            };
+            if !is_hard {
+                let link = &object[..end];
+                return Err(self.refuse(format!("{link} is a link to another place, which is not followed")));
+            }
+        }
+        Ok(true)
+    }
+
+    /// Not collective. What a data set is, if it is one that this program could have written.
+    pub fn stored(&self, dataset: &str) -> Result<Stored, FileError> {
+        let _turn = library();
+        if !self.leads_to(dataset)? {
+            return Err(self.refuse(format!("data set {dataset} is missing")));
+        }
+        let name = c_text(dataset);
+        // SAFETY: open file, terminated name; identifiers are checked and closed by `wrap`, and `dims` is only filled when
+        // it is long enough.
+        unsafe {
+            let set = self.wrap(H5Dopen2(self.id(), name.as_ptr(), H5P_DEFAULT), H5Dclose, dataset)?;
+            let list = self.wrap(H5Dget_create_plist(set.id), H5Pclose, dataset)?;
+            let plain = H5Pget_layout(list.id) == H5D_CONTIGUOUS
+                && H5Pget_external_count(list.id) == 0
+                && H5Pget_nfilters(list.id) == 0;
+            if !plain {
+                let reason = "is in pieces, packed or in another file; this program writes none such";
+                return Err(self.refuse(format!("{dataset} {reason}")));
+            }
+            let kind = self.wrap(H5Dget_type(set.id), H5Tclose, dataset)?;
+            let Some(kind) = Kind::of_type(kind.id) else {
+                return Err(
+                    self.refuse(format!("{dataset} holds no numbers of a kind that this program writes"))
+                );
+            };
+            let space = self.wrap(H5Dget_space(set.id), H5Sclose, dataset)?;
+            let rank = H5Sget_simple_extent_ndims(space.id);
+            if !(1..=2).contains(&rank) {
+                return Err(self.refuse(format!("{dataset} has {rank} dimensions, not one or two")));
+            }
+            let mut dims = [0; 2];
+            let code = H5Sget_simple_extent_dims(space.id, dims.as_mut_ptr(), std::ptr::null_mut());
+            self.check(code, dataset)?;
+            let [rows, components] = dims;
+            if components > MOST_COMPONENTS {
+                return Err(self.refuse(format!("{dataset} has {components} numbers in each row")));
+            }
+            let row = components.max(1) as usize * kind.bytes();
+            let bytes = self.held_bytes(dataset, rows, row)?;
+            let place = if bytes == 0 { 0 } else { H5Dget_offset(set.id) };
+            if place.checked_add(bytes).is_none_or(|end| end > self.size) {
+                return Err(self.refuse(format!("{dataset} does not lie within the file")));
+            }
+            Ok(Stored { rows, components: components as usize, kind, place, bytes })
+        }
+    }
+
+    /// Collective on a shared file. Reads rows `offset .. offset + rows` of a data set of numbers of type `T`.
+    pub fn read_slab<T: Element>(&self, dataset: &str, offset: u64, rows: u64) -> Result<Vec<T>, FileError> {
+        let read = self.stored(dataset).and_then(|stored| self.read_rows(dataset, stored, offset, rows));
+        self.agree(read)
+    }
+
+    fn read_rows<T: Element>(
+        &self,
+        dataset: &str,
+        stored: Stored,
+        offset: u64,
+        rows: u64,
+    ) -> Result<Vec<T>, FileError> {
+        if stored.kind != T::KIND {
+            return Err(self.refuse(format!("{dataset} holds {}; expected {}", stored.kind, T::KIND)));
+        }
+        if offset.checked_add(rows).is_none_or(|end| end > stored.rows) {
+            let held = stored.rows;
+            let reason = format!("{dataset} has {held} rows; {rows} from row {offset} were asked for");
+            return Err(self.refuse(reason));
+        }
+        // Both are at most the bytes of the data set, which lies within the file.
+        let row = stored.components.max(1);
+        let mut values = Vec::new();
+        let numbers = rows as usize * row;
+        if values.try_reserve_exact(numbers).is_err() {
+            let bytes = numbers * size_of::<T>();
+            return Err(self.refuse(format!("no memory for {bytes} bytes of {dataset}")));
+        }
+        values.resize(numbers, T::zeroed());
+        let at = stored.place + offset * (row * size_of::<T>()) as u64;
+        self.read_exact(bytemuck::cast_slice_mut(&mut values), at)?;
+        Ok(values)
+    }
+
+    /// Not collective. Hands all bytes of a data set on, piece by piece.
+    pub fn for_bytes(&self, dataset: &str, mut each: impl FnMut(&[u8])) -> Result<(), FileError> {
+        let stored = self.stored(dataset)?;
+        let mut piece = vec![0; stored.bytes.min(PIECE) as usize];
+        for start in (0..stored.bytes).step_by(PIECE as usize) {
+            let piece = &mut piece[..(stored.bytes - start).min(PIECE) as usize];
+            self.read_exact(piece, stored.place + start)?;
+            each(piece);
+        }
+        Ok(())
+    }
+
+    fn read_exact(&self, bytes: &mut [u8], at: u64) -> Result<(), FileError> {
+        let failed = |source| FileError::System { path: self.path.clone(), action: "read", source };
+        self.rows.read_exact_at(bytes, at).map_err(failed)
+    }
+}
+
+/// Opens a file and looks at its first bytes. Returns it with its size.
+fn look_at(path: &Path) -> Result<(File, u64), FileError> {
+    let system = |source| FileError::System { path: path.into(), action: "open", source };
+    // Without waiting: nobody may ever write to a pipe of that name.
+    let mut file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path).map_err(system)?;
+    let data = file.metadata().map_err(system)?;
+    if !data.is_file() {
+        let reason = "neither a file nor a link to one".into();
+        return Err(FileError::Refused { path: path.into(), reason });
+    }
+    let mut start = [0; 8];
+    match file.read_exact(&mut start) {
+        Ok(()) if start == *b"\x89HDF\r\n\x1a\n" => Ok((file, data.len())),
+        Ok(()) => Err(FileError::NotHdf5 { path: path.into() }),
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+            Err(FileError::CutShort { path: path.into(), reason: "fewer than 8 bytes".into() })
+        }
+        Err(e) => Err(system(e)),
+    }
+}

@@ -1,0 +1,53 @@
+//! What a picture takes from an output file. All of it has the right checksum.
+
+use crate::io::hdf5_file::{FileError, Kind, Reader};
+use crate::io::snapshot::Header;
+use crate::io::snapshot::checked::Checked;
+
+/// Cells of a leaf along an axis.
+const CELLS: f64 = 4.0;
+
+/// A data set with a row for each particle, and the numbers of a row.
+pub(super) fn numbers(file: &Reader, header: &Header, dataset: &str) -> Result<(Vec<f64>, usize), FileError> {
+    let stored = file.stored(dataset)?;
+    let (n, components) = (header.particles, stored.components);
+    let mut checked = Checked::new(None, file, header);
+    let values = match stored.kind {
+        Kind::U64 => {
+            checked.read_all::<u64>(dataset, n, components)?.into_iter().map(|value| value as f64).collect()
+        }
+        Kind::I32 => checked.read_all::<i32>(dataset, n, components)?.into_iter().map(f64::from).collect(),
+        Kind::F32 => checked.read_all::<f32>(dataset, n, components)?.into_iter().map(f64::from).collect(),
+        Kind::F64 => checked.read_all(dataset, n, components)?,
+        other => return Err(file.refuse(format!("{dataset} holds {other}, which no field does"))),
+    };
+    Ok((values, components.max(1)))
+}
+
+/// Positions of the particles, three numbers each.
+pub(super) fn points(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
+    match numbers(file, header, "VTKHDF/Points")? {
+        (points, 3) if points.iter().all(|x| x.is_finite()) => Ok(points),
+        _ => Err(file.refuse("VTKHDF/Points does not hold three finite numbers for each particle")),
+    }
+}
+
+/// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
+/// root octants where the file does not tell.
+pub(super) fn radii(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
+    let n = header.particles;
+    let (state, level) = ("state/particles/half_width", "VTKHDF/PointData/leaf_level");
+    let quarter = |level: i32| header.root_edge / f64::from(1_u32 << level.clamp(0, 31)) / CELLS / 4.0;
+    let mut checked = Checked::new(None, file, header);
+    let radii = if file.exists(state) {
+        checked.read_all(state, n, 0)?
+    } else if file.exists(level) {
+        checked.read_all::<i32>(level, n, 0)?.into_iter().map(quarter).collect()
+    } else {
+        vec![quarter(3); n as usize]
+    };
+    match radii.iter().find(|radius| !(radius.is_finite() && **radius > 0.0)) {
+        Some(radius) => Err(file.refuse(format!("a particle has a half width of {radius:?} m"))),
+        None => Ok(radii),
+    }
+}

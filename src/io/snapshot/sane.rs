@@ -1,0 +1,139 @@
+//! What a state must be beside whole: what no run can have written is refused, whatever its checksums say.
+
+use partition::{MAX_LEVEL, Octant};
+
+use super::View;
+use super::fields::{PointField, Values};
+use super::header::Header;
+use super::state::columns;
+use crate::grid::leaf_geometry::position_key;
+use crate::particle::chunk::{TILE, Tag};
+
+/// Numbers of the job that tags of particles refer to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Number of materials.
+    pub materials: usize,
+    /// Number of bodies.
+    pub bodies: usize,
+}
+
+/// This rank's particles have finite numbers only; says which one has not.
+pub(super) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
+    for chunk in view.chunks {
+        for p in 0..chunk.len() {
+            let tile = chunk.tile_of(p);
+            let Some(column) = tile.iter().position(|line| !line[p % TILE].is_finite()) else { continue };
+            let sets = columns::<D>();
+            let name = sets.iter().rfind(|set| set.first <= column).map_or("", |set| set.name);
+            let (id, value, position) = (chunk.ids()[p], tile[column][p % TILE], chunk.position(p));
+            return Err(unstable(name, id, value, &position));
+        }
+    }
+    Ok(())
+}
+
+/// Values of a field that is to be written are finite; `width` for each particle.
+pub(super) fn finite_field<const D: usize>(
+    view: &View<D>,
+    field: PointField,
+    values: &Values,
+) -> Result<(), String> {
+    let (at, width, value) = match values {
+        Values::Real(values, width) => {
+            let Some(at) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+            (at, width, values[at])
+        }
+        Values::Single(values, width) => {
+            let Some(at) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+            (at, width, f64::from(values[at]))
+        }
+        Values::Id(_) | Values::Integer(_) => return Ok(()),
+    };
+    let row = at / (*width).max(1);
+    let mut particles = view.chunks.iter().flat_map(|chunk| (0..chunk.len()).map(move |p| (chunk, p)));
+    match particles.nth(row) {
+        Some((chunk, p)) => Err(unstable(field.name(), chunk.ids()[p], value, &chunk.position(p))),
+        None => Ok(()),
+    }
+}
+
+fn unstable(name: &str, id: u64, value: f64, position: &[f64]) -> String {
+    format!(
+        "not written: {name} of particle {id} is {value:?}, at {position:?} m (relative to the domain's lower corner); \
+         the run has become unstable"
+    )
+}
+
+/// Finite numbers; masses and half widths above 0. `values` has `width` numbers for each particle.
+pub(super) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), String> {
+    let positive = ["mass", "half_width"].contains(&name);
+    let is_wrong = |value: &f64| !value.is_finite() || (positive && *value <= 0.0);
+    match values.iter().position(is_wrong) {
+        None => Ok(()),
+        Some(at) => {
+            let expected = if positive { "a positive number" } else { "a finite number" };
+            Err(format!(
+                "{name} of the particle in row {} is {:?}; expected {expected}",
+                at / width,
+                values[at]
+            ))
+        }
+    }
+}
+
+/// Every particle in its leaf: the first leaves have the first rows, as many as `counts` says.
+pub(super) fn positions<const D: usize>(
+    header: &Header,
+    octants: &[Octant<D>],
+    counts: &[u64],
+    positions: &[f64],
+) -> Result<(), String> {
+    let roots: [u32; D] = std::array::from_fn(|axis| header.roots[axis] as u32);
+    let mut rows = positions.chunks_exact(D).enumerate();
+    for (octant, &count) in octants.iter().zip(counts) {
+        for (row, position) in rows.by_ref().take(count as usize) {
+            let position: [f64; D] = std::array::from_fn(|axis| position[axis]);
+            let inside = (0..D).all(|axis| {
+                position[axis] >= 0.0 && position[axis] <= header.root_edge * f64::from(roots[axis])
+            });
+            let key = position_key(position, roots, header.root_edge);
+            if !(inside && (octant.key()..octant.key_end()).contains(&key)) {
+                return Err(format!(
+                    "the particle in row {row}, at {position:?} m, is not in its leaf of level {} at {:?}",
+                    octant.level, octant.coord
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Materials and bodies of the job, levels of a tree.
+pub(super) fn tags(tags: &[u64], limits: Limits) -> Result<(), String> {
+    let is_wrong = |tag: &u64| {
+        let Tag { material, body, level } = Tag::unpack(*tag);
+        usize::from(material) >= limits.materials || usize::from(body) >= limits.bodies || level > MAX_LEVEL
+    };
+    match tags.iter().position(is_wrong) {
+        None => Ok(()),
+        Some(row) => {
+            let Tag { material, body, level } = Tag::unpack(tags[row]);
+            Err(format!(
+                "the particle in row {row} is of material {material}, body {body} and level {level}; \
+                 there are {} materials, {} bodies and levels to {MAX_LEVEL}",
+                limits.materials, limits.bodies
+            ))
+        }
+    }
+}
+
+/// No identifier twice among these.
+pub(super) fn identifiers(ids: &[u64]) -> Result<(), String> {
+    let mut sorted = ids.to_vec();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        None => Ok(()),
+        Some(pair) => Err(format!("two particles have the identifier {}", pair[0])),
+    }
+}
