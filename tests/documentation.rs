@@ -293,6 +293,31 @@ fn commands_in_the_comments_of_jobs_run() {
     assert!(jobs >= 7, "{jobs}");
 }
 
+/// The table of `tests/README.md` has every file of tests, and nothing else.
+#[test]
+fn every_test_is_listed() {
+    let table = text(Path::new("tests/README.md"));
+    let listed: BTreeSet<String> = table
+        .lines()
+        .filter_map(|row| row.strip_prefix("| `")?.split('`').next())
+        .map(|name| name.trim_end_matches(['/', '*']).trim_end_matches(".rs").to_owned())
+        .collect();
+    let mut there = BTreeSet::from(["src".to_owned(), "partition/tests/distributed".to_owned()]);
+    for path in files(Path::new("tests")) {
+        let in_tests = path.strip_prefix("tests").expect("below tests");
+        match in_tests.iter().count() {
+            1 if path.extension().is_some_and(|e| e == "rs") => {
+                there.insert(in_tests.with_extension("").display().to_string())
+            }
+            2 if path.ends_with("main.rs") => {
+                there.insert(in_tests.parent().expect("a folder").display().to_string())
+            }
+            _ => false,
+        };
+    }
+    assert_eq!(listed, there);
+}
+
 /// The anchor of a heading, as GitHub makes it.
 fn anchor(heading: &str) -> String {
     let kept = heading.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
