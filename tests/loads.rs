@@ -192,7 +192,7 @@ fn wrong_loads_are_refused_with_their_key() {
         ("kind = 'damping'\nrate = -1", "loads[0].rate", "0 or more"),
         ("kind = 'damping'\nrate = 1\nfrom = 2\nuntil = 1", "loads[0].until", "after from"),
         ("kind = 'dampin'\nrate = 1", "loads[0].kind", "did you mean \"damping\""),
-        ("kind = 'damping'\nrat = 1", "loads[0].rat", "did you mean \"rate\""),
+        ("kind = 'damping'\nrat = 1", "loads[0].rat", "did you mean `rate`"),
     ];
     for (load, key, words) in cases {
         let directory = tempfile::tempdir().expect("temporary directory");
