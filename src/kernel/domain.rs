@@ -147,7 +147,7 @@ pub(super) fn softening<V: Vector, const D: usize>(
     is_cut.any().then(|| factors(half, &least))
 }
 
-/// [`softening`] of a box that is wider than a cell along another axis, of cells of edge `cell`. Before a wall cut it, it was wider
+/// `softening` of a box that is wider than a cell along another axis, of cells of edge `cell`. Before a wall cut it, it was wider
 /// than the limit along every axis.
 pub fn softening_at<const D: usize>(
     position: &[f64; D],

@@ -5,7 +5,7 @@
 //! reads its own with plain system calls, at the place that the library has given the data set. So no rank waits inside
 //! a library for one that has failed; the system's own reason for a failure is known; and whatever a file declares is
 //! compared with its size before memory is taken for it. Handles live no longer than the call or the file that they
-//! belong to. The library knows no threads: whoever calls it holds its lock ([`library`]).
+//! belong to. The library knows no threads: whoever calls it holds its lock (`library`).
 //!
 //! | file | concern |
 //! |---|---|
