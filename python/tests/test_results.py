@@ -45,7 +45,7 @@ def test_sums_over_particles_are_those_of_the_history(plane: agimp.Results) -> N
 def test_times_come_from_the_index_and_are_those_of_the_files(plane: agimp.Results) -> None:
     assert len(plane) == 5
     assert plane.times.tolist() == [out.time for out in plane]
-    assert plane.times[0] == 0.0 and plane.times[-1] == 0.02
+    assert plane.times[0] == 0.0 and 0.02 <= plane.times[-1] < 0.021
     assert plane.at(0.0101).path == plane[2].path
     assert plane[-1].path == plane[4].path
     assert [out.step for out in plane[1:3]] == [plane[1].step, plane[2].step]

@@ -32,7 +32,7 @@ def test_a_job_file_runs_where_it_is_told(needs_program: str, tmp_path: Path) ->
     job = agimp.job(PLANE, name="short").set("time.end", 0.001).set("output.directory", "elsewhere/x")
     path = job.save(tmp_path / "jobs" / "short.toml")
     run = agimp.run(path, where=tmp_path)
-    assert run.directory == tmp_path / "elsewhere" / "x" and run[-1].time == 0.001
+    assert run.directory == tmp_path / "elsewhere" / "x" and 0.001 <= run[-1].time < 0.0013
     with pytest.raises(ValueError, match="named after the file"):
         agimp.run(path, "other", where=tmp_path)
     with pytest.raises(FileNotFoundError, match="no such job file"):
