@@ -19,3 +19,4 @@ pub mod setup;
 pub mod simd;
 pub mod solver;
 pub mod text;
+pub mod view;

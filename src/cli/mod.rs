@@ -18,6 +18,7 @@ mod quote;
 mod ranks;
 mod run;
 mod schema;
+mod view;
 pub mod weights;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
@@ -44,6 +45,8 @@ pub enum Command {
     Info(info::Arguments),
     /// Draw the particles of an output file as PNG.
     Plot(plot::Arguments),
+    /// Write an HTML page that shows particles and tree in a browser: turn, zoom, play, cut, read values.
+    View(view::Arguments),
     /// Print a number that tells states apart, whatever the ranks that wrote the files.
     Digest(digest::Arguments),
     /// Tell where the states in two files differ.
@@ -121,6 +124,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::New(arguments) => new::execute(&arguments),
         Command::Info(arguments) => info::execute(&arguments),
         Command::Plot(arguments) => plot::execute(&arguments),
+        Command::View(arguments) => view::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),
         Command::Material(arguments) => material::execute(&arguments),

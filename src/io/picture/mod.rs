@@ -18,7 +18,7 @@ mod colour;
 mod derived;
 mod font;
 mod scene;
-mod source;
+pub(super) mod source;
 
 use canvas::Canvas;
 use derived::{Source, is_class, magnitude};

@@ -8,7 +8,7 @@ use crate::io::snapshot::checked::Checked;
 const CELLS: f64 = 4.0;
 
 /// A data set with a row for each particle, and the numbers of a row.
-pub(super) fn numbers(file: &Reader, header: &Header, dataset: &str) -> Result<(Vec<f64>, usize), FileError> {
+pub(in crate::io) fn numbers(file: &Reader, header: &Header, dataset: &str) -> Result<(Vec<f64>, usize), FileError> {
     let stored = file.stored(dataset)?;
     let (n, components) = (header.particles, stored.components);
     let mut checked = Checked::new(None, file, header);
@@ -25,7 +25,7 @@ pub(super) fn numbers(file: &Reader, header: &Header, dataset: &str) -> Result<(
 }
 
 /// Positions of the particles, three numbers each.
-pub(super) fn points(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
+pub(in crate::io) fn points(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
     match numbers(file, header, "VTKHDF/Points")? {
         (points, 3) if points.iter().all(|x| x.is_finite()) => Ok(points),
         _ => Err(file.refuse("VTKHDF/Points does not hold three finite numbers for each particle")),
@@ -34,7 +34,7 @@ pub(super) fn points(file: &Reader, header: &Header) -> Result<Vec<f64>, FileErr
 
 /// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
 /// root octants where the file does not tell.
-pub(super) fn radii(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
+pub(in crate::io) fn radii(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
     let n = header.particles;
     let (state, level) = ("state/particles/half_width", "VTKHDF/PointData/leaf_level");
     let quarter = |level: i32| header.root_edge / f64::from(1_u32 << level.clamp(0, 31)) / CELLS / 4.0;

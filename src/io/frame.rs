@@ -1,0 +1,169 @@
+//! What the files of a run show at one time: particles with their fields, and leaves. For viewers and exports; not collective.
+use std::path::{Path, PathBuf};
+
+use super::hdf5_file::{FileError, Reader};
+use super::picture::source;
+use super::series::Series;
+use super::snapshot::checked::Checked;
+use super::snapshot::fields::Values;
+use super::snapshot::{Header, PointField};
+
+/// Particles of an output or checkpoint file.
+pub struct Frame {
+    /// What the file says about itself.
+    pub header: Header,
+    /// Positions, m; the third component is 0 in plane strain.
+    pub positions: Vec<[f64; 3]>,
+    /// Half widths of the undeformed boxes, m.
+    pub half_widths: Vec<f64>,
+    /// The fields asked for that the file shows.
+    pub(crate) fields: Vec<(PointField, Values)>,
+}
+
+/// Leaves of the tree.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Leaves {
+    /// Level of each leaf.
+    pub levels: Vec<u8>,
+    /// Lower corner of each leaf, counted in leaves of its level from the lower corner of the domain.
+    pub coords: Vec<[u32; 3]>,
+}
+
+impl Frame {
+    /// Reads the particles of a file with those of the fields `wanted` that it shows. Fields that `required` names
+    /// must be there.
+    pub fn read(path: &Path, wanted: &[PointField], required: bool) -> Result<Self, FileError> {
+        let file = Reader::open_alone(path)?;
+        let header = header_of_particles(&file)?;
+        let points = source::points(&file, &header)?;
+        let half_widths = source::radii(&file, &header)?;
+        let mut fields = Vec::new();
+        for &field in wanted {
+            match dataset(&file, field) {
+                Some(name) => fields.push((field, values(&file, &header, field, &name)?)),
+                None if required => {
+                    let shown: Vec<&str> = shown(&file).into_iter().map(PointField::name).collect();
+                    let (name, shown) = (field.name(), shown.join(", "));
+                    return Err(file.refuse(format!("the file does not show {name}; it shows {shown}")));
+                }
+                None => {}
+            }
+        }
+        let positions = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        Ok(Self { header, positions, half_widths, fields })
+    }
+
+    /// Lower and upper corner of the domain, m.
+    pub fn domain(&self) -> [[f64; 3]; 2] {
+        let low = |axis: usize| self.header.origin.get(axis).copied().unwrap_or(0.0);
+        let edge =
+            |axis: usize| self.header.roots.get(axis).map_or(0.0, |&n| n as f64 * self.header.root_edge);
+        [std::array::from_fn(low), std::array::from_fn(|axis| low(axis) + edge(axis))]
+    }
+}
+
+/// The fields that a file shows, in the order of [`PointField::ALL`].
+pub fn shown(file: &Reader) -> Vec<PointField> {
+    PointField::ALL.into_iter().filter(|&field| dataset(file, field).is_some()).collect()
+}
+
+/// The fields that the file at `path` shows.
+pub fn shown_in(path: &Path) -> Result<Vec<PointField>, FileError> {
+    let file = Reader::open_alone(path)?;
+    header_of_particles(&file)?;
+    Ok(shown(&file))
+}
+
+/// The header of a file with particles; refuses others.
+fn header_of_particles(file: &Reader) -> Result<Header, FileError> {
+    let header = Header::read(file)?;
+    if !file.exists("VTKHDF/PointData") || file.exists("VTKHDF/CellData/level") {
+        return Err(file.refuse("the file holds no particles (is it a tree file?)"));
+    }
+    Ok(header)
+}
+
+fn dataset(file: &Reader, field: PointField) -> Option<String> {
+    let name = format!("VTKHDF/PointData/{}", field.name());
+    file.exists(&name).then_some(name)
+}
+
+fn values(file: &Reader, header: &Header, field: PointField, name: &str) -> Result<Values, FileError> {
+    let rows = header.particles;
+    let mut checked = Checked::new(None, file, header);
+    Ok(match field {
+        PointField::Id => Values::Id(checked.read_all(name, rows, 0)?),
+        _ if is_integer(field) => Values::Integer(checked.read_all(name, rows, 0)?),
+        _ => {
+            let (values, components) = source::numbers(file, header, name)?;
+            Values::Real(values, components)
+        }
+    })
+}
+
+/// Whether a field holds small whole numbers.
+pub fn is_integer(field: PointField) -> bool {
+    matches!(
+        field,
+        PointField::Material | PointField::Body | PointField::ParticleLevel | PointField::LeafLevel
+    )
+}
+
+impl Leaves {
+    /// The leaves that belong to an output: of the tree file beside it, or of its own restart state; none if there is
+    /// neither.
+    pub fn of_output(path: &Path) -> Result<Self, FileError> {
+        let beside = tree_beside(path);
+        let file = Reader::open_alone(if beside.exists() { &beside } else { path })?;
+        let header = Header::read(&file)?;
+        let (rows, dimension) = (header.leaves, header.dimension.clamp(1, 3));
+        let mut checked = Checked::new(None, &file, &header);
+        if file.exists("VTKHDF/CellData/level") {
+            let levels: Vec<u8> = checked.read_all("VTKHDF/CellData/level", rows, 0)?;
+            let corners = 1_u64 << dimension;
+            let points: Vec<f64> = checked.read_all("VTKHDF/Points", rows.saturating_mul(corners), 3)?;
+            let coords = points.chunks_exact(3 * corners as usize).zip(&levels).map(|(corner, &level)| {
+                let edge = header.root_edge / f64::from(1_u32 << level.min(31));
+                let low = |axis: usize| header.origin.get(axis).copied().unwrap_or(0.0);
+                std::array::from_fn(|axis| ((corner[axis] - low(axis)) / edge).round() as u32)
+            });
+            return Ok(Self { coords: coords.collect(), levels });
+        }
+        if !file.exists("state/tree/level") {
+            return Ok(Self::default());
+        }
+        let levels = checked.read_all("state/tree/level", rows, 0)?;
+        let coords: Vec<u32> = checked.read_all("state/tree/coord", rows, dimension)?;
+        let padded = |c: &[u32]| std::array::from_fn(|axis| c.get(axis).copied().unwrap_or(0));
+        Ok(Self { coords: coords.chunks_exact(dimension).map(padded).collect(), levels })
+    }
+}
+
+/// `a/b_000001.hdf` has its tree in `a/b_000001.tree.hdf`.
+fn tree_beside(output: &Path) -> PathBuf {
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = output.extension().unwrap_or_default().to_string_lossy();
+    output.with_file_name(format!("{stem}.tree.{ending}"))
+}
+
+/// The output files that the words of a command line mean: an index (`.series`) stands for the files that it lists.
+pub fn expand(words: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+    let mut files = Vec::new();
+    for word in words {
+        if word.extension().is_none_or(|ending| ending != "series") {
+            files.push(word.clone());
+            continue;
+        }
+        let refused = |reason: &str| FileError::Refused { path: word.clone(), reason: reason.into() };
+        let entries = Series::listed(word).ok_or_else(|| {
+            refused(
+                "found no index of outputs; expected a file such as NAME.hdf.series that a run has written",
+            )
+        })?;
+        if entries.is_empty() {
+            return Err(refused("the index lists no outputs"));
+        }
+        files.extend(entries.into_iter().map(|entry| word.with_file_name(entry.name)));
+    }
+    Ok(files)
+}
