@@ -303,7 +303,9 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
         return { metre: pixels, rows: picked.rows, title: document.title, now: element('now').textContent, area: coloured(v) };";
     let (result, coloured) = in_browser(&chromium, directory.path(), &page, script);
     assert_eq!(result["title"], "Half");
-    assert_eq!(result["now"], "3 of 3: 0.01 s");
+    // The run ends with the first step that reaches 0.01 s.
+    let now = result["now"].as_str().expect("text");
+    assert!(now.starts_with("3 of 3: 0.01"), "{now}");
     let row = |name: &str| {
         let rows = result["rows"].as_array().expect("rows");
         let found = rows.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name} in {rows:?}"));
