@@ -196,7 +196,7 @@ fn page_is_one_file_that_names_no_other_and_no_markup_of_titles() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_told_and_writes_nothing() {
+fn what_cannot_be_shown_is_refused_and_writes_nothing() {
     let directory = run();
     let here = directory.path();
     std::fs::write(here.join("not.hdf"), "a file of plain text").expect("written");
@@ -315,7 +315,8 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
     let at = |name: &str| row(name).parse::<f64>().expect("a number");
     assert!((at("x, m") + 0.36).abs() < 0.02, "{}", row("x, m"));
     assert!((at("y, m") - 2.13).abs() < 0.02, "{}", row("y, m"));
-    assert!((at("density, kg/m³") - 1000.0).abs() < 30.0, "{}", row("density, kg/m³"));
+    // The wall holds the rubber that moves away at 1 m/s: behind the wave of 11.6 m/s it is stretched by 9 %.
+    assert!((900.0..=1001.0).contains(&at("density, kg/m³")), "{}", row("density, kg/m³"));
     assert_eq!(row("material"), "rubber");
     // Half a metre by half a metre is coloured.
     let area = 0.25 * real(&result["metre"]) * real(&result["metre"]);

@@ -8,7 +8,11 @@ use crate::io::snapshot::checked::Checked;
 const CELLS: f64 = 4.0;
 
 /// A data set with a row for each particle, and the numbers of a row.
-pub(in crate::io) fn numbers(file: &Reader, header: &Header, dataset: &str) -> Result<(Vec<f64>, usize), FileError> {
+pub(in crate::io) fn numbers(
+    file: &Reader,
+    header: &Header,
+    dataset: &str,
+) -> Result<(Vec<f64>, usize), FileError> {
     let stored = file.stored(dataset)?;
     let (n, components) = (header.particles, stored.components);
     let mut checked = Checked::new(None, file, header);
