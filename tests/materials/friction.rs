@@ -109,3 +109,41 @@ fn volume_that_has_opened_is_given_back() {
         assert!((point.history[PLASTIC_VOLUME] - dilated).abs() < 1e-12);
     }
 }
+
+fn cohesive(case: &Value, keys: &str) -> Box<dyn Material> {
+    let tension = case["tension"].as_f64().map_or(String::new(), |t| format!(", tension_cutoff = {t:e}"));
+    let matching = match case["match"].as_str().unwrap() {
+        name if name.starts_with("plane_strain") => "plane_strain",
+        name => name,
+    };
+    let keys = format!(
+        ", friction_angle = {}, cohesion = {}, dilation_angle = {}, match = '{matching}'{tension}{keys}",
+        case["phi_deg"], case["c"], case["psi_deg"]
+    );
+    model("drucker_prager", case, &keys)
+}
+
+#[test]
+fn drucker_prager_returns_to_cone_apex_and_cut_off() {
+    for case in data("driver_drucker_prager_cohesive.json")["cases"].as_array().unwrap() {
+        check_returns(cohesive(case, ", volume_correction = false").as_ref(), &case["rows"]);
+    }
+}
+
+#[test]
+fn cohesive_drucker_prager_along_paths() {
+    for case in data("driver_drucker_prager_cohesive.json")["cases"].as_array().unwrap() {
+        let material = cohesive(case, ", volume_correction = false");
+        for path in case["paths"].as_array().unwrap() {
+            for steps in [1, 20] {
+                let mut point = Point::new(material.as_ref());
+                let mut last = [0.0; 3];
+                for strain in path["eps_points"].as_array().unwrap() {
+                    stretch_to(&mut point, last, numbers(strain), steps);
+                    last = numbers(strain);
+                }
+                close_on_axes(&point.stress, &path["tau_end"], 10.0 * greatest(&path["tau_end"]), path);
+            }
+        }
+    }
+}

@@ -14,9 +14,11 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
-use crate::material::parameters::Lame;
+use super::von_mises::Overstress;
+use crate::material::hardening::{Curve, Flow, Hardening};
+use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
-use crate::material::{Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
+use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.
@@ -26,12 +28,14 @@ pub enum FrictionMatch {
     /// Compression meridian: `alpha = sqrt(2/3) · 2 sin(phi) / (3 - sin(phi))` (Klar et al. 2016).
     #[default]
     TriaxialCompression,
-    /// Non-dilatant flow in plane strain: `alpha = sqrt(2) sin(phi) / 3`.
+    /// Extension meridian: `alpha = sqrt(2/3) · 2 sin(phi) / (3 + sin(phi))`.
+    TriaxialExtension,
+    /// Flow in plane strain; without dilation `alpha = sqrt(2) sin(phi) / 3`.
     PlaneStrain,
 }
 
 /// Hencky elasticity with Drucker-Prager yield, non-associated flow (Klar et al. 2016).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Young's modulus, Pa; above 0.
@@ -46,6 +50,29 @@ pub struct Parameters {
     /// Where the cone meets the Mohr-Coulomb friction angle.
     #[serde(default, rename = "match")]
     pub matching: FrictionMatch,
+    /// Cohesion, Pa.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e13))]
+    pub cohesion: f64,
+    /// Dilation angle, degrees; at most the friction angle.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 90.0))]
+    pub dilation_angle: f64,
+    /// Greatest mean stress, Pa; by default only the apex bounds it.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e13))]
+    pub tension_cutoff: Option<f64>,
+    /// How the cohesion changes with plastic strain: a number is the modulus of linear hardening, Pa.
+    #[serde(default)]
+    pub hardening: Hardening,
+    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |dev d_p|^h` (Perzyna 1966). 0: no overstress.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e13))]
+    pub viscosity: f64,
+    /// Exponent h of the rate in the overstress.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub rate_exponent: f64,
     /// Book the volume gained in tension and give it back on compression (Tampubolon et al. 2017).
     #[serde(default = "yes")]
     pub volume_correction: bool,
@@ -55,14 +82,61 @@ fn yes() -> bool {
     true
 }
 
+fn one() -> f64 {
+    1.0
+}
+
+/// History variable of the volume that is booked, or of the temperature.
+const OWN: usize = PLASTIC_VOLUME + 1;
+
+/// What there is beside dry friction.
+#[derive(Clone, Debug)]
+struct Cohesive {
+    /// Bulk modulus, Pa.
+    bulk: f64,
+    /// `|dev τ| + α tr τ ≤ k`: α, and k per cohesion.
+    alpha: f64,
+    strength: f64,
+    /// Plastic volume per norm of the plastic shear strain, over 3.
+    beta: f64,
+    cohesion: Curve,
+    /// Greatest mean stress, Pa.
+    tension: f64,
+    overstress: Option<Overstress>,
+    volume_correction: bool,
+}
+
+/// α, k per cohesion, and β.
+fn cone(p: &Parameters) -> [f64; 3] {
+    let (sine, cosine) = (libm::sin(p.friction_angle.to_radians()), libm::cos(p.friction_angle.to_radians()));
+    let dilation = libm::sin(p.dilation_angle.to_radians());
+    let triaxial = |sign: f64| {
+        let alpha = |sine: f64| (2.0_f64 / 3.0).sqrt() * 2.0 * sine / (3.0 + sign * sine);
+        [alpha(sine), (2.0_f64 / 3.0).sqrt() * 6.0 * cosine / (3.0 + sign * sine), alpha(dilation)]
+    };
+    match p.matching {
+        FrictionMatch::TriaxialCompression => triaxial(-1.0),
+        FrictionMatch::TriaxialExtension => triaxial(1.0),
+        FrictionMatch::PlaneStrain => {
+            // Such that sin ψ is the ratio of rates of volume and shear in the plane.
+            let beta = 2.0_f64.sqrt() * dilation / (9.0 + 3.0 * dilation * dilation).sqrt();
+            let d = (0.5 * (1.0 - 1.5 * beta * beta)).sqrt();
+            let denominator = d + 0.5 * beta * sine;
+            [sine / (3.0 * denominator), cosine / denominator, beta]
+        }
+    }
+}
+
 /// Drucker-Prager granular material.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct DruckerPrager {
     solid: Hencky,
     /// `(3λ + 2μ)/(2μ) α`.
     slope: f64,
     /// 1 with volume correction, 0 without.
     correction: f64,
+    /// Cohesion and all else.
+    cohesive: Option<Cohesive>,
 }
 
 impl Model for DruckerPrager {
@@ -73,30 +147,100 @@ impl Model for DruckerPrager {
         let sine = libm::sin(p.friction_angle.to_radians());
         let alpha = match p.matching {
             FrictionMatch::TriaxialCompression => (2.0_f64 / 3.0).sqrt() * 2.0 * sine / (3.0 - sine),
+            FrictionMatch::TriaxialExtension => (2.0_f64 / 3.0).sqrt() * 2.0 * sine / (3.0 + sine),
             FrictionMatch::PlaneStrain => 2.0_f64.sqrt() * sine / 3.0,
         };
         let slope = (3.0 * lame.lambda + 2.0 * lame.mu) / (2.0 * lame.mu) * alpha;
         let correction = if p.volume_correction { 1.0 } else { 0.0 };
-        Self { solid: Hencky::of(p.young, p.poisson, density), slope, correction }
+        Self {
+            solid: Hencky::of(p.young, p.poisson, density),
+            slope,
+            correction,
+            cohesive: Cohesive::new(p, lame, density),
+        }
+    }
+
+    fn check(p: &Parameters) -> Result<(), OutOfRange> {
+        p.hardening.check(p.cohesion)?;
+        let fail = |range: String| {
+            Err(OutOfRange { key: "dilation_angle".to_owned(), value: p.dilation_angle, range })
+        };
+        if p.dilation_angle > p.friction_angle {
+            return fail(format!("at most friction_angle, {}", p.friction_angle));
+        }
+        if p.hardening.heats() && p.volume_correction && p.dilation_angle > 0.0 {
+            return fail("0 with Johnson-Cook hardening, unless volume_correction = false".to_owned());
+        }
+        Ok(())
     }
 
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 30",
             "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 30, match = 'plane_strain', volume_correction = false",
+            "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 35, cohesion = 2e3, dilation_angle = 10, \
+             tension_cutoff = 1e3, match = 'triaxial_extension'",
+            "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 25, cohesion = 1e4, volume_correction = false, \
+             viscosity = 20.0, hardening = {kind = 'exponential_softening', residual = 2e3, strain = 0.1, length = 0.2}",
         ]
     }
 }
 
 impl Law for DruckerPrager {
-    const HISTORIES: usize = PLASTIC_VOLUME + 1;
+    const HISTORIES: usize = OWN + 1;
 
     #[inline(always)]
     fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        match &self.cohesive {
+            None => self.return_dry(state, step.plane),
+            Some(cohesive) => cohesive.respond(&self.solid, state, step),
+        }
+    }
+
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
+        self.solid.energy(state, plane)
+    }
+
+    fn density(&self) -> f64 {
+        Law::density(&self.solid)
+    }
+
+    fn wave_speed(&self) -> f64 {
+        Law::wave_speed(&self.solid)
+    }
+
+    fn history_names(&self) -> &'static [&'static str] {
+        match &self.cohesive {
+            Some(cohesive) if cohesive.cohesion.temperature().is_some() => {
+                &["plastic_shear_strain", "plastic_volume", "temperature"]
+            }
+            Some(cohesive) if cohesive.books_apart() => {
+                &["plastic_shear_strain", "plastic_volume", "volume_gain"]
+            }
+            _ => &["plastic_shear_strain", "volume_gain"],
+        }
+    }
+
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        let mut history = [0.0; HISTORIES];
+        history[OWN] = self.cohesive.as_ref().and_then(|own| own.cohesion.temperature()).unwrap_or(0.0);
+        history
+    }
+
+    fn softens(&self) -> bool {
+        self.cohesive.as_ref().is_some_and(|own| own.cohesion.softens())
+    }
+}
+
+impl DruckerPrager {
+    /// Dry friction without dilation.
+    #[inline(always)]
+    fn return_dry<V: Vector>(&self, state: &mut State<V>, plane: bool) {
         let zero = V::splat(0.0);
         let one = V::splat(1.0);
         let (shear, gain) = (state.history[PLASTIC_STRAIN], state.history[PLASTIC_VOLUME]);
-        let trial = Strain::of(&state.elastic, step.plane);
+        let trial = Strain::of(&state.elastic, plane);
         let booked = gain * self.correction;
         let trace = trial.trace + booked;
         let norm = trial.norm;
@@ -121,23 +265,137 @@ impl Law for DruckerPrager {
             state.work = flows.select(retained * excess * (2.0 * self.solid.shear_modulus()), zero);
         }
         let trace = apart.select(zero, trace);
-        trial.finish(&self.solid, state, [trace, kept], changed, apart, step.plane);
+        trial.finish(&self.solid, state, [trace, kept], changed, apart, plane);
+    }
+}
+
+impl Cohesive {
+    /// What the parameters ask for beside dry friction, if anything.
+    fn new(p: &Parameters, lame: Lame, density: f64) -> Option<Self> {
+        let cohesion = Curve::new(&p.hardening, p.cohesion, density);
+        let overstress = Overstress::new(p.viscosity, p.rate_exponent);
+        let is_dry = p.cohesion == 0.0 && cohesion.linear() == Some(0.0) && overstress.is_none();
+        if is_dry && p.dilation_angle == 0.0 && p.tension_cutoff.is_none() {
+            return None;
+        }
+        let [alpha, strength, beta] = cone(p);
+        Some(Self {
+            bulk: lame.lambda + 2.0 / 3.0 * lame.mu,
+            alpha,
+            strength,
+            beta,
+            cohesion,
+            tension: p.tension_cutoff.unwrap_or(f64::INFINITY),
+            overstress,
+            volume_correction: p.volume_correction,
+        })
     }
 
+    /// Whether volume that has opened is booked apart from that of dilation.
+    fn books_apart(&self) -> bool {
+        self.volume_correction && self.beta > 0.0
+    }
+
+    /// Any cohesion, dilation, cut-off, hardening and overstress: `f = |dev τ| + α tr τ - k`, flow along `|dev τ| + β tr τ`.
     #[inline(always)]
-    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
-        self.solid.energy(state, plane)
-    }
-
-    fn density(&self) -> f64 {
-        Law::density(&self.solid)
-    }
-
-    fn wave_speed(&self) -> f64 {
-        Law::wave_speed(&self.solid)
-    }
-
-    fn history_names(&self) -> &'static [&'static str] {
-        &["plastic_shear_strain", "volume_gain"]
+    fn respond<V: Vector>(&self, solid: &Hencky, state: &mut State<V>, step: &Step) {
+        let zero = V::splat(0.0);
+        let one = V::splat(1.0);
+        let root = (2.0_f64 / 3.0).sqrt();
+        let twice_mu = 2.0 * solid.shear_modulus();
+        let shear = state.history[PLASTIC_STRAIN];
+        let volume = state.history[PLASTIC_VOLUME];
+        let booked = match (self.volume_correction, self.books_apart()) {
+            (false, _) => zero,
+            (true, false) => volume,
+            (true, true) => state.history[OWN],
+        };
+        let heats = self.cohesion.temperature().is_some();
+        let temperature = if heats { state.history[OWN] } else { zero };
+        let trial = Strain::of(&state.elastic, step.plane);
+        let strain = trial.trace + booked;
+        let (norm, trace) = (trial.norm * twice_mu, strain * (3.0 * self.bulk));
+        let kappa = shear * root;
+        // k after an increment of the norm of the plastic shear strain, and its derivative.
+        let strength = |increment: V| {
+            let flow = Flow { increment: increment * root, temperature: [temperature, zero] };
+            let [value, slope] =
+                self.cohesion.strength(increment.mul_add(V::splat(root), kappa), &flow, step);
+            [value * self.strength, slope * (self.strength * root)]
+        };
+        let tip = |strength: V| {
+            let apex = if self.alpha > 0.0 { strength * (1.0 / self.alpha) } else { V::splat(f64::INFINITY) };
+            apex.min(V::splat(3.0 * self.tension))
+        };
+        let [first, _] = strength(zero);
+        let excess = trace.mul_add(V::splat(self.alpha), norm) - first;
+        let shears = zero.lt(excess);
+        // Nothing flows by its rate without a step, but the material opens at once.
+        let torn = tip(first).lt(trace);
+        let returns = zero.lt(booked.abs());
+        let none = V::Mask::from_bits(0);
+        let yields = if self.overstress.is_some() && step.dt <= 0.0 { none } else { shears };
+        let flows = yields | torn;
+        let changed = flows | returns;
+        let (mut kept, mut end_trace, mut opens) = (one, trace, none);
+        state.work = zero;
+        if flows.any() {
+            // Increment at which the norm, less by 2μ for each, and the trace, less by `bulk` α for each, meet the cone.
+            let on_cone = |load: V, stiffness: f64, active: V::Mask| {
+                let function = |increment: V| {
+                    let [mut value, mut slope] = strength(increment);
+                    if let Some(overstress) = self.overstress {
+                        let [own, change] = overstress.of(increment, step.dt);
+                        (value, slope) = (value + own, slope + change);
+                    }
+                    [increment.neg_mul_add(V::splat(stiffness), load) - value, -(slope + V::splat(stiffness))]
+                };
+                let high = (load * (1.0 / stiffness)).max(V::splat(f64::MIN_POSITIVE));
+                let guess = ((load - first) * (1.0 / stiffness)).max(V::splat(f64::MIN_POSITIVE)).min(high);
+                active.select(root::newton(function, guess, high, load.abs() * f64::EPSILON, active), zero)
+            };
+            let volumetric = 9.0 * self.bulk * self.beta;
+            let load = trace.mul_add(V::splat(self.alpha), norm);
+            let mut slip = on_cone(load, twice_mu + volumetric * self.alpha, yields);
+            end_trace = slip.neg_mul_add(V::splat(volumetric), trace);
+            let whole = trial.norm;
+            let [mut end_strength, _] = strength(slip.min(whole));
+            let cut =
+                (flows & tip(end_strength).lt(end_trace)) | (torn & !yields) | (yields & whole.lt(slip));
+            if cut.any() {
+                // At the apex all shear goes; at the cut-off there is a corner with the cone, or none goes.
+                let mean = V::splat(3.0 * self.tension);
+                let is_apex = first.le(mean * self.alpha);
+                let load = is_apex.select(zero, mean).mul_add(V::splat(self.alpha), norm);
+                let corner = cut & yields & !is_apex & first.lt(load);
+                let own = (cut & yields & is_apex).select(whole, on_cone(load, twice_mu, corner).min(whole));
+                slip = cut.select(own, slip);
+                [end_strength, _] = strength(slip);
+                end_trace = cut.select(tip(end_strength), end_trace);
+            }
+            opens = cut;
+            let left = whole - slip;
+            kept = (flows & zero.lt(whole)).select(left / whole, one);
+            let plastic = (trace - end_trace) * (1.0 / (3.0 * self.bulk));
+            let work = (left * twice_mu).mul_add(slip, end_trace * plastic * (1.0 / 3.0));
+            state.work = flows.select(work, zero).max(zero);
+            state.history[PLASTIC_STRAIN] = flows.select(shear + slip, shear);
+        }
+        let end = flows.select(end_trace * (1.0 / (3.0 * self.bulk)), strain);
+        if changed.any() {
+            state.history[PLASTIC_VOLUME] = changed.select(volume + (trial.trace - end), volume);
+            if self.books_apart() {
+                let gained = opens.select((strain - end).max(zero), zero);
+                state.history[OWN] = changed.select(gained, booked);
+            } else if self.volume_correction {
+                // Nothing is booked any more once the material is closed, not even by rounding.
+                let gained = opens.select(state.history[PLASTIC_VOLUME], zero);
+                state.history[PLASTIC_VOLUME] = changed.select(gained, volume);
+            }
+            if heats {
+                state.history[OWN] = state.work.mul_add(V::splat(self.cohesion.heat()), temperature);
+            }
+        }
+        trial.finish(solid, state, [end, kept], changed, none, step.plane);
     }
 }
