@@ -124,6 +124,50 @@ pub(super) fn cut_at_walls<V: Vector, const D: usize>(
     half
 }
 
+/// Half widths of boxes which no wall is near enough to cut: what [`cut_at_walls`] gives there.
+#[inline(always)]
+pub(super) fn away_from_walls<V: Vector, const D: usize>(whole: &[V; D], cell: f64) -> [V; D] {
+    let mut half = *whole;
+    for half in &mut half {
+        *half = half.max(V::splat(LEAST_SHARE * cell));
+    }
+    half
+}
+
+/// Boxes of a batch in a block at a wall of the domain.
+#[derive(Clone, Copy)]
+pub(super) struct AtWall<'a, V, const D: usize> {
+    /// Half widths before walls cut them, m.
+    pub whole: [V; D],
+    /// Half widths within the domain, m.
+    pub half: [V; D],
+    /// Edge of the cells, m.
+    pub cell: f64,
+    /// Upper corner of the domain, m.
+    pub extent: &'a [f64; D],
+}
+
+impl<V: Vector, const D: usize> AtWall<'_, V, D> {
+    /// What particles that move to `moved` keep of the columns of B, where that is not all for all of them.
+    ///
+    /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept, C grows like `1/d`, and
+    /// a particle that drifts to the wall would come with ever faster nodes and pass through. So B falls with the distance.
+    #[inline(always)]
+    pub fn kept_affine_velocity(&self, moved: &[V; D]) -> Option<[V; D]> {
+        if !is_cut(&self.whole, &self.half) {
+            return None;
+        }
+        let next = cut_at_walls(&self.whole, moved, self.cell, self.extent);
+        let one = V::splat(1.0);
+        let mut kept = next;
+        for axis in 0..D {
+            let share = (next[axis] / self.half[axis]).min(one);
+            kept[axis] = self.half[axis].lt(self.whole[axis]).select(share, one);
+        }
+        Some(kept)
+    }
+}
+
 /// Factors of the slopes along each axis, for boxes of half widths `half` that were cut from `whole`; `None` if all are 1.
 ///
 /// A particle at a distance d from a wall has the weight `d/h` at the next node, and the slope `1/h`. Where it is alone, so that
@@ -163,7 +207,7 @@ pub fn softening_at<const D: usize>(
 
 /// Whether a wall cuts any of the boxes.
 #[inline(always)]
-pub(super) fn is_cut<V: Vector, const D: usize>(whole: &[V; D], half: &[V; D]) -> bool {
+fn is_cut<V: Vector, const D: usize>(whole: &[V; D], half: &[V; D]) -> bool {
     let mut is_cut = V::Mask::from_bits(0);
     for axis in 0..D {
         is_cut = is_cut | half[axis].lt(whole[axis]);
@@ -171,7 +215,7 @@ pub(super) fn is_cut<V: Vector, const D: usize>(whole: &[V; D], half: &[V; D]) -
     is_cut.any()
 }
 
-#[inline(never)]
+#[inline(always)]
 fn factors<V: Vector, const D: usize>(half: &[V; D], least: &[V; D]) -> [V; D] {
     let mut factor = *half;
     for axis in 0..D {
@@ -249,6 +293,9 @@ fn stretches<V: Vector, const D: usize>(
 pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -> u32 {
     if !scheme.is_plastic {
         return 0;
+    }
+    if scheme.is_all_plastic {
+        return (1 << LANES) - 1;
     }
     let index = index();
     let is_plastic = |lane: usize| scheme.materials[usize::from(index[lane])].is_plastic();

@@ -8,6 +8,7 @@
 //! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches, Tile};
+use super::domain::AtWall;
 pub use super::gathered::{Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
@@ -15,7 +16,7 @@ use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
-use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, VectorMask, widest};
+use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
 /// Memory that is used from bin to bin, as it takes a while to set it up.
 pub struct Scratch<const D: usize> {
@@ -66,6 +67,14 @@ impl<const D: usize> Kernel for Gather<'_, D> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> f64 {
+        // Two copies of the loop, so that bins away from walls do not ask at every particle.
+        if self.frame.is_at_wall() { self.run_all::<V, true>() } else { self.run_all::<V, false>() }
+    }
+}
+
+impl<const D: usize> Gather<'_, D> {
+    #[inline(always)]
+    fn run_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
         let Self { scratch, chunk, select, frame, scheme, dt, fields, leavers, next } = self;
         let batches = Batches::new(select, chunk, next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -76,16 +85,19 @@ impl<const D: usize> Kernel for Gather<'_, D> {
             let tile = batch.tile_mut::<D>(tiles, spare);
             let position: [V; D] = batch.positions(tile);
             let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
-            let half = domain::cut_at_walls(&whole, &position, cell, extent);
+            let (half, wall) = if AT_WALL {
+                let half = domain::cut_at_walls(&whole, &position, cell, extent);
+                (half, Some(AtWall { whole, half, cell, extent }))
+            } else {
+                (domain::away_from_walls(&whole, cell), None)
+            };
             weights.fill(frame, &position, &position, &half);
-            if let Some(factors) = domain::softening(&whole, &half, cell) {
+            if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
                 weights.soften(&factors);
             }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
-            if scheme.transfer == Transfer::Apic && domain::is_cut(&whole, &half) {
-                keep_affine_velocity(sums, &whole, &half, &position, dt, cell, extent);
-            }
-            greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
+            let speed = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, wall, leavers);
+            greatest = speed.max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
         largest(greatest)
@@ -147,10 +159,9 @@ pub fn advance_gathered<const D: usize>(
         }
         let whole = domain::whole_of_batch(tile, tags, &batch, f64::INFINITY, scheme);
         let half = domain::cut_at_walls(&whole, &position, cell, extent);
-        if scheme.transfer == Transfer::Apic && domain::is_cut(&whole, &half) {
-            keep_affine_velocity(sums, &whole, &half, &position, dt, cell, extent);
-        }
-        greatest = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, leavers).max(greatest);
+        let wall = Some(AtWall { whole, half, cell, extent });
+        let speed = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, wall, leavers);
+        greatest = speed.max(greatest);
         batch.put_back::<D>(tiles, spare);
     }
     largest(greatest)
@@ -182,35 +193,6 @@ pub fn interpolate<const D: usize>(
     }
 }
 
-/// Reduces B of particles that move towards a wall which cuts their boxes, in proportion to their distance from it.
-///
-/// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept, C grows like `1/d`, and
-/// a particle that drifts to the wall would come with ever faster nodes and pass through.
-#[inline(never)]
-fn keep_affine_velocity<V: Vector, const D: usize>(
-    sums: &mut Sums<D>,
-    whole: &[V; D],
-    half: &[V; D],
-    position: &[V; D],
-    dt: f64,
-    cell: f64,
-    extent: &[f64; D],
-) {
-    let velocity = V::columns(&sums.velocity);
-    let mut moved = *position;
-    for axis in 0..D {
-        moved[axis] = velocity[axis].mul_add(V::splat(dt), position[axis]);
-    }
-    let next = domain::cut_at_walls(whole, &moved, cell, extent);
-    let one = V::splat(1.0);
-    for axis in 0..D {
-        let kept = half[axis].lt(whole[axis]).select((next[axis] / half[axis]).min(one), one).to_array();
-        for (row, kept) in sums.affine[axis].iter_mut().zip(kept) {
-            *row = *row * F64x4::splat(kept);
-        }
-    }
-}
-
 fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }
@@ -226,6 +208,7 @@ fn advance<V: Vector, const D: usize>(
     scheme: &Scheme,
     dt: f64,
     cell: f64,
+    wall: Option<AtWall<V, D>>,
     leavers: &mut Leavers<D>,
 ) -> V {
     let zero = V::splat(0.0);
@@ -256,11 +239,18 @@ fn advance<V: Vector, const D: usize>(
         square = new.mul_add(new, square);
     }
     leavers.look(batch, &moved);
+    let kept = match (scheme.transfer, wall) {
+        (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
+        _ => None,
+    };
     for k in 0..D {
         let affine = V::columns(&sums.affine[k]);
         for i in 0..D {
             let value = match scheme.transfer {
-                Transfer::Apic => affine[i],
+                Transfer::Apic => match kept {
+                    Some(kept) => affine[i] * kept[k],
+                    None => affine[i],
+                },
                 Transfer::Tpic => gradient[i][k],
                 Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
             };
@@ -280,22 +270,29 @@ fn advance<V: Vector, const D: usize>(
         trial[c].store(state.elastic[c].as_array_mut());
     }
     if plastic {
-        for h in 0..scheme.histories {
-            let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
-            history.store(state.history[h].as_array_mut());
+        for h in 0..material::HISTORIES {
+            if h < scheme.histories {
+                let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
+                history.store(state.history[h].as_array_mut());
+            }
         }
     }
     let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
     let update = Step { dt, plane: D == 2, cell, size };
-    material::update(scheme.materials, &index, &mut state, &update);
+    match scheme.materials {
+        [only] => only.update(&mut state, &update),
+        several => material::update(several, &index, &mut state, &update),
+    }
     let result = |lanes: &Lanes| V::load(lanes.as_array());
     for c in 0..Layout::<D>::SYMMETRIC {
         batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
         batch.store(tile, Layout::<D>::STRESS + c, result(&state.stress[c]));
     }
     if plastic {
-        for h in 0..scheme.histories {
-            batch.store(tile, Layout::<D>::HISTORY + h, result(&state.history[h]));
+        for h in 0..material::HISTORIES {
+            if h < scheme.histories {
+                batch.store(tile, Layout::<D>::HISTORY + h, result(&state.history[h]));
+            }
         }
         let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
         batch.store(tile, Layout::<D>::WORK, work);

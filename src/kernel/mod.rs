@@ -74,6 +74,16 @@ pub struct Frame<const D: usize> {
     pub extent: [f64; D],
 }
 
+impl<const D: usize> Frame<D> {
+    /// Whether a wall of the domain is near enough to cut boxes whose centres lie in the block.
+    fn is_at_wall(&self) -> bool {
+        (0..D).any(|axis| {
+            let upper = self.corner[axis] + BLOCK as f64 * self.cell;
+            self.corner[axis] < self.cell || upper > self.extent[axis] - self.cell
+        })
+    }
+}
+
 /// Which particles of a chunk take part.
 #[derive(Clone, Copy, Debug)]
 pub enum Select<'a> {
@@ -146,6 +156,8 @@ pub struct Scheme<'a> {
     pub materials: &'a [Box<dyn Material>],
     /// Whether any of them flows. If not, no particle is asked.
     pub is_plastic: bool,
+    /// Whether all of them flow. If so, no particle is asked either.
+    pub is_all_plastic: bool,
     /// History variables that they use.
     pub histories: usize,
     /// Whether any of them asks for the size of cells.
@@ -161,9 +173,10 @@ impl<'a> Scheme<'a> {
         materials: &'a [Box<dyn Material>],
     ) -> Self {
         let is_plastic = materials.iter().any(|material| material.is_plastic());
+        let is_all_plastic = is_plastic && materials.iter().all(|material| material.is_plastic());
         let histories = materials.iter().map(|material| material.history_names().len()).max().unwrap_or(0);
         let softens = materials.iter().any(|material| material.softens());
-        Self { boxes, root_cell, transfer, materials, is_plastic, histories, softens }
+        Self { boxes, root_cell, transfer, materials, is_plastic, is_all_plastic, histories, softens }
     }
 
     /// Edge of a cell of a level, m.

@@ -82,10 +82,15 @@ impl<const D: usize> Kernel for Scatter<'_, D> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { scratch, chunk, select, frame, scheme, dt, arena, moments, next } = self;
-        // Two copies of the loop, so that bins without constrained nodes do not ask at every particle.
+        // Copies of the loop, so that bins away from walls and bins without constrained nodes do not ask at every particle.
         match moments {
-            None => scatter_all::<V, D>(scratch, chunk, select, frame, scheme, dt, arena, None, next),
-            moments => scatter_all::<V, D>(scratch, chunk, select, frame, scheme, dt, arena, moments, next),
+            None if !frame.is_at_wall() => {
+                scatter_all::<V, D, false>(scratch, chunk, select, frame, scheme, dt, arena, None, next);
+            }
+            None => scatter_all::<V, D, true>(scratch, chunk, select, frame, scheme, dt, arena, None, next),
+            moments => {
+                scatter_all::<V, D, true>(scratch, chunk, select, frame, scheme, dt, arena, moments, next);
+            }
         }
     }
 }
@@ -120,7 +125,7 @@ pub fn scatter_sub_boxes<const D: usize>(
 }
 
 #[inline(always)]
-fn scatter_all<V: Vector, const D: usize>(
+fn scatter_all<V: Vector, const D: usize, const AT_WALL: bool>(
     scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
     select: Select,
@@ -139,9 +144,12 @@ fn scatter_all<V: Vector, const D: usize>(
         let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
         let position: [V; D] = batch.positions(tile);
         let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
-        let half = domain::cut_at_walls(&whole, &position, cell, &frame.extent);
+        let half = match AT_WALL {
+            true => domain::cut_at_walls(&whole, &position, cell, &frame.extent),
+            false => domain::away_from_walls(&whole, cell),
+        };
         prepared.weights.fill(frame, &position, &position, &half);
-        if let Some(factors) = domain::softening(&whole, &half, cell) {
+        if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
             prepared.weights.soften(&factors);
         }
         let mut spread = prepared.weights.spread;

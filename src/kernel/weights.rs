@@ -83,7 +83,7 @@ impl<const D: usize> Weights<D> {
     }
 
     /// Multiplies slopes and arms along each axis by a factor.
-    #[inline(never)]
+    #[inline(always)]
     pub fn soften<V: Vector>(&mut self, factors: &[V; D]) {
         for (axis, factor) in self.axis.iter_mut().zip(factors) {
             for lanes in axis.slope.iter_mut().chain(&mut axis.arm) {
