@@ -3,6 +3,7 @@ pub mod adaptivity;
 pub mod bench;
 pub mod boundary;
 pub mod cli;
+pub mod csr;
 pub mod exact_sum;
 pub mod geometry;
 pub mod grid;

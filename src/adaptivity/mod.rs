@@ -13,11 +13,8 @@ use crate::geometry::{Aabb, Shape, Side};
 /// Dynamic refinement as a job asks for it.
 #[derive(Clone, Debug)]
 pub struct Adaptivity<const D: usize> {
-    /// Steps from one occasion for a regrid to the next.
+    /// Steps from one regrid to the next.
     pub every: u64,
-    /// Way that the fastest may go from one change of the tree to the next, in edges of finest leaves; occasions are passed
-    /// over as long as it is less. 0: none is.
-    pub travel: f64,
     /// Width of the layer around what a criterion wants, in leaves of the wanted level.
     pub buffer: u32,
     /// Coarsest level of all leaves.

@@ -187,14 +187,6 @@ fn write_refinement<const D: usize>(
         "refinement   every {} steps, {} leaves around what is wanted, particles {merging}",
         adaptivity.every, adaptivity.buffer
     )?;
-    if adaptivity.travel > 0.0 {
-        let (twice, four_times) = (2 * adaptivity.every, 4 * adaptivity.every);
-        writeln!(
-            out,
-            "  tree               every {twice} or {four_times} while nothing goes {} edges of a finest leaf in so many",
-            number(adaptivity.travel, 4)
-        )?;
-    }
     for criterion in &adaptivity.criteria {
         writeln!(out, "  level {:5}        {}", criterion.level, words(problem, criterion))?;
     }

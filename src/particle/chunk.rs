@@ -15,6 +15,8 @@ pub use super::column::{Column, ColumnMut};
 pub use super::layout::{Layout, Tag};
 use super::widest::Widest;
 use crate::memory::Block;
+use std::num::NonZeroU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Particles of a tile.
 pub const TILE: usize = 8;
@@ -35,6 +37,19 @@ pub struct Chunk<const D: usize> {
     capacity: usize,
     block: Block<Line>,
     widest: Widest,
+    revision: Option<Revision>,
+}
+
+/// Names what the first particles of a chunk hold: as long as a chunk has the revision that it once had, these particles are what
+/// they were, where they were. Appending keeps it, every other change ends it, and no two contents have the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Revision(NonZeroU64);
+
+impl Revision {
+    fn new() -> Option<Self> {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        NonZeroU64::new(LAST.fetch_add(1, Ordering::Relaxed) + 1).map(Self)
+    }
 }
 
 /// Where a chunk lies in memory: from the chunk that comes next, kernels fetch the first lines while they
@@ -101,8 +116,20 @@ impl<const D: usize> Chunk<D> {
         Column::new(self.tiles().get(column..).unwrap_or_default(), Layout::<D>::REALS, self.len)
     }
 
+    /// The revision of the present content.
+    pub fn revision(&mut self) -> Option<Revision> {
+        self.revision = self.revision.or_else(Revision::new);
+        self.revision
+    }
+
+    /// Whether the chunk has had this revision since, and only appended particles.
+    pub fn still_has(&self, revision: Revision) -> bool {
+        self.revision == Some(revision)
+    }
+
     /// Column `column`, mutable.
     pub fn column_mut(&mut self, column: usize) -> ColumnMut<'_> {
+        self.revision = None;
         if column == Layout::<D>::HALF {
             self.widest = Widest::UNKNOWN;
         }
@@ -142,6 +169,7 @@ impl<const D: usize> Chunk<D> {
     /// All tiles and tags at once, for kernels that write the former, undeformed half widths excepted, and read the
     /// latter.
     pub fn tiles_mut_and_tags(&mut self) -> (&mut [[f64; TILE]], &[u64]) {
+        self.revision = None;
         let (tiles, words) = self.block.split_at_mut(self.capacity / TILE * Layout::<D>::REALS);
         let tags = &cast_slice(words)[(Self::TAGS - Self::IDS) * self.capacity..][..self.len];
         (cast_slice_mut(tiles), tags)
@@ -155,6 +183,7 @@ impl<const D: usize> Chunk<D> {
 
     /// Writes columns of particle `p` from `first` on.
     pub fn write(&mut self, first: usize, p: usize, values: &[f64]) {
+        self.revision = None;
         if (first..first + values.len()).contains(&Layout::<D>::HALF) {
             self.widest = Widest::UNKNOWN;
         }
@@ -194,6 +223,7 @@ impl<const D: usize> Chunk<D> {
 
     /// Identifiers, mutable.
     pub fn ids_mut(&mut self) -> &mut [u64] {
+        self.revision = None;
         self.words_mut(Self::IDS)
     }
 
@@ -204,6 +234,7 @@ impl<const D: usize> Chunk<D> {
 
     /// Packed tags, mutable.
     pub fn tags_mut(&mut self) -> &mut [u64] {
+        self.revision = None;
         self.words_mut(Self::TAGS)
     }
 
@@ -227,8 +258,8 @@ impl<const D: usize> Chunk<D> {
     /// Appends a particle with all columns zero and returns its index.
     pub fn push_zeroed(&mut self, id: u64, tag: Tag) -> usize {
         let p = self.extend_zeroed(1);
-        self.ids_mut()[p] = id;
-        self.tags_mut()[p] = tag.pack();
+        self.words_mut(Self::IDS)[p] = id;
+        self.words_mut(Self::TAGS)[p] = tag.pack();
         p
     }
 
@@ -256,7 +287,7 @@ impl<const D: usize> Chunk<D> {
 
     /// Makes particle `p` a copy of particle `q` of `source`.
     pub fn replace(&mut self, p: usize, source: &Self, q: usize) {
-        self.widest = Widest::UNKNOWN;
+        (self.widest, self.revision) = (Widest::UNKNOWN, None);
         self.set(p, source, q);
     }
 
@@ -339,6 +370,7 @@ impl<const D: usize> Chunk<D> {
     /// Removes the particles `gone` (ascending). The last of those that stay fill the gaps in order, so that the cost
     /// depends on the number removed and the new order on nothing else.
     pub fn remove(&mut self, gone: &[u32]) {
+        self.revision = None;
         let len = self.len - gone.len();
         let gaps = gone.iter().copied().take_while(|&p| (p as usize) < len);
         let mut leaving = gone[gaps.clone().count()..].iter().copied().peekable();
@@ -358,7 +390,7 @@ impl<const D: usize> Chunk<D> {
     pub fn keep(&mut self, stay: &[u32]) {
         stay.iter().enumerate().for_each(|(to, &from)| self.copy_within(to, from as usize));
         self.len = stay.len();
-        self.widest = Widest::UNKNOWN;
+        (self.widest, self.revision) = (Widest::UNKNOWN, None);
         self.give_back();
     }
 
@@ -434,6 +466,45 @@ mod tests {
             assert_eq!(back.column(column), chunk.column(column));
         }
         assert!(Chunk::<3>::from_bytes(&[1, 2, 3]).is_empty());
+    }
+
+    #[test]
+    fn a_revision_lasts_until_something_but_appending_happens() {
+        type Change = fn(&mut Chunk<2>);
+        let tag = Tag { material: 0, body: 0, level: 0 };
+        let appending: [Change; 3] = [
+            |chunk| _ = chunk.push_zeroed(7, Tag { material: 0, body: 0, level: 0 }),
+            |chunk| chunk.push_from(&chunk.clone(), 0),
+            |chunk| chunk.reserve_exact(1000),
+        ];
+        let others: [Change; 9] = [
+            |chunk| chunk.column_mut(Layout::<2>::MASS)[0] = 1.0,
+            |chunk| chunk.write(Layout::<2>::MASS, 0, &[1.0]),
+            |chunk| chunk.tags_mut()[0] = 1,
+            |chunk| chunk.ids_mut()[0] = 1,
+            |chunk| chunk.tiles_mut_and_tags().0[0][0] = 1.0,
+            |chunk| chunk.replace(0, &chunk.clone(), 1),
+            |chunk| chunk.remove(&[1]),
+            |chunk| chunk.keep(&[0]),
+            |chunk| *chunk = chunk.gathered(&[1, 0]),
+        ];
+        let mut chunk = Chunk::<2>::new();
+        (0..20).for_each(|id| _ = chunk.push_zeroed(id, tag));
+        for change in others {
+            let mut chunk = chunk.clone();
+            let first = chunk.revision().unwrap();
+            for append in appending {
+                append(&mut chunk);
+                assert!(chunk.still_has(first) && chunk.revision() == Some(first));
+            }
+            change(&mut chunk);
+            assert!(!chunk.still_has(first));
+            assert_ne!(chunk.revision(), Some(first));
+        }
+        let first = chunk.revision().unwrap();
+        chunk.keep(&[]);
+        (0..20).for_each(|id| _ = chunk.push_zeroed(id, tag));
+        assert!(!chunk.still_has(first));
     }
 
     #[test]

@@ -16,8 +16,7 @@ use partition::comm::{Comm, World};
 
 /// Steps from one regrid to the next.
 const EVERY: u64 = 20;
-/// Steps of a turn: several regrids, as some change the tree and others do not, and as many as a tree stays with
-/// `adaptivity.travel` at most.
+/// Steps of a turn: several regrids, as some change the tree and others do not.
 const TURN: u64 = 4 * EVERY;
 /// Cells of level 2 are 20 mm wide, with particles 10 mm apart.
 const SPACING: f64 = 0.01;

@@ -106,37 +106,6 @@ fn region_and_its_way() {
     });
 }
 
-/// Steps after which the tree had changed while a stripe went 0.1 edges of a finest leaf per occasion, of 5 steps each.
-fn steps_of_changes(comm: &Comm, travel: f64) -> Vec<u64> {
-    let criterion = "kind = 'region'\nlevel = 1\nshape = { kind = 'box', min = [0.26, -9], max = [0.49, 9] }\n\
-                     motion = [{ time = 0, translation = [0, 0] }, { time = 0.04, translation = [1, 0] }]";
-    let text = job(5, criterion, &bar(), "dt_max = 1e-4")
-        .replace("every_steps = 5", &format!("every_steps = 5\ntravel = {travel:?}"));
-    let (mut solver, mut steps) = (solver::<2>(comm, &text), Vec::new());
-    while solver.clock.time < 0.05 {
-        let before = solver.regrids;
-        advance(&mut solver, 5);
-        if solver.regrids > before {
-            steps.push(solver.clock.step);
-        }
-    }
-    assert_stripe(&solver, (1.26, 1.49));
-    steps
-}
-
-/// As long as less than `travel` is gone, the tree changes at every second or fourth occasion only.
-#[test]
-fn few_changes_while_nothing_goes_far() {
-    on_ranks("criteria::few_changes_while_nothing_goes_far", &[1, 2], |comm| {
-        for (travel, every) in [(0.0, 5), (0.15, 5), (0.25, 10), (0.5, 20), (4.0, 20)] {
-            let steps = steps_of_changes(comm, travel);
-            assert!(steps.len() >= 4, "{travel}: {steps:?}");
-            assert!(steps.iter().all(|step| step % every == 0), "{travel}: {steps:?}");
-            assert!(steps.iter().any(|step| step % (2 * every) != 0), "{travel}: {steps:?}");
-        }
-    });
-}
-
 #[test]
 fn collider() {
     let criterion = "kind = 'collider'\nlevel = 2\ncollider = 'ball'\ndistance = 0.06";

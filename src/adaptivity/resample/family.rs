@@ -10,11 +10,9 @@
 //! to cross to the leaf on the lower side for a while. It cannot know which faces cut a family that is near several, so
 //! the caller tries the combinations of axes in turn.
 use super::merge::{Limits, of_level};
-use super::numbered::Numbered;
-use super::sieve::Sieve;
 use super::{Setting, ids, patience};
-use crate::particle::chunk::Chunk;
-use crate::particle::chunk::Tag;
+use crate::csr::Csr;
+use crate::particle::chunk::{Chunk, Tag};
 
 /// Lower and upper corner of a leaf, m.
 pub type Bounds<const D: usize> = ([f64; D], [f64; D]);
@@ -44,23 +42,19 @@ pub(super) fn parents<const D: usize>(chunk: &Chunk<D>, of: impl Iterator<Item =
 }
 
 /// Particles of a level that have one of the parents (ascending), by parent and number.
-pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8, parents: &[u64]) -> Vec<Sibling> {
-    let sieve = Sieve::of(parents.iter().copied());
+pub(super) fn siblings<const D: usize>(chunk: &Chunk<D>, level: u8, parents: &[u64]) -> Csr<Sibling> {
     let (mut found, mut last) = (Vec::new(), 0);
     for (p, tag) in of_level(chunk, level) {
         let Some((parent, number)) = ids::parent::<D>(chunk.ids()[p as usize]) else { continue };
         if parents.get(last) != Some(&parent) {
-            if !sieve.may_hold(parent) {
-                continue;
-            }
             let Ok(place) = parents.binary_search(&parent) else { continue };
             last = place;
         }
         found.push((last as u32, Sibling { parent, tag, number, p }));
     }
-    let mut siblings = Numbered::new(&found, parents.len());
-    siblings.each().for_each(|family| family.sort_unstable());
-    siblings.into_items()
+    let mut siblings = Csr::new(parents.len(), found.into_iter());
+    siblings.each_mut().for_each(|family| family.sort_unstable());
+    siblings
 }
 
 /// Whether two are siblings that may become one.
@@ -115,7 +109,7 @@ pub(super) fn waiting<const D: usize>(
     let siblings = siblings(chunk, level, parents);
     let parents_of_split = parents_of_split(chunk, level);
     let mut waiting = Vec::new();
-    for family in siblings.chunk_by(same_parent) {
+    for family in siblings.items().chunk_by(same_parent) {
         let distance = greatest_distance(setting, limits, family[0].tag, level);
         if are_torn(chunk, family, distance) {
             continue;
@@ -156,7 +150,7 @@ pub fn separated<const D: usize>(
             continue;
         }
         let siblings = siblings(chunk, level, &due);
-        for family in siblings.chunk_by(same_parent).filter(|family| family.len() < 1 << D) {
+        for family in siblings.items().chunk_by(same_parent).filter(|family| family.len() < 1 << D) {
             let distance = greatest_distance(setting, limits, family[0].tag, level);
             if are_torn(chunk, family, distance) {
                 continue;

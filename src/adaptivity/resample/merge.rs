@@ -3,8 +3,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::family::{self, Bounds};
 use super::mix::{Group, mixtures};
-use super::numbered::Numbered;
 use super::{Setting, patience, volume};
+use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// How different particles may be that become one.
@@ -149,7 +149,7 @@ fn replace<const D: usize>(
 /// Complete families of a level with one of the given members, by identifier. Children in the order of their numbers.
 fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Group> {
     let siblings = family::siblings(chunk, level, &family::parents(chunk, with.iter().copied()));
-    let whole = siblings.chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
+    let whole = siblings.items().chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
     whole
         .map(|siblings| Group::new(siblings.iter().map(|child| child.p).collect(), siblings[0].parent, true))
         .collect()
@@ -198,14 +198,15 @@ fn strangers<const D: usize>(
     let waits = waiting(&members.iter().map(|(_, p)| *p).collect::<Vec<u32>>());
     members.retain(|(_, p)| !waits[*p as usize]);
     let (mut groups, mut alone) = (Vec::new(), Vec::new());
-    for ((tag, _), cell) in in_order.iter().zip(Numbered::new(&members, in_order.len()).each()) {
+    let cells = Csr::new(in_order.len(), members.iter().copied());
+    for (number, (tag, _)) in in_order.iter().enumerate() {
         let edge = 2.0 * setting.nominal(Tag::unpack(*tag), level - 1);
         // A lattice of equal parts fills the volume to round-off. More must not come in: boxes wider than a cell by more
         // than that would need another grid.
         let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 8.0 * f64::EPSILON);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
-        for &mut p in cell {
+        for &p in cells.of(number) {
             let part = volume(chunk, p as usize);
             if filled + part > room {
                 close(chunk, &mut group, &mut groups, &mut alone);

@@ -13,9 +13,7 @@ pub mod ids;
 pub mod ledger;
 mod merge;
 mod mix;
-mod numbered;
 pub mod patience;
-mod sieve;
 mod split;
 #[cfg(test)]
 mod tests;

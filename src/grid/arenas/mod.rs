@@ -75,8 +75,6 @@ pub struct ArenaMut<'a, const D: usize> {
     pub moments: &'a mut [Row],
     /// Address of the arena that comes next, to read ahead.
     pub next: usize,
-    /// Bin of the arena after that; at the end the last one.
-    pub next_but_one: usize,
 }
 
 impl<const D: usize> ArenaMut<'_, D> {
@@ -155,13 +153,11 @@ impl<const D: usize> Arenas<D> {
                 let slot = self.slot[arena.bin as usize] as usize;
                 let rows = rows.cut(slot * nodes..(slot + 1) * nodes);
                 let [first, end] = arena.moments.map(|moment| moment as usize);
-                let bin = arena.bin as usize;
-                ArenaMut { bin, rows, moments: moments.cut(first..end), next: 0, next_but_one: bin }
+                ArenaMut { bin: arena.bin as usize, rows, moments: moments.cut(first..end), next: 0 }
             })
             .collect();
         for first in 1..arenas.len() {
             arenas[first - 1].next = arenas[first].rows.as_ptr().addr();
-            arenas[first - 1].next_but_one = arenas[(first + 1).min(arenas.len() - 1)].bin;
         }
         arenas
     }
@@ -171,10 +167,10 @@ impl<const D: usize> Arenas<D> {
         self.occupied[self.number[bin] as usize].window
     }
 
-    /// The occupied bins that come after an occupied one, with their windows.
-    pub fn after(&self, bin: usize) -> impl Iterator<Item = (usize, Window<D>)> {
-        let next = &self.occupied[self.number[bin] as usize + 1..];
-        next.iter().map(|next| (next.bin as usize, next.window))
+    /// The occupied bin that comes after an occupied one, with its window.
+    pub fn after(&self, bin: usize) -> Option<(usize, Window<D>)> {
+        let next = self.occupied.get(self.number[bin] as usize + 1)?;
+        Some((next.bin as usize, next.window))
     }
 
     /// Whether an occupied bin reaches a block.

@@ -3,6 +3,7 @@
 //! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have scattered, and an
 //! arena whose blocks are all summed up serves a bin of a later wave. The first wave are the bins that other ranks need, so that
 //! their exchange can start. No sum depends on any of this: what a block adds up, and in which order, the plan says.
+use crate::csr::Csr;
 use crate::grid::plan::GridPlan;
 use crate::kernel::{Row, arena_nodes};
 
@@ -35,11 +36,11 @@ impl Seam {
 #[derive(Clone, Debug, Default)]
 pub struct Waves {
     /// Numbers of the bins among the occupied ones, by wave.
-    bins: Groups,
+    bins: Csr<u32>,
     /// Blocks that bins reach, by the wave with which they are summed up.
-    blocks: Groups,
+    blocks: Csr<u32>,
     /// By wave, bins whose arenas are free after it.
-    freed: Groups,
+    freed: Csr<u32>,
     /// Arena of each occupied bin.
     slots: Vec<u32>,
     /// Arenas in use at a time.
@@ -92,15 +93,15 @@ impl Waves {
         let waves = 1 + before.div_ceil(size).max(1);
         let mut asked = seam.is_asked.iter().zip(&self.wave_of_block).filter(|(asked, _)| **asked);
         debug_assert!(asked.all(|(_, &wave)| wave == FIRST as u32 || wave == NONE), "asked for, but late");
-        self.bins.fill(waves, self.wave_of_bin.iter().copied());
-        self.blocks.fill(waves, self.wave_of_block.iter().copied());
+        fill(&mut self.bins, waves, self.wave_of_bin.iter().copied());
+        fill(&mut self.blocks, waves, self.wave_of_block.iter().copied());
         let last_use = |bin: u32| {
             if keep || seam.is_kept[bin as usize] {
                 return NONE;
             }
             reached(bin).map(|block| self.wave_of_block[block]).max().unwrap_or(FIRST as u32)
         };
-        self.freed.fill(waves, occupied.map(last_use));
+        fill(&mut self.freed, waves, occupied.map(last_use));
         self.assign_slots(waves);
     }
 
@@ -128,7 +129,7 @@ impl Waves {
 
     /// Number of waves.
     pub fn count(&self) -> usize {
-        self.bins.count()
+        self.bins.groups()
     }
 
     /// Bins of a wave, by their numbers among the occupied ones; their arenas ascend as they do.
@@ -186,41 +187,9 @@ impl FreeSlots {
     }
 }
 
-/// Numbers by group, ascending in each.
-#[derive(Clone, Debug, Default)]
-struct Groups {
-    /// Start of each group, and the end.
-    start: Vec<u32>,
-    members: Vec<u32>,
-}
-
-impl Groups {
-    /// Puts 0, 1, … into the groups given, but for those in [`NONE`].
-    fn fill(&mut self, groups: usize, group_of: impl Iterator<Item = u32> + Clone) {
-        self.start.clear();
-        self.start.resize(groups + 1, 0);
-        let group_of = (0..).zip(group_of).filter(|(_, group)| *group != NONE);
-        group_of.clone().for_each(|(_, group)| self.start[group as usize + 1] += 1);
-        (0..groups).for_each(|group| self.start[group + 1] += self.start[group]);
-        self.members.clear();
-        self.members.resize(self.start[groups] as usize, 0);
-        for (member, group) in group_of {
-            // Starts serve as places until all are filled.
-            let place = &mut self.start[group as usize];
-            self.members[*place as usize] = member;
-            *place += 1;
-        }
-        self.start.rotate_right(1);
-        self.start[0] = 0;
-    }
-
-    fn count(&self) -> usize {
-        self.start.len().saturating_sub(1)
-    }
-
-    fn of(&self, group: usize) -> &[u32] {
-        &self.members[self.start[group] as usize..self.start[group + 1] as usize]
-    }
+/// Puts 0, 1, … into the groups given, but for those in [`NONE`].
+fn fill(groups: &mut Csr<u32>, count: usize, group_of: impl Iterator<Item = u32> + Clone) {
+    groups.fill(count, group_of.zip(0..).filter(|(group, _)| *group != NONE));
 }
 
 #[cfg(test)]

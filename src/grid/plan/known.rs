@@ -3,6 +3,7 @@ use partition::{Brick, Forest, MAX_LEVEL, Octant};
 
 use rustc_hash::FxHashSet;
 
+use crate::csr::starts;
 use crate::grid::mask::{offset, offset_count, shifted};
 use crate::kernel::BLOCK;
 
@@ -123,14 +124,8 @@ impl<const D: usize> KnownTree<D> {
         let wanted = (2 * self.keys.len() as u64).next_power_of_two().ilog2();
         self.slice_bits = (last.key_end() - first).max(1).ilog2().saturating_sub(wanted);
         let count = ((last.key_end() - 1 - first) >> self.slice_bits) as usize + 1;
-        self.slices.clear();
-        self.slices.resize(count + 1, 0);
-        for key in &self.keys {
-            self.slices[((key - first) >> self.slice_bits) as usize + 1] += 1;
-        }
-        for slice in 0..count {
-            self.slices[slice + 1] += self.slices[slice];
-        }
+        let slices = self.keys.iter().map(|key| ((key - first) >> self.slice_bits) as usize);
+        starts(&mut self.slices, count, slices);
     }
 
     /// Number of known leaves with keys below `key`, `or_equal` to it.

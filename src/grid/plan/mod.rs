@@ -24,8 +24,8 @@ use self::sources::{Part, Piece};
 use super::constraints::columns::Columns;
 use super::constraints::constraint::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
+use crate::csr::Csr;
 use crate::kernel::ARENA_EDGE;
-use crate::simd::prefetch;
 
 pub mod closure;
 pub mod constrained;
@@ -97,8 +97,7 @@ pub struct GridPlan<const D: usize> {
     pub feeders: Feeders,
     /// Sums that this rank needs of others, by rank.
     pub pieces: Vec<Piece<D>>,
-    pub(super) parts: Vec<Part>,
-    pub(super) part_start: Vec<u32>,
+    pub(super) parts: Csr<Part>,
     /// Per level, links to the parents of its constrained nodes.
     pub links: Vec<Links>,
     /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
@@ -120,12 +119,6 @@ impl<const D: usize> Bin<D> {
 }
 
 impl<const D: usize> GridPlan<D> {
-    /// Asks for what the plan has of a bin.
-    pub fn read_ahead(&self, bin: usize) {
-        let first = self.bins.as_ptr().wrapping_add(bin).addr();
-        (0..size_of::<Bin<D>>()).step_by(64).for_each(|byte| prefetch(first + byte));
-    }
-
     /// Collective. Builds the ghost layer and the grid of each rank.
     pub fn build(comm: &Comm, forest: &Forest<D>, root_edge: f64, allowance: Allowance) -> Self {
         let mut tree = KnownTree::own(forest, comm.rank(), allowance);
@@ -147,8 +140,7 @@ impl<const D: usize> GridPlan<D> {
             leaf_start: Vec::new(),
             feeders: Feeders::default(),
             pieces: Vec::new(),
-            parts: Vec::new(),
-            part_start: Vec::new(),
+            parts: Csr::default(),
             links: Vec::new(),
             face_nodes: Vec::new(),
             columns: 0,
@@ -219,7 +211,7 @@ impl<const D: usize> GridPlan<D> {
             + self.bins.capacity() * size_of::<Bin<D>>()
             + self.feeders.heap_bytes()
             + self.pieces.capacity() * size_of::<Piece<D>>()
-            + self.parts.capacity() * size_of::<Part>()
+            + self.parts.heap_bytes()
             + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
 

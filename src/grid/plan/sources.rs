@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 use super::feeders::NO_BIN;
 use super::reach::bin_sources;
 use super::{Block, GridPlan};
+use crate::csr::Csr;
 use crate::grid::constraints::columns::Columns;
 use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
 use crate::grid::order::each_subtree;
@@ -105,24 +106,19 @@ impl<const D: usize> GridPlan<D> {
         let mut place = vec![0; pieces.len()];
         by_rank.iter().zip(0..).for_each(|(&piece, at)| place[piece as usize] = at);
         self.pieces = by_rank.iter().map(|&piece| pieces[piece as usize]).collect();
-        self.part_start = vec![0; self.blocks.len() + 1];
-        for (block, part) in parts {
-            self.part_start[block as usize + 1] += 1;
-            self.parts.push(Part { piece: place[part.piece as usize], ..part });
-        }
-        for block in 0..self.blocks.len() {
-            self.part_start[block + 1] += self.part_start[block];
-        }
+        let placed =
+            |(block, part): &(u32, Part)| (*block, Part { piece: place[part.piece as usize], ..*part });
+        self.parts = Csr::new(self.blocks.len(), parts.iter().map(placed));
     }
 
     /// Parts of pieces that enter the sum of a block.
     pub fn parts(&self, block: usize) -> &[Part] {
-        &self.parts[self.part_start[block] as usize..self.part_start[block + 1] as usize]
+        self.parts.of(block)
     }
 
     /// Whether other ranks contribute to the sum of a block.
     pub fn is_seam(&self, block: usize) -> bool {
-        self.part_start[block] != self.part_start[block + 1]
+        !self.parts(block).is_empty()
     }
 
     /// Own bins that may contribute to a block.

@@ -64,7 +64,6 @@ pub(in crate::job) fn adaptivity<const D: usize>(
     let cell = context.root_edge / 4.0;
     Some(Adaptivity {
         every: written.every_steps,
-        travel: written.travel,
         buffer: written.buffer,
         base_level: context.tree.base_level,
         regions: regions.collect(),

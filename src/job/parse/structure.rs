@@ -4,6 +4,7 @@
 //! each stands, and can say what a key means.
 use super::error::{Fault, MOST, QUOTED, alternatives};
 use super::source::{Node, Path, Value as Toml};
+use crate::job::schema::GONE;
 use crate::text::{excerpt, nearest};
 use serde_json::Value;
 
@@ -213,6 +214,12 @@ impl<'s> Checker<'s> {
             if self.faults.len() > MOST {
                 return;
             }
+            let whole = path.key(key.clone()).to_string();
+            if let Some((_, why)) = GONE.iter().find(|(gone, _)| *gone == whole) {
+                let (message, span) = (format!("the key `{key}` is gone: {why}"), inner.key_span.clone());
+                self.faults.push(Fault { key: whole, message, span, help: None });
+                continue;
+            }
             // A key that is missing is what a misspelt one was most likely meant to be.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
             let free = keys.clone().filter(|known| node.get(known).is_none());
@@ -230,7 +237,7 @@ impl<'s> Checker<'s> {
             };
             let help = layers.properties().find(|(known, _)| Some(*known) == meant);
             self.faults.push(Fault {
-                key: path.key(key.clone()).to_string(),
+                key: whole,
                 message,
                 span: inner.key_span.clone(),
                 help: help.and_then(|(_, schema)| schema.get("description")?.as_str().map(str::to_owned)),

@@ -14,13 +14,6 @@ pub struct Adaptivity {
     #[serde(default = "twenty")]
     #[schemars(range(min = 1, max = 100_000))]
     pub every_steps: u64,
-    /// Part of the edge of a finest leaf that the fastest particle, collider or region may go from one change of the tree to
-    /// the next: as long as it goes less, the tree changes at every second or fourth occasion only. By default at each.
-    /// What comes into coarse leaves before the tree has changed is less exact; a buffer helps.
-    // Left out of the digest, so that files of jobs without it can be continued.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    #[schemars(range(min = 0.0, max = 4.0))]
-    pub travel: f64,
     /// Width of the layer around what a criterion wants, in leaves of the wanted level. To this comes the way that
     /// the material can go until the tree changes next.
     #[serde(default = "one")]
@@ -41,10 +34,6 @@ pub struct Adaptivity {
 
 fn twenty() -> u64 {
     20
-}
-
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
 }
 
 fn one() -> u32 {

@@ -14,3 +14,10 @@ pub mod loads;
 pub mod output;
 pub mod reference;
 pub mod shape;
+
+/// Keys that files of earlier versions may have: path, and why the key is gone with what to do.
+pub(super) const GONE: [(&str, &str); 1] = [(
+    "adaptivity.travel",
+    "it saved 1 % of the time and let the material outrun the fine leaves; the tree changes every adaptivity.every_steps \
+     steps. Remove it, and raise every_steps where regrids cost too much",
+)];

@@ -59,16 +59,16 @@ impl<const D: usize> Solver<D> {
     /// # Errors
     /// On all ranks when any rank failed.
     pub fn regrid(&mut self) -> Result<bool, Disagreement> {
-        match &self.physics.adaptivity {
-            Some(adaptivity) if self.clock.step.is_multiple_of(adaptivity.every) => {}
+        let every = match &self.physics.adaptivity {
+            Some(adaptivity) if self.clock.step.is_multiple_of(adaptivity.every) => adaptivity.every,
             _ => return Ok(false),
-        }
+        };
         let (start, phases) = (Instant::now(), self.phases);
         self.parts.begin();
         if self.surveys.len() != self.chunks.len() {
             self.survey_now();
         }
-        let levels_before = self.steps_between_trees().and_then(|steps| self.change_tree(steps));
+        let levels_before = self.change_tree(every);
         let is_new = levels_before.is_some();
         let mut looks = self.look_at_levels();
         let mut split_in = self.split_particles(&looks, levels_before.as_deref());
@@ -115,9 +115,6 @@ impl<const D: usize> Solver<D> {
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
-        }
-        if is_other || is_due {
-            self.grid.lists.forget();
         }
         if is_other || merged {
             // Who has moved may have a box that is wide in the leaf where it is now.

@@ -87,11 +87,6 @@ impl<const D: usize> BinLists<D> {
         leaves.map(|((bins, &sorted), own)| OfLeaf { bins: bins.as_deref_mut(), sorted, own })
     }
 
-    /// Not collective. To be called when particles have not only advanced or been appended since the last sort.
-    pub(in crate::solver) fn forget(&mut self) {
-        self.leaves.iter_mut().flatten().for_each(|bins| bins.forget());
-    }
-
     /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
     /// `each` with the number of a part and its D.
     pub fn spread_parts(
@@ -166,21 +161,20 @@ impl<const D: usize> OfLeaf<'_, D> {
 
     /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are gone: what it looks
     /// at is still in the cache.
-    pub fn sort_ahead(
+    pub fn presort(
         self,
         plan: &GridPlan<D>,
         leaf: usize,
-        chunk: &Chunk<D>,
+        chunk: &mut Chunk<D>,
         widths: &impl BoxWidths<D>,
         scratch: &mut Scratch,
     ) {
         let Self { bins, own, .. } = self;
         let sorting = Sorting { plan, widths, leaf, own };
-        if let Some(bins) = bins {
-            bins.forget();
-            if may_need_lists(Some(bins), chunk, &sorting) {
-                bins.sort_ahead(chunk, &sorting, scratch);
-            }
+        if let Some(bins) = bins
+            && may_need_lists(Some(bins), chunk, &sorting)
+        {
+            bins.presort(chunk, &sorting, scratch);
         }
     }
 }

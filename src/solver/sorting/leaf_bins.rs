@@ -15,7 +15,7 @@ use crate::grid::plan::reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::kernel::domain::softening_at;
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Revision};
 use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
@@ -40,8 +40,8 @@ pub struct LeafBins<const D: usize> {
     pub(super) sides: Option<Sides<D>>,
     /// Particles that are not whole in the leaf's own bin, with their bin; they ascend.
     elsewhere: Vec<(u32, u32)>,
-    /// So many of the first particles were held against the leaves around when they had advanced, and are not again.
-    ahead: usize,
+    /// What is sorted already: so many of the first particles, as long as the chunk has the revision.
+    presorted: Option<(Revision, usize)>,
 }
 
 /// In place of a bin: the box is in none as a whole.
@@ -102,7 +102,8 @@ impl<const D: usize> LeafBins<D> {
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) -> Result<bool, BinMissing> {
-        let known = std::mem::take(&mut self.ahead);
+        let presorted = self.presorted.take().filter(|(revision, _)| chunk.still_has(*revision));
+        let known = presorted.map_or(0, |(_, particles)| particles);
         if known == 0 {
             self.begin();
         }
@@ -126,11 +127,11 @@ impl<const D: usize> LeafBins<D> {
         looked.map(|()| true)
     }
 
-    /// Does what of [`LeafBins::sort`] has to look at particles, as long as these are in the cache. Until then others may only
-    /// be appended to the leaf, or [`LeafBins::forget`] is called.
-    pub(in crate::solver) fn sort_ahead(
+    /// Classifies the particles now, while they are in the cache, so that the next [`LeafBins::sort`] only classifies those that
+    /// are appended until then. Any other change of the chunk ends its revision, and `sort` begins anew.
+    pub(in crate::solver) fn presort(
         &mut self,
-        chunk: &Chunk<D>,
+        chunk: &mut Chunk<D>,
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) {
@@ -138,16 +139,9 @@ impl<const D: usize> LeafBins<D> {
             return;
         }
         self.begin();
-        self.ahead = match self.look(chunk, 0, sorting, scratch) {
-            Ok(()) => chunk.len(),
-            // Found again, and told, when it matters.
-            Err(_) => 0,
-        };
-    }
-
-    /// Has the next [`LeafBins::sort`] look at all particles.
-    pub(in crate::solver) fn forget(&mut self) {
-        self.ahead = 0;
+        // An error is found again, and told, when it matters.
+        let looked = self.look(chunk, 0, sorting, scratch);
+        self.presorted = looked.ok().and_then(|()| Some((chunk.revision()?, chunk.len())));
     }
 
     /// Whether a sort from the beginning leads to the same.

@@ -48,28 +48,18 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Physics<D> {
+    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest.
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
-        let signal = |(material, square): (u16, f64)| {
-            self.materials[usize::from(material)].wave_speed() + square.sqrt()
-        };
-        let (mut fastest, mut run) = (0.0, None);
+        let mut fastest: f64 = 0.0;
         let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS);
         for (tile, tags) in tiles.zip(chunk.tags().chunks(TILE)) {
             let velocity = tile[Layout::<D>::VELOCITY..].iter().take(D).map(Lanes::load);
-            let squares = velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum)).to_array();
-            for (&tag, square) in tags.iter().zip(squares) {
-                let own = Tag::unpack(tag).material;
-                // One root for each run of particles of one material.
-                let greatest = match run {
-                    Some((material, greatest)) if material == own => greatest,
-                    _ => {
-                        fastest = run.map_or(fastest, |run| f64::max(fastest, signal(run)));
-                        0.0
-                    }
-                };
-                run = Some((own, f64::max(greatest, square)));
+            let squares = velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum));
+            for (&tag, speed) in tags.iter().zip(squares.sqrt().to_array()) {
+                let material = &self.materials[usize::from(Tag::unpack(tag).material)];
+                fastest = fastest.max(material.wave_speed() + speed);
             }
         }
-        run.map_or(fastest, |run| f64::max(fastest, signal(run)))
+        fastest
     }
 }

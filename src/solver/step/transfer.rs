@@ -135,7 +135,6 @@ impl<const D: usize> Solver<D> {
                 let selected = Selected::of(lists, number, chunk);
                 arena.clear(&window_of(lists, number));
                 read_ahead(arena.next);
-                plan.read_ahead(arena.next_but_one);
                 let (frame, rows, sums) = (frame(plan, bin), arena.rows, arena.moments);
                 let nodes = constrained(plan, bin);
                 if let Some(whole) = selected.whole {
@@ -271,14 +270,10 @@ impl<const D: usize> Solver<D> {
                         }
                         let window = window_of(lists, number);
                         fields.load(plan, bin, &window, arena);
-                        let mut after = arenas.after(bin);
-                        let next = after.next().map_or(Place::default(), |(next, window)| {
+                        let next = arenas.after(bin).map_or(Place::default(), |(next, window)| {
                             fields.read_ahead(plan, next, &window);
                             places[plan.bins[next].leaf as usize]
                         });
-                        if let Some((next_but_one, _)) = after.next() {
-                            plan.read_ahead(next_but_one);
-                        }
                         if let Some(changes) = changes {
                             load_rows(plan, bin, &window, changes, increments);
                         }
@@ -324,7 +319,7 @@ impl<const D: usize> Solver<D> {
                         let departed =
                             borders.depart(&plan.tree, leaf, chunk, &scratch.leavers.found, resampling);
                         if !is_empty {
-                            lists.sort_ahead(plan, leaf, chunk, &widths, &mut scratch.sort);
+                            lists.presort(plan, leaf, chunk, &widths, &mut scratch.sort);
                         }
                         departed
                     };
