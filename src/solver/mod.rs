@@ -1,6 +1,7 @@
 //! The time integration: one explicit step of the adaptive material point method.
 //!
-//! [`Solver::step`] is the method; the rooms beside it hold its phases.
+//! `Solver::advance` is the method, and `docs/time-step.md` goes through it; the rooms beside it hold its phases.
+//! [`Solver::step`] adds what is no physics: clock, measured costs and the reduction.
 //!
 //! | room | what it holds, from the bottom up |
 //! |---|---|
@@ -27,15 +28,14 @@ pub use state::{Clock, Requests, Solver, StepError, StepReport};
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
-use self::migration::migrate::{MigrateError, Moved};
-use self::sorting::bins::BinMissing;
+use self::migration::migrate::Moved;
 use crate::adaptivity::resample::ledger::Books;
-use crate::grid::arenas::waves;
 use crate::particle::Chunk;
 use crate::solver::state::bookings::{Contacts, LoadBooks};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
 use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::parts::Parts;
 use crate::solver::state::phases::{Phase, Phases, thread_time};
 use crate::solver::state::recall::Recall;
@@ -55,7 +55,7 @@ impl<const D: usize> Solver<D> {
         let partitioned = LastPartition::at_start(start);
         let mut solver = Self {
             comm: comm.clone(),
-            signal: vec![0.0; chunks.len()],
+            leaf_data: LeafData::default(),
             contacts: Contacts::new(&physics, clock.time),
             load_books: LoadBooks::new(physics.loads.len(), clock.time),
             physics,
@@ -68,11 +68,8 @@ impl<const D: usize> Solver<D> {
             books: Books::default(),
             regrids: 0,
             parts: Parts::default(),
-            surveys: Vec::new(),
-            places: Vec::new(),
             recall: Recall::default(),
             sent_before: Traffic::default(),
-            arena_bytes: 0,
             surface_bytes: 0,
             costs: Costs::new(clock.step),
             partitioned,
@@ -80,13 +77,14 @@ impl<const D: usize> Solver<D> {
             is_to_weigh: false,
             weighed: None,
         };
+        solver.leaf_data.reset(solver.chunks.len());
         solver.books.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
         solver.provide_reach(reach);
         if clock == Clock::default() {
             // A box without a bin stops the first step, which says so.
             let _ = solver.moments_from_affine();
-            solver.signal = solver.signals_at_rest();
+            solver.leaf_data.signal = solver.signals_at_rest();
             solver.clock.bound = comm.min_f64(solver.local_bound());
         }
         solver
@@ -97,71 +95,56 @@ impl<const D: usize> Solver<D> {
     /// # Errors
     /// On all ranks when any rank failed, with that rank and its reason.
     pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
-        self.comm.begin_step(self.clock.step);
-        self.costs.begin_step(self.clock.step, self.chunks.len());
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
-        let rates = self.collider_rates(dt);
-
-        let sorted = self.sort_into_bins();
-        self.note_velocities();
-        self.nodes_from_particles(dt);
-        self.weigh();
-        let impulses = self.update_nodes(dt, &rates);
-        self.form_increments();
-        self.prolong();
-        let departed = self.gather(dt);
-        self.costs.end_step();
-        let moved = self.arrive(departed);
-        let reach = self.reach_now();
-
-        self.clock.step += 1;
-        self.clock.time = if dt < left { self.clock.time + dt } else { end };
-        self.clock.dt = dt;
-        self.advance_colliders(&rates, impulses, dt);
-        self.close_step(sorted, moved, reach, requests)
+        let to = if dt < left { self.clock.time + dt } else { end };
+        self.comm.begin_step(self.clock.step);
+        self.leaf_data.begin_step(self.clock.step, self.chunks.len());
+        self.weigh_particles();
+        let advanced = self.advance(to, dt);
+        self.weigh_nodes();
+        self.leaf_data.times.end_step();
+        (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
+        self.close_step(advanced, requests)
     }
 
-    /// Collective over neighbours. P2G, exchange, node sums and restriction: momentum with the impulse of stress
-    /// over `dt`, and mass, on real nodes.
-    pub(super) fn nodes_from_particles(&mut self, dt: f64) {
-        self.scatter(dt, waves::FIRST);
-        self.sum_nodes(waves::FIRST);
-        let pending = self.send_sums();
-        for wave in waves::FIRST + 1..self.grid.waves() {
-            self.scatter(dt, wave);
-            self.sum_nodes(wave);
-        }
-        self.add_sums_of_neighbours(pending);
-        self.restrict();
+    /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s. `docs/time-step.md` goes through it.
+    fn advance(&mut self, to: f64, dt: f64) -> Result<Moved, StepError> {
+        let rates = self.collider_rates(dt);
+        let sorted = self.sort_into_bins();
+        self.particles_to_nodes(dt);
+        let impulses = self.update_node_velocities(dt, &rates);
+        self.prolong_velocities();
+        let departed = self.nodes_to_particles(dt);
+        let moved = self.migrate_particles(departed);
+        self.move_colliders(&rates, impulses, to, dt);
+        // A rank that has failed serves its neighbours to the end of the step.
+        sorted?;
+        Ok(moved?)
     }
 
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
         self.sent_before = self.traffic();
         // Fresh memory costs as much as the first scatter into it.
-        let arenas = std::mem::take(&mut self.grid.arenas);
+        let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.arenas), self.grid.sum_bytes);
         // The new one shall not stand beside all of the old one.
         self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
-        self.grid.arenas = arenas;
+        (self.grid.arenas, self.grid.sum_bytes) = (arenas, sum_bytes);
     }
 
     /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.
     fn close_step(
         &mut self,
-        sorted: Result<(), BinMissing>,
-        moved: Result<Moved, MigrateError>,
-        reach: u32,
+        advanced: Result<Moved, StepError>,
         requests: Requests,
     ) -> Result<StepReport, Disagreement> {
-        let bound = self.local_bound();
-        let outcome: Result<Moved, StepError> = match (sorted, moved) {
-            (Err(error), _) => Err(error.into()),
-            (_, Err(error)) => Err(error.into()),
-            _ if bound.is_nan() || bound <= 0.0 => Err(StepError::TimeStep { dt: bound }),
-            (_, Ok(moved)) => Ok(moved),
-        };
+        let (bound, reach) = (self.local_bound(), self.reach_now());
+        let outcome = advanced.and_then(|moved| match bound.is_nan() || bound <= 0.0 {
+            true => Err(StepError::TimeStep { dt: bound }),
+            false => Ok(moved),
+        });
         let flag = |set: bool| if set { -1.0 } else { 0.0 };
         let bound = if outcome.is_ok() { bound } else { 0.0 };
         let mut least = [

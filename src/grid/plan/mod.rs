@@ -25,7 +25,8 @@ use super::constraints::columns::Columns;
 use super::constraints::constraint::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use crate::csr::Csr;
-use crate::kernel::ARENA_EDGE;
+use crate::kernel::constrained::ConstrainedNodes;
+use crate::kernel::{ARENA_EDGE, Frame};
 
 pub mod closure;
 pub mod constrained;
@@ -194,6 +195,23 @@ impl<const D: usize> GridPlan<D> {
     /// Bins of own leaf `leaf`.
     pub fn leaf_bins(&self, leaf: usize) -> std::ops::Range<usize> {
         self.leaf_start[leaf] as usize..self.leaf_start[leaf + 1] as usize
+    }
+
+    /// Edge of a cell of the finest bins of an own leaf, m.
+    pub fn finest_cell(&self, leaf: usize) -> f64 {
+        let finest = self.bins[self.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
+        self.cell(finest.unwrap_or(0))
+    }
+
+    /// The block of cells of a bin.
+    pub fn frame(&self, bin: &Bin<D>) -> Frame<D> {
+        let cell = self.cell(bin.block.level);
+        Frame { corner: bin.block.coord.map(|c| f64::from(4 * c) * cell), cell, extent: self.extent() }
+    }
+
+    /// Constrained nodes in the arena of a bin, if there are any.
+    pub fn constrained(&self, bin: &Bin<D>) -> Option<&ConstrainedNodes> {
+        Some(&self.constraints[bin.touched? as usize].nodes)
     }
 
     /// Position of a node relative to the domain's lower corner, m.

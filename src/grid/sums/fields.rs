@@ -199,9 +199,16 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
-    /// touch nodes with first moments these.
-    pub fn load(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>, arena: &mut VelocityArena<D>) {
-        let bin = &plan.bins[bin];
+    /// touch nodes with first moments these. Prefetches the same of the occupied bin that comes next, and returns that.
+    pub fn load(
+        &self,
+        plan: &GridPlan<D>,
+        arenas: &Arenas<D>,
+        number: usize,
+        window: &Window<D>,
+        arena: &mut VelocityArena<D>,
+    ) -> Option<usize> {
+        let bin = &plan.bins[number];
         let constraints = bin.touched.map(|table| &plan.constraints[table as usize]);
         // Blocks on all sides give all nodes of the window a value.
         if bin.around[..offset_count(D)].contains(&NO_BLOCK) {
@@ -214,11 +221,14 @@ impl<const D: usize> NodeFields<D> {
                 constraints.copy_block(index, self.moments_of(plan, block), &mut arena.moments);
             }
         }
+        let (next, window) = arenas.after(number)?;
+        self.prefetch(plan, next, &window);
+        Some(next)
     }
 
-    /// Asks for what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the processor to foresee
+    /// Prefetches what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the processor to foresee
     /// them.
-    pub fn read_ahead(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
+    fn prefetch(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
         let (rows, nodes) = (self.rows.as_ptr().addr(), block_nodes(D));
         for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {
             shared.for_each_run(|run| run.read_ahead(rows + size_of::<Row>() * (block * nodes + run.block)));

@@ -2,7 +2,7 @@
 use std::sync::atomic::Ordering;
 
 use crate::solver::state::Solver;
-use crate::solver::state::cost::{KINDS, Kind, UNIT, arena_cost, loads, measurements};
+use crate::solver::state::cost::{KINDS, Kind, UNIT, arena_cost, loads};
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
@@ -37,20 +37,21 @@ impl<const D: usize> Solver<D> {
         let mut sums = vec![0u64; 2 * KINDS * materials + 2];
         let (times, rest) = sums.split_at_mut(KINDS * materials);
         let (particles, nodes) = rest.split_at_mut(KINDS * materials);
+        let leaf_times = &self.leaf_data.times;
         for (leaf, chunk) in self.chunks.iter().enumerate().filter(|(_, chunk)| !chunk.is_empty()) {
             nodes[1] += steps;
             let (kind, len) = (self.kind(leaf) as usize, chunk.len() as u64);
-            let time = self.costs.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
+            let time = leaf_times.nanoseconds.get(leaf).map_or(0, |time| time.load(Ordering::Relaxed));
             for (material, load) in loads(chunk, materials).into_iter().enumerate() {
                 let share = time as f64 * load as f64 / (len + arena_cost(D, len)) as f64;
                 times[KINDS * material + kind] += units(share * 1e-9);
-                particles[KINDS * material + kind] += load * measurements(leaf, &self.costs.steps);
+                particles[KINDS * material + kind] += load * leaf_times.measurements(leaf);
             }
         }
         let threads = rayon::current_num_threads() as f64;
         nodes[0] = units((seconds - self.costs.agreed_seconds).max(0.0) * threads);
         (self.costs.agreed_seconds, self.costs.agreed_step) = (seconds, self.clock.step);
-        self.costs.forget(self.chunks.len());
+        self.leaf_data.times.reset(self.chunks.len());
         self.comm.sum_u64(&mut sums);
         self.costs.take_in(&sums, materials);
     }

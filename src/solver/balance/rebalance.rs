@@ -124,8 +124,7 @@ impl<const D: usize> Solver<D> {
         self.parts.end(Part::Partition);
         // The tree may have changed before, even if no leaf moves now.
         if self.grid.plan.revision != self.forest.revision() {
-            self.signal = vec![0.0; self.chunks.len()];
-            self.costs.forget(self.chunks.len());
+            self.leaf_data.reset(self.chunks.len());
             self.rebuild_grid(self.agreed_reach());
         }
         self.parts.end(Part::Grid);

@@ -18,7 +18,6 @@ use crate::simd::{Lanes, Vector};
 use crate::solver::physics::{Physics, StepControl};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
-use crate::solver::step::transfer::sort_with;
 use crate::solver::step::update::update_velocity;
 
 /// A particle with its box. Lengths in m, relative to the domain's lower corner.
@@ -139,7 +138,7 @@ impl<const D: usize> GivenBoxes<D> {
     /// On the rank that has a box which fits no bin; all ranks complete the exchange.
     pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
         let solver = &mut self.solver;
-        let sorted = sort_with(&mut solver.grid, &solver.chunks, &mut solver.phases, &self.halves);
+        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, &self.halves);
         solver.nodes_from_particles(dt);
         sorted
     }
@@ -189,7 +188,7 @@ impl<const D: usize> GivenBoxes<D> {
     /// Not collective. G2P without moving anything: particles take velocity and affine state of the nodes.
     pub fn to_particles(&mut self, transfer: Transfer) {
         self.solver.physics.transfer = transfer;
-        self.solver.gather(0.0);
+        self.solver.nodes_to_particles(0.0);
         self.solver.physics.transfer = Transfer::Apic;
     }
 

@@ -93,41 +93,47 @@ impl<const D: usize> Solver<D> {
         self.is_to_weigh = true;
     }
 
-    /// Not collective. Adds up masses, if that is asked for, in a step whose nodes have their sums.
-    pub(in crate::solver) fn weigh(&mut self) {
+    /// Not collective. Adds up the mass of the particles, if that is asked for, before a step.
+    pub(in crate::solver) fn weigh_particles(&mut self) {
+        if !self.is_to_weigh {
+            return;
+        }
+        let chunks = &self.chunks;
+        let particles = self.phases.time(Phase::Output, || {
+            let leaves = chunks.par_iter().with_min_len(64).fold(ExactSum::new, |mut sum, chunk| {
+                leaf_mass(chunk).enter(&mut sum);
+                sum
+            });
+            leaves.reduce(ExactSum::new, together)
+        });
+        self.weighed = Some(Weighed { particles, nodes: ExactSum::new() });
+    }
+
+    /// Not collective. Adds up the mass on the nodes, if that is asked for, after a step that has summed it.
+    pub(in crate::solver) fn weigh_nodes(&mut self) {
         if !std::mem::take(&mut self.is_to_weigh) {
             return;
         }
         self.note_surface();
-        let (plan, fields, chunks) = (&self.grid.plan, &self.grid.fields, &self.chunks);
-        self.weighed = self.phases.time(Phase::Output, || {
+        let (plan, fields) = (&self.grid.plan, &self.grid.fields);
+        let nodes = self.phases.time(Phase::Output, || {
             let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
-            let on_nodes = blocks.filter(|(index, _)| fields.active[*index]);
-            let on_nodes = on_nodes.fold(ExactSum::new, |mut sum, (index, block)| {
+            let active = blocks.filter(|(index, _)| fields.active[*index]);
+            let sums = active.fold(ExactSum::new, |mut sum, (index, block)| {
                 let rows = &fields.rows[index * block_nodes(D)..];
                 bits(block.owned).for_each(|bit| sum.add(rows[bit as usize].0[3]));
                 sum
             });
-            let of_leaves = chunks.par_iter().with_min_len(64).fold(ExactSum::new, |mut sum, chunk| {
-                leaf_mass(chunk).enter(&mut sum);
-                sum
-            });
-            // Exact sums do not depend on how they are put together.
-            let together = |mut sum: ExactSum, other: ExactSum| {
-                sum.merge(&other);
-                sum
-            };
-            Some(Weighed([
-                on_nodes.reduce(ExactSum::new, together),
-                of_leaves.reduce(ExactSum::new, together),
-            ]))
+            sums.reduce(ExactSum::new, together)
         });
+        self.weighed.iter_mut().for_each(|weighed| weighed.nodes = nodes.clone());
     }
 
     /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the latter, when a
     /// step weighed them last; `None` if none has since the last call.
     pub fn weighed_mass_error(&mut self) -> Option<f64> {
-        let Weighed(mut sums) = self.weighed.take()?;
+        let Weighed { particles, nodes } = self.weighed.take()?;
+        let mut sums = [nodes, particles];
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         let [nodes, particles] = sums.map(|sum| sum.to_f64());
         Some((nodes - particles) / particles)
@@ -137,6 +143,12 @@ impl<const D: usize> Solver<D> {
     pub fn particle_totals(&self) -> ParticleTotals {
         particle_totals(&self.comm, &self.physics, &self.chunks, self.clock.time)
     }
+}
+
+/// Exact sums do not depend on how they are put together.
+fn together(mut sum: ExactSum, other: ExactSum) -> ExactSum {
+    sum.merge(&other);
+    sum
 }
 
 /// Mass, momentum and angular momentum of nothing.

@@ -152,7 +152,7 @@ impl<const D: usize> Solver<D> {
             colliders: &self.contacts.states,
             plan: &self.grid.plan,
             fields: &self.grid.fields,
-            surveys: &self.surveys,
+            surveys: &self.leaf_data.surveys,
             surroundings: &self.recall.surroundings,
             masses: &[],
             beside_empty: &[],

@@ -47,8 +47,12 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn survey_now(&mut self) {
         let Some(adaptivity) = &self.physics.adaptivity else { return };
         let watch = Watch::after_step(adaptivity, 0);
-        self.surveys.resize(self.chunks.len(), Survey::default());
-        self.surveys.iter_mut().zip(&self.chunks).for_each(|(survey, chunk)| watch.look(chunk, survey));
+        self.leaf_data.surveys.resize(self.chunks.len(), Survey::default());
+        self.leaf_data
+            .surveys
+            .iter_mut()
+            .zip(&self.chunks)
+            .for_each(|(survey, chunk)| watch.look(chunk, survey));
     }
 }
 
@@ -65,7 +69,7 @@ impl<const D: usize> Solver<D> {
         };
         let (start, phases) = (Instant::now(), self.phases);
         self.parts.begin();
-        if self.surveys.len() != self.chunks.len() {
+        if self.leaf_data.surveys.len() != self.chunks.len() {
             self.survey_now();
         }
         let levels_before = self.change_tree(every);
@@ -74,12 +78,9 @@ impl<const D: usize> Solver<D> {
         let mut split_in = self.split_particles(&looks, levels_before.as_deref());
         let is_split = split_in.contains(&true);
         self.parts.end(Part::Split);
-        if is_new {
-            if self.rebalance() {
-                // Children may have come with leaves of other ranks.
-                split_in = vec![true; self.chunks.len()];
-            }
-            self.surveys.clear();
+        if is_new && self.rebalance() {
+            // Children may have come with leaves of other ranks.
+            split_in = vec![true; self.chunks.len()];
         }
         if is_new || is_split {
             looks = self.look_at_levels();
@@ -111,7 +112,7 @@ impl<const D: usize> Solver<D> {
         }
         if is_other {
             // Merged particles are no faster than the fastest of those that they stand for.
-            self.signal = self.signals_at_rest();
+            self.leaf_data.signal = self.signals_at_rest();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
@@ -147,7 +148,7 @@ impl<const D: usize> Solver<D> {
         let _ = self.sort_into_bins();
         self.nodes_from_particles(0.0);
         let rates = self.collider_rates(0.0);
-        self.update_nodes(0.0, &rates);
+        self.update_node_velocities(0.0, &rates);
         self.phases = phases;
     }
 
@@ -191,7 +192,8 @@ impl<const D: usize> Solver<D> {
         let per_edge = adaptivity.finest_edges_per_metre(self.physics.root_edge);
         let way =
             |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
-        let leaves = self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.surveys).enumerate();
+        let leaves =
+            self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.leaf_data.surveys).enumerate();
         let each = leaves.with_min_len(64).map(|(number, ((leaf, chunk), survey))| {
             let values = &values[number * count..][..count];
             let levels = if chunk.is_empty() { 0 } else { wanted_levels(adaptivity, leaf.level, values) };
@@ -291,7 +293,7 @@ impl<const D: usize> Solver<D> {
             levels[to.clone()].fill(finest);
             if from.len() == 1 && to.len() == 1 {
                 chunks[to.start] = std::mem::take(&mut sources[from.start]);
-                surveys[to.start] = self.surveys[from.start];
+                surveys[to.start] = self.leaf_data.surveys[from.start];
                 continue;
             }
             let room = sources[from.clone()].iter().map(Chunk::len).sum::<usize>();
@@ -307,7 +309,7 @@ impl<const D: usize> Solver<D> {
             }
         }
         self.chunks = chunks;
-        self.surveys = surveys;
+        self.leaf_data.surveys = surveys;
         levels
     }
 

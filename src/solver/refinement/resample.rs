@@ -21,7 +21,7 @@ impl<const D: usize> Solver<D> {
         }
         let turns = self.turns();
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&turns).enumerate();
-        let surveys = Some(&self.surveys).filter(|surveys| surveys.len() == self.chunks.len());
+        let surveys = Some(&self.leaf_data.surveys).filter(|surveys| surveys.len() == self.chunks.len());
         let each = leaves.with_min_len(64).map(|(number, ((chunk, leaf), &turn))| {
             // Who came in this very step can wait for the next time.
             let known = surveys.and_then(|surveys| surveys[number].levels?.look(leaf.level, turn));
@@ -56,7 +56,8 @@ impl<const D: usize> Solver<D> {
         let Some(resampling) = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, extent) else {
             return Vec::new();
         };
-        let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.surveys).enumerate();
+        let leaves =
+            self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.surveys).enumerate();
         let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), survey))| {
             let too_wide = |stretch| resampling.may_exceed(survey.width, leaf.level, stretch);
             let is_wanted = looks[number].coarser || resampling.stretch().is_some_and(too_wide);

@@ -128,7 +128,9 @@ impl<const D: usize> BinLists<D> {
             let bins = self.of_leaf(leaf);
             let is_occupied = move |number: usize| bins.is_none_or(|bins| !bins.members[number].is_empty());
             let numbers = (0..bins.map_or(1, |bins| bins.members.len())).filter(move |&n| is_occupied(n));
-            numbers.map(move |number| (first + number, window_of(bins, number)))
+            numbers.map(move |number| {
+                (first + number, bins.map_or(Window::FULL, |bins| bins.members[number].window))
+            })
         })
     }
 
@@ -188,9 +190,4 @@ fn may_need_lists<const D: usize>(
     let &Sorting { plan, widths, own, .. } = sorting;
     let given = !widths.are_known_to_kernels();
     given || bins.is_some_and(LeafBins::is_beside_finer) || widths.bound(chunk) > 0.5 * plan.cell(own.level)
-}
-
-/// The nodes that the members of a bin touch.
-pub(in crate::solver) fn window_of<const D: usize>(lists: Option<&LeafBins<D>>, bin: usize) -> Window<D> {
-    lists.map_or(Window::FULL, |lists| lists.members[bin].window)
 }

@@ -4,16 +4,10 @@
 //! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class; the leaf's arena
 //! counts as some particles more. Steps in which nodes are summed and updated give the cost of a leaf beside them. Costs
 //! steer the partition, which changes no bit of the state.
-use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
-use crate::solver::state::phases::thread_time;
+use crate::solver::state::leaf_data::MEASURE_EVERY;
 
-/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
-/// processor time takes as long as several particles.
-const MEASURE_EVERY: u64 = 32;
 /// A leaf without particles costs one such part of what a leaf with particles costs beside them.
 const EMPTY: u64 = 8;
 /// Unit of measured costs, s.
@@ -52,12 +46,6 @@ pub struct Costs {
     particle: Vec<[u64; KINDS]>,
     /// Cost of a leaf with particles beside them.
     leaf: u64,
-    /// Measured nanoseconds per own leaf.
-    pub(in crate::solver) nanoseconds: Vec<AtomicU64>,
-    /// Steps since the last agreement, the one under way included.
-    pub(in crate::solver) steps: Range<u64>,
-    /// Whether particles are transferred for a step, not for a row of the history.
-    is_step: bool,
     /// Step at which this process began.
     first_step: u64,
     /// Steps and seconds of node work up to the last agreement.
@@ -90,38 +78,6 @@ impl Costs {
         self.agreed_step - self.first_step >= MEASURE_EVERY
     }
 
-    /// Not collective. Begins a step of `leaves` own leaves.
-    pub(in crate::solver) fn begin_step(&mut self, step: u64, leaves: usize) {
-        if self.nanoseconds.len() != leaves {
-            self.forget(leaves);
-        }
-        let first = if self.steps.is_empty() { step } else { self.steps.start };
-        self.steps = first..step + 1;
-        self.is_step = true;
-    }
-
-    /// Not collective. Particles have been transferred.
-    pub(in crate::solver) fn end_step(&mut self) {
-        self.is_step = false;
-    }
-
-    /// Not collective. Forgets times that belong to other leaves.
-    pub(in crate::solver) fn forget(&mut self, leaves: usize) {
-        self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
-        self.steps = 0..0;
-    }
-
-    /// Runs work on the particles of a leaf, on any thread.
-    pub(in crate::solver) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
-        if !self.is_step || !is_measured(leaf, self.steps.end) {
-            return work();
-        }
-        let start = thread_time();
-        let result = work();
-        self.nanoseconds[leaf].fetch_add((thread_time() - start).as_nanos() as u64, Ordering::Relaxed);
-        result
-    }
-
     /// Cost of a leaf.
     pub(in crate::solver) fn of<const D: usize>(&self, chunk: &Chunk<D>, kind: Kind) -> u64 {
         if self.particle.is_empty() {
@@ -134,17 +90,6 @@ impl Costs {
         let cost = particles.iter().zip(&self.particle).map(|(count, cost)| count * cost[kind as usize]);
         self.leaf + cost.sum::<u64>()
     }
-}
-
-/// Whether time is taken of a leaf in the step before `end`.
-fn is_measured(leaf: usize, end: u64) -> bool {
-    (leaf as u64 + end).is_multiple_of(MEASURE_EVERY)
-}
-
-/// In how many of some steps time was taken of a leaf.
-pub(in crate::solver) fn measurements(leaf: usize, steps: &Range<u64>) -> u64 {
-    let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
-    before(steps.end) - before(steps.start)
 }
 
 /// Particles of a chunk by material.
@@ -195,16 +140,6 @@ impl Costs {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn measurements_are_counted() {
-        for leaf in 0..70 {
-            for steps in [0..1, 5..5, 3..40, 31..200, 64..64 + MEASURE_EVERY] {
-                let each = steps.clone().filter(|step| is_measured(leaf, step + 1));
-                assert_eq!(measurements(leaf, &steps), each.count() as u64);
-            }
-        }
-    }
 
     #[test]
     fn costs_follow_what_is_measured() {

@@ -1,16 +1,20 @@
 //! What lives on the grid for one tree and one partition.
 use partition::Forest;
-use partition::comm::{Comm, Traffic};
+use partition::comm::{Comm, Pending, Traffic};
+use rayon::prelude::*;
 
-use crate::grid::arenas::Arenas;
+use crate::grid::arenas::{ArenaMut, Arenas, waves};
 use crate::grid::plan::known::Allowance;
 use crate::grid::sums::exchange::ReceivedSums;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
-use crate::kernel::Row;
+use crate::kernel::{Row, spread};
 use crate::memory::Block;
+use crate::particle::Chunk;
 use crate::solver::migration::migrate::Migration;
 use crate::solver::physics::Physics;
-use crate::solver::sorting::bins::BinLists;
+use crate::solver::sorting::bin_view::BinView;
+use crate::solver::sorting::bins::{BinLists, BinMissing, BoxWidths};
+use crate::solver::state::phases::{Phase, Phases};
 
 /// Plan, arenas, fields and exchanges.
 pub struct Grid<const D: usize> {
@@ -24,6 +28,8 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) migration: Migration<D>,
     pub(in crate::solver) lists: BinLists<D>,
     pub(in crate::solver) seam: Seam,
+    /// Bytes of the last exchange of sums.
+    pub(in crate::solver) sum_bytes: u64,
 }
 
 impl<const D: usize> Grid<D> {
@@ -48,6 +54,7 @@ impl<const D: usize> Grid<D> {
             migration: Migration::new(comm, &plan, neighbours, physics.leaving),
             lists: BinLists::new(&plan),
             seam: exchange.seam(&plan),
+            sum_bytes: 0,
             exchange,
             received,
             plan,
@@ -67,9 +74,75 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// In how many waves bins scatter.
-    pub(in crate::solver) fn waves(&self) -> usize {
-        self.arenas.waves().count()
+    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any.
+    ///
+    /// # Errors
+    /// A box that needs a bin outside the plan; the caller makes it collective.
+    pub(in crate::solver) fn sort(
+        &mut self,
+        phases: &mut Phases,
+        chunks: &[Chunk<D>],
+        widths: &impl BoxWidths<D>,
+    ) -> Result<(), BinMissing> {
+        let Self { plan, lists, arenas, seam, .. } = self;
+        phases.time(Phase::Sort, || {
+            let sorted = lists.sort(plan, chunks, widths);
+            lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
+                spread::of_parts(chunk, parts, &plan.frame(bin), plan.constrained(bin), each);
+            });
+            arenas.occupy(plan, seam, lists.occupied(plan, chunks));
+            sorted
+        })
+    }
+
+    /// Collective over neighbours. Calls `scatter` with each bin that has members and its arena, on any thread, and leaves the
+    /// sums of the arenas of all ranks on real nodes. No bit depends on the order in which bins scatter.
+    pub(in crate::solver) fn scatter_and_sum<S: Default>(
+        &mut self,
+        phases: &mut Phases,
+        chunks: &[Chunk<D>],
+        scatter: impl Fn(&mut S, &BinView<'_, D>, ArenaMut<'_, D>) + Sync + Send,
+    ) {
+        // Neighbours wait for the sums of the first wave, which travel while the others scatter.
+        self.scatter_wave(phases, chunks, waves::FIRST, &scatter);
+        let pending = self.send_sums(phases);
+        for wave in waves::FIRST + 1..self.arenas.waves().count() {
+            self.scatter_wave(phases, chunks, wave, &scatter);
+        }
+        let Self { plan, arenas, fields, exchange, received, .. } = self;
+        phases.time(Phase::Exchange, || exchange.finish(pending, received));
+        phases.time(Phase::Sum, || fields.add_received(plan, arenas, received));
+        phases.time(Phase::Nodes, || fields.restrict(plan));
+    }
+
+    /// Not collective. Scatters the bins of a wave, and adds up the blocks that are complete with it.
+    fn scatter_wave<S: Default>(
+        &mut self,
+        phases: &mut Phases,
+        chunks: &[Chunk<D>],
+        wave: usize,
+        scatter: &(impl Fn(&mut S, &BinView<'_, D>, ArenaMut<'_, D>) + Sync + Send),
+    ) {
+        let Self { plan, lists, arenas, fields, .. } = self;
+        let bins = arenas.of_wave(wave);
+        phases.time(Phase::Scatter, || {
+            bins.into_par_iter().for_each_init(S::default, |scratch, arena| {
+                let leaf = plan.bins[arena.bin].leaf as usize;
+                let bin = BinView::new(plan, lists.of_leaf(leaf), arena.bin, chunks[leaf].len());
+                scatter(scratch, &bin, arena);
+            });
+        });
+        phases.time(Phase::Sum, || fields.sum(plan, arenas, wave));
+    }
+
+    /// Collective over neighbours. Starts sending the sums that neighbours need.
+    fn send_sums(&mut self, phases: &mut Phases) -> Pending {
+        let Self { plan, arenas, fields, exchange, .. } = self;
+        let before = exchange.traffic().bytes;
+        let messages = phases.time(Phase::Sum, || exchange.pack(plan, arenas, fields));
+        let pending = phases.time(Phase::Exchange, || exchange.begin(messages));
+        self.sum_bytes = exchange.traffic().bytes - before;
+        pending
     }
 
     /// Heap bytes held.

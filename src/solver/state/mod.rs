@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
-//! | `survey` | bounds on the particles of each leaf |
+//! | [`leaf_data`], `survey` | what is noted of each leaf; bounds on its particles |
 //! | `recall`, `surroundings` | what regrids remember |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
 //! | [`phases`], [`parts`] | timers |
@@ -17,20 +17,20 @@ use super::sorting::bins::BinMissing;
 use crate::adaptivity::resample::ledger::Books;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
-use crate::particle::chunk::Place;
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{Contacts, LoadBooks};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::parts::Parts;
 use crate::solver::state::phases::Phases;
 use crate::solver::state::recall::Recall;
-use crate::solver::state::survey::Survey;
 
 pub mod bookings;
 pub mod cost;
 pub mod grid;
 pub(super) mod last_partition;
+pub mod leaf_data;
 pub mod parts;
 pub mod phases;
 pub(super) mod recall;
@@ -85,9 +85,12 @@ pub struct Requests {
     pub checkpoint: bool,
 }
 
-/// Mass on the real nodes and of the particles in one step, on one rank.
+/// Mass of the particles, and on the real nodes, in one step, on one rank.
 #[derive(Clone, Debug)]
-pub(in crate::solver) struct Weighed(pub(in crate::solver) [ExactSum; 2]);
+pub(in crate::solver) struct Weighed {
+    pub(in crate::solver) particles: ExactSum,
+    pub(in crate::solver) nodes: ExactSum,
+}
 
 /// Particles, tree and clock of one rank, and what advances them.
 pub struct Solver<const D: usize> {
@@ -107,8 +110,8 @@ pub struct Solver<const D: usize> {
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,
-    /// Per own leaf, the greatest sum of wave speed and particle speed after the last step, m/s.
-    pub(super) signal: Vec<f64>,
+    /// What is noted of each own leaf.
+    pub(super) leaf_data: LeafData<D>,
     /// Particles that this rank deleted because they left the domain.
     pub deleted: u64,
     /// Splits and merges of particles so far.
@@ -117,16 +120,10 @@ pub struct Solver<const D: usize> {
     pub regrids: u64,
     /// Where the time of regrids went since the start of this process.
     pub parts: Parts,
-    /// What was noted of each own leaf in the last step.
-    pub(super) surveys: Vec<Survey<D>>,
-    /// Where the columns of each own leaf were at the start of the last G2P.
-    pub(super) places: Vec<Place>,
     /// What regrids remember; nothing that a bit depends on.
     pub(super) recall: Recall<D>,
     /// What grids of earlier trees and partitions have sent.
     pub(super) sent_before: Traffic,
-    /// Bytes of the last exchange of arenas.
-    pub(super) arena_bytes: u64,
     /// Least bytes that these nodes need, as of the last step that was weighed.
     pub(super) surface_bytes: u64,
     pub(super) costs: Costs,

@@ -115,17 +115,19 @@ impl<const D: usize> Solver<D> {
         sums
     }
 
-    /// Collective. Moves the colliders over the step that has just been done. One more reduction if any is free.
-    pub(in crate::solver) fn advance_colliders(
+    /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes gave to the
+    /// colliders in it. One more reduction if any is free.
+    pub(in crate::solver) fn move_colliders(
         &mut self,
         rates: &[Rate<D>],
         step: Vec<[ExactSum; SUMS]>,
+        to: f64,
         dt: f64,
     ) {
         for (sums, step) in self.contacts.sums.iter_mut().zip(&step) {
             sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
         }
-        let gravity = self.physics.gravity.at(self.clock.time - 0.5 * dt);
+        let gravity = self.physics.gravity.at(to - 0.5 * dt);
         let mut impulses = vec![[0.0; SUMS]; step.len()];
         if self.physics.colliders.iter().any(|collider| collider.free().is_some()) {
             let comm = &self.comm;
@@ -135,7 +137,7 @@ impl<const D: usize> Solver<D> {
         for (((collider, state), rate), impulse) in all.zip(rates).zip(impulses) {
             let [x, y, z, turn @ ..] = impulse;
             let linear = std::array::from_fn(|a| [x, y, z][a]);
-            *state = collider.advanced(state, rate, &gravity, [self.clock.time, dt], linear, turn);
+            *state = collider.advanced(state, rate, &gravity, [to, dt], linear, turn);
         }
     }
 
@@ -171,10 +173,9 @@ impl<const D: usize> Solver<D> {
             if speed == 0.0 {
                 continue;
             }
-            let filled = self.signal.iter().zip(self.forest.leaves()).enumerate();
+            let filled = self.leaf_data.signal.iter().zip(self.forest.leaves()).enumerate();
             for (leaf, (_, octant)) in filled.filter(|(_, (signal, _))| **signal > 0.0) {
-                let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
-                let cell = plan.cell(finest.unwrap_or(0));
+                let cell = plan.finest_cell(leaf);
                 let edge = f64::from(BLOCK as u32) * plan.cell(octant.level);
                 let aabb = Aabb::new(
                     octant.coord.map(|c| f64::from(c) * edge),

@@ -1,5 +1,5 @@
 //! What lives on the grid for one tree and one partition, and the exchanges of a step.
-use partition::comm::{Pending, Traffic};
+use partition::comm::Traffic;
 use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
@@ -78,17 +78,6 @@ impl<const D: usize> Solver<D> {
         &self.grid
     }
 
-    /// Starts sending the sums that neighbours need.
-    pub(in crate::solver) fn send_sums(&mut self) -> Pending {
-        let grid = &mut self.grid;
-        let before = grid.exchange.traffic().bytes;
-        let messages =
-            self.phases.time(Phase::Sum, || grid.exchange.pack(&grid.plan, &grid.arenas, &grid.fields));
-        let pending = self.phases.time(Phase::Exchange, || grid.exchange.begin(messages));
-        self.arena_bytes = grid.exchange.traffic().bytes - before;
-        pending
-    }
-
     /// Not collective. Notes what the surface between partitions needs, while the arenas are those of the present tree.
     pub(in crate::solver) fn note_surface(&mut self) {
         self.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
@@ -101,17 +90,10 @@ impl<const D: usize> Solver<D> {
             leaves: self.forest.leaves().len() as u64,
             ghost_leaves: tree.ghost_len() as u64,
             neighbours: exchange.neighbours().len() as u64,
-            arena_bytes: self.arena_bytes,
+            arena_bytes: self.grid.sum_bytes,
             surface_bytes: self.surface_bytes,
             grid_bytes: self.grid.heap_bytes() as u64,
         }
-    }
-
-    /// Waits for the sums of neighbours and adds them.
-    pub(in crate::solver) fn add_sums_of_neighbours(&mut self, pending: Pending) {
-        let grid = &mut self.grid;
-        self.phases.time(Phase::Exchange, || grid.exchange.finish(pending, &mut grid.received));
-        self.phases.time(Phase::Sum, || grid.fields.add_received(&grid.plan, &grid.arenas, &grid.received));
     }
 
     /// Collective over neighbours. Moves particles to the leaves that contain them; those of other leaves than `may_stray` says
@@ -130,8 +112,14 @@ impl<const D: usize> Solver<D> {
         self.book_migration(moved, &splits)
     }
 
-    /// Collective over neighbours. The second half of [`Solver::migrate`], after G2P, which has the first.
-    pub(in crate::solver) fn arrive(&mut self, departed: Vec<Departed>) -> Result<Moved, MigrateError> {
+    /// Collective over neighbours. Particles that have left their leaf go to the leaf, and rank, that contains them.
+    ///
+    /// # Errors
+    /// A particle that has left the domain or moved too far, on the rank that finds it.
+    pub(in crate::solver) fn migrate_particles(
+        &mut self,
+        departed: Vec<Departed>,
+    ) -> Result<Moved, MigrateError> {
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         let mut splits = Vec::new();
         let moved = self

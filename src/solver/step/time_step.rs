@@ -29,11 +29,10 @@ impl<const D: usize> Solver<D> {
             true => greatest * gravity.iter().map(|g| (g / greatest) * (g / greatest)).sum::<f64>().sqrt(),
             false => 0.0,
         };
-        let particles = self.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
+        let particles = self.leaf_data.signal.iter().enumerate().filter(|(_, signal)| **signal > 0.0).fold(
             f64::INFINITY,
             |bound, (leaf, signal)| {
-                let finest = plan.bins[plan.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
-                let length = self.physics.control.cfl * plan.cell(finest.unwrap_or(0));
+                let length = self.physics.control.cfl * plan.finest_cell(leaf);
                 bound.min(length / signal).min((length / gravity).sqrt())
             },
         );

@@ -1,10 +1,48 @@
-//! Momentum on the nodes: velocities, gravity and the conditions on domain faces.
+//! Velocities of nodes: forces, conditions on domain faces, and interpolation from real to constrained nodes.
 use rayon::prelude::*;
 
 use crate::boundary::FaceCondition;
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::Row;
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::phases::Phase;
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. `v_j = p_j / m_j + Δt g` on real nodes, then loads, the conditions of colliders in their order, and those of
+    /// domain faces, which come last so that nothing is driven out of the domain. Returns impulse and angular impulse on each
+    /// collider from the nodes of this rank.
+    pub(in crate::solver) fn update_node_velocities(
+        &mut self,
+        dt: f64,
+        rates: &[Rate<D>],
+    ) -> Vec<[ExactSum; SUMS]> {
+        let gravity = self.physics.gravity.at(self.clock.time + 0.5 * dt);
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
+        let pushes = self.apply_loads(dt);
+        let impulses = self.collide(rates);
+        let (grid, faces) = (&mut self.grid, &self.physics.faces);
+        self.phases.time(Phase::Nodes, || apply_faces(&mut grid.fields, &grid.plan, faces));
+        self.book_loads(&pushes);
+        impulses
+    }
+
+    /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the increments alike.
+    pub(in crate::solver) fn prolong_velocities(&mut self) {
+        self.form_increments();
+        self.prolong();
+    }
+
+    /// Not collective. Interpolates what the rows of real nodes hold on constrained nodes.
+    pub(in crate::solver) fn prolong(&mut self) {
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
+    }
+}
 
 /// Turns sums of momentum and mass on real nodes into velocities at the end of the step,
 /// `v = p / m + dt g`, where `p` holds the impulse of stress already.

@@ -1,0 +1,130 @@
+//! What is noted of each own leaf beside its particles.
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::particle::Chunk;
+use crate::particle::chunk::Place;
+use crate::solver::state::phases::thread_time;
+use crate::solver::state::survey::Survey;
+
+/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
+/// processor time takes as long as several particles.
+pub(in crate::solver) const MEASURE_EVERY: u64 = 32;
+
+/// What is noted of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset together when
+/// these change.
+#[derive(Debug, Default)]
+pub struct LeafData<const D: usize> {
+    /// Greatest sum of wave speed and particle speed after the last step, m/s; 0 if that is not known.
+    pub(in crate::solver) signal: Vec<f64>,
+    /// Bounds on the particles, noted in the last step; none where it is not that of these leaves.
+    pub(in crate::solver) surveys: Vec<Survey<D>>,
+    /// Where the particles were in memory at the start of the last G2P.
+    pub(in crate::solver) places: Vec<Place>,
+    /// Time that the particles took.
+    pub(in crate::solver) times: LeafTimes,
+}
+
+impl<const D: usize> LeafData<D> {
+    /// Not collective. Nothing is known of so many own leaves.
+    pub(in crate::solver) fn reset(&mut self, leaves: usize) {
+        self.signal.clear();
+        self.signal.resize(leaves, 0.0);
+        self.surveys.clear();
+        self.places.clear();
+        self.times.reset(leaves);
+    }
+
+    /// Not collective. Begins the step of this number, in which all is noted anew.
+    pub(in crate::solver) fn begin_step(&mut self, step: u64, leaves: usize) {
+        if self.signal.len() != leaves || self.times.nanoseconds.len() != leaves {
+            self.reset(leaves);
+        }
+        let first = if self.times.steps.is_empty() { step } else { self.times.steps.start };
+        self.times.steps = first..step + 1;
+        self.times.is_step = true;
+    }
+
+    /// Not collective. Makes room for what G2P notes.
+    pub(in crate::solver) fn begin_gather(&mut self, chunks: &[Chunk<D>]) {
+        self.signal.resize(chunks.len(), 0.0);
+        self.surveys.resize(chunks.len(), Survey::default());
+        self.places.clear();
+        self.places.extend(chunks.iter().map(Chunk::place));
+    }
+}
+
+/// Processor time that P2G and G2P take in each own leaf, summed over some steps.
+#[derive(Debug, Default)]
+pub(in crate::solver) struct LeafTimes {
+    /// Nanoseconds per own leaf.
+    pub nanoseconds: Vec<AtomicU64>,
+    /// The steps, the one under way included.
+    pub steps: Range<u64>,
+    /// Whether particles are transferred for a step, not for a row of the history.
+    is_step: bool,
+}
+
+impl LeafTimes {
+    /// Not collective. Forgets what was measured.
+    pub fn reset(&mut self, leaves: usize) {
+        self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
+        self.steps = 0..0;
+    }
+
+    /// Not collective. The step is over.
+    pub fn end_step(&mut self) {
+        self.is_step = false;
+    }
+
+    /// Runs work on the particles of a leaf, on any thread.
+    pub fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
+        if !self.is_step || !is_measured(leaf, self.steps.end) {
+            return work();
+        }
+        let start = thread_time();
+        let result = work();
+        self.nanoseconds[leaf].fetch_add((thread_time() - start).as_nanos() as u64, Ordering::Relaxed);
+        result
+    }
+
+    /// In how many of the steps time was taken of a leaf.
+    pub fn measurements(&self, leaf: usize) -> u64 {
+        let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
+        before(self.steps.end) - before(self.steps.start)
+    }
+}
+
+/// Whether time is taken of a leaf in the step before `end`.
+fn is_measured(leaf: usize, end: u64) -> bool {
+    (leaf as u64 + end).is_multiple_of(MEASURE_EVERY)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_are_counted() {
+        for leaf in 0..70 {
+            for steps in [0..1, 5..5, 3..40, 31..200, 64..64 + MEASURE_EVERY] {
+                let each = steps.clone().filter(|step| is_measured(leaf, step + 1)).count() as u64;
+                assert_eq!(LeafTimes { steps, ..LeafTimes::default() }.measurements(leaf), each);
+            }
+        }
+    }
+
+    /// What was noted of other leaves is never taken for that of these, not even if there are as many.
+    #[test]
+    fn one_reset_forgets_all_that_was_noted() {
+        let mut data = LeafData::<2>::default();
+        data.begin_step(7, 3);
+        data.begin_gather(&vec![Chunk::new(); 3]);
+        data.signal[1] = 5.0;
+        data.times.nanoseconds[1].store(9, Ordering::Relaxed);
+        data.reset(3);
+        assert_eq!(data.signal, [0.0; 3]);
+        assert!(data.surveys.is_empty() && data.places.is_empty() && data.times.steps.is_empty());
+        assert!(data.times.nanoseconds.iter().all(|time| time.load(Ordering::Relaxed) == 0));
+    }
+}

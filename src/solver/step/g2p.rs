@@ -1,0 +1,221 @@
+//! G2P: nodes to particles, in parallel over leaves.
+//!
+//! All that happens to the particles of a leaf happens at once, while they are in the cache: see `Sweep::advance_leaf`.
+use rayon::prelude::*;
+
+use crate::adaptivity::resample::cell_fit::Resampling;
+use crate::grid::arenas::Arenas;
+use crate::grid::sums::fields::{VelocityArena, load_rows};
+use crate::grid::{GridPlan, NodeFields};
+use crate::kernel::g2p::{Fields, Gathered, Moments};
+use crate::kernel::leavers::Leavers;
+use crate::kernel::{Row, Scheme, arena_nodes, g2p};
+use crate::particle::Chunk;
+use crate::particle::chunk::Place;
+use crate::solver::migration::depart::{Borders, Departed};
+use crate::solver::sorting::bin_view::BinView;
+use crate::solver::sorting::bins::OfLeaf;
+use crate::solver::sorting::leaf_bins::{self, LeafBins};
+use crate::solver::sorting::widths::Widths;
+use crate::solver::state::Solver;
+use crate::solver::state::leaf_data::LeafData;
+use crate::solver::state::phases::Phase;
+use crate::solver::state::survey::{Survey, Watch};
+
+/// Memory that a thread reuses from leaf to leaf.
+struct Scratch<const D: usize> {
+    kernel: g2p::Scratch<D>,
+    arena: VelocityArena<D>,
+    increments: Vec<Row>,
+    gathered: Vec<Gathered<D>>,
+    leavers: Leavers<D>,
+    sort: leaf_bins::Scratch,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self {
+            kernel: g2p::Scratch::default(),
+            arena: VelocityArena::default(),
+            increments: vec![Row::default(); arena_nodes(D)],
+            gathered: Vec::new(),
+            leavers: Leavers::default(),
+            sort: leaf_bins::Scratch::default(),
+        }
+    }
+}
+
+impl<const D: usize> Scratch<D> {
+    /// Makes room for what so many cut boxes gather.
+    fn begin_cut(&mut self, boxes: usize) {
+        self.gathered.clear();
+        self.gathered.resize(boxes, Gathered::default());
+    }
+}
+
+/// Particles whose boxes are cut.
+fn cut_of<const D: usize>(lists: Option<&LeafBins<D>>) -> &[u32] {
+    lists.map_or(&[], |bins| &bins.cut)
+}
+
+/// What G2P in all leaves shares.
+struct Sweep<'a, const D: usize> {
+    dt: f64,
+    scheme: &'a Scheme<'a>,
+    plan: &'a GridPlan<D>,
+    fields: &'a NodeFields<D>,
+    arenas: &'a Arenas<D>,
+    /// Changes of velocity (FLIP) or new velocities of particles (XPIC) on the nodes.
+    increments: Option<&'a [Row]>,
+    borders: &'a Borders<D>,
+    resampling: Option<&'a Resampling<'a, D>>,
+    widths: &'a Widths<'a, D>,
+    watch: Watch,
+    /// Where the particles of each leaf lie.
+    places: &'a [Place],
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. `v = Σ w v_j`, `B = Σ w v_j ⊗ (x_j - x)`, `b ← (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, return mapping, `τ(b)`,
+    /// `x ← x + Δt v`. Returns what has departed from leaves, in their order, for [`Solver::migrate_particles`].
+    pub(in crate::solver) fn nodes_to_particles(&mut self, dt: f64) -> Vec<Departed> {
+        let scheme = self.physics.scheme();
+        let adaptivity = self.physics.adaptivity.as_ref();
+        let resampling = Resampling::new(adaptivity, &scheme, self.grid.plan.extent());
+        let widths = self.physics.widths(&self.grid.plan);
+        let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
+        self.leaf_data.begin_gather(&self.chunks);
+        let LeafData { signal, surveys, places, times } = &mut self.leaf_data;
+        let sweep = Sweep {
+            dt,
+            scheme: &scheme,
+            plan: &self.grid.plan,
+            fields: &self.grid.fields,
+            arenas: &self.grid.arenas,
+            increments: scheme.transfer.has_increments().then_some(&*self.grid.increments.rows),
+            borders: &self.grid.migration.borders,
+            resampling: resampling.as_ref(),
+            widths: &widths,
+            watch: watch.unwrap_or_default(),
+            places,
+        };
+        let (chunks, lists) = (&mut self.chunks, &mut self.grid.lists);
+        self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(surveys).zip(signal).enumerate();
+            let departed =
+                leaves.map_init(Scratch::default, |scratch, (leaf, (((chunk, bins), survey), signal))| {
+                    // Of empty leaves there may be very many, and to take the time costs more than they do.
+                    let is_empty = chunk.is_empty();
+                    let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, survey, signal);
+                    if is_empty { advance() } else { times.time(leaf, advance) }
+                });
+            departed.filter(Departed::is_any).collect()
+        })
+    }
+
+    /// S: velocities of the nodes at all particles, leaf by leaf.
+    pub(super) fn interpolate(&mut self) -> Vec<Vec<[f64; D]>> {
+        let scheme = self.physics.scheme();
+        let (plan, rows, lists) = (&self.grid.plan, &self.grid.fields.rows, &self.grid.lists);
+        let chunks = &self.chunks;
+        self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter().enumerate();
+            let all = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                let lists = lists.of_leaf(leaf);
+                let cut = cut_of(lists);
+                scratch.begin_cut(cut.len());
+                let Scratch { kernel, increments: arena, gathered, .. } = scratch;
+                let mut velocities = vec![[0.0; D]; chunk.len()];
+                for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
+                    load_rows(plan, bin.number, &bin.window, rows, arena);
+                    let nodes = Fields { velocity: arena, increment: None, moments: None };
+                    g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+                    if let Some(whole) = bin.whole {
+                        g2p::interpolate(kernel, chunk, whole, &bin.frame, &scheme, arena, |p, v| {
+                            velocities[p] = v;
+                        });
+                    }
+                }
+                for (&p, gathered) in cut.iter().zip(&*gathered) {
+                    velocities[p as usize] = gathered.velocity();
+                }
+                velocities
+            });
+            all.collect()
+        })
+    }
+}
+
+impl<const D: usize> Sweep<'_, D> {
+    /// All that happens to the particles of a leaf: they advance, their extrema are noted, those that leave are taken out, and
+    /// the others are sorted for the next P2G.
+    fn advance_leaf(
+        &self,
+        scratch: &mut Scratch<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        bins: OfLeaf<'_, D>,
+        survey: &mut Survey<D>,
+        signal: &mut f64,
+    ) -> Departed {
+        let is_empty = chunk.is_empty();
+        self.watch.before(chunk, survey);
+        *signal = self.gather(scratch, leaf, chunk, bins.lists());
+        self.watch.after(chunk, self.dt, survey);
+        let leavers = &scratch.leavers.found;
+        let departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
+        if !is_empty {
+            bins.presort(self.plan, leaf, chunk, self.widths, &mut scratch.sort);
+        }
+        departed
+    }
+
+    /// Advances the particles of a leaf, bin by bin, and notes those that leave it. Returns the greatest `c + |v|`, m/s.
+    fn gather(
+        &self,
+        scratch: &mut Scratch<D>,
+        leaf: usize,
+        chunk: &mut Chunk<D>,
+        lists: Option<&LeafBins<D>>,
+    ) -> f64 {
+        scratch.leavers.begin(self.borders.of_leaf(leaf));
+        if chunk.is_empty() {
+            return 0.0;
+        }
+        scratch.begin_cut(cut_of(lists).len());
+        let mut fastest: f64 = 0.0;
+        for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
+            fastest = fastest.max(self.gather_bin(scratch, &bin, chunk));
+        }
+        let fastest = fastest.max(self.advance_cut(scratch, leaf, chunk, cut_of(lists)));
+        // Bins take them in turn.
+        scratch.leavers.found.sort_unstable();
+        fastest
+    }
+
+    /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
+    /// [`Sweep::gather`].
+    fn gather_bin(&self, scratch: &mut Scratch<D>, bin: &BinView<'_, D>, chunk: &mut Chunk<D>) -> f64 {
+        let Scratch { kernel, arena, increments, gathered, leavers, .. } = scratch;
+        let next = self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
+        if let Some(rows) = self.increments {
+            load_rows(self.plan, bin.number, &bin.window, rows, increments);
+        }
+        let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
+        let increment = self.increments.map(|_| &increments[..]);
+        let nodes = Fields { velocity: &arena.rows, increment, moments };
+        g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+        let Some(whole) = bin.whole else { return 0.0 };
+        let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
+        let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
+        g2p::gather(kernel, chunk, whole, frame, scheme, dt, &nodes, leavers, next)
+    }
+
+    /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
+    fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
+        let Scratch { kernel, gathered, leavers, .. } = scratch;
+        let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
+        let (scheme, dt) = (self.scheme, self.dt);
+        g2p::advance_gathered(kernel, chunk, cut, gathered, scheme, dt, cell, &extent, leavers)
+    }
+}

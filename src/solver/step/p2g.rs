@@ -1,0 +1,98 @@
+//! P2G: particles to nodes, in parallel over bins.
+use rayon::prelude::*;
+
+use crate::grid::arenas::ArenaMut;
+use crate::kernel::p2g::{self, MomentSums};
+use crate::kernel::{Scheme, Transfer, spread};
+use crate::particle::Chunk;
+use crate::particle::chunk::{Layout, Place};
+use crate::solver::sorting::bin_view::BinView;
+use crate::solver::sorting::bins::BinMissing;
+use crate::solver::state::Solver;
+
+impl<const D: usize> Solver<D> {
+    /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut.
+    ///
+    /// # Errors
+    /// A box that needs a bin outside the plan, on the rank that has it.
+    pub(in crate::solver) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
+        let widths = self.physics.widths(&self.grid.plan);
+        self.grid.sort(&mut self.phases, &self.chunks, &widths)
+    }
+
+    /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w m (v + C (x_j - x)) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
+    /// ranks; with FLIP and XPIC also `p_j` without stress.
+    pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
+        self.note_velocities();
+        self.nodes_from_particles(dt);
+    }
+
+    /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes.
+    pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
+        let (chunks, times, scheme) = (&self.chunks, &self.leaf_data.times, self.physics.scheme());
+        self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
+            times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, dt, arena));
+        });
+    }
+
+    /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
+    /// keep none.
+    pub(in crate::solver) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
+        match self.physics.transfer {
+            Transfer::Apic => {}
+            Transfer::Tpic => return Ok(()),
+            Transfer::Flip { .. } | Transfer::Xpic { .. } => {
+                for chunk in &mut self.chunks {
+                    let first = Layout::<D>::AFFINE;
+                    (first..first + D * D).for_each(|column| chunk.column_mut(column).fill(0.0));
+                }
+                return Ok(());
+            }
+        }
+        self.sort_into_bins()?;
+        let scheme = self.physics.scheme();
+        let (plan, lists) = (&self.grid.plan, &self.grid.lists);
+        self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
+            let mut spreads = vec![[0.0; D]; chunk.len()];
+            for bin in BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()) {
+                if let Some(whole) = bin.whole {
+                    let constrained = bin.constrained;
+                    spread::of_particles(chunk, whole, &bin.frame, &scheme, constrained, |p, spread| {
+                        spreads[p] = spread;
+                    });
+                }
+                bin.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
+            }
+            for i in 0..D {
+                for k in 0..D {
+                    let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
+                    column.into_iter().zip(&spreads).for_each(|(value, spread)| *value *= spread[k]);
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+/// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena.
+fn scatter<const D: usize>(
+    scratch: &mut p2g::Scratch<D>,
+    bin: &BinView<'_, D>,
+    chunks: &[Chunk<D>],
+    scheme: &Scheme<'_>,
+    dt: f64,
+    mut arena: ArenaMut<'_, D>,
+) {
+    arena.clear(&bin.window);
+    let chunk = &chunks[bin.leaf];
+    let ArenaMut { rows, moments: sums, .. } = arena;
+    if let Some(whole) = bin.whole {
+        let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums: &mut *sums });
+        let next = chunks.get(bin.leaf + 1).map_or(Place::default(), Chunk::place);
+        p2g::scatter(scratch, chunk, whole, &bin.frame, scheme, dt, rows, moments, next);
+    }
+    if !bin.parts.is_empty() {
+        let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums });
+        p2g::scatter_sub_boxes(scratch, chunk, bin.parts, &bin.frame, scheme, dt, rows, moments);
+    }
+}
