@@ -12,7 +12,7 @@
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `root.rs` | roots of scalar equations, lane by lane |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
-//! | `driver.rs` | one particle along a path |
+//! | `driver/` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
 mod coulomb;
@@ -35,6 +35,8 @@ pub use tensor::eigen::{self, Symmetric};
 pub const PLASTIC_STRAIN: usize = 0;
 /// The history variable that is the logarithm of the plastic volume ratio; 0 for models without.
 pub const PLASTIC_VOLUME: usize = 1;
+/// The first history variable that is a model's own, such as its temperature.
+const OWN: usize = PLASTIC_VOLUME + 1;
 
 /// The model with these parameters and the density of the undeformed material, kg/m³.
 pub fn build(parameters: &Parameters, density: f64) -> Box<dyn Material> {

@@ -4,8 +4,11 @@ use agimp::material::driver::{Matrix, Point, increment};
 use agimp::material::{HISTORIES, Material, PLASTIC_STRAIN, PLASTIC_VOLUME, Parameters};
 use serde_json::Value;
 
+mod cap;
+mod flow;
 mod friction;
 mod metal;
+mod random_paths;
 
 const UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 

@@ -1,6 +1,6 @@
 //! Hardening laws for batches of particles.
 use super::{Hardening, HardeningLaw};
-use crate::material::Step;
+use crate::material::{HISTORIES, OWN, Step};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};
 
@@ -146,6 +146,23 @@ impl Curve {
     /// Whether it depends on the size of cells.
     pub fn softens(&self) -> bool {
         self.length.is_some()
+    }
+
+    /// Names of the history variables of a frictional model: plastic shear strain, plastic volume, and temperature or, with
+    /// `books_apart`, the volume that has opened.
+    pub fn frictional_history(&self, books_apart: bool) -> &'static [&'static str] {
+        match (self.temperature(), books_apart) {
+            (Some(_), _) => &["plastic_shear_strain", "plastic_volume", "temperature"],
+            (None, true) => &["plastic_shear_strain", "plastic_volume", "volume_gain"],
+            (None, false) => &["plastic_shear_strain", "plastic_volume"],
+        }
+    }
+
+    /// History variables of an undeformed particle: its temperature.
+    pub fn initial_history(&self) -> [f64; HISTORIES] {
+        let mut history = [0.0; HISTORIES];
+        history[OWN] = self.temperature().unwrap_or(0.0);
+        history
     }
 
     /// Temperature of the undeformed material, K, for laws with one.

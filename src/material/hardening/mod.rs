@@ -220,8 +220,28 @@ impl Hardening {
         }
     }
 
+    /// As [`Hardening::check`] for cohesion (Pa) of a model with these angles of friction and dilation, degrees.
+    pub(super) fn check_frictional(
+        &self,
+        cohesion: f64,
+        [friction, dilation]: [f64; 2],
+        volume_correction: bool,
+    ) -> Result<(), OutOfRange> {
+        self.check(cohesion)?;
+        let fail =
+            |range: String| Err(OutOfRange { key: "dilation_angle".to_owned(), value: dilation, range });
+        if dilation > friction {
+            return fail(format!("at most friction_angle, {friction}"));
+        }
+        // There is one history variable for temperature or booked volume.
+        if self.heats() && volume_correction && dilation > 0.0 {
+            return fail("0 with Johnson-Cook hardening, unless volume_correction = false".to_owned());
+        }
+        Ok(())
+    }
+
     /// Whether it needs the history variable of the temperature.
-    pub(super) fn heats(&self) -> bool {
+    fn heats(&self) -> bool {
         matches!(self, Self::Law(HardeningLaw::JohnsonCook { .. }))
     }
 }

@@ -18,7 +18,7 @@ use super::von_mises::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.
@@ -85,9 +85,6 @@ fn yes() -> bool {
 fn one() -> f64 {
     1.0
 }
-
-/// History variable of the volume that is booked, or of the temperature.
-const OWN: usize = PLASTIC_VOLUME + 1;
 
 /// What there is beside dry friction.
 #[derive(Clone, Debug)]
@@ -161,17 +158,8 @@ impl Model for DruckerPrager {
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
-        p.hardening.check(p.cohesion)?;
-        let fail = |range: String| {
-            Err(OutOfRange { key: "dilation_angle".to_owned(), value: p.dilation_angle, range })
-        };
-        if p.dilation_angle > p.friction_angle {
-            return fail(format!("at most friction_angle, {}", p.friction_angle));
-        }
-        if p.hardening.heats() && p.volume_correction && p.dilation_angle > 0.0 {
-            return fail("0 with Johnson-Cook hardening, unless volume_correction = false".to_owned());
-        }
-        Ok(())
+        let angles = [p.friction_angle, p.dilation_angle];
+        p.hardening.check_frictional(p.cohesion, angles, p.volume_correction)
     }
 
     fn examples() -> &'static [&'static str] {
@@ -212,20 +200,13 @@ impl Law for DruckerPrager {
 
     fn history_names(&self) -> &'static [&'static str] {
         match &self.cohesive {
-            Some(cohesive) if cohesive.cohesion.temperature().is_some() => {
-                &["plastic_shear_strain", "plastic_volume", "temperature"]
-            }
-            Some(cohesive) if cohesive.books_apart() => {
-                &["plastic_shear_strain", "plastic_volume", "volume_gain"]
-            }
-            _ => &["plastic_shear_strain", "volume_gain"],
+            Some(own) => own.cohesion.frictional_history(own.books_apart()),
+            None => &["plastic_shear_strain", "volume_gain"],
         }
     }
 
     fn initial_history(&self) -> [f64; HISTORIES] {
-        let mut history = [0.0; HISTORIES];
-        history[OWN] = self.cohesive.as_ref().and_then(|own| own.cohesion.temperature()).unwrap_or(0.0);
-        history
+        self.cohesive.as_ref().map_or([0.0; HISTORIES], |own| own.cohesion.initial_history())
     }
 
     fn softens(&self) -> bool {

@@ -13,6 +13,8 @@
 //! | `tresca.rs` | metal, undrained clay: Tresca yield |
 //! | `drucker_prager.rs` | sand: Drucker-Prager yield |
 //! | `mohr_coulomb.rs` | soil, rock: Mohr-Coulomb yield |
+//! | `cap/` | clay, snow and other matter that yields under pressure alone |
+//! | `flow/` | fluid, dense granular flow |
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -20,8 +22,10 @@ use serde::{Deserialize, Serialize};
 use super::law::{Law, Material};
 use super::parameters::{OutOfRange, ranges};
 
+pub mod cap;
 pub mod drucker_prager;
 pub mod fixed_corotated;
+pub mod flow;
 pub mod hencky;
 pub mod mohr_coulomb;
 pub mod neo_hookean;
@@ -121,4 +125,14 @@ materials! {
     DruckerPrager(drucker_prager::DruckerPrager),
     /// Mohr-Coulomb plasticity.
     MohrCoulomb(mohr_coulomb::MohrCoulomb),
+    /// Modified Cam-clay in finite strain.
+    CamClay(cap::cam_clay::CamClay),
+    /// Non-associated Cam-clay: matter that fractures (Wolper et al. 2019).
+    NonAssociatedCamClay(cap::non_associated_cam_clay::NonAssociatedCamClay),
+    /// Snow (Stomakhin et al. 2013).
+    Snow(cap::snow::Snow),
+    /// Dense granular flow with a friction that grows with the rate (Dunatunga and Kamrin 2015).
+    MuI(flow::mu_i::MuI),
+    /// Weakly compressible Newtonian fluid.
+    Fluid(flow::fluid::Fluid),
 }

@@ -16,11 +16,8 @@ use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::principal::Principal;
 use crate::material::tensor::strain::{Strain, finish};
-use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask, each};
-
-/// History variable of the volume that is booked, or of the temperature.
-const OWN: usize = PLASTIC_VOLUME + 1;
 
 /// How the material flows at yield.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -148,13 +145,13 @@ impl Model for MohrCoulomb {
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
-        p.hardening.check(p.cohesion)?;
+        let angles = [p.friction_angle, p.dilation_angle];
+        p.hardening.check_frictional(p.cohesion, angles, p.volume_correction)?;
         let within = |key: &str, value: f64, limit: f64, name: &str| {
             let range = format!("at most {name}, {limit}");
             if value <= limit { Ok(()) } else { Err(OutOfRange { key: key.to_owned(), value, range }) }
         };
         let friction = p.residual_friction_angle.unwrap_or(p.friction_angle);
-        within("dilation_angle", p.dilation_angle, p.friction_angle, "friction_angle")?;
         within("residual_friction_angle", friction, p.friction_angle, "friction_angle")?;
         let dilation = p.residual_dilation_angle.unwrap_or(p.dilation_angle);
         within("residual_dilation_angle", dilation, p.dilation_angle, "dilation_angle")?;
@@ -172,10 +169,6 @@ impl Model for MohrCoulomb {
                 let range = "left out with flow = \"radial\"".to_owned();
                 return Err(OutOfRange { key: "tension_cutoff".into(), value, range });
             }
-        }
-        if p.hardening.heats() && p.volume_correction && p.dilation_angle > 0.0 {
-            let range = "0 with Johnson-Cook hardening, unless volume_correction = false".to_owned();
-            return Err(OutOfRange { key: "dilation_angle".into(), value: p.dilation_angle, range });
         }
         Ok(())
     }
@@ -360,17 +353,11 @@ impl Law for MohrCoulomb {
     }
 
     fn history_names(&self) -> &'static [&'static str] {
-        match (self.cohesion.temperature(), self.books_apart()) {
-            (Some(_), _) => &["plastic_shear_strain", "plastic_volume", "temperature"],
-            (None, true) => &["plastic_shear_strain", "plastic_volume", "volume_gain"],
-            (None, false) => &["plastic_shear_strain", "plastic_volume"],
-        }
+        self.cohesion.frictional_history(self.books_apart())
     }
 
     fn initial_history(&self) -> [f64; HISTORIES] {
-        let mut history = [0.0; HISTORIES];
-        history[OWN] = self.cohesion.temperature().unwrap_or(0.0);
-        history
+        self.cohesion.initial_history()
     }
 
     fn softens(&self) -> bool {

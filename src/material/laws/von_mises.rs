@@ -13,12 +13,12 @@ use super::hencky::Hencky;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};
 
 /// History variable of the temperature, K.
-pub(super) const TEMPERATURE: usize = PLASTIC_VOLUME + 1;
+const TEMPERATURE: usize = OWN;
 
 /// Hencky elasticity with von Mises yield, isotropic hardening and viscous overstress.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -162,9 +162,7 @@ impl Law for VonMises {
     }
 
     fn initial_history(&self) -> [f64; HISTORIES] {
-        let mut history = [0.0; HISTORIES];
-        history[TEMPERATURE] = self.curve.temperature().unwrap_or(0.0);
-        history
+        self.curve.initial_history()
     }
 
     fn softens(&self) -> bool {

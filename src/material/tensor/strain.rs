@@ -66,13 +66,27 @@ impl<V: Vector> Strain<V> {
         &self,
         solid: &Hencky,
         state: &mut State<V>,
-        [trace, kept]: [V; 2],
+        end: [V; 2],
         changed: V::Mask,
         unstrained: V::Mask,
         plane: bool,
     ) {
+        let (trace, deviator) = self.rewrite(state, end, changed, unstrained, plane);
+        solid.load(state, trace, &deviator);
+    }
+
+    /// Writes the elastic tensor of the final state as [`Strain::finish`] does; returns trace and deviator of its strain.
+    #[inline(always)]
+    pub fn rewrite(
+        &self,
+        state: &mut State<V>,
+        [trace, kept]: [V; 2],
+        changed: V::Mask,
+        unstrained: V::Mask,
+        plane: bool,
+    ) -> (V, Symmetric<V>) {
         if !changed.any() {
-            return solid.load(state, self.trace, &self.deviator);
+            return (self.trace, self.deviator);
         }
         let elastic = self.elastic(trace, kept, plane);
         let kept = changed.select(kept, V::splat(1.0));
@@ -82,7 +96,7 @@ impl<V: Vector> Strain<V> {
             state.elastic[c] = changed.select(returned, state.elastic[c]);
         }
         let deviator = each(self.deviator, |component| component * kept);
-        solid.load(state, changed.select(trace, self.trace), &deviator);
+        (changed.select(trace, self.trace), deviator)
     }
 }
 

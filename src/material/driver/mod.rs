@@ -1,12 +1,15 @@
-//! A material point driven along a prescribed path of deformation.
+//! A material point driven along a prescribed path: `mod.rs` of deformation, `control.rs` of strains and stresses.
+use super::tensor::strain::Strain;
 use super::{HISTORIES, Material, State, Step};
 use crate::simd::{LANES, Lanes, Vector};
+
+pub mod control;
 
 /// A 3×3 matrix, `m[i][j]` in row i and column j.
 pub type Matrix = [[f64; 3]; 3];
 
 /// One particle of a material, with scalar state. Symmetric tensors: `xx, yy, zz, xy, xz, yz`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Point<'a> {
     material: &'a dyn Material,
     /// Elastic left Cauchy-Green tensor.
@@ -23,6 +26,8 @@ pub struct Point<'a> {
     pub dt: f64,
     /// Edge of the cells that softening is regularised with, m; 0: none.
     pub size: f64,
+    /// Edge of the cells on which it moves, m: what bounds the step of viscous flow. Infinite: none.
+    pub cell: f64,
 }
 
 impl<'a> Point<'a> {
@@ -37,6 +42,7 @@ impl<'a> Point<'a> {
             wave_speed: 0.0,
             dt: 0.0,
             size: 0.0,
+            cell: f64::INFINITY,
         };
         point.set_trial(point.elastic);
         point
@@ -73,7 +79,8 @@ impl<'a> Point<'a> {
         self.elastic = trial;
         let mut state = State::new(trial.map(Lanes::splat));
         state.history = self.history.map(Lanes::splat);
-        let step = Step { dt: self.dt, size: [self.size; LANES], ..Step::rest(self.is_plane()) };
+        let step =
+            Step { dt: self.dt, cell: self.cell, size: [self.size; LANES], ..Step::rest(self.is_plane()) };
         self.material.update(&mut state, &step);
         let scalar = |lanes: Lanes| lanes.to_array()[0];
         self.elastic = state.elastic.map(scalar);
@@ -98,6 +105,22 @@ pub fn increment(from: &Matrix, to: &Matrix) -> Option<Matrix> {
     }
     let inverse = std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant));
     Some(product(to, &inverse))
+}
+
+/// Logarithmic strain `½ ln F Fᵀ` of a deformation gradient.
+pub fn logarithmic_strain(gradient: &Matrix) -> [f64; 6] {
+    let b = product(gradient, &transposed(gradient));
+    let tensor = [b[0][0], b[1][1], b[2][2], b[0][1], b[0][2], b[1][2]];
+    let strain = Strain::of(&tensor.map(Lanes::splat), false);
+    let scalar = |lanes: Lanes| lanes.to_array()[0];
+    let mean = scalar(strain.trace) / 3.0;
+    std::array::from_fn(|c| scalar(strain.deviator[c]) + if c < 3 { mean } else { 0.0 })
+}
+
+/// Determinant.
+pub fn determinant(a: &Matrix) -> f64 {
+    let minor = |j: usize, k: usize| a[1][j] * a[2][k] - a[1][k] * a[2][j];
+    a[0][0] * minor(1, 2) - a[0][1] * minor(0, 2) + a[0][2] * minor(0, 1)
 }
 
 fn full(s: &[f64; 6]) -> Matrix {

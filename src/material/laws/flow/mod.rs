@@ -1,0 +1,10 @@
+//! Laws of matter that flows.
+//!
+//! | file | model |
+//! |---|---|
+//! | `fluid.rs` | weakly compressible Newtonian fluid |
+//! | `mu_i.rs` | dense granular flow whose friction grows with the rate: μ(I) |
+//!
+//! Bingham and Herschel-Bulkley flow is that of `von_mises` with `viscosity` and `rate_exponent`.
+pub mod fluid;
+pub mod mu_i;
