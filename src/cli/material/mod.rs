@@ -1,0 +1,435 @@
+//! `agimp material`: drives one particle of a model along a path of strains and stresses.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `mod.rs` | arguments, errors, and the drive itself |
+//! | `path.rs` | paths from files |
+//! | `trial.rs` | tests of the laboratory as paths |
+//! | `table.rs` | what is printed of each state |
+//! | `chart.rs` | the states as a picture |
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use self::path::{Deformation, Drive, Row};
+use self::table::{Stage, Table};
+use self::trial::Trial;
+use super::Failure;
+use crate::material::driver::control::{Controlled, NoSolution};
+use crate::material::driver::{Point, increment};
+use crate::material::parameters::NotAModel;
+use crate::material::{Material, Parameters, build};
+
+mod chart;
+mod path;
+mod table;
+mod trial;
+
+/// Arguments of `agimp material`.
+#[derive(Args, Clone, Debug)]
+pub struct Arguments {
+    /// Model and parameters as in a job, for example 'model = "hencky", young = 1e6, poisson = 0.3';
+    /// or the name of a TOML file that holds them
+    #[arg(long, value_name = "TOML|FILE")]
+    pub model: String,
+
+    /// Density of the undeformed material, kg/m³ (for the wave speed)
+    #[arg(long, default_value_t = 1000.0)]
+    pub density: f64,
+
+    /// Equal parts into which each step of the path is divided
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub substeps: u32,
+
+    /// A test of the laboratory in place of a path: the material is first brought under --pressure on all sides
+    #[arg(long, value_enum, conflicts_with = "path")]
+    pub test: Option<Trial>,
+
+    /// Confining pressure of --test, Pa
+    #[arg(long, default_value_t = 1e5, requires = "test", allow_negative_numbers = true)]
+    pub pressure: f64,
+
+    /// Where --test ends, since the confined state: logarithmic strain along z, on all axes (isotropic), or shear (simple_shear) [default: -0.1; simple_shear: 0.2]
+    #[arg(long, requires = "test", allow_negative_numbers = true)]
+    pub range: Option<f64>,
+
+    /// Rows of --test after the confinement
+    #[arg(long, default_value_t = 50, requires = "test", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub rows: u32,
+
+    /// Duration of --test, s; 0: nothing flows by its rate
+    #[arg(long, default_value_t = 0.0, requires = "test", allow_negative_numbers = true)]
+    pub duration: f64,
+
+    /// Draw stress, strain and stress path into this file (SVG)
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+
+    /// The path: CSV or JSON. A CSV whose header names strain_xx (logarithmic) or stress_xx (Cauchy, Pa), and so on for yy, zz,
+    /// xy, xz and yz, prescribes these since the start; other components have no strain; time (s) and shear (of
+    /// x over y) may stand beside. Otherwise each row is the total deformation since the start: 3 numbers are
+    /// logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a list of
+    /// rows, alone or under the key "path" or "rows"; a row is a list of numbers (the 9 may be nested) or
+    /// an object that holds one under "F" or "eps_log"; its other keys do not matter.
+    #[arg(value_name = "PATH", required_unless_present = "test")]
+    pub path: Option<PathBuf>,
+}
+
+/// Why `agimp material` cannot go on.
+#[derive(Debug, thiserror::Error)]
+enum MaterialError {
+    /// A file cannot be read.
+    #[error("cannot read {}: {error}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        error: std::io::Error,
+    },
+    /// The text of the model is none.
+    #[error(transparent)]
+    Model(#[from] NotAModel),
+    /// The density is not above zero.
+    #[error("--density {0} is out of range: it must be above 0 (kg/m³)")]
+    Density(f64),
+    /// The path is no valid JSON.
+    #[error("{}: {error}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        error: serde_json::Error,
+    },
+    /// A row of the path.
+    #[error("{}, row {row}: {reason}", path.display())]
+    Row {
+        /// The file.
+        path: PathBuf,
+        /// Row, counted from 1 without header and comments.
+        row: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A stress of a row cannot be had.
+    #[error("{place}, row {row}: {reason}")]
+    Stress {
+        /// The file or the test.
+        place: String,
+        /// Row, counted from 1.
+        row: usize,
+        /// Which one.
+        reason: NoSolution,
+    },
+    /// A number of the command line.
+    #[error("--{option} {value} is out of range: it must be {range}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range in words.
+        range: &'static str,
+    },
+    /// The picture cannot be written.
+    #[error("cannot write {}: {reason}", path.display())]
+    Plot {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The result cannot be written.
+    #[error("cannot write the result: {0}")]
+    Write(#[from] std::io::Error),
+}
+
+/// Drives the particle and prints its states as CSV.
+///
+/// # Errors
+/// Model or path cannot be used, or standard output cannot be written.
+pub fn execute(args: &Arguments) -> Result<(), Failure> {
+    drive(args, &mut std::io::stdout().lock()).map_err(|error| match error {
+        MaterialError::Write(error) => error.into(),
+        other => Failure::Usage(other.to_string()),
+    })
+}
+
+/// Runs the command and writes CSV to `out`: the undeformed state, then one line per row of the path.
+fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
+    let parameters = model(&args.model)?;
+    if !(args.density > 0.0 && args.density.is_finite()) {
+        return Err(MaterialError::Density(args.density));
+    }
+    let (place, drive) = match (&args.path, args.test) {
+        (_, Some(test)) => ("--test".to_owned(), Drive::Control(trial::rows(test, args)?)),
+        (Some(path), None) => (path.display().to_string(), path::read_path(path)?),
+        // clap wants one of them.
+        (None, None) => (String::new(), Drive::Deformation(Vec::new())),
+    };
+    let material = build(&parameters, args.density);
+    let mut table = Table::new(material.history_names());
+    let driven = match drive {
+        Drive::Deformation(rows) => deform(material.as_ref(), &rows, args, &place, &mut table),
+        Drive::Control(rows) => control(material.as_ref(), &rows, args, &place, &mut table),
+    };
+    // What came before the error is shown as well.
+    table.write(out)?;
+    driven?;
+    match &args.plot {
+        Some(path) => {
+            chart::draw(&table, path).map_err(|reason| MaterialError::Plot { path: path.clone(), reason })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Along total deformations.
+fn deform(
+    material: &dyn Material,
+    rows: &[Deformation],
+    args: &Arguments,
+    place: &str,
+    table: &mut Table,
+) -> Result<(), MaterialError> {
+    let mut point = Point::new(material);
+    let mut last = Deformation::Strain([0.0; 3]);
+    table.push(&Stage { time: 0.0, gradient: last.gradient(), point: &point });
+    for (i, &target) in rows.iter().enumerate() {
+        for part in 1..=args.substeps {
+            let share = f64::from(part) / f64::from(args.substeps);
+            let before = last.towards(&target, f64::from(part - 1) / f64::from(args.substeps));
+            let after = last.towards(&target, share);
+            if let (Deformation::Strain(before), Deformation::Strain(after)) = (before, after) {
+                point.stretch(std::array::from_fn(|k| after[k] - before[k]));
+                continue;
+            }
+            match increment(&before.gradient(), &after.gradient()) {
+                Some(step) => point.deform(&step),
+                None => {
+                    let reason =
+                        "the straight line from the row before to this deformation gradient passes a \
+                                  singular one; give rows between them"
+                            .to_string();
+                    return Err(MaterialError::Row { path: place.into(), row: i + 1, reason });
+                }
+            }
+        }
+        last = target;
+        table.push(&Stage { time: 0.0, gradient: target.gradient(), point: &point });
+    }
+    Ok(())
+}
+
+/// Along prescribed strains and stresses. Strains of a test count from its first row, the confined state.
+fn control(
+    material: &dyn Material,
+    rows: &[Row],
+    args: &Arguments,
+    place: &str,
+    table: &mut Table,
+) -> Result<(), MaterialError> {
+    let mut body = Controlled::new(material);
+    let mut time = 0.0;
+    table.push(&Stage { time, gradient: body.gradient(), point: &body.point });
+    let mut start = [0.0; 6];
+    for (i, row) in rows.iter().enumerate() {
+        let dt = (row.time - time) / f64::from(args.substeps);
+        body.go(&row.target.since(&start), args.substeps, dt).map_err(|reason| MaterialError::Stress {
+            place: place.to_owned(),
+            row: i + 1,
+            reason,
+        })?;
+        if args.test.is_some() && i == 0 {
+            start = body.strain();
+        }
+        time = row.time;
+        table.push(&Stage { time, gradient: body.gradient(), point: &body.point });
+    }
+    Ok(())
+}
+
+/// Reads a model from TOML text or from the file of that name.
+fn model(text: &str) -> Result<Parameters, MaterialError> {
+    if text.contains('=') {
+        return Ok(text.parse()?);
+    }
+    Ok(read(Path::new(text))?.parse()?)
+}
+
+fn read(path: &Path) -> Result<String, MaterialError> {
+    std::fs::read_to_string(path).map_err(|error| MaterialError::Read { path: path.to_path_buf(), error })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn result(model: &str, name: &str, path: &str, substeps: u32) -> Result<String, String> {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join(name);
+        std::fs::write(&file, path).unwrap();
+        let args = Arguments {
+            model: model.to_string(),
+            density: 1000.0,
+            substeps,
+            test: None,
+            pressure: 1e5,
+            range: None,
+            rows: 50,
+            duration: 0.0,
+            plot: None,
+            path: Some(file),
+        };
+        let mut out = Vec::new();
+        drive(&args, &mut out).map_err(|error| error.to_string())?;
+        Ok(String::from_utf8(out).unwrap())
+    }
+
+    const METAL: &str = "model = \"von_mises\", young = 1e9, poisson = 0.25, yield_stress = 1e6";
+
+    fn last_row(text: &str) -> Vec<f64> {
+        text.lines().last().unwrap().split(',').map(|field| field.parse().unwrap()).collect()
+    }
+
+    #[test]
+    fn strains_and_gradients_agree() {
+        let strains =
+            result(METAL, "path.csv", "x, y, z\n# shear\n0.001,-0.001,0\n0.01,-0.01,0\n", 4).unwrap();
+        assert_eq!(strains.lines().count(), 4);
+        let f = |a: f64| format!("[[{:e},0,0],[0,{:e},0],[0,0,1]]", libm::exp(a), libm::exp(-a));
+        let json = format!("{{\"path\": [{}, {}]}}", f(0.001), f(0.01));
+        let gradients = result(METAL, "path.json", &json, 1).unwrap();
+        // Perfect plasticity in pure shear: tau = σ_y / √3.
+        for text in [&strains, &gradients] {
+            assert!((last_row(text)[1] - 1e6 / 3.0_f64.sqrt()).abs() < 1e-3);
+        }
+        assert!(strains.starts_with("row,tau_xx,tau_yy,tau_zz,tau_xy,tau_xz,tau_yz,b_xx"));
+        assert!(strains.lines().next().unwrap().contains(",plastic_strain,plastic_work,"));
+    }
+
+    #[test]
+    fn errors_say_what_would_be_right() {
+        let error = |model: &str, path: &str| result(model, "path.csv", path, 1).unwrap_err();
+        assert!(error(METAL, "1,2\n").contains("row 1: expected 3 numbers"));
+        assert!(error(METAL, "0,0,0\n0,a,0\n").contains("row 2: 'a' is not a number"));
+        assert!(error(METAL, "1,0,0,0,1,0,0,0,-1\n").contains("determinant above 0"));
+        let bad = "model = \"hencky\", young = 1e6, poisson = 0.5";
+        assert!(
+            error(bad, "0,0,0").contains("poisson = 0.5 is out of range: it must be above -1 and below 0.5")
+        );
+        assert!(error("model = \"rubber\", young = 1e6", "0,0,0").contains("rubber"));
+        assert!(error("no_such_file.toml", "0,0,0").contains("cannot read no_such_file.toml"));
+    }
+
+    fn tested(model: &str, test: Trial, pressure: f64, range: f64) -> Result<Vec<Vec<f64>>, String> {
+        let args = Arguments {
+            model: model.to_string(),
+            density: 1000.0,
+            substeps: 1,
+            test: Some(test),
+            pressure,
+            range: Some(range),
+            rows: 40,
+            duration: 1.0,
+            plot: None,
+            path: None,
+        };
+        let mut out = Vec::new();
+        drive(&args, &mut out).map_err(|error| error.to_string())?;
+        let text = String::from_utf8(out).unwrap();
+        Ok(text.lines().skip(1).map(|line| line.split(',').map(|f| f.parse().unwrap()).collect()).collect())
+    }
+
+    /// Columns from the end: time, six strains, six stresses, p, q, Lode angle.
+    fn stress(row: &[f64], component: usize) -> f64 {
+        row[row.len() - 9 + component]
+    }
+
+    const SAND: &str = "model = 'mohr_coulomb', young = 1e8, poisson = 0.3, friction_angle = 30";
+
+    #[test]
+    fn sand_in_tests_of_the_laboratory() {
+        // Triaxial compression: σ1 = N σ3 with N = 3.
+        let rows = tested(SAND, Trial::Triaxial, 1e5, -0.05).unwrap();
+        let last = rows.last().unwrap();
+        assert!((stress(last, 2) / stress(last, 0) - 3.0).abs() < 1e-6, "{last:?}");
+        assert!((stress(last, 0) + 1e5).abs() < 1.0);
+        // q = 2 p0, p = 5/3 p0, compression has the Lode angle 60°.
+        let [p, q, lode] = [last[last.len() - 3], last[last.len() - 2], last[last.len() - 1]];
+        assert!(
+            (p - 5e5 / 3.0).abs() < 1.0 && (q - 2e5).abs() < 1.0 && (lode - 60.0).abs() < 1e-3,
+            "{last:?}"
+        );
+        // Oedometer: K0 = ν / (1 - ν), above 1/N.
+        let rows = tested(SAND, Trial::Oedometer, 1.0, -0.05).unwrap();
+        let last = rows.last().unwrap();
+        assert!((stress(last, 0) / stress(last, 2) - 3.0 / 7.0).abs() < 1e-6, "{last:?}");
+        // Biaxial: the same ratio, and the stress across is ν (σ1 + σ3).
+        let rows = tested(SAND, Trial::Biaxial, 1e5, -0.05).unwrap();
+        let last = rows.last().unwrap();
+        assert!((stress(last, 2) / stress(last, 0) - 3.0).abs() < 1e-6, "{last:?}");
+        assert!(stress(last, 1) < stress(last, 0) && stress(last, 1) > stress(last, 2));
+        // The strain counts from the confined state.
+        let confined = tested(SAND, Trial::Biaxial, 1e5, -0.05).unwrap()[1].clone();
+        let strain = |row: &[f64], component: usize| row[row.len() - 15 + component];
+        assert!((strain(last, 2) - strain(&confined, 2) + 0.05).abs() < 1e-12);
+        assert!((strain(last, 1) - strain(&confined, 1)).abs() < 1e-12 && strain(last, 1) < -1e-4);
+        // Simple shear under a constant normal stress; isotropic compression at K = E / (3 - 6 ν).
+        let rows = tested(SAND, Trial::SimpleShear, 1e5, 0.1).unwrap();
+        assert!((stress(rows.last().unwrap(), 1) + 1e5).abs() < 1.0);
+        let rows = tested(SAND, Trial::Isotropic, 1e5, -0.01).unwrap();
+        let last = rows.last().unwrap();
+        let expected = 1e8 / 1.2 * 0.03 + 1e5;
+        assert!((last[1] + expected).abs() < 1e-3 * expected, "{last:?}");
+    }
+
+    #[test]
+    fn strains_and_stresses_by_name() {
+        let path = "time, strain_zz, stress_xx, stress_yy\n1, -0.001, 0, 0\n2, -0.01, 0, 0\n";
+        let text = result(METAL, "path.csv", path, 4).unwrap();
+        // The Kirchhoff stress of a perfectly plastic bar is its yield stress.
+        assert!((last_row(&text)[3] + 1e6).abs() < 1.0, "{text}");
+        let error = |path: &str| result(METAL, "path.csv", path, 1).unwrap_err();
+        assert!(
+            error("strain_zx\n0\n").contains("column 'strain_zx' is not known; there are time, shear, and")
+        );
+        assert!(
+            error("strain_xx,stress_xx\n0,0\n").contains("'strain_xx' and 'stress_xx' prescribe the same")
+        );
+        assert!(error("strain_xx,time\n0,2\n0,1\n").contains("row 2: time 1 is before 2"));
+        assert!(error("strain_xx,time\n0\n").contains("row 1: expected 2 numbers as in the header, found 1"));
+        let beyond = error("strain_xx,stress_yy,stress_zz\n0,0,-3e6\n");
+        assert!(
+            beyond.contains(
+                "row 1: no deformation found with stress_yy = 0.0000e0, stress_zz = -3.0000e6 Pa; the nearest"
+            ),
+            "{beyond}"
+        );
+    }
+
+    #[test]
+    fn states_are_drawn() {
+        let directory = tempfile::tempdir().unwrap();
+        let picture = directory.path().join("sand.svg");
+        let mut table = Table::new(&[]);
+        let material = build(&SAND.parse().unwrap(), 1600.0);
+        let args = Arguments {
+            model: SAND.to_string(),
+            density: 1600.0,
+            substeps: 1,
+            test: Some(Trial::Triaxial),
+            pressure: 1e5,
+            range: Some(-0.05),
+            rows: 20,
+            duration: 0.0,
+            plot: None,
+            path: None,
+        };
+        let rows = trial::rows(Trial::Triaxial, &args).unwrap();
+        control(material.as_ref(), &rows, &args, "", &mut table).unwrap();
+        chart::draw(&table, &picture).unwrap();
+        let text = std::fs::read_to_string(&picture).unwrap();
+        assert!(text.starts_with("<svg") && text.contains("polyline"), "{text}");
+    }
+}
