@@ -5,7 +5,7 @@ use clap::Parser as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // First of all, since a batch queue may send its signal while a run starts. An error is told when the run begins.
+    // First of all, since a batch queue may send its signal while a run starts. An error is reported when the run begins.
     if std::env::args_os().nth(1).is_some_and(|command| command == "run") {
         let _ = StopRequest::listen();
     }
@@ -17,7 +17,7 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.tell();
+            failure.report();
             ExitCode::from(failure.exit_code())
         }
     }

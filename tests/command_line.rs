@@ -314,3 +314,210 @@ fn a_key_that_is_not_there_is_named_missing() {
     let (_, _, message) = check(&JOB.replace("end = 2e-3", "end = 2e-3, clf = 0.3"));
     assert!(message.contains("unknown key `clf`; did you mean `cfl`?"), "{message}");
 }
+
+/// Trees and regions far too large to be made are counted by arithmetic or up to a bound.
+#[test]
+fn check_answers_at_once_whatever_the_file_asks_for() {
+    let body = "bodies = [";
+    let bars: String = (0..200)
+        .map(|i| {
+            let (low, high) = (0.3 + 0.002 * f64::from(i), 0.301 + 0.002 * f64::from(i));
+            format!(
+                "{{ name = \"b{i}\", material = \"MATERIAL\", shape = {{ kind = \"rotated\", angle = 45, centre = [0.5, 0.5], \
+                 shape = {{ kind = \"box\", min = [0.3, {low}], max = [0.7, {high}] }} }} }},"
+            )
+        })
+        .collect();
+    let strips: String = (0..10_000)
+        .map(|i| {
+            let (low, high) = (f64::from(i) / 1e4, f64::from(i + 1) / 1e4);
+            format!(
+                "{{ name = \"b{i}\", material = \"MATERIAL\", shape = {{ kind = \"box\", min = [{low}, 0.8], max = [{high}, 0.9] }} }},"
+            )
+        })
+        .collect();
+    let block = "shape = { kind = \"box\", min = [0, 0, 0], max = [0.5, 0.5, 0.5] }";
+    let ball = "shape = { kind = \"sphere\", centre = [0.5, 0.5, 0.5], radius = 0.4 }";
+    let region = "{ level = 15, shape = { kind = \"box\", min = [0, 0], max = [1, 1] } }";
+    let space = JOB.replace("dimension = 2", "dimension = 3").replace("[1, 1]", "[1, 1, 1]");
+    let space = space.replace("[0, 0]", "[0, 0, 0]").replace("[0.5, 0.5]", "[0.5, 0.5, 0.5]");
+    let everywhere =
+        "adaptivity = { criteria = [{ kind = \"material\", material = \"MATERIAL\", level = 15 }] }\n";
+    let cases = [
+        (format!("{space}tree.base_level = 10\n"), "leaves 1 073 741 824"),
+        (format!("{JOB}tree.base_level = 15\n"), "particles 17 179 869 184"),
+        (format!("{JOB}tree.regions = [{region}]\n"), "leaves 1 073 741 824"),
+        (format!("{}tree.base_level = 10\n", space.replace(block, ball)), "particles at least "),
+        (format!("{space}{everywhere}"), "of the job's tree, before the criteria"),
+        (
+            format!(
+                "{}tree.base_level = 9\n",
+                JOB.replace(body, &(body.to_owned() + &bars))
+                    .replace("max = [0.5, 0.5]", "max = [0.01, 0.01]")
+            ),
+            "and 101 more bodies",
+        ),
+        (format!("{}tree.base_level = 11\n", JOB.replace(body, &(body.to_owned() + &strips))), "more bodies"),
+    ];
+    for (text, expected) in cases {
+        let start = std::time::Instant::now();
+        let (code, out, message) = check(&text);
+        let out: Vec<String> =
+            out.lines().map(|l| l.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
+        assert!(
+            code == 0 && out.iter().any(|line| line.contains(expected)),
+            "{expected}: {message}{}",
+            out.join("\n")
+        );
+        // Two seconds on an idle machine, in a release build.
+        assert!(start.elapsed().as_secs_f64() < 15.0, "{expected}: {:?}", start.elapsed());
+    }
+}
+
+/// A pipe without end, or a file of gigabytes, is no job.
+#[test]
+fn a_file_without_end_is_no_job() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = agimp(directory.path(), &["check", "/dev/zero"]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("/dev/zero:1:1: found more than 16 MB"), "{message}");
+}
+
+#[test]
+fn check_and_run_warn_of_what_is_likely_not_meant() {
+    let directory = tempfile::tempdir().unwrap();
+    let thin: Vec<String> = (0..16)
+        .map(|i| {
+            format!("{{ name = \"c{i}\", shape = {{ kind = \"box\", min = [0, 0.9], max = [1, 0.91] }} }}")
+        })
+        .collect();
+    let sand = "model = \"drucker_prager\", friction_angle = 30,";
+    let job = format!("{}colliders = [{}]\n", JOB.replace("model = \"hencky\",", sand), thin.join(", "));
+    std::fs::write(directory.path().join("job.toml"), job).unwrap();
+    for command in ["check", "run"] {
+        let output = agimp(directory.path(), &[command, "job.toml"]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{message}");
+        for part in [
+            "agimp: warning: boundaries: the job names no condition for x_min, x_max, y_min, y_max; the default holds there",
+            "agimp: warning: materials[0].match: ",
+            "agimp: warning: colliders[15].shape: \"c15\" is 10 mm thick",
+        ] {
+            assert!(message.contains(part), "{command}: {part} is not in\n{message}");
+        }
+    }
+    // A run of 10^9 steps; many colliders and materials: twenty warnings.
+    let sands: String = (0..30)
+        .map(|i| format!("[[materials]]\nname = \"s{i}\"\ndensity = 1000\nmodel = \"drucker_prager\"\nyoung = 1e6\npoisson = 0.2\nfriction_angle = 30\n"))
+        .collect();
+    let many =
+        JOB.replace("materials = [", "ignored = [").replace("material = \"MATERIAL\"", "material = \"s3\"");
+    let many: String = many
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("ignored"))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let (code, _, message) = check(&format!("{many}{sands}"));
+    assert_eq!((code, message.matches("agimp: warning: ").count()), (0, 21), "{message}");
+    assert!(message.contains("agimp: warning: and 11 more"), "{message}");
+    let (_, out, message) = check(&JOB.replace("end = 2e-3", "end = 1e6"));
+    assert!(message.contains("steps; stiffer material"), "{message}");
+    assert!(out.contains("wall time    about "), "{out}");
+}
+
+#[test]
+fn check_lists_loads() {
+    let load =
+        "[[loads]]\nname = \"wind\"\nkind = \"body_force\"\nacceleration = [1.5, \"sin(t)\"]\nfrom = 0.5\n";
+    let (code, out, message) = check(&format!("{JOB}{load}"));
+    assert_eq!(code, 0, "{message}");
+    assert!(out.contains("loads        1\n"), "{out}");
+    assert!(
+        out.contains(
+            "wind               body force (1.5 m/s², an expression in m/s²), everywhere, from 500 ms on"
+        ),
+        "{out}"
+    );
+}
+
+/// Values of the command line take the place of those of the file, and are checked like these.
+#[test]
+fn settings_are_checked_like_the_file() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("job.toml"), JOB).unwrap();
+    let refused = [
+        (
+            vec!["--set", "time.clf=0.3"],
+            "--set time.clf=0.3: time.clf: unknown key `clf`; did you mean `cfl`?",
+        ),
+        (
+            vec!["--set", "materials.0.density=-5"],
+            "--set materials.0.density=-5: materials[0].density: found -5; expected a number at least",
+        ),
+        (
+            vec!["--set", "materials.STEEL.density=5"],
+            "--set materials.STEEL.density=5: materials: found no element \"STEEL\"; expected 0 or \"MATERIAL\"",
+        ),
+        (
+            vec!["--set", "materials.MATERIAL.young=soft"],
+            "found the text \"soft\"; expected a number above 0",
+        ),
+        (vec!["--set", "bodies[0].shape.max.0=9"], "--set bodies[0].shape.max.0=9"),
+        (vec!["--set", "time.end"], "--set time.end: found no \"=\"; expected KEY=VALUE"),
+        (vec!["--end", "0"], "--end 0: time.end: found 0; expected a number above 0"),
+        (vec!["--end", "-1"], "--end -1: time.end: found -1; expected a number above 0"),
+        (vec!["--end", "soon"], "--end soon: time.end: found the text \"soon\"; expected a number above 0"),
+        (vec!["--out", ""], "--out : output.directory: found an empty text"),
+    ];
+    for (arguments, part) in refused {
+        for command in ["check", "run"] {
+            let output = agimp(directory.path(), &[&[command, "job.toml"], &arguments[..]].concat());
+            let message = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+            // A shape that leaves the domain is a fault of the shape, in the file.
+            if !part.starts_with("--set bodies") {
+                assert!(message.contains(part), "{arguments:?}:\n{message}");
+            }
+        }
+    }
+    // A fault of the file keeps its line, also behind a value that takes more lines.
+    let faulty = JOB.replace("time = {", "title2 = 1\ntime = {");
+    std::fs::write(directory.path().join("faulty.toml"), faulty).unwrap();
+    let output = agimp(
+        directory.path(),
+        &["check", "faulty.toml", "--set", "domain.min=[0, 0]", "--set", "gravity=[0, -1]"],
+    );
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("faulty.toml:6:1: title2: unknown key"), "{message}");
+    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 2, "nothing is written");
+}
+
+#[test]
+fn settings_decide_what_is_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = |name: &str| {
+        std::fs::read(directory.path().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    };
+    let other = JOB.replace("young = 1e6", "young = 3e6").replace("end = 2e-3", "end = 1e-3");
+    std::fs::write(directory.path().join("job.toml"), JOB).unwrap();
+    std::fs::create_dir(directory.path().join("edited")).unwrap();
+    std::fs::write(directory.path().join("edited/job.toml"), other).unwrap();
+    printed(&agimp(directory.path(), &["run", "edited/job.toml", "--quiet", "--out", "edited/out"]));
+    let set = ["--set", "materials.MATERIAL.young=3e6"];
+    let run =
+        |rest: &[&str]| agimp(directory.path(), &[&["run", "job.toml", "--quiet"], &set[..], rest].concat());
+    printed(&run(&["--end", "1e-3", "--out", "set"]));
+    assert_eq!(file("set/job.history.csv"), file("edited/out/job.history.csv"));
+    // The text in the files is that of the job as it was run.
+    let text = printed(&agimp(directory.path(), &["info", "set/job_000001.hdf"]));
+    assert!(text.contains("job"), "{text}");
+    // A restart knows that the end may change, and that nothing else may.
+    printed(&run(&["--end", "2e-3", "--out", "set", "--restart", "latest"]));
+    printed(&run(&["--out", "whole"]));
+    assert_eq!(file("set/job.history.csv"), file("whole/job.history.csv"));
+    let refused = agimp(directory.path(), &["run", "job.toml", "--out", "set", "--restart", "latest"]);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    assert!(message.contains("`materials[0].young` is 3000000.0 there and 1000000.0 here"), "{message}");
+}

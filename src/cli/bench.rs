@@ -4,9 +4,10 @@ use std::io::Write;
 
 use partition::comm::{Comm, World};
 
-use super::message::together;
+use super::Failure;
 use super::run::start_threads;
-use super::{Failure, ranks};
+use super::shared::message::together;
+use super::shared::ranks;
 use crate::bench::jobs::{BenchJob, JOBS};
 use crate::bench::machine::Machine;
 use crate::bench::{Extent, Figures, measure};

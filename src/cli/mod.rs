@@ -1,4 +1,4 @@
-//! Command line: one file per subcommand. The only part of the library that prints.
+//! Command line: one file per subcommand, and `shared/` for what several need. The only part of the library that prints.
 use crate::job::JobError;
 use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};
@@ -10,16 +10,15 @@ mod diff;
 mod digest;
 mod info;
 mod material;
-mod message;
-pub use message::unusable;
 mod new;
 mod plot;
-mod quote;
-mod ranks;
 mod run;
 mod schema;
+mod shared;
 mod view;
 pub mod weights;
+
+pub use self::shared::message::unusable;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
 #[derive(Debug, Parser)]
@@ -35,21 +34,21 @@ pub struct Arguments {
 pub enum Command {
     /// Run a job; under `mpirun` on all its ranks.
     Run(run::Arguments),
-    /// Check a job file and tell its size and cost, without running it.
+    /// Check a job file and print its size and cost, without running it.
     Check(check::Arguments),
     /// Print the JSON schema of job files.
     Schema(schema::Arguments),
     /// Write a commented job file to start from.
     New(new::Arguments),
-    /// Tell what is in an output or checkpoint file.
+    /// Show what is in an output or checkpoint file.
     Info(info::Arguments),
     /// Draw the particles of an output file as PNG.
     Plot(plot::Arguments),
     /// Write an HTML page that shows particles and tree in a browser: turn, zoom, play, cut, read values.
     View(view::Arguments),
-    /// Print a number that tells states apart, whatever the ranks that wrote the files.
+    /// Print a number that is equal for equal states, whatever the ranks that wrote the files.
     Digest(digest::Arguments),
-    /// Tell where the states in two files differ.
+    /// Show where the states in two files differ.
     Diff(diff::Arguments),
     /// Drive one particle of a material along a path of deformation.
     Material(material::Arguments),
@@ -80,9 +79,9 @@ pub enum Failure {
     /// The run was asked to stop and has written a checkpoint.
     #[error("stopped on request; go on with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
-    /// All is said; what is left is to end with this exit code.
-    #[error("a failure that has been told")]
-    Told(u8),
+    /// The user knows all; what is left is to end with this exit code.
+    #[error("a failure that has been reported")]
+    Reported(u8),
 }
 
 /// Exit code for input that cannot be used.
@@ -95,7 +94,7 @@ impl Failure {
             Self::Job(_) | Self::Seed(_) | Self::Usage(_) => BAD_INPUT,
             Self::Run(_) => 1,
             Self::Arguments(error) => error.exit_code() as u8,
-            Self::Told(code) => *code,
+            Self::Reported(code) => *code,
             Self::Stopped(_) => crate::run::stop::STOPPED,
         }
     }
@@ -106,7 +105,7 @@ impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
         match error.kind() {
             // Whoever listened has heard enough, as in `agimp schema | head`.
-            std::io::ErrorKind::BrokenPipe => Self::Told(0),
+            std::io::ErrorKind::BrokenPipe => Self::Reported(0),
             _ => Self::Run(format!("cannot write: {error}")),
         }
     }
@@ -115,7 +114,7 @@ impl From<std::io::Error> for Failure {
 /// Carries out a command.
 ///
 /// # Errors
-/// Wrong input, or a failure on the way; [`Failure::exit_code`] tells which.
+/// Wrong input, or a failure on the way; [`Failure::exit_code`] says which.
 pub fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Run(arguments) => run::execute(&arguments),

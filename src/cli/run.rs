@@ -5,11 +5,16 @@ use std::path::PathBuf;
 
 use partition::comm::{Comm, World};
 
-use super::message::together;
-use super::{Failure, ranks};
+use super::Failure;
+use super::shared::message::{together, warn_of};
+use super::shared::ranks;
+use super::shared::settings::Changes;
 use crate::job::problem::AnyProblem;
+use crate::job::{Problem, Settings};
 use crate::run::stop::StopRequest;
 use crate::run::{self, Options, Outcome, RunError, Summary, restart};
+use crate::setup::estimate::steps;
+use crate::setup::warnings::warnings;
 
 /// Arguments of `agimp run`.
 #[derive(Debug, clap::Args)]
@@ -28,12 +33,16 @@ pub struct Arguments {
     /// Print nothing but errors and warnings.
     #[arg(long)]
     pub quiet: bool,
+    /// Values of the job that are set here.
+    #[command(flatten)]
+    pub changes: Changes,
 }
 
 impl Arguments {
     /// The words that decide what a run does. Threads and messages are each rank's own affair.
-    fn words(&self) -> Vec<&OsStr> {
+    fn words<'a>(&'a self, settings: &'a Settings) -> Vec<&'a OsStr> {
         let mut words = vec![OsStr::new("run"), self.job.as_os_str()];
+        words.extend(settings.words());
         if let Some(from) = &self.restart {
             words.extend([OsStr::new("--restart"), from]);
         }
@@ -50,10 +59,11 @@ impl Arguments {
 /// The job is wrong, or the run failed; the same on all ranks.
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
+    let settings = arguments.changes.settings()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    ranks::same_command(comm, &arguments.words())?;
-    let problem = ranks::load(comm, &arguments.job)?;
+    ranks::same_command(comm, &arguments.words(&settings))?;
+    let problem = ranks::load(comm, &arguments.job, &settings)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from.to_str() {
@@ -64,6 +74,11 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         speaks: comm.rank() == 0 && !arguments.quiet,
         threads,
     };
+    let warned = match &problem {
+        AnyProblem::Two(problem) => warned(comm, problem),
+        AnyProblem::Three(problem) => warned(comm, problem),
+    };
+    together(comm, warned)?;
     let outcome = match &problem {
         AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
@@ -71,7 +86,16 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     together(comm, conclude(outcome, options.speaks))
 }
 
-/// Tells how a finished run ended; anything else is a failure.
+/// Collective. Warns of what is likely not meant in the job, once.
+fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<(), Failure> {
+    let (_, steps) = steps(problem).map_err(|error| Failure::Usage(error.to_string()))?;
+    if comm.rank() == 0 {
+        warn_of(&warnings(problem, steps));
+    }
+    Ok(())
+}
+
+/// Reports how a finished run ended; anything else is a failure.
 fn conclude(outcome: Result<Outcome, RunError>, speaks: bool) -> Result<(), Failure> {
     match outcome {
         Ok(Outcome::Finished(summary)) => {

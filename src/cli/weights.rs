@@ -7,7 +7,7 @@ use partition::{Brick, Forest, MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
 use super::Failure;
-use super::message::together;
+use super::shared::message::together;
 use crate::grid::direct;
 use crate::grid::plan::known::KnownTree;
 use crate::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle, RealNode};

@@ -4,12 +4,14 @@
 //! primitives; for booleans the value is a bound, never larger in magnitude than the distance to the
 //! surface and with the right sign, so that a ball of that radius lies on one side.
 mod classify;
+mod common_point;
 mod gradient;
 mod primitives;
 mod rotation;
 mod shape;
 
 pub use classify::Side;
+pub use common_point::common_point;
 pub use rotation::rotation;
 pub use shape::{Frustum, Placement, Shape};
 

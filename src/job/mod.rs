@@ -11,10 +11,16 @@ pub mod schema;
 
 pub use difference::{Difference, differences};
 pub use parse::error::{Fault, FaultList, JobError};
+pub use parse::settings::Settings;
 pub use problem::{AnyProblem, Problem};
 pub use schema::json::schema;
 
+use std::io::Read as _;
 use std::path::Path;
+use std::sync::LazyLock;
+
+use self::parse::error::Lines;
+use self::parse::settings::Edited;
 
 /// Reads and checks a job file. Not collective: every rank that calls it reads the file.
 ///
@@ -22,22 +28,40 @@ use std::path::Path;
 /// The file cannot be read, or its content is not a valid job; all faults that were found, with their
 /// places.
 pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
-    from_bytes(read(path)?, path)
+    load_with(path, &Settings::default())
 }
+
+/// As [`load`], with some values set from outside.
+///
+/// # Errors
+/// The same; also a setting may be at fault.
+pub fn load_with(path: &Path, settings: &Settings) -> Result<AnyProblem, JobError> {
+    from_bytes(read(path)?, path, settings)
+}
+
+/// Longest job file, bytes.
+const MOST_BYTES: u64 = 16_000_000;
 
 /// The bytes of a job file. Not collective.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read, or is too long.
 pub fn read(path: &Path) -> Result<Vec<u8>, JobError> {
-    std::fs::read(path).map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+    read.map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(JobError::TooLong { path: path.to_path_buf(), most: MOST_BYTES / 1_000_000 });
+    }
+    Ok(bytes)
 }
 
-/// Checks the bytes of a job file. Nothing is read from `path`: its stem becomes the name of the job.
+/// Checks the bytes of a job file, with some values set from outside. Nothing is read from `path`: its stem becomes the name
+/// of the job.
 ///
 /// # Errors
 /// The name is not UTF-8, or the content is not a valid job; all faults that were found, with their places.
-pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
+pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<AnyProblem, JobError> {
     if path.file_stem().is_some_and(|stem| stem.to_str().is_none()) {
         return Err(JobError::Name { path: path.to_path_buf() });
     }
@@ -45,10 +69,12 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
         let message = "found a byte that is not UTF-8; expected text in UTF-8".into();
-        let faults = vec![Fault { key: String::new(), message, span: valid..valid, help: None }];
+        let faults =
+            vec![Fault { key: String::new(), message, span: valid..valid, help: None, setting: None }];
         FaultList { path: path.to_path_buf(), text, faults }
     })?;
-    parse(&text, path).map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
+    parse_with(&text, path, settings)
+        .map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
 }
 
 /// Checks the text of a job file. Nothing is read from `path`: its stem becomes the name of the job.
@@ -56,22 +82,45 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<AnyProblem, JobError> {
 /// # Errors
 /// All faults that were found.
 pub fn parse(text: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
-    let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None }];
+    parse_with(text, path, &Settings::default())
+}
+
+/// As [`parse`], with some values set from outside.
+///
+/// # Errors
+/// All faults that were found, in the file and in the settings.
+pub fn parse_with(text: &str, path: &Path, settings: &Settings) -> Result<AnyProblem, Vec<Fault>> {
+    let edited = settings.apply(text)?;
+    parse_edited(&edited, text, path)
+        .map_err(|faults| faults.into_iter().map(|fault| edited.attribute(fault)).collect())
+}
+
+/// `original` is the text before settings have changed it.
+fn parse_edited(edited: &Edited, original: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
+    let text = edited.text.as_str();
+    let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None, setting: None }];
     let tree = parse::source::Node::parse(text).map_err(|(span, message)| match text.get(span.clone()) {
         Some(key) if message == "duplicate key" => {
             let message = "found the key a second time; expected it once".into();
-            vec![Fault { key: key.to_owned(), message, span, help: None }]
+            vec![Fault { key: key.to_owned(), message, span, help: None, setting: None }]
         }
         _ => alone(span, message),
     })?;
-    let faults = parse::structure::check(&tree, &schema());
+    let faults = parse::structure::check(&tree, schema_of_jobs());
     if !faults.is_empty() {
         return Err(faults);
     }
     // What the schema accepts, the types accept; should they ever differ, the parser's words count.
     let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
-    convert::convert(&file, &tree, text, path)
+    let lines = Lines::of(original);
+    convert::convert(&file, &tree, text, &|byte| lines.position(edited.original(byte)), path)
+}
+
+/// The schema that all jobs are checked against, made once.
+fn schema_of_jobs() -> &'static serde_json::Value {
+    static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(schema);
+    &SCHEMA
 }
 
 #[cfg(test)]

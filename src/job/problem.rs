@@ -82,6 +82,8 @@ pub struct Problem<const D: usize> {
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[FaceCondition; 2]; D],
+    /// Which of them the job names; the others have the default.
+    pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
     /// What happens to particles that leave the domain.

@@ -7,6 +7,7 @@ use partition::Forest;
 use partition::comm::Comm;
 
 use super::RunError;
+use crate::adaptivity::resample::ids;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
@@ -244,6 +245,7 @@ fn restored<const D: usize>(
     let shipment = forest.partition(comm, &weights, cut_at(problem.adaptivity.as_ref()));
     let chunks = shipment.move_items(comm, restored.chunks, Chunk::append_to, Chunk::from_bytes);
     let header = restored.header;
+    check_counts::<D>(&header.scalars).map_err(|reason| refused(&reason))?;
     let clock = Clock {
         step: header.step,
         time: header.time,
@@ -264,7 +266,21 @@ fn restored<const D: usize>(
     Ok((solver, header.scalars))
 }
 
-/// Collective. Refuses a file of another job, and tells which keys differ. What else may be wrong with the file is found
+/// Counters that no run reaches.
+const MOST: u64 = 1 << 53;
+
+/// What no run can have counted is refused, whatever the checksum of the header says.
+fn check_counts<const D: usize>(scalars: &Scalars) -> Result<(), String> {
+    for (name, count) in &scalars.counts {
+        let most = if name == BOOKS[3] { ids::roots(D) } else { MOST };
+        if *count > most {
+            return Err(format!("the header says {name} = {count}; no run counts further than {most}"));
+        }
+    }
+    Ok(())
+}
+
+/// Collective. Refuses a file of another job, and says which keys differ. What else may be wrong with the file is found
 /// when it is read.
 fn check_job<const D: usize>(comm: &Comm, problem: &Problem<D>, path: &Path) -> Result<(), String> {
     let found = if comm.rank() == 0 { differing_job(problem, path) } else { None };
@@ -316,4 +332,20 @@ fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathB
     comm.broadcast_bytes(0, &mut bytes);
     let names = bytes.split(|&byte| byte == 0).filter(|name| !name.is_empty());
     Ok(names.map(|name| PathBuf::from(OsStr::from_bytes(name))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that would overflow as soon as the run counts on.
+    #[test]
+    fn counters_made_with_intent_are_refused() {
+        let with = |name: &str, count| Scalars { counts: vec![(name.into(), count)], ..Scalars::default() };
+        for name in [NEXT_OUTPUT, OUTPUT_STEP, DELETED, "splits", "next_root"] {
+            assert_eq!(check_counts::<3>(&with(name, 1000)), Ok(()));
+            let error = check_counts::<3>(&with(name, u64::MAX)).expect_err(name);
+            assert!(error.contains(name), "{error}");
+        }
+    }
 }

@@ -1,4 +1,6 @@
 //! From a job to the first state: tree, partition and particles.
+use std::convert::Infallible;
+
 use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
@@ -13,6 +15,7 @@ use crate::solver::{Clock, Physics, Solver, StepControl};
 
 pub mod estimate;
 pub mod seed;
+pub mod warnings;
 
 /// The constant part of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
@@ -41,14 +44,35 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
 /// # Errors
 /// Two bodies overlap or one has no particle; the same on all ranks.
 pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solver<D>, Disagreement> {
+    let Ok(solver) = solver_within::<D, Infallible>(comm, problem, |_| Ok(()))?;
+    Ok(solver)
+}
+
+/// Particles, leaves and leaves with particles of all ranks.
+pub type Size = [u64; 3];
+
+/// Collective. As [`solver`], unless `fits` refuses the size of a tree on the way there: then its refusal, before any
+/// particle of that tree is made.
+///
+/// # Errors
+/// Two bodies overlap or one has no particle; the same on all ranks.
+pub fn solver_within<const D: usize, R>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    fits: impl Fn(Size) -> Result<(), R>,
+) -> Result<Result<Solver<D>, R>, Disagreement> {
     let mut forest = first_forest(comm, problem);
-    comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+    if let Err(refusal) = fits(comm.agree(partition_by_seeds(comm, problem, &mut forest))?) {
+        return Ok(Err(refusal));
+    }
     let mut solver = seeded(comm, problem, forest)?;
     // Criteria look at particles, and finer leaves have other particles: until the tree stays.
     let mut passes = 0;
     while passes < MAX_LEVEL && solver.regrid_before_start() {
         let mut forest = solver.forest;
-        comm.agree(partition_by_seeds(comm, problem, &mut forest))?;
+        if let Err(refusal) = fits(comm.agree(partition_by_seeds(comm, problem, &mut forest))?) {
+            return Ok(Err(refusal));
+        }
         solver = seeded(comm, problem, forest)?;
         passes += 1;
     }
@@ -58,7 +82,7 @@ pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solve
     }
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts))?;
-    Ok(solver)
+    Ok(Ok(solver))
 }
 
 /// Collective. Fills the leaves of a tree with numbered particles.
@@ -94,7 +118,7 @@ fn first_forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Forest<D> 
     forest
 }
 
-/// Collective. Partitions a tree by the particles that its leaves will hold.
+/// Collective. Partitions a tree by the particles that its leaves will hold. Returns its size.
 ///
 /// # Errors
 /// Two bodies overlap; on the rank that found it.
@@ -102,17 +126,24 @@ fn partition_by_seeds<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
     forest: &mut Forest<D>,
-) -> Result<(), SeedError> {
+) -> Result<Size, SeedError> {
     // Counted, not filled: leaves that go to other ranks shall take no memory here.
     let count = |leaf: &Octant<D>| {
         let mut counts = vec![0; problem.bodies.len()];
-        count_leaf(problem, leaf, &mut counts).map(|()| leaf_cost::<D>(counts.iter().sum()))
+        count_leaf(problem, leaf, &mut counts).map(|()| counts.iter().sum())
     };
     let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
-    let even = || vec![1; forest.leaves().len()];
-    let weights = counted.as_ref().map_or_else(|_| even(), Clone::clone);
+    let weights = match &counted {
+        Ok(counts) => counts.iter().map(|&count| leaf_cost::<D>(count)).collect(),
+        Err(_) => vec![1; forest.leaves().len()],
+    };
     forest.partition(comm, &weights, cut_at(problem.adaptivity.as_ref()));
-    counted.map(|_| ())
+    let mut size = counted.as_ref().map_or([0; 3], |counts| {
+        let filled = counts.iter().filter(|count| **count > 0).count();
+        [counts.iter().sum(), counts.len() as u64, filled as u64]
+    });
+    comm.sum_u64(&mut size);
+    counted.map(|_| size)
 }
 
 /// Not collective. The particles of the own leaves, ids not yet given.

@@ -57,7 +57,7 @@ pub fn fill_leaf<const D: usize>(
     octant: &Octant<D>,
     chunk: &mut Chunk<D>,
 ) -> Result<(), SeedError> {
-    visit(problem, octant, |index, points| {
+    visit(problem, octant, 0..problem.bodies.len(), |index, points| {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
         let volume: f64 = [spacing; D].iter().product();
@@ -96,7 +96,30 @@ pub fn count_leaf<const D: usize>(
     octant: &Octant<D>,
     counts: &mut [u64],
 ) -> Result<(), SeedError> {
-    visit(problem, octant, |body, points| counts[body] += points.len() as u64)
+    count_bodies(problem, octant, 0..problem.bodies.len(), |body, points| counts[body] += points)
+}
+
+/// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles of in the leaf.
+/// `bodies` are in the order of the job; the others must lie outside the leaf.
+///
+/// # Errors
+/// A point lies in two bodies.
+pub fn count_bodies<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    bodies: impl Iterator<Item = usize>,
+    mut take: impl FnMut(usize, u64),
+) -> Result<(), SeedError> {
+    visit(problem, octant, bodies, |body, points| take(body, points.len() as u64))
+}
+
+/// Not collective. The number of lattice points in a box that a body has in leaves of a level if it fills the box.
+pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &Aabb<D>, level: u8) -> u64 {
+    let spacing = spacing(problem, level, &problem.bodies[body]);
+    let along = |a: usize| {
+        first_at_or_after(cell.upper[a], spacing).saturating_sub(first_at_or_after(cell.lower[a], spacing))
+    };
+    (0..D).fold(1, |all, a| all.saturating_mul(along(a)))
 }
 
 /// Not collective. Checks the number of particles of each body in all leaves of all ranks together.
@@ -129,18 +152,16 @@ fn velocity_gradient<const D: usize>(spin: [f64; 3]) -> [[f64; D]; D] {
     std::array::from_fn(|i| std::array::from_fn(|j| skew[i][j]))
 }
 
-/// Calls `take(body, points)` for each body with points in the leaf.
+/// Calls `take(body, points)` for each of some bodies with points in the leaf.
 fn visit<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
+    bodies: impl Iterator<Item = usize>,
     mut take: impl FnMut(usize, &[[f64; D]]),
 ) -> Result<(), SeedError> {
     let cell = problem.octant_box(octant);
-    let near: Vec<(usize, Side)> = problem
-        .bodies
-        .iter()
-        .enumerate()
-        .map(|(index, body)| (index, body.shape.classify(&cell)))
+    let near: Vec<(usize, Side)> = bodies
+        .map(|index| (index, problem.bodies[index].shape.classify(&cell)))
         .filter(|(_, side)| *side != Side::Outside)
         .collect();
     let mut points = Vec::new();

@@ -1,7 +1,7 @@
 use super::*;
 use crate::geometry::Shape;
 use crate::job::{AnyProblem, parse};
-use crate::setup::estimate::leaves;
+use crate::setup::estimate::explicit::leaves;
 use proptest::prelude::*;
 
 fn problem<const D: usize>(text: &str) -> Problem<D>

@@ -34,7 +34,7 @@ pub fn agimp(directory: &Path) -> Command {
 /// `mpirun` in a directory. What the program needs of the MPI library it has to set itself.
 pub fn mpirun(directory: &Path, ranks: usize) -> Command {
     let mut command = mpirun::command(ranks, PATIENCE.as_secs() as u32);
-    command.current_dir(directory).env_remove("OMPI_MCA_io").env_remove("OMPI_MCA_mpi_yield_when_idle");
+    command.current_dir(directory).env_remove("OMPI_MCA_mpi_yield_when_idle");
     command
 }
 

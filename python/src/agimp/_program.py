@@ -64,7 +64,6 @@ def environment() -> dict[str, str]:
     if hasattr(os, "geteuid") and os.geteuid() == 0:  # Open MPI asks for both before it runs as root
         settings.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
         settings.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-    settings.setdefault("OMPI_MCA_io", "^ompio")
     settings.setdefault("OMPI_MCA_btl_vader_single_copy_mechanism", "none")
     settings.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
     return settings

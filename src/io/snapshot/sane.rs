@@ -65,16 +65,22 @@ fn unstable(name: &str, id: u64, value: f64, position: &[f64]) -> String {
     )
 }
 
-/// Finite numbers; masses and half widths above 0. `values` has `width` numbers for each particle.
+/// Greatest half width, m: no domain is wider.
+const WIDEST: f64 = 1e9;
+/// Greatest number of a particle, in its unit.
+const GREATEST: f64 = 1e30;
+
+/// Finite numbers that a run can have; masses and half widths above 0. `values` has `width` numbers for each particle.
 pub(super) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), String> {
     let positive = ["mass", "half_width"].contains(&name);
-    let is_wrong = |value: &f64| !value.is_finite() || (positive && *value <= 0.0);
+    let most = if name == "half_width" { WIDEST } else { GREATEST };
+    let is_wrong = |value: &f64| !value.is_finite() || value.abs() > most || (positive && *value <= 0.0);
     match values.iter().position(is_wrong) {
         None => Ok(()),
         Some(at) => {
             let expected = if positive { "a positive number" } else { "a finite number" };
             Err(format!(
-                "{name} of the particle in row {} is {:?}; expected {expected}",
+                "{name} of the particle in row {} is {:?}; expected {expected}, at most {most:e} in size",
                 at / width,
                 values[at]
             ))

@@ -1,5 +1,5 @@
 //! Dynamic refinement of the job file to that of the solver.
-use super::{Checks, Space};
+use super::checks::{Checks, Space};
 use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Kind};
 use crate::boundary::motion::{Knot, Motion};

@@ -1,11 +1,12 @@
 //! Colliders of the job file to those of the solver.
-use super::{Checks, Space};
+use super::checks::{Checks, Space};
 use crate::boundary::motion::{Free, Knot, Motion, Rate};
 use crate::boundary::{Collider, Contact};
 use crate::geometry::Aabb;
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{Contact as WrittenContact, Motion as Written, Row};
-use crate::job::schema::job_file::{self as file, AxisName, Spin};
+use crate::job::schema::common::{AxisName, Spin, Vector};
+use crate::job::schema::job_file as file;
 use crate::text::written;
 
 /// Most colliders of a job: what a checkpoint's header has room for.
@@ -130,11 +131,7 @@ fn motion<const D: usize>(
 }
 
 /// A vector, or 0 where none is given.
-fn optional<const D: usize>(
-    checks: &mut Checks,
-    vector: Option<&file::Vector>,
-    path: &Path,
-) -> Option<[f64; D]> {
+fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
     vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
 }
 

@@ -1,5 +1,5 @@
 //! Loads of the job file to those of the solver.
-use super::{Checks, Space};
+use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity};
 use crate::load::{Kind, Load};

@@ -3,6 +3,7 @@
 //!
 //! | file | what it checks |
 //! |---|---|
+//! | `checks` | what all need: faults with their places, the domain |
 //! | `settings` | faces, numerics, output, report |
 //! | `shapes` | shapes |
 //! | `adaptivity` | dynamic refinement |
@@ -10,10 +11,11 @@
 //! | `loads` | loads and quantities |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
+use self::checks::{Checks, Space};
 use self::colliders::colliders;
 use self::loads::{loads, vector};
-use self::settings::{digest, faces, numerics, output, report};
-use super::parse::error::{Fault, Lines, MOST, QUOTED, names as listed};
+use self::settings::{digest, faces, named_faces, numerics, output, report};
+use super::parse::error::{Fault, QUOTED, names as listed};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::job_file::{self as file, JobFile};
@@ -25,6 +27,7 @@ use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
 
 mod adaptivity;
+mod checks;
 mod colliders;
 mod loads;
 mod overlap;
@@ -34,14 +37,15 @@ mod shapes;
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
 
-/// Converts and checks; `text` is what `file` and `tree` were made from.
+/// Converts and checks; `text` is what `file` and `tree` were made from, `position` gives line and column of its bytes.
 pub(super) fn convert(
     file: &JobFile,
     tree: &Node,
     text: &str,
+    position: &dyn Fn(usize) -> (usize, usize),
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
-    let mut checks = Checks { tree, lines: Lines::of(text), faults: Vec::new() };
+    let mut checks = Checks { tree, text, position, faults: Vec::new() };
     let problem = if file.dimension == 2 {
         problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
@@ -53,50 +57,6 @@ pub(super) fn convert(
             checks.faults.sort_by_key(|fault| fault.span.start);
             Err(checks.faults)
         }
-    }
-}
-
-/// Collects faults; knows where the keys of the file stand.
-pub(super) struct Checks<'t> {
-    tree: &'t Node,
-    lines: Lines<'t>,
-    faults: Vec<Fault>,
-}
-
-impl Checks<'_> {
-    /// Whether there are so many faults that it is no use to look for more.
-    pub fn is_full(&self) -> bool {
-        self.faults.len() > MOST
-    }
-
-    /// Notes a fault of the value at `path`.
-    pub fn fault(&mut self, path: &Path, message: String) {
-        if self.is_full() {
-            return;
-        }
-        let span = self.tree.locate(path);
-        self.faults.push(Fault { key: path.to_string(), message, span, help: None });
-    }
-
-    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
-    pub fn column_name<'a>(&mut self, name: &str, mut before: impl Iterator<Item = &'a str>, path: &Path) {
-        let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-        if name.is_empty() || !name.chars().all(allowed) {
-            let name = excerpt(name, QUOTED);
-            self.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
-        } else if before.any(|other| other == name) {
-            let name = excerpt(name, QUOTED);
-            self.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
-        }
-    }
-
-    /// The components of a vector of the job's dimension.
-    pub fn vector<const D: usize>(&mut self, vector: &file::Vector, path: &Path) -> Option<[f64; D]> {
-        let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();
-        if array.is_none() {
-            self.fault(path, format!("found {} components; expected {D} in a {D}D job", vector.0.len()));
-        }
-        array
     }
 }
 
@@ -133,7 +93,7 @@ fn problem<const D: usize>(
     let problem = Problem {
         name,
         path: path.to_path_buf(),
-        text: checks.lines.text.to_owned(),
+        text: checks.text.to_owned(),
         title: file.title.clone(),
         digest: digest(file),
         origin,
@@ -146,6 +106,7 @@ fn problem<const D: usize>(
         gravity: gravity?,
         loads: loads?,
         faces: faces?,
+        named_faces: named_faces(&file.boundaries),
         colliders: colliders?,
         leaving: match file.boundaries.leaving {
             file::Leaving::Error => LeavingPolicy::Error,
@@ -180,19 +141,6 @@ fn problem<const D: usize>(
         );
     }
     Some(problem)
-}
-
-/// The domain in the file's coordinates, for conversions and messages.
-pub(super) struct Space<const D: usize> {
-    pub origin: [f64; D],
-    pub size: [f64; D],
-}
-
-impl<const D: usize> Space<D> {
-    fn words(&self, x: &[f64; D]) -> String {
-        let components: Vec<String> = (0..D).map(|a| number(x[a] + self.origin[a], 7)).collect();
-        format!("[{}]", components.join(", "))
-    }
 }
 
 /// Gravity is the same everywhere.
@@ -415,7 +363,7 @@ fn body<const D: usize>(
     }
     Some(Body {
         name: body.name.clone(),
-        place: checks.lines.position(checks.tree.locate(&here).start),
+        place: (checks.position)(checks.tree.locate(&here).start),
         centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
         shape,
         material: material?,

@@ -1,12 +1,8 @@
 //! Finds bodies that overlap before a particle is made.
-use crate::geometry::{Aabb, Side};
-use crate::job::problem::{Body, Problem};
-use std::collections::VecDeque;
+use crate::geometry::{Aabb, common_point};
+use crate::job::Problem;
 
-/// Boxes looked at for one pair of bodies. What is not found then is thin, and found when the
-/// particles are made if it matters to them.
-const BUDGET: usize = 20_000;
-/// Boxes looked at for all pairs, and pairs whose bounds are compared for each of them.
+/// Boxes looked at for all pairs (what is not found then is thin, and found when particles are made if it matters to them), and pairs whose bounds are compared for each of them.
 const TOTAL: usize = 1_000_000;
 const BOUNDS_PER_BOX: usize = 20;
 
@@ -33,7 +29,9 @@ pub(in crate::job) fn find<const D: usize>(problem: &Problem<D>) -> Vec<Overlap<
             if (0..D).any(|axis| common.upper[axis] - common.lower[axis] <= slack) {
                 continue;
             }
-            if let Some(point) = common_point([&bodies[first], &bodies[second]], common, slack, &mut boxes) {
+            if let Some(point) =
+                common_point([&bodies[first].shape, &bodies[second].shape], common, slack, &mut boxes)
+            {
                 found.push(Overlap { bodies: [first, second], point });
                 break;
             }
@@ -44,36 +42,4 @@ pub(in crate::job) fn find<const D: usize>(problem: &Problem<D>) -> Vec<Overlap<
         }
     }
     found
-}
-
-/// A point in `common` that lies in both bodies; takes the boxes that it looks at off `budget`.
-fn common_point<const D: usize>(
-    pair: [&Body<D>; 2],
-    common: Aabb<D>,
-    slack: f64,
-    budget: &mut usize,
-) -> Option<[f64; D]> {
-    let mut queue = VecDeque::from([common]);
-    for _ in 0..BUDGET.min(*budget) {
-        let cell = queue.pop_front()?;
-        *budget -= 1;
-        if (0..D).any(|axis| cell.upper[axis] - cell.lower[axis] <= slack) {
-            continue;
-        }
-        if pair.iter().any(|body| body.shape.classify(&cell) == Side::Outside) {
-            continue;
-        }
-        let centre = cell.centre();
-        if pair.iter().all(|body| body.shape.distance(&centre) < -slack) {
-            return Some(centre);
-        }
-        queue.extend((0..1_usize << D).map(|corner| {
-            let upper = |axis: usize| corner >> axis & 1 == 1;
-            Aabb::new(
-                std::array::from_fn(|axis| if upper(axis) { centre[axis] } else { cell.lower[axis] }),
-                std::array::from_fn(|axis| if upper(axis) { cell.upper[axis] } else { centre[axis] }),
-            )
-        }));
-    }
-    None
 }

@@ -1,5 +1,5 @@
 //! From the file's types to a checked problem: faces, numerics, output and report.
-use super::{Checks, Space};
+use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
@@ -32,6 +32,13 @@ pub(in crate::job) fn faces<const D: usize>(
     };
     let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
     Some(std::array::from_fn(|a| all[a].map(condition)))
+}
+
+/// Which faces of the domain the job names.
+pub(in crate::job) fn named_faces<const D: usize>(boundaries: &file::Boundaries) -> [[bool; 2]; D] {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
+    std::array::from_fn(|a| all[a].map(Option::is_some))
 }
 
 /// Transfer and box policy.

@@ -17,6 +17,8 @@ pub struct Fault {
     pub span: Range<usize>,
     /// More that may help, such as the meaning of the key.
     pub help: Option<String>,
+    /// The setting that the fault is about, as typed, such as `--end 0`; `None` if the file is at fault.
+    pub setting: Option<String>,
 }
 
 /// A job cannot be read.
@@ -30,6 +32,14 @@ pub enum JobError {
         /// Why.
         source: std::io::Error,
     },
+    /// The file is too long to be a job.
+    #[error("{}:1:1: found more than {most} MB; expected a job file of at most {most} MB", path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Most that is read, MB.
+        most: u64,
+    },
     /// Files of the run could not be named after the job.
     #[error("{}: the name of the file is not UTF-8; expected one that is, since results take it over", path.display())]
     Name {
@@ -41,8 +51,8 @@ pub enum JobError {
     Invalid(#[from] FaultList),
 }
 
-/// Faults of a file that are told; the rest are counted.
-const TOLD: usize = 20;
+/// Faults of a file that are shown; the rest are counted.
+const SHOWN: usize = 20;
 /// Faults after which no more are looked for.
 pub(in crate::job) const MOST: usize = 1000;
 /// Longest message, in characters. What it quotes of the file is shorter; only lists of what is possible come near.
@@ -71,19 +81,24 @@ impl FaultList {
         position(&self.text, byte)
     }
 
-    /// `file:line:column: key: message` of one fault, without characters that control a terminal.
+    /// `file:line:column: key: message` of one fault, or with the setting in the place of the file's; without characters that control a terminal.
     pub fn headline(&self, fault: &Fault) -> String {
-        let (line, column) = self.position(fault.span.start);
-        let path = self.path.display().to_string();
+        let path = match &fault.setting {
+            Some(typed) => excerpt(typed, LONGEST_KEY).into_owned(),
+            None => {
+                let (line, column) = self.position(fault.span.start);
+                format!("{}:{line}:{column}", printable(&self.path.display().to_string()))
+            }
+        };
         let key = excerpt(&fault.key, LONGEST_KEY);
         let separator = if key.is_empty() { "" } else { ": " };
         let message = excerpt(&fault.message, LONGEST);
-        format!("{}:{line}:{column}: {key}{separator}{message}", printable(&path))
+        format!("{path}: {key}{separator}{message}")
     }
 
-    /// The faults to tell: the first ones of the file.
-    pub fn told(&self) -> &[Fault] {
-        &self.faults[..self.faults.len().min(TOLD)]
+    /// The faults to show: the first ones of the file.
+    pub fn shown(&self) -> &[Fault] {
+        &self.faults[..self.faults.len().min(SHOWN)]
     }
 
     /// How many there are, if that is worth a line: `3 faults in job.toml`.
@@ -92,8 +107,8 @@ impl FaultList {
         let path = printable(&path);
         match count {
             0 | 1 => None,
-            _ if count > MOST => Some(format!("the first {TOLD} of more than {MOST} faults in {path}")),
-            _ if count > TOLD => Some(format!("the first {TOLD} of {count} faults in {path}")),
+            _ if count > MOST => Some(format!("the first {SHOWN} of more than {MOST} faults in {path}")),
+            _ if count > SHOWN => Some(format!("the first {SHOWN} of {count} faults in {path}")),
             _ => Some(format!("{count} faults in {path}")),
         }
     }
@@ -101,23 +116,23 @@ impl FaultList {
 
 impl fmt::Display for FaultList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, fault) in self.told().iter().enumerate() {
+        for (i, fault) in self.shown().iter().enumerate() {
             if i > 0 {
                 writeln!(f)?;
             }
             f.write_str(&self.headline(fault))?;
         }
         match self.summary() {
-            Some(summary) if self.faults.len() > TOLD => write!(f, "\n{summary}"),
+            Some(summary) if self.faults.len() > SHOWN => write!(f, "\n{summary}"),
             _ => Ok(()),
         }
     }
 }
 
-/// Places in a text that is asked about often.
+/// Places in the text of a file that is asked about often.
 pub(in crate::job) struct Lines<'t> {
-    /// All of it.
-    pub(in crate::job) text: &'t str,
+    /// The text as the user has written it.
+    text: &'t str,
     /// First byte of each line.
     starts: Vec<usize>,
 }

@@ -217,7 +217,7 @@ impl<'s> Checker<'s> {
             let whole = path.key(key.clone()).to_string();
             if let Some((_, why)) = GONE.iter().find(|(gone, _)| *gone == whole) {
                 let (message, span) = (format!("the key `{key}` is gone: {why}"), inner.key_span.clone());
-                self.faults.push(Fault { key: whole, message, span, help: None });
+                self.faults.push(Fault { key: whole, message, span, help: None, setting: None });
                 continue;
             }
             // A key that is missing is what a misspelt one was most likely meant to be.
@@ -241,6 +241,7 @@ impl<'s> Checker<'s> {
                 message,
                 span: inner.key_span.clone(),
                 help: help.and_then(|(_, schema)| schema.get("description")?.as_str().map(str::to_owned)),
+                setting: None,
             });
         }
         for key in missing {
@@ -254,6 +255,7 @@ impl<'s> Checker<'s> {
                 message: format!("missing key `{key}`{meaning}"),
                 span: node.span.clone(),
                 help: None,
+                setting: None,
             });
         }
     }
@@ -264,8 +266,8 @@ impl<'s> Checker<'s> {
         let count = elements.len() as f64;
         if count < least || count > most {
             self.mismatch(node, &type_words("array", layers), layers, path);
-            // One fault says it all if there are far too many.
-            if count > 10.0 * most {
+            // One fault says it all if there are far too many, or many.
+            if count > most && (count > 10.0 * most || most > 1000.0) {
                 return;
             }
         }
@@ -303,7 +305,7 @@ impl<'s> Checker<'s> {
 
     fn fault(&mut self, node: &Node, path: &Path, message: String, layers: &Layers<'s>) {
         let (key, help) = (path.to_string(), layers.description());
-        self.faults.push(Fault { key, message, span: node.span.clone(), help });
+        self.faults.push(Fault { key, message, span: node.span.clone(), help, setting: None });
     }
 }
 
@@ -314,8 +316,12 @@ fn tag_of(option: &Value) -> Option<&str> {
 }
 
 /// A limit as a person would write it.
-fn plain(limit: f64) -> String {
-    if limit.abs() >= 1e7 { format!("{limit:e}") } else { limit.to_string() }
+pub(in crate::job) fn plain(limit: f64) -> String {
+    if limit.abs() >= 1e7 || (limit != 0.0 && limit.abs() < 1e-3) {
+        format!("{limit:e}")
+    } else {
+        limit.to_string()
+    }
 }
 
 /// "a number above 0 and at most 1".

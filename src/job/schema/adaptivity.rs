@@ -1,5 +1,5 @@
 //! Dynamic refinement as it is written in a job file.
-use super::job_file::Vector;
+use super::common::{Vector, yes};
 use super::shape::Shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -87,10 +87,6 @@ impl Default for Merge {
     }
 }
 
-fn yes() -> bool {
-    true
-}
-
 fn default_velocity() -> f64 {
     0.005
 }
@@ -124,11 +120,11 @@ pub enum Criterion {
         shape: Shape,
         /// Distance within which leaves are refined, m.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         distance: f64,
         /// Distance within which fine leaves stay, m; 1.5 times `distance` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
         /// Its motion: linear between rows, at rest before the first and after the last.
         #[serde(default)]
@@ -143,11 +139,11 @@ pub enum Criterion {
         collider: String,
         /// Distance within which leaves are refined, m.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         distance: f64,
         /// Distance within which fine leaves stay, m; 1.5 times `distance` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
     },
     /// At free surfaces: where nodes of a leaf, or next to it, have next to no mass.
@@ -162,11 +158,11 @@ pub enum Criterion {
         #[schemars(range(min = 1, max = 15))]
         level: u8,
         /// Value from which leaves are refined, 1/s.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         refine: f64,
         /// Value from which fine leaves stay, 1/s; half of `refine` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
     },
     /// Where a particle has plastic strain.
@@ -175,11 +171,11 @@ pub enum Criterion {
         #[schemars(range(min = 1, max = 15))]
         level: u8,
         /// Value from which leaves are refined.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         refine: f64,
         /// Value from which fine leaves stay; half of `refine` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
     },
     /// Where the material flows plastically: the mean rate of plastic strain over the leaf's particles.
@@ -188,11 +184,11 @@ pub enum Criterion {
         #[schemars(range(min = 1, max = 15))]
         level: u8,
         /// Value from which leaves are refined, 1/s.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         refine: f64,
         /// Value from which fine leaves stay, 1/s; half of `refine` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
     },
     /// Where a particle's box is stretched.
@@ -201,11 +197,11 @@ pub enum Criterion {
         #[schemars(range(min = 1, max = 15))]
         level: u8,
         /// Width over undeformed width from which leaves are refined.
-        #[schemars(extend("exclusiveMinimum" = 1.0))]
+        #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 1.0))]
         refine: f64,
         /// Value from which fine leaves stay; half way from 1 to `refine` by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         coarsen: Option<f64>,
     },
     /// Where there is a material.
@@ -223,6 +219,7 @@ pub enum Criterion {
 #[serde(deny_unknown_fields)]
 pub struct Way {
     /// Time, s.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub time: f64,
     /// Way from its place in the job, m.
     pub translation: Vector,

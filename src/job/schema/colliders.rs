@@ -1,5 +1,5 @@
 //! Colliders as they are written in a job file.
-use super::job_file::{AxisName, Spin, Vector};
+use super::common::{AxisName, Spin, Vector, velocity};
 use super::shape::Shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -53,6 +53,7 @@ pub enum Motion {
     Steady {
         /// Velocity of the reference point, m/s; 0 by default.
         #[serde(default)]
+        #[schemars(transform = velocity)]
         velocity: Option<Vector>,
         /// Angular velocity about the reference point, rad/s: three components in 3D, one number in 2D.
         #[serde(default)]
@@ -66,16 +67,18 @@ pub enum Motion {
         #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
         /// Rows with increasing times; at least two.
+        #[schemars(length(max = 100_000))]
         rows: Vec<Row>,
     },
     /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
     /// touches within a cell of its surface. It does not feel the faces of the domain nor other colliders.
     Free {
         /// Mass, kg; in 2D of one metre of thickness.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e24), extend("exclusiveMinimum" = 0.0))]
         mass: f64,
         /// Velocity at the start, m/s; 0 by default.
         #[serde(default)]
+        #[schemars(transform = velocity)]
         velocity: Option<Vector>,
         /// Axes along which it may move; all by default.
         #[serde(default)]
@@ -83,7 +86,7 @@ pub enum Motion {
         /// Moment of inertia about the axis through the reference point, kg m²; in 2D of one metre of thickness. It
         /// does not turn by default.
         #[serde(default)]
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e30), extend("exclusiveMinimum" = 0.0))]
         inertia: Option<f64>,
         /// Axis about which it turns, fixed, any length; 3D only, z by default.
         #[serde(default)]
@@ -91,6 +94,7 @@ pub enum Motion {
         axis: Option<Vector>,
         /// Angular velocity about the axis at the start, rad/s; 0 by default.
         #[serde(default)]
+        #[schemars(range(min = -1e8, max = 1e8))]
         angular_velocity: f64,
     },
 }
@@ -100,11 +104,13 @@ pub enum Motion {
 #[serde(deny_unknown_fields)]
 pub struct Row {
     /// Time, s.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub time: f64,
     /// Way of the reference point from its place in the job, m; 0 by default.
     #[serde(default)]
     pub translation: Option<Vector>,
     /// Angle from the place in the job, degrees, counter-clockwise seen against the axis; may exceed a turn.
     #[serde(default)]
+    #[schemars(range(min = -1e9, max = 1e9))]
     pub rotation: f64,
 }

@@ -3,6 +3,8 @@
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
 pub use super::colliders::Collider;
+pub use super::common::{AxisName, Spin, Vector};
+use super::common::{velocity, yes};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 use super::shape::Shape;
@@ -44,8 +46,10 @@ pub struct JobFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptivity: Option<Adaptivity>,
     /// Materials.
+    #[schemars(length(max = 65_535))]
     pub materials: Vec<Material>,
     /// Bodies.
+    #[schemars(length(max = 65_535))]
     pub bodies: Vec<Body>,
     /// Loads, in the order in which they act.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -75,17 +79,6 @@ pub struct JobFile {
     pub report: Option<Report>,
 }
 
-/// Components along x, y (and z in 3D): as many as the job has dimensions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(transparent)]
-#[schemars(inline, transform = two_or_three)]
-pub struct Vector(pub Vec<f64>);
-
-fn two_or_three(schema: &mut schemars::Schema) {
-    schema.insert("minItems".into(), 2.into());
-    schema.insert("maxItems".into(), 3.into());
-}
-
 /// The box in which everything happens: a brick of cubic root octants.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -97,7 +90,7 @@ pub struct Domain {
     pub size: Vector,
     /// Edge of a root octant (level 0), m. A leaf of level L has the edge `root_edge / 2^L` and 4 cells
     /// along it.
-    #[schemars(range(max = 1e7), extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-9, max = 1e7))]
     pub root_edge: f64,
 }
 
@@ -184,10 +177,6 @@ impl Default for Tree {
     }
 }
 
-pub(super) fn yes() -> bool {
-    true
-}
-
 /// A region of deeper level: every leaf that meets it is split until it has that level.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -205,7 +194,7 @@ pub struct Material {
     /// Name, by which bodies refer to it.
     pub name: String,
     /// Density of the undeformed material, kg/m³.
-    #[schemars(range(max = 1e5), extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-6, max = 1e5))]
     pub density: f64,
     /// Constitutive model and its parameters.
     #[serde(flatten)]
@@ -228,6 +217,7 @@ pub struct Body {
     pub particles_per_cell: f64,
     /// Velocity, m/s; at rest by default.
     #[serde(default)]
+    #[schemars(transform = velocity)]
     pub velocity: Option<Vector>,
     /// Angular velocity about the centre of the body's bounding box, rad/s: three components in 3D, one
     /// number in 2D (about z, counter-clockwise).
@@ -239,30 +229,20 @@ fn two() -> f64 {
     2.0
 }
 
-/// An angular velocity.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Spin {
-    /// About z, in 2D, rad/s.
-    Plane(f64),
-    /// Components about x, y and z, in 3D, rad/s.
-    Space([f64; 3]),
-}
-
 /// End of the run and time step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// End of the run, s. It ends with the first step that reaches this time.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub end: f64,
     /// Courant number: the part of a cell that the fastest wave may cross in one step.
     #[serde(default = "default_cfl")]
-    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-3, max = 1.0))]
     pub cfl: f64,
     /// Longest time step, s; unlimited by default.
     #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-15, max = 1e12))]
     pub dt_max: Option<f64>,
     /// Most that a time step may exceed the one before it, as a factor.
     #[serde(default = "default_growth")]
@@ -299,6 +279,7 @@ pub struct Numerics {
     pub boxes: Boxes,
     /// Bounds of half width over undeformed half width for `boxes = "volume"`; [0.25, 2] by default.
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 8.0)))]
     pub box_stretch: Option<[f64; 2]>,
 }
 
@@ -328,17 +309,4 @@ pub enum Boxes {
     Fixed,
     /// One cell of the particle's own level.
     Cell,
-}
-
-/// Name of a coordinate axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum AxisName {
-    /// First axis.
-    X,
-    /// Second axis.
-    Y,
-    /// Third axis; 3D only.
-    #[schemars(extend("x-dimension" = 3))]
-    Z,
 }

@@ -37,6 +37,33 @@ mod tests {
         assert!(missing.is_empty(), "{missing:?}");
     }
 
+    /// Every number of the file has a lower and an upper limit, so that none is finite and yet impossible.
+    #[test]
+    fn numbers_have_limits() {
+        fn walk(value: &Value, path: &str, missing: &mut Vec<String>) {
+            let is_number = |kind: &Value| kind == "number" || kind == "integer";
+            let kinds = match &value["type"] {
+                Value::Array(kinds) => kinds.iter().any(is_number),
+                kind => is_number(kind),
+            };
+            let has = |words: [&str; 2]| words.iter().any(|word| value.get(word).is_some());
+            let lower = has(["minimum", "exclusiveMinimum"]);
+            if kinds && !(lower && has(["maximum", "exclusiveMaximum"])) {
+                missing.push(path.to_owned());
+            }
+            match value {
+                Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), missing)),
+                Value::Array(list) => {
+                    list.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), missing));
+                }
+                _ => {}
+            }
+        }
+        let mut missing = Vec::new();
+        walk(&schema(), "", &mut missing);
+        assert!(missing.is_empty(), "{missing:#?}");
+    }
+
     /// Every number among the parameters of a model has a range.
     #[test]
     fn models_have_limits() {

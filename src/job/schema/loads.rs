@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 #[serde(untagged)]
 pub enum Quantity {
     /// The same everywhere and always.
-    Number(f64),
+    Number(#[schemars(range(min = -1e12, max = 1e12))] f64),
     /// An expression in x, y, z (m) and t (s) with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
     /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, floor, ceil, min, max.
     Expression(String),
     /// Rows [time (s), value] with increasing times.
-    Table(Vec<[f64; 2]>),
+    Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
 }
 
 /// A load: what acts on the material beside gravity, contact and the faces of the domain. It acts on nodes inside its shape.
@@ -28,9 +28,11 @@ pub struct Load {
     pub shape: Option<Shape>,
     /// Time from which it acts, s; 0 by default.
     #[serde(default)]
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub from: f64,
     /// Time until which it acts, s; to the end by default.
     #[serde(default)]
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub until: Option<f64>,
     /// What it does.
     #[serde(flatten)]

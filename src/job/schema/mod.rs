@@ -4,10 +4,12 @@
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
 //! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`shape`] | tables of a part of the file |
+//! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
 pub mod adaptivity;
 pub mod colliders;
+pub mod common;
 pub mod job_file;
 pub(super) mod json;
 pub mod loads;

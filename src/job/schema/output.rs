@@ -1,5 +1,5 @@
 //! What a job writes, as its file has it: outputs, checkpoints, history, telemetry, report.
-use super::job_file::{AxisName, Vector, yes};
+use super::common::{AxisName, Vector, yes};
 use crate::job::problem::{CollapseLaw, Field};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ pub struct Output {
     pub directory: Option<String>,
     /// Simulated time between output files, s; only start and end by default.
     #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every: Option<f64>,
     /// Particle fields.
     #[serde(default = "default_fields")]
@@ -48,22 +48,22 @@ fn default_fields() -> Vec<Field> {
     vec![Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain]
 }
 
-/// Checkpoints. With no interval, one is written only when the run is told to stop, and when it ends if the
+/// Checkpoints. With no interval, one is written only when the run is asked to stop, and when it ends if the
 /// output files carry no state.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
     /// Steps between checkpoints.
     #[serde(default)]
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: Option<u64>,
     /// Simulated time between checkpoints, s.
     #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every_time: Option<f64>,
     /// Wall time between checkpoints, minutes.
     #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(max = 1e7), extend("exclusiveMinimum" = 0.0))]
     pub every_wall_minutes: Option<f64>,
     /// Checkpoints kept; older ones are deleted when a newer one is complete.
     #[serde(default = "default_keep")]
@@ -86,7 +86,7 @@ fn default_keep() -> u32 {
 #[serde(deny_unknown_fields)]
 pub struct History {
     /// Steps between rows; 10 by default.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: u64,
 }
 
@@ -101,7 +101,7 @@ impl Default for History {
 #[serde(deny_unknown_fields)]
 pub struct Telemetry {
     /// Steps between lines; 100 by default.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: u64,
 }
 
@@ -123,10 +123,10 @@ pub enum Report {
         #[serde(default)]
         up: Option<AxisName>,
         /// Initial radius (axisymmetric) or half width (planar), m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         radius: f64,
         /// Initial height, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         height: f64,
         /// Which laws to compare with.
         law: CollapseLaw,

@@ -3,6 +3,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value};
 
+use crate::job::parse::structure::plain;
+
 /// Every table and key with its range, default and meaning.
 pub fn reference() -> String {
     let schema = super::json::schema();
@@ -11,7 +13,7 @@ pub fn reference() -> String {
     let mut out = String::from(
         "# Job file\n\n\
          Made by `agimp schema --markdown`; do not edit. All quantities are in SI units. `agimp new` writes commented\n\
-         examples, `agimp check` tells what a job will take.\n\n\
+         examples, `agimp check` says what a job will take.\n\n\
          ## The file\n\n",
     );
     keys(&mut out, &schema);
@@ -95,7 +97,9 @@ fn value(property: &Value) -> String {
         "boolean" => "`true` or `false`".to_owned(),
         "string" => "text".to_owned(),
         kind => {
-            let bound = |key: &str, sign: &str| property[key].as_f64().map(|limit| format!("{sign} {limit}"));
+            let bound = |key: &str, sign: &str| {
+                property[key].as_f64().map(|limit| format!("{sign} {}", plain(limit)))
+            };
             let limits =
                 [("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<")];
             let limits: Vec<String> = limits.iter().filter_map(|(key, sign)| bound(key, sign)).collect();

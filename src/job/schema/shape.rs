@@ -1,5 +1,5 @@
 //! Shapes as they are written in a job file.
-use super::job_file::Vector;
+use super::common::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ pub enum Shape {
         /// Centre, m.
         centre: Vector,
         /// Radius, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         radius: f64,
     },
     /// A ball; 3D only.
@@ -29,7 +29,7 @@ pub enum Shape {
         /// Centre, m.
         centre: Vector,
         /// Radius, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         radius: f64,
     },
     /// A circular cylinder; 3D only.
@@ -41,10 +41,10 @@ pub enum Shape {
         #[serde(default)]
         axis: Option<Vector>,
         /// Distance between the ends, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         height: f64,
         /// Radius, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         radius: f64,
     },
     /// A circular cone, possibly truncated; 3D only.
@@ -56,14 +56,14 @@ pub enum Shape {
         #[serde(default)]
         axis: Option<Vector>,
         /// Distance from the base to the tip or to the truncated end, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         height: f64,
         /// Radius of the base, m.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         radius: f64,
         /// Radius of the other end, m; 0, a pointed cone, by default.
         #[serde(default)]
-        #[schemars(range(min = 0.0))]
+        #[schemars(range(min = 0.0, max = 1e12))]
         top_radius: f64,
     },
     /// Everything on one side of a plane.

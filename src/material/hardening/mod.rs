@@ -88,7 +88,7 @@ pub enum HardeningLaw {
     Table {
         /// Pairs of plastic strain and strength (Pa), strains above 0 and increasing. The first point is strain 0 with the
         /// strength of the undeformed material, and is not listed.
-        #[schemars(extend("minItems" = 1, "maxItems" = 64))]
+        #[schemars(extend("minItems" = 1, "maxItems" = 64), inner(inner(range(min = 0.0, max = 1e13))))]
         points: Vec<[f64; 2]>,
     },
     /// Strength falls linearly to a residual: `Y = Y₀ - (Y₀ - Y_r) κ/κ_r`, at least `Y_r`.

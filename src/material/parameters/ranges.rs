@@ -1,14 +1,17 @@
 //! Ranges of parameters, as the schema of the job file states them.
+use std::sync::LazyLock;
+
 use serde_json::Value;
 
 use super::{OutOfRange, Parameters};
 
 /// The first parameter that is outside the range that its type states.
 pub fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
-    let schema = schemars::schema_for!(Parameters).to_value();
+    // Made once: a job may have thousands of materials.
+    static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Parameters).to_value());
     // What is not finite has no form in JSON, and comes as null.
     let value = serde_json::to_value(parameters).unwrap_or_default();
-    Ranges { root: &schema }.look(&schema, &value, "")
+    Ranges { root: &SCHEMA }.look(&SCHEMA, &value, "")
 }
 
 struct Ranges<'a> {
@@ -102,5 +105,9 @@ fn within(schema: &Value, value: &Value, key: &str) -> Result<(), OutOfRange> {
 
 /// A limit as a person would write it.
 fn plain(limit: f64) -> String {
-    if limit.abs() >= 1e7 { format!("{limit:e}") } else { limit.to_string() }
+    if limit.abs() >= 1e7 || (limit != 0.0 && limit.abs() < 1e-3) {
+        format!("{limit:e}")
+    } else {
+        limit.to_string()
+    }
 }

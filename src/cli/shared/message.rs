@@ -1,31 +1,32 @@
-//! How failures are told: once, whatever the number of ranks.
+//! How failures and warnings are reported: once, whatever the number of ranks.
 use std::io::{IsTerminal as _, Write as _};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, Report};
 use partition::comm::{Comm, World, is_launched};
 
-use super::Failure;
 use super::quote::Quote;
+use crate::cli::Failure;
+use crate::io::progress::warn;
 use crate::job::{FaultList, JobError};
-use crate::text::printable;
+use crate::text::{excerpt, printable};
 
 impl Failure {
-    /// Tells the user, unless that is done.
-    pub fn tell(&self) {
+    /// Reports the failure on standard error, unless that is done.
+    pub fn report(&self) {
         match self {
             Self::Job(JobError::Invalid(list)) => explain_faults(list),
-            Self::Told(_) => {}
-            // If nobody listens, nobody is told.
+            Self::Reported(_) => {}
+            // If nobody listens, there is nobody to report to.
             Self::Arguments(error) => drop(error.print()),
-            other => tell(&format!("agimp: {}", visible(&other.to_string()))),
+            other => print(&format!("agimp: {}", visible(&other.to_string()))),
         }
     }
 }
 
-/// Collective. A failure of one rank or of all ends all: the lowest of those that failed tells why, and every
-/// rank gets its exit code. None goes on before that is told: as soon as one rank has ended without success,
+/// Collective. A failure of one rank or of all ends all: the lowest of those that failed says why, and every
+/// rank gets its exit code. None goes on before that is said: as soon as one rank has ended without success,
 /// `mpirun` ends the others, whatever these still have to say.
-pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
+pub(in crate::cli) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
     let ranks = comm.size() as u64;
     let mut lowest = [if result.is_err() { comm.rank() as u64 } else { ranks }];
     comm.min_u64(&mut lowest);
@@ -33,27 +34,27 @@ pub(super) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, 
     match &result {
         Ok(_) if lowest[0] == ranks => return result,
         Err(failure) if lowest[0] == comm.rank() as u64 => {
-            failure.tell();
+            failure.report();
             code = [u64::from(failure.exit_code())];
         }
         _ => {}
     }
     comm.min_u64(&mut code);
-    Err(Failure::Told(code[0] as u8))
+    Err(Failure::Reported(code[0] as u8))
 }
 
 /// Collective under `mpirun`: its ranks. A process that it has not started is alone, and need not be able to start MPI.
-pub(super) fn launched() -> Result<Option<World>, Failure> {
+pub(in crate::cli) fn launched() -> Result<Option<World>, Failure> {
     is_launched().then(World::init).transpose().map_err(|error| Failure::Run(error.to_string()))
 }
 
 /// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the parser
-/// refuses, told once.
+/// refuses, reported once.
 pub fn unusable(error: clap::Error) -> Failure {
     let Ok(Some(world)) = launched() else { return error.into() };
     match together(world.comm(), Err::<(), _>(error.into())) {
-        Ok(()) => Failure::Told(0),
-        Err(told) => told,
+        Ok(()) => Failure::Reported(0),
+        Err(reported) => reported,
     }
 }
 
@@ -62,17 +63,39 @@ fn visible(message: &str) -> String {
     message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
-/// Writes a message in one piece: `mpirun` may put its own words between pieces. If nobody listens, nobody is told.
-fn tell(text: &str) {
+/// Writes a message in one piece: `mpirun` may put its own words between pieces. That nobody listens is no failure.
+fn print(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
+
+/// Warnings that are shown; the rest are counted.
+const MOST_WARNINGS: usize = 20;
+
+/// Writes warnings about a job.
+pub(in crate::cli) fn warn_of(warnings: &[String]) {
+    for text in warnings.iter().take(MOST_WARNINGS) {
+        warn(&excerpt(text, LONGEST_WARNING));
+    }
+    if warnings.len() > MOST_WARNINGS {
+        warn(&format!("and {} more", warnings.len() - MOST_WARNINGS));
+    }
+}
+
+/// Longest warning, in characters.
+const LONGEST_WARNING: usize = 500;
 
 /// Each fault on a line of its own that editors and scripts understand, then its place in the file.
 fn explain_faults(list: &FaultList) {
     let theme =
         if std::io::stderr().is_terminal() { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
     let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
-    for fault in list.told() {
+    for fault in list.shown() {
+        if fault.setting.is_some() {
+            // Its place is the command line.
+            print(&list.headline(fault));
+            fault.help.iter().for_each(|help| print(&format!("  help: {help}")));
+            continue;
+        }
         let source = Quote::of(list, fault);
         let mut diagnostic = MietteDiagnostic::new(list.headline(fault))
             .with_label(LabeledSpan::at(source.label.clone(), "here"));
@@ -83,11 +106,11 @@ fn explain_faults(list: &FaultList) {
         let mut text = String::new();
         match handler.render_report(&mut text, report.as_ref()) {
             // Without colours the line begins with the file, as editors and scripts like it.
-            Ok(()) => tell(text.strip_prefix("  x ").unwrap_or(&text)),
-            Err(_) => tell(&list.headline(fault)),
+            Ok(()) => print(text.strip_prefix("  x ").unwrap_or(&text)),
+            Err(_) => print(&list.headline(fault)),
         }
     }
     if let Some(summary) = list.summary() {
-        tell(&format!("agimp: {summary}"));
+        print(&format!("agimp: {summary}"));
     }
 }

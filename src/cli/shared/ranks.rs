@@ -9,13 +9,13 @@ use std::path::Path;
 
 use partition::comm::Comm;
 
-use super::Failure;
 use super::message::together;
-use crate::job::{self, AnyProblem};
+use crate::cli::Failure;
+use crate::job::{self, AnyProblem, Settings};
 
 /// Collective. Refuses ranks whose command differs from that of rank 0. `words` are the words of the command that decide
 /// what it does.
-pub(super) fn same_command(comm: &Comm, words: &[&OsStr]) -> Result<(), Failure> {
+pub(in crate::cli) fn same_command(comm: &Comm, words: &[&OsStr]) -> Result<(), Failure> {
     // Ranks whose command line cannot be used at all say so here.
     together(comm, Ok(()))?;
     let own = words.join(OsStr::new(" "));
@@ -33,10 +33,10 @@ fn differs(rank: usize, own: &OsStr, first: &[u8]) -> Failure {
     ))
 }
 
-/// Collective. The job as rank 0 reads it, on all ranks.
-pub(super) fn load(comm: &Comm, path: &Path) -> Result<AnyProblem, Failure> {
+/// Collective. The job as rank 0 reads it, on all ranks, with the settings that all ranks have.
+pub(in crate::cli) fn load(comm: &Comm, path: &Path, settings: &Settings) -> Result<AnyProblem, Failure> {
     let read = if comm.rank() == 0 { job::read(path) } else { Ok(Vec::new()) };
     let mut bytes = together(comm, read.map_err(Failure::from))?;
     comm.broadcast_bytes(0, &mut bytes);
-    together(comm, job::from_bytes(bytes, path).map_err(Failure::from))
+    together(comm, job::from_bytes(bytes, path, settings).map_err(Failure::from))
 }

@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     fn quote(text: &str, span: Range<usize>) -> Quote {
-        let fault = Fault { key: String::new(), message: "wrong".into(), span, help: None };
+        let fault = Fault { key: String::new(), message: "wrong".into(), span, help: None, setting: None };
         let list = FaultList { path: "job.toml".into(), text: text.into(), faults: vec![fault.clone()] };
         Quote::of(&list, &fault)
     }

@@ -1,0 +1,14 @@
+//! What several subcommands need.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `message` | failures in words, once whatever the number of ranks |
+//! | `quote` | the lines of a job around a fault |
+//! | `settings` | `--set`, `--out` and `--end` |
+//! | `summary` | the size and the cost of a job |
+//! | `ranks` | one command and one job on all ranks |
+pub(super) mod message;
+mod quote;
+pub(super) mod ranks;
+pub(super) mod settings;
+pub(super) mod summary;

@@ -1,0 +1,191 @@
+//! The size and the cost of a job in words.
+use std::io::Write;
+
+use crate::adaptivity::{Adaptivity, Criterion, Kind};
+use crate::boundary::motion::Motion;
+use crate::job::Problem;
+use crate::load::{Kind as LoadKind, Load};
+use crate::quantity::Quantity;
+use crate::setup::estimate::Estimate;
+use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time};
+
+/// Longest name that is printed, in characters.
+const NAME: usize = 60;
+/// Bodies that are listed.
+const MOST_BODIES: usize = 100;
+
+/// Writes what a job will take on some ranks; `is_refined` says whether the counts are of the tree that its criteria make.
+pub(in crate::cli) fn write<const D: usize>(
+    out: &mut impl Write,
+    ranks: u32,
+    problem: &Problem<D>,
+    estimate: &Estimate,
+    is_refined: bool,
+) -> std::io::Result<()> {
+    if !problem.title.is_empty() {
+        writeln!(out, "{}", excerpt(&problem.title, 200))?;
+    }
+    let size: Vec<String> = problem.size().iter().map(|edge| number(*edge, 7)).collect();
+    let roots: Vec<String> = problem.brick.roots.iter().map(u32::to_string).collect();
+    writeln!(out, "domain       {} m, {} root octants", size.join(" x "), roots.join(" x "))?;
+    let least = if estimate.is_cut { "at least " } else { "" };
+    writeln!(out, "particles    {least}{}", grouped(estimate.total_particles()))?;
+    for (body, count) in problem.bodies.iter().zip(&estimate.particles).take(MOST_BODIES) {
+        writeln!(
+            out,
+            "  {:18} {:>14}  {}",
+            excerpt(&body.name, NAME),
+            grouped(*count),
+            excerpt(&problem.materials[body.material].name, NAME)
+        )?;
+    }
+    if problem.bodies.len() > MOST_BODIES {
+        writeln!(out, "  and {} more bodies", grouped((problem.bodies.len() - MOST_BODIES) as u64))?;
+    }
+    if !problem.colliders.is_empty() {
+        writeln!(out, "colliders    {}", problem.colliders.len())?;
+        for collider in &problem.colliders {
+            writeln!(out, "  {:18} {}", excerpt(&collider.name, NAME), collider)?;
+        }
+    }
+    if !problem.loads.is_empty() {
+        writeln!(out, "loads        {}", problem.loads.len())?;
+        for load in &problem.loads {
+            writeln!(out, "  {:18} {}", excerpt(&load.name, NAME), load_in_words(load))?;
+        }
+    }
+    writeln!(out, "leaves       {least}{}", grouped(estimate.total_leaves()))?;
+    writeln!(out, "  level      cell edge         leaves         filled          cells      particles")?;
+    let cells_per_leaf = 4_u64.pow(D as u32);
+    for (level, count) in estimate.levels.iter().enumerate().filter(|(_, count)| count.leaves > 0) {
+        writeln!(
+            out,
+            "  {level:5}   {:>12} {:>14} {:>14} {:>14} {:>14}",
+            quantity(problem.cell_edge(level as u8), "m"),
+            grouped(count.leaves),
+            grouped(count.filled),
+            grouped(count.leaves * cells_per_leaf),
+            grouped(count.particles)
+        )?;
+    }
+    if estimate.is_cut {
+        writeln!(
+            out,
+            "  Not counted to the end: the tree or the surfaces of bodies are too large. There is more than this."
+        )?;
+    }
+    if let Some(adaptivity) = &problem.adaptivity {
+        write_refinement(out, problem, adaptivity, is_refined)?;
+    }
+    let about = if estimate.is_cut { "more than" } else { "about" };
+    writeln!(
+        out,
+        "memory       {about} {} per rank on {} at the start; outputs and material that spreads add to it",
+        bytes(estimate.memory_per_rank(ranks)),
+        plural(ranks)
+    )?;
+    writeln!(out, "time step    about {}", quantity(estimate.time_step, "s"))?;
+    let (steps, end) = (number(estimate.steps, 4), quantity(problem.time.end, "s"));
+    writeln!(out, "steps        about {steps} to {end}")?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
+    writeln!(
+        out,
+        "wall time    {about} {} on {} of this machine's kind, while the counts and the step stay",
+        wall_time(estimate.wall_time(cores)),
+        if cores == 1 { "1 core".into() } else { format!("{cores} cores") }
+    )?;
+    writeln!(
+        out,
+        "outputs      {} of {about} {} each",
+        grouped(estimate.outputs),
+        bytes(estimate.output_bytes)
+    )?;
+    writeln!(
+        out,
+        "checkpoints  {about} {} each, the last {} kept",
+        bytes(estimate.checkpoint_bytes),
+        problem.checkpoint.keep
+    )?;
+    Ok(())
+}
+
+/// Criteria in words, and what they mean for the numbers above and below.
+fn write_refinement<const D: usize>(
+    out: &mut impl Write,
+    problem: &Problem<D>,
+    adaptivity: &Adaptivity<D>,
+    is_refined: bool,
+) -> std::io::Result<()> {
+    let merging = if adaptivity.merge.is_some() { "split and merge" } else { "split" };
+    writeln!(
+        out,
+        "refinement   every {} steps, {} leaves around what is wanted, particles {merging}",
+        adaptivity.every, adaptivity.buffer
+    )?;
+    for criterion in &adaptivity.criteria {
+        writeln!(out, "  level {:5}        {}", criterion.level, words(problem, criterion))?;
+    }
+    writeln!(
+        out,
+        "  Counts and memory are those {}; time step and steps are for the finest level",
+        if is_refined { "at the start, with the criteria" } else { "of the job's tree, before the criteria" }
+    )?;
+    writeln!(out, "  that criteria want.")
+}
+
+/// A criterion in words.
+fn words<const D: usize>(problem: &Problem<D>, criterion: &Criterion<D>) -> String {
+    let (refine, coarsen) = (criterion.refine, criterion.coarsen);
+    let amount = |value: f64, unit: &str| quantity(value, unit);
+    let near = |what: &str| {
+        format!("within {} of {what}, until {} from it", amount(refine, "m"), amount(coarsen, "m"))
+    };
+    let above = |what: &str, unit: &str| {
+        format!("{what} from {} on, until below {}", amount(refine, unit), amount(coarsen, unit))
+    };
+    match &criterion.kind {
+        Kind::Region { motion: Motion::Fixed, .. } => near("a region"),
+        Kind::Region { .. } => near("a region that moves"),
+        Kind::Collider(index) => near(&format!("collider {}", problem.colliders[*index].name)),
+        Kind::FreeSurface => "at free surfaces".into(),
+        Kind::VelocityGradient => above("velocity gradient", "1/s"),
+        Kind::PlasticStrain => above("plastic strain", ""),
+        Kind::PlasticStrainRate => above("plastic strain rate", "1/s"),
+        Kind::Stretch => above("stretch of particles", ""),
+        Kind::Material(index) => {
+            format!("where there is {}", excerpt(&problem.materials[usize::from(*index)].name, NAME))
+        }
+    }
+}
+
+fn plural(ranks: u32) -> String {
+    if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
+}
+
+/// What a load does, and where and when.
+fn load_in_words<const D: usize>(load: &Load<D>) -> String {
+    let value = |quantity: &Quantity, unit: &str| match quantity {
+        Quantity::Constant(value) => self::quantity(*value, unit),
+        Quantity::Expression(_) => format!("an expression in {unit}"),
+        Quantity::Table(_) => format!("a table in {unit}"),
+    };
+    let axes = ["x", "y", "z"];
+    let what = match &load.kind {
+        LoadKind::BodyForce(components) => {
+            let components: Vec<String> = components.iter().map(|c| value(c, "m/s²")).collect();
+            format!("body force ({})", components.join(", "))
+        }
+        LoadKind::Velocity(components) => {
+            let given = components.iter().zip(axes).filter_map(|(c, axis)| Some((c.as_ref()?, axis)));
+            let given: Vec<String> = given.map(|(c, axis)| format!("{axis}: {}", value(c, "m/s"))).collect();
+            format!("velocity {}", given.join(", "))
+        }
+        LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),
+    };
+    let place = if load.region.is_some() { "in a region" } else { "everywhere" };
+    match (load.from > 0.0, load.until.is_finite()) {
+        (false, false) => format!("{what}, {place}, always"),
+        (_, false) => format!("{what}, {place}, from {} on", quantity(load.from, "s")),
+        _ => format!("{what}, {place}, from {} to {}", quantity(load.from, "s"), quantity(load.until, "s")),
+    }
+}

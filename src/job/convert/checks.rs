@@ -1,0 +1,68 @@
+//! What all conversions need: faults with their places, and the domain.
+use crate::job::parse::error::{Fault, MOST, QUOTED};
+use crate::job::parse::source::{Node, Path};
+use crate::job::schema::common::Vector;
+use crate::text::{excerpt, number};
+
+/// Collects faults; knows where the keys of the file stand.
+pub(in crate::job) struct Checks<'t> {
+    /// The file with the places of its values.
+    pub tree: &'t Node,
+    /// Text of the job.
+    pub text: &'t str,
+    /// Line and column, both from 1, of a byte of the text.
+    pub position: &'t dyn Fn(usize) -> (usize, usize),
+    /// What is wrong so far.
+    pub faults: Vec<Fault>,
+}
+
+impl Checks<'_> {
+    /// Whether there are so many faults that it is no use to look for more.
+    pub fn is_full(&self) -> bool {
+        self.faults.len() > MOST
+    }
+
+    /// Notes a fault of the value at `path`.
+    pub fn fault(&mut self, path: &Path, message: String) {
+        if self.is_full() {
+            return;
+        }
+        let span = self.tree.locate(path);
+        self.faults.push(Fault { key: path.to_string(), message, span, help: None, setting: None });
+    }
+
+    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
+    pub fn column_name<'a>(&mut self, name: &str, mut before: impl Iterator<Item = &'a str>, path: &Path) {
+        let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(allowed) {
+            let name = excerpt(name, QUOTED);
+            self.fault(path, format!("found \"{name}\"; expected letters, digits, \"_\" and \"-\" only"));
+        } else if before.any(|other| other == name) {
+            let name = excerpt(name, QUOTED);
+            self.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
+        }
+    }
+
+    /// The components of a vector of the job's dimension.
+    pub fn vector<const D: usize>(&mut self, vector: &Vector, path: &Path) -> Option<[f64; D]> {
+        let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();
+        if array.is_none() {
+            self.fault(path, format!("found {} components; expected {D} in a {D}D job", vector.0.len()));
+        }
+        array
+    }
+}
+
+/// The domain in the file's coordinates, for conversions and messages.
+pub(in crate::job) struct Space<const D: usize> {
+    pub origin: [f64; D],
+    pub size: [f64; D],
+}
+
+impl<const D: usize> Space<D> {
+    /// A point in the file's coordinates, in words.
+    pub fn words(&self, x: &[f64; D]) -> String {
+        let components: Vec<String> = (0..D).map(|a| number(x[a] + self.origin[a], 7)).collect();
+        format!("[{}]", components.join(", "))
+    }
+}

@@ -1,0 +1,266 @@
+//! What a job will cost, found without running it.
+use self::count::Tally;
+use super::seed::SeedError;
+use crate::grid::mask::{offset, offset_count};
+use crate::job::problem::{Field, Problem};
+use crate::material;
+use crate::particle::Layout;
+use crate::setup::Size;
+use bytemuck::{Pod, Zeroable};
+use partition::Octant;
+use rustc_hash::FxHashSet;
+use std::path::PathBuf;
+
+mod count;
+
+/// The size and the cost of a job cannot be estimated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EstimateError {
+    /// A particle cannot be made.
+    #[error(transparent)]
+    Seed(#[from] SeedError),
+    /// The steps cannot be counted.
+    #[error(
+        "{}:1:1: time: found a first time step of {time_step:e} s and an end of {end:e} s; expected steps that can be counted: \
+         look at root_edge, young, density, velocities and cfl",
+        path.display()
+    )]
+    Steps {
+        /// The job file.
+        path: PathBuf,
+        /// First time step, s.
+        time_step: f64,
+        /// End of the run, s.
+        end: f64,
+    },
+}
+
+/// Size and cost of a job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Particles of each body, in the order of the job; on the tree that the job gives, unless that of
+    /// [`Estimate::for_tree`] is another, since criteria of dynamic refinement need the particles themselves.
+    pub particles: Vec<u64>,
+    /// Leaves of that tree by level, from level 0 to the finest one.
+    pub levels: Vec<LevelCount>,
+    /// Whether there are more particles and leaves than that: the tree is too large to be counted to the end.
+    pub is_cut: bool,
+    /// First time step, s; with dynamic refinement for leaves of the finest level that a criterion wants.
+    pub time_step: f64,
+    /// Steps to the end if the first time step were kept.
+    pub steps: f64,
+    /// Particles that one core advances by a step in a second; roughly.
+    pub particle_steps_per_second: f64,
+    /// Bytes of memory of all ranks together, without the program itself; about.
+    pub memory: f64,
+    /// Bytes of one output file with its tree; about.
+    pub output_bytes: f64,
+    /// Number of outputs, the first and the last one included.
+    pub outputs: u64,
+    /// Bytes of one checkpoint; about.
+    pub checkpoint_bytes: f64,
+}
+
+/// Particles that one core advances by a step in a second, in 2D and in 3D: two thirds of what docs/performance.md has, for
+/// machines that are slower and cores that share their memory.
+const PARTICLE_STEPS_PER_SECOND: [f64; 2] = [12e6, 5.5e6];
+
+/// Bytes that each rank takes with next to no particles: the program itself and its libraries.
+const PROGRAM: f64 = 37e6;
+
+/// Leaves of one level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LevelCount {
+    /// All leaves.
+    pub leaves: u64,
+    /// Leaves with particles.
+    pub filled: u64,
+    /// Those of them that touch a leaf of another level.
+    pub filled_jumps: u64,
+    /// Particles.
+    pub particles: u64,
+}
+
+impl LevelCount {
+    /// Not collective. Counts of some leaves by level up to the finest one, given the particles of each.
+    pub fn of_levels<const D: usize>(
+        problem: &Problem<D>,
+        leaves: &[Octant<D>],
+        particles: &[u64],
+    ) -> Vec<Self> {
+        let all: FxHashSet<Octant<D>> = leaves.iter().copied().collect();
+        let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
+        let mut levels = vec![Self::default(); usize::from(finest) + 1];
+        for (leaf, &particles) in leaves.iter().zip(particles) {
+            let mut around =
+                (0..offset_count(D)).filter_map(|index| leaf.neighbour(offset(index), &problem.brick));
+            let is_jump = particles > 0 && around.any(|neighbour| !all.contains(&neighbour));
+            let level = &mut levels[usize::from(leaf.level)];
+            level.leaves += 1;
+            level.filled += u64::from(particles > 0);
+            level.filled_jumps += u64::from(is_jump);
+            level.particles += particles;
+        }
+        levels
+    }
+}
+
+impl Estimate {
+    /// Bytes of memory of each of some ranks that share the work evenly; about.
+    pub fn memory_per_rank(&self, ranks: u32) -> f64 {
+        PROGRAM + self.memory / f64::from(ranks)
+    }
+
+    /// Seconds of wall time on some cores if particles and time step stay what they are at the start; roughly.
+    pub fn wall_time(&self, cores: u32) -> f64 {
+        let steps = self.total_particles() as f64 * self.steps;
+        steps / (self.particle_steps_per_second * f64::from(cores))
+    }
+
+    /// Particles of all bodies.
+    pub fn total_particles(&self) -> u64 {
+        self.particles.iter().fold(0, |sum, count| sum.saturating_add(*count))
+    }
+
+    /// The estimate for a tree with these particles and leaves, which criteria have refined.
+    pub fn for_tree<const D: usize>(
+        mut self,
+        problem: &Problem<D>,
+        particles: Vec<u64>,
+        levels: Vec<LevelCount>,
+    ) -> Self {
+        (self.particles, self.levels, self.is_cut) = (particles, levels, false);
+        add_bytes(problem, &mut self);
+        self
+    }
+
+    /// Leaves of all levels.
+    pub fn total_leaves(&self) -> u64 {
+        self.levels.iter().fold(0, |sum, level| sum.saturating_add(level.leaves))
+    }
+}
+
+/// Not collective. Counts the leaves of the tree and the points that bodies have in them, with a bound on the work: see
+/// [`Estimate::is_cut`].
+///
+/// # Errors
+/// Two bodies share a lattice point, or the steps cannot be counted.
+pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, EstimateError> {
+    let (time_step, steps) = steps(problem)?;
+    let Tally { particles, levels, is_cut } = count::count(problem)?;
+    let outputs =
+        problem.output.every.map_or(2, |every| (problem.time.end / every - 1e-9).floor() as u64 + 2);
+    let mut estimate = Estimate {
+        particles,
+        levels,
+        is_cut,
+        time_step,
+        steps,
+        particle_steps_per_second: 0.0,
+        memory: 0.0,
+        output_bytes: 0.0,
+        outputs,
+        checkpoint_bytes: 0.0,
+    };
+    add_bytes(problem, &mut estimate);
+    Ok(estimate)
+}
+
+/// Not collective. The first time step (s) and the number of such steps to the end, on leaves of the finest level that the
+/// job's regions and criteria ask for: criteria may make any leaf as fine as they want, which shortens the step of all.
+///
+/// # Errors
+/// One of them is not a finite number above 0.
+pub fn steps<const D: usize>(problem: &Problem<D>) -> Result<(f64, f64), EstimateError> {
+    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
+    let finest = criteria.map(|criterion| criterion.level).fold(problem.finest_level(), u8::max);
+    let time_step = time_step(problem, finest);
+    let steps = (problem.time.end / time_step).ceil();
+    if time_step.is_finite() && time_step > 0.0 && steps.is_finite() {
+        return Ok((time_step, steps));
+    }
+    Err(EstimateError::Steps { path: problem.path.clone(), time_step, end: problem.time.end })
+}
+
+/// Courant condition over the fastest wave and the fastest particle at the start, on the finest cells.
+fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
+    let wave = problem
+        .bodies
+        .iter()
+        .map(|body| &problem.materials[body.material])
+        .map(|material| material::build(&material.model, material.density).wave_speed())
+        .fold(0.0, f64::max);
+    let norm = |v: &[f64]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let speed = problem
+        .bodies
+        .iter()
+        .map(|body| {
+            let bounds = body.shape.bounds();
+            let reach = if bounds.half_diagonal().is_finite() { bounds.half_diagonal() } else { 0.0 };
+            norm(&body.velocity) + norm(&body.angular_velocity) * reach
+        })
+        .fold(0.0, f64::max);
+    let extent = problem.size();
+    let colliders = problem.colliders.iter();
+    let speed = colliders.fold(speed, |speed, collider| {
+        // A collider bounds the step by its own speed, not on top of the wave's.
+        speed.max(collider.greatest_speed(&collider.state_at(0.0), &extent, 0.0) - wave)
+    });
+    let courant = problem.time.cfl * problem.cell_edge(finest) / (wave + speed);
+    problem.time.dt_max.map_or(courant, |longest| courant.min(longest)).min(problem.time.end)
+}
+
+/// Bytes of the state of a particle: its reals, identifier and tag.
+const fn state_bytes<const D: usize>() -> f64 {
+    8.0 * (Layout::<D>::REALS + 2) as f64
+}
+
+/// Bytes of memory of particles and leaves of all ranks together; about.
+///
+/// What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
+/// plan, filled ones node fields, arenas and half a page of particles; where levels meet there are more blocks and bins,
+/// and moments of constrained nodes.
+fn memory<const D: usize>(particles: u64, levels: &[LevelCount]) -> f64 {
+    let rows = 7_f64.powi(D as i32);
+    let levels = levels.iter().map(|level| {
+        1.6 * level.leaves as f64 + 52.0 * level.filled as f64 + 105.0 * level.filled_jumps as f64
+    });
+    particles as f64 * state_bytes::<D>() + rows * levels.sum::<f64>()
+}
+
+/// Bytes of memory of a tree of some size if half of its leaves with particles lie where levels meet; about.
+pub fn tree_memory<const D: usize>([particles, leaves, filled]: Size) -> f64 {
+    memory::<D>(particles, &[LevelCount { leaves, filled, filled_jumps: filled / 2, particles }])
+}
+
+fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
+    let particles = estimate.total_particles() as f64;
+    let leaves = estimate.total_leaves() as f64;
+    let state = state_bytes::<D>();
+    estimate.memory = memory::<D>(estimate.total_particles(), &estimate.levels);
+    estimate.particle_steps_per_second = PARTICLE_STEPS_PER_SECOND[D - 2];
+
+    // A particle in the file: three coordinates, a vertex (connectivity, offset, type), the fields.
+    let fields: usize = problem.output.fields.iter().map(|field| field_bytes(*field)).sum();
+    let restart = if problem.output.restart { state } else { 0.0 };
+    // A leaf in the tree's file: eight corners, their connectivity, offset, type and level.
+    let leaf = 8.0 * 24.0 + 8.0 * 8.0 + 8.0 + 2.0;
+    estimate.output_bytes = particles * (24.0 + 17.0 + fields as f64 + restart) + leaves * leaf;
+    estimate.checkpoint_bytes = particles * state + leaves * 16.0;
+}
+
+fn field_bytes(field: Field) -> usize {
+    match field {
+        Field::Body | Field::Material | Field::LeafLevel | Field::ParticleLevel => 4,
+        Field::Velocity => 24,
+        Field::Stress => 48,
+        _ => 8,
+    }
+}
+
+#[cfg(test)]
+pub(in crate::setup) mod explicit;
+#[cfg(test)]
+#[path = "estimate_tests.rs"]
+mod tests;
