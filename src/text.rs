@@ -6,6 +6,9 @@ use std::borrow::Cow;
 /// Significant digits of a measured or computed quantity where nothing asks for more.
 const DIGITS: usize = 4;
 
+/// Significant digits of a coordinate.
+const PLACE_DIGITS: usize = 7;
+
 /// Metric prefixes with their powers of ten.
 const PREFIXES: [(i32, &str); 7] = [(-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
 
@@ -69,6 +72,12 @@ fn without_zeros(text: &str) -> &str {
 pub fn written(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+/// A place in space: `(0.25, 1.5) m`.
+pub fn place(coordinates: &[f64]) -> String {
+    let numbers: Vec<String> = coordinates.iter().map(|&x| number(x, PLACE_DIGITS)).collect();
+    format!("({}) m", numbers.join(", "))
 }
 
 /// A count with its thousands set apart: `1 234 567`.
@@ -212,6 +221,11 @@ mod tests {
     fn numbers_are_written_as_people_write_them() {
         let written = [5.0, 0.1, 1e308, 5e-324, -2.5e-7, 1e15].map(written);
         assert_eq!(written, ["5", "0.1", "1e308", "5e-324", "-2.5e-7", "1000000000000000"]);
+    }
+
+    #[test]
+    fn places_are_short() {
+        assert_eq!(place(&[0.1 + 0.2, -2.5, f64::NAN]), "(0.3, -2.5, NaN) m");
     }
 
     #[test]

@@ -14,6 +14,8 @@ pub enum FaceCondition {
     },
     /// Mirror plane; for velocities the same as `slip`.
     Symmetric,
+    /// None: material moves out as it would without the face, and particles that cross it leave the domain.
+    Outflow,
 }
 
 impl FaceCondition {
@@ -24,6 +26,7 @@ impl FaceCondition {
     /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step).
     pub fn apply<const D: usize>(self, velocity: &mut [f64; D], axis: usize, inward: f64) {
         match self {
+            Self::Outflow => {}
             Self::Sticky => *velocity = [0.0; D],
             Self::Slip | Self::Symmetric => velocity[axis] = 0.0,
             Self::Separating { friction } => {

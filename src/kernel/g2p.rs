@@ -14,6 +14,7 @@ use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use crate::material::eigen::determinant;
 use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
@@ -33,8 +34,8 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 /// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if any is not finite. `leavers` notes those that leave its
-/// box; `next` is the place of the chunk that will be read after this one.
+/// speed and particle speed, m/s, for the time step; infinite if the state of any particle is not finite or its det b is not
+/// above zero. `leavers` notes those that leave its box; `next` is the place of the chunk that will be read after this one.
 pub fn gather<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
@@ -284,21 +285,32 @@ fn advance<V: Vector, const D: usize>(
         several => material::update(several, &index, &mut state, &update),
     }
     let result = |lanes: &Lanes| V::load(lanes.as_array());
+    // Not finite as soon as one of them is not.
+    let mut sum = zero;
     for c in 0..Layout::<D>::SYMMETRIC {
-        batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, result(&state.elastic[c]));
-        batch.store(tile, Layout::<D>::STRESS + c, result(&state.stress[c]));
+        elastic[c] = result(&state.elastic[c]);
+        batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, elastic[c]);
+        let stress = result(&state.stress[c]);
+        batch.store(tile, Layout::<D>::STRESS + c, stress);
+        sum += stress;
     }
+    let ratio = determinant(&elastic);
     if plastic {
         for h in 0..material::HISTORIES {
             if h < scheme.histories {
-                batch.store(tile, Layout::<D>::HISTORY + h, result(&state.history[h]));
+                let history = result(&state.history[h]);
+                batch.store(tile, Layout::<D>::HISTORY + h, history);
+                sum += history;
             }
         }
         let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
         batch.store(tile, Layout::<D>::WORK, work);
+        sum += work;
     }
     let speed = result(&state.wave_speed) + square.sqrt();
-    batch.of_members(speed.le(V::splat(f64::MAX)).select(speed, V::splat(f64::INFINITY)))
+    let most = V::splat(f64::MAX);
+    let is_sound = zero.lt(ratio) & ratio.le(most) & sum.abs().le(most) & speed.le(most);
+    batch.of_members(is_sound.select(speed, V::splat(f64::INFINITY)))
 }
 
 /// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.

@@ -2,9 +2,11 @@
 use crate::adaptivity::resample::ledger::BooksTotal;
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
+use crate::exact_sum::ExactSum;
 use crate::io::history::Column;
 use crate::load::Load;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
+use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{LoadTotals, Reaction};
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -12,7 +14,7 @@ const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
 }
 
 /// Columns after the step, without those of colliders.
-const COLUMNS: [Column<'static>; 15] = [
+const COLUMNS: [Column<'static>; 20] = [
     column("time", "s"),
     column("dt", "s"),
     column("kinetic_energy", "J"),
@@ -28,6 +30,11 @@ const COLUMNS: [Column<'static>; 15] = [
     column("mass", "kg"),
     column("grid_mass", "kg"),
     column("particles", ""),
+    column("put_back", ""),
+    column("deleted", ""),
+    column("deleted_mass", "kg"),
+    column("left", ""),
+    column("left_mass", "kg"),
 ];
 
 /// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
@@ -80,7 +87,14 @@ fn turning_axes<const D: usize>() -> std::ops::Range<usize> {
 }
 
 /// The values of a row that are not of colliders.
-pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) -> Vec<f64> {
+pub fn row(
+    time: f64,
+    dt: f64,
+    particles: &ParticleTotals,
+    grid: &GridTotals,
+    crossings: &Crossings,
+) -> Vec<f64> {
+    let [deleted_mass, left_mass] = crossings.masses.each_ref().map(ExactSum::to_f64);
     let [px, py, pz] = particles.momentum;
     let [lx, ly, lz] = grid.angular_momentum;
     vec![
@@ -99,6 +113,11 @@ pub fn row(time: f64, dt: f64, particles: &ParticleTotals, grid: &GridTotals) ->
         particles.mass,
         grid.mass,
         particles.count as f64,
+        crossings.put_back as f64,
+        crossings.deleted as f64,
+        deleted_mass,
+        crossings.left as f64,
+        left_mass,
     ]
 }
 

@@ -298,7 +298,7 @@ impl<'a, const D: usize> Run<'a, D> {
         }
         let row = self.recorder.last_row() != Some(step);
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
-        self.recorder.finish(&self.solver);
+        self.recorder.finish(self.comm, &self.solver);
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;

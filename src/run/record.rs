@@ -9,7 +9,7 @@ use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
-use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
+use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 
@@ -135,7 +135,7 @@ impl Recorder {
             let totals = self.totals(comm, solver);
             solver.phases = phases;
             let (grid, particles) = totals?;
-            mass_error.get_or_insert((grid.mass - particles.mass) / particles.mass);
+            mass_error.get_or_insert(totals::mass_error(grid.mass, particles.mass));
             if row {
                 written = self.row(comm, solver, &particles, &grid);
             }
@@ -187,10 +187,11 @@ impl Recorder {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let loads = solver.load_totals();
+        let crossings = solver.crossings.gather(comm);
         let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
         let mut written = Ok(());
         if let Some(history) = &mut self.history {
-            let mut values = history::row(clock.time, clock.dt, particles, grid);
+            let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
             if let Some(books) = &books {
                 values.extend(history::book_values(books));
             }
@@ -266,8 +267,12 @@ impl Recorder {
         self.progress.message(text);
     }
 
-    /// Not collective. The run is over.
-    pub fn finish<const D: usize>(&mut self, solver: &Solver<D>) {
+    /// Collective. The run is over.
+    pub fn finish<const D: usize>(&mut self, comm: &Comm, solver: &Solver<D>) {
         self.progress.finish(solver.clock.step, solver.clock.time, solver.clock.dt);
+        let crossings = solver.crossings.gather(comm).to_string();
+        if !crossings.is_empty() {
+            self.message(&crossings);
+        }
     }
 }

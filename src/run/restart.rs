@@ -18,6 +18,7 @@ use crate::job::{self, Problem};
 use crate::particle::Chunk;
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
+use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::cost::leaf_weight;
 use crate::solver::{Clock, Solver};
 
@@ -37,7 +38,10 @@ pub const OUTPUT_STEP: &str = "output_step";
 /// Name of the counter that holds the step of the last row of the history.
 pub const ROW_STEP: &str = "row_step";
 const BOUND: &str = "time_step_bound";
-const DELETED: &str = "deleted";
+/// Names of the counters of particles that crossed faces of the domain.
+const CROSSINGS: [&str; 3] = ["put_back", "deleted", "left"];
+/// Names of the masses deleted and left.
+const CROSSED_MASSES: [&str; 2] = ["deleted_mass", "left_mass"];
 
 /// What output files hold.
 pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
@@ -52,17 +56,22 @@ pub fn scalars<const D: usize>(
     next_output: u64,
     output_step: Option<u64>,
 ) -> Scalars {
-    let mut deleted = [solver.deleted];
-    comm.sum_u64(&mut deleted);
-    let mut counts = vec![(NEXT_OUTPUT.into(), next_output), (DELETED.into(), deleted[0])];
+    let mut crossings = solver.crossings.gather(comm);
+    let mut counts = vec![(NEXT_OUTPUT.into(), next_output)];
+    let numbers = [crossings.put_back, crossings.deleted, crossings.left];
+    counts.extend(CROSSINGS.iter().map(|name| String::from(*name)).zip(numbers));
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
     let mut reals = vec![(BOUND.into(), solver.clock.bound)];
-    let mut exact = Vec::new();
+    let mut exact: Vec<(String, Vec<i64>)> = CROSSED_MASSES
+        .iter()
+        .zip(&mut crossings.masses)
+        .map(|(name, sum)| ((*name).into(), sum.words().to_vec()))
+        .collect();
     if !solver.contacts.states.is_empty() {
         reals.push((SINCE.into(), solver.contacts.since));
         let mut sums: Vec<ExactSum> = solver.contacts.sums.iter().flatten().cloned().collect();
         ExactSum::sum_over_ranks(comm, &mut sums);
-        exact = sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())).collect();
+        exact.extend(sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())));
     }
     if !solver.load_books.sums.is_empty() {
         reals.push((LOADS_SINCE.into(), solver.load_books.since));
@@ -131,6 +140,18 @@ fn restore_books<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &
     if rank == 0 {
         (books.splits, books.merges, books.removed) = (splits?, merges?, removed?);
         (books.split_energy, books.merge_energy) = (split_energy, merge_energy);
+    }
+    Some(())
+}
+
+/// Takes over what is booked of particles that crossed faces, on rank 0. `None` if the file lacks one.
+fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    let [put_back, deleted, left] = CROSSINGS.map(|name| scalars.count(name));
+    let [of_deleted, of_left] = CROSSED_MASSES.map(|name| scalars.exact(name).and_then(ExactSum::from_words));
+    let masses = [of_deleted?, of_left?];
+    let crossings = Crossings { put_back: put_back?, deleted: deleted?, left: left?, masses };
+    if rank == 0 {
+        solver.crossings = crossings;
     }
     Some(())
 }
@@ -260,9 +281,8 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the sums of a load are missing"))?;
     restore_books(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the books of splits and merges are missing"))?;
-    if comm.rank() == 0 {
-        solver.deleted = header.scalars.count(DELETED).unwrap_or(0);
-    }
+    restore_crossings(comm.rank(), &mut solver, &header.scalars)
+        .ok_or_else(|| refused("the books of particles that left the domain are missing"))?;
     Ok((solver, header.scalars))
 }
 
@@ -342,7 +362,7 @@ mod tests {
     #[test]
     fn counters_made_with_intent_are_refused() {
         let with = |name: &str, count| Scalars { counts: vec![(name.into(), count)], ..Scalars::default() };
-        for name in [NEXT_OUTPUT, OUTPUT_STEP, DELETED, "splits", "next_root"] {
+        for name in [NEXT_OUTPUT, OUTPUT_STEP, "splits", "next_root"].into_iter().chain(CROSSINGS) {
             assert_eq!(check_counts::<3>(&with(name, 1000)), Ok(()));
             let error = check_counts::<3>(&with(name, u64::MAX)).expect_err(name);
             assert!(error.contains(name), "{error}");

@@ -20,6 +20,7 @@ pub mod warnings;
 /// The constant part of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     Physics {
+        origin: problem.origin,
         root_edge: problem.root_edge,
         graded: problem.tree.graded,
         materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),

@@ -13,8 +13,9 @@ use partition::Octant;
 pub enum SeedError {
     /// A lattice point lies in two bodies.
     #[error(
-        "{place}: found the body \"{second}\" overlapping \"{first}\" at {point:?} m; expected bodies that \
-         share no point"
+        "{place}: found the body \"{second}\" overlapping \"{first}\" at {}; expected bodies that \
+         share no point",
+        crate::text::place(point)
     )]
     Overlap {
         /// File, line, column and key of the second body's shape.

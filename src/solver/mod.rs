@@ -28,6 +28,7 @@ pub use state::{Clock, Requests, Solver, StepError, StepReport};
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
+use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
 use crate::adaptivity::resample::ledger::Books;
 use crate::particle::Chunk;
@@ -64,7 +65,7 @@ impl<const D: usize> Solver<D> {
             clock,
             phases: Phases::default(),
             grid,
-            deleted: 0,
+            crossings: Crossings::default(),
             books: Books::default(),
             regrids: 0,
             parts: Parts::default(),

@@ -7,6 +7,8 @@ use crate::material::Material;
 
 /// What is solved: the same on every rank, constant over a run.
 pub struct Physics<const D: usize> {
+    /// Lower corner of the domain in the coordinates of the job, m; all positions are relative to it.
+    pub origin: [f64; D],
     /// Edge of a root octant, m.
     pub root_edge: f64,
     /// Whether neighbouring leaves differ by one level at most.
@@ -23,7 +25,7 @@ pub struct Physics<const D: usize> {
     pub colliders: Vec<Collider<D>>,
     /// Dynamic refinement; `None`: tree and particles keep their sizes.
     pub adaptivity: Option<Adaptivity<D>>,
-    /// What happens to particles that leave the domain.
+    /// What happens to particles that leave the domain where no face is an outflow.
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,

@@ -29,6 +29,7 @@ pub(in crate::job) fn faces<const D: usize>(
         Some(file::Face::Sticky {}) => FaceCondition::Sticky,
         Some(file::Face::Separating { friction }) => FaceCondition::Separating { friction: *friction },
         Some(file::Face::Symmetric {}) => FaceCondition::Symmetric,
+        Some(file::Face::Outflow {}) => FaceCondition::Outflow,
     };
     let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
     Some(std::array::from_fn(|a| all[a].map(condition)))

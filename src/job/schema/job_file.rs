@@ -118,7 +118,8 @@ pub struct Boundaries {
     #[serde(default)]
     #[schemars(extend("x-dimension" = 3))]
     pub z_max: Option<Face>,
-    /// What happens to particles that leave the domain.
+    /// What happens to particles that leave the domain through other faces than those of kind `outflow`. Particles that
+    /// rounding alone takes through a face are put back and counted in any case.
     #[serde(default)]
     pub leaving: Leaving,
 }
@@ -140,6 +141,9 @@ pub enum Face {
     },
     /// A plane of symmetry.
     Symmetric {},
+    /// An open end: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted
+    /// with their mass.
+    Outflow {},
 }
 
 /// What happens to particles that leave the domain.

@@ -136,7 +136,7 @@ impl<const D: usize> Solver<D> {
         let mut sums = [nodes, particles];
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         let [nodes, particles] = sums.map(|sum| sum.to_f64());
-        Some((nodes - particles) / particles)
+        Some(mass_error(nodes, particles))
     }
 
     /// Collective. Sums over all particles.
@@ -152,6 +152,11 @@ fn together(mut sum: ExactSum, other: ExactSum) -> ExactSum {
 }
 
 /// Mass, momentum and angular momentum of nothing.
+/// How much the mass on the nodes differs from that of the particles, as a share of it; 0 where there is no mass.
+pub fn mass_error(nodes: f64, particles: f64) -> f64 {
+    if nodes == particles { 0.0 } else { (nodes - particles) / particles }
+}
+
 fn empty_sums() -> Vec<ExactSum> {
     vec![ExactSum::new(); 7]
 }

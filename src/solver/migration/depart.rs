@@ -2,16 +2,18 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
+use super::crossings::{Crossed, Crossing, FaceRules};
 use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
-use crate::boundary::Leaving;
 use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::grid::{GridPlan, KnownTree};
 use crate::kernel::leavers;
+use crate::material::HISTORIES;
+use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::lanes::{list_lanes, positions};
-use crate::simd::VectorMask;
+use crate::simd::{Lanes, Vector, VectorMask};
 
 /// Where a particle goes.
 #[derive(Clone, Copy)]
@@ -20,8 +22,10 @@ pub(in crate::solver) enum Destination {
     Stay,
     /// To a known leaf.
     Leaf(u32),
-    /// Out of the domain, and is removed.
-    Gone,
+    /// Out of the domain, and is deleted.
+    Deleted,
+    /// Out of the domain through an outflow face, and is removed.
+    Left,
     /// Nowhere itself; its children have destinations of their own.
     Split,
 }
@@ -29,7 +33,7 @@ pub(in crate::solver) enum Destination {
 /// The boxes of the own leaves, and what happens to particles outside them.
 pub struct Borders<const D: usize> {
     boxes: Vec<([f64; D], [f64; D])>,
-    leaving: Leaving,
+    rules: FaceRules<D>,
     root_edge: f64,
 }
 
@@ -38,8 +42,8 @@ pub struct Borders<const D: usize> {
 pub(in crate::solver) struct Departed {
     /// Records of the particles that go to other leaves, in their order.
     pub records: Vec<u64>,
-    /// Number of particles out of the domain.
-    pub deleted: u64,
+    /// Particles that crossed a face of the domain.
+    pub crossed: Crossed,
     /// Why nothing was taken out.
     pub error: Option<MigrateError>,
     /// Splits of those that enter finer leaves.
@@ -49,7 +53,7 @@ pub(in crate::solver) struct Departed {
 impl Departed {
     /// Whether there is anything to tell.
     pub fn is_any(&self) -> bool {
-        !self.records.is_empty() || self.deleted > 0 || self.error.is_some() || self.splits.is_some()
+        !self.records.is_empty() || self.crossed.is_any() || self.error.is_some() || self.splits.is_some()
     }
 
     /// Takes particles, ascending, out of a chunk.
@@ -69,7 +73,8 @@ impl Departed {
     fn note<const D: usize>(&mut self, chunk: &Chunk<D>, p: usize, destination: Destination) {
         match destination {
             Destination::Leaf(to) => push_record(&mut self.records, u64::from(to), chunk, p),
-            Destination::Gone => self.deleted += 1,
+            Destination::Deleted => self.crossed.deleted.push(chunk.column(Layout::<D>::MASS)[p]),
+            Destination::Left => self.crossed.left.push(chunk.column(Layout::<D>::MASS)[p]),
             Destination::Stay | Destination::Split => {}
         }
     }
@@ -77,10 +82,10 @@ impl Departed {
 
 impl<const D: usize> Borders<D> {
     /// Of the own leaves of a plan.
-    pub fn new(plan: &GridPlan<D>, leaving: Leaving) -> Self {
+    pub(in crate::solver) fn new(plan: &GridPlan<D>, rules: FaceRules<D>) -> Self {
         let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
         let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
-        Self { boxes, leaving, root_edge: plan.root_edge }
+        Self { boxes, rules, root_edge: plan.root_edge }
     }
 
     /// Lower and upper corner of an own leaf, m.
@@ -126,12 +131,15 @@ impl<const D: usize> Borders<D> {
         outside: &[u32],
         resampling: Option<&Resampling<'_, D>>,
     ) -> Result<Departed, MigrateError> {
-        let mut leavers = self.destinations(tree, leaf, chunk, outside.iter().copied())?;
+        let mut put_back = 0;
+        let mut leavers = self.destinations(tree, leaf, chunk, outside.iter().copied(), &mut put_back)?;
         leavers.retain(|(_, destination)| !matches!(destination, Destination::Stay));
-        let Some(resampling) = resampling else { return Ok(Departed::take(chunk, &leavers)) };
-        let parents = too_coarse(tree, chunk, resampling, &mut leavers);
+        let parents = resampling.map(|resampling| too_coarse(tree, chunk, resampling, &mut leavers));
+        let parents = parents.unwrap_or_default();
         let mut children = chunk.gathered(&parents);
         let mut departed = Departed::take(chunk, &leavers);
+        departed.crossed.put_back = put_back;
+        let Some(resampling) = resampling else { return Ok(departed) };
         if parents.is_empty() {
             return Ok(departed);
         }
@@ -141,7 +149,8 @@ impl<const D: usize> Borders<D> {
         while !which.is_empty() {
             resampling.split(&mut children, &which, level, &mut splits);
             let all = 0..children.len() as u32;
-            leavers = self.destinations(tree, leaf, &mut children, all)?;
+            let put_back = &mut departed.crossed.put_back;
+            leavers = self.destinations(tree, leaf, &mut children, all, put_back)?;
             which = too_coarse(tree, &children, resampling, &mut leavers);
         }
         for (p, destination) in leavers {
@@ -154,15 +163,16 @@ impl<const D: usize> Borders<D> {
         Ok(departed)
     }
 
-    /// Where the listed particles of a leaf go.
+    /// Where the listed particles of a leaf go; those that are put back into the domain are counted.
     fn destinations(
         &self,
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
         particles: impl Iterator<Item = u32>,
+        put_back: &mut u64,
     ) -> Result<Vec<(u32, Destination)>, MigrateError> {
-        particles.map(|p| Ok((p, self.destination(tree, leaf, chunk, p as usize)?))).collect()
+        particles.map(|p| Ok((p, self.destination(tree, leaf, chunk, p as usize, put_back)?))).collect()
     }
 
     fn destination(
@@ -171,24 +181,27 @@ impl<const D: usize> Borders<D> {
         leaf: usize,
         chunk: &mut Chunk<D>,
         p: usize,
+        put_back: &mut u64,
     ) -> Result<Destination, MigrateError> {
         let mut position = chunk.position(p);
         if position.iter().any(|x| !x.is_finite()) {
-            return Err(too_far(chunk, p));
+            return Err(self.too_far(chunk, p));
         }
         let roots = tree.brick().roots;
         let extent: [f64; D] = std::array::from_fn(|axis| f64::from(roots[axis]) * self.root_edge);
-        if (0..D).any(|axis| position[axis] < 0.0 || position[axis] >= extent[axis]) {
-            match self.leaving {
-                Leaving::Delete => return Ok(Destination::Gone),
-                Leaving::Error => {
-                    return Err(MigrateError::Left { id: chunk.ids()[p], position: position.to_vec() });
-                }
-                Leaving::Clamp => {
-                    for axis in 0..D {
-                        position[axis] = position[axis].clamp(0.0, extent[axis].next_down());
-                        chunk.column_mut(Layout::<D>::POSITION + axis)[p] = position[axis];
-                    }
+        match self.rules.of(&position, &extent) {
+            None => {}
+            Some(Crossing::Deleted) => return Ok(Destination::Deleted),
+            Some(Crossing::Left) => return Ok(Destination::Left),
+            Some(Crossing::Refused) => {
+                let position = self.rules.in_job(&position);
+                return Err(MigrateError::Left { id: chunk.ids()[p], position });
+            }
+            Some(Crossing::PutBack) => {
+                *put_back += 1;
+                for axis in 0..D {
+                    position[axis] = position[axis].clamp(0.0, extent[axis].next_down());
+                    chunk.column_mut(Layout::<D>::POSITION + axis)[p] = position[axis];
                 }
             }
         }
@@ -196,9 +209,56 @@ impl<const D: usize> Borders<D> {
         match tree.locate(key) {
             Some(to) if to == leaf => Ok(Destination::Stay),
             Some(to) => Ok(Destination::Leaf(to as u32)),
-            None => Err(too_far(chunk, p)),
+            None => Err(self.too_far(chunk, p)),
         }
     }
+
+    fn too_far(&self, chunk: &Chunk<D>, p: usize) -> MigrateError {
+        MigrateError::TooFar { id: chunk.ids()[p], position: self.rules.in_job(&chunk.position(p)) }
+    }
+
+    /// The error of a particle whose new leaf belongs to a rank that is no neighbour.
+    pub(super) fn stray(&self, record: &[u64]) -> MigrateError {
+        let column = |column: usize| f64::from_bits(record[1 + column]);
+        let position: [f64; D] = std::array::from_fn(|axis| column(Layout::<D>::POSITION + axis));
+        let position = self.rules.in_job(&position);
+        MigrateError::TooFar { id: record[1 + Layout::<D>::REALS], position }
+    }
+
+    /// The first particle of a leaf whose state material cannot have, where G2P found that there is one.
+    pub(in crate::solver) fn unsound(&self, chunk: &Chunk<D>) -> Option<MigrateError> {
+        (0..chunk.len()).find_map(|p| {
+            let (quantity, value) = unsound_quantity(chunk, p)?;
+            let position = self.rules.in_job(&chunk.position(p));
+            Some(MigrateError::Unsound { id: chunk.ids()[p], position, quantity, value })
+        })
+    }
+}
+
+/// What of a particle's state cannot be, with its value.
+fn unsound_quantity<const D: usize>(chunk: &Chunk<D>, p: usize) -> Option<(&'static str, f64)> {
+    let value = |column: usize| chunk.column(column)[p];
+    let symmetric = |first: usize| first..first + Layout::<D>::SYMMETRIC;
+    let columns = [
+        ("position", Layout::<D>::POSITION..Layout::<D>::POSITION + D),
+        ("velocity", Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D),
+        ("left Cauchy-Green tensor", symmetric(Layout::<D>::LEFT_CAUCHY_GREEN)),
+        ("stress", symmetric(Layout::<D>::STRESS)),
+        ("history variable", Layout::<D>::HISTORY..Layout::<D>::HISTORY + HISTORIES),
+        ("plastic work", Layout::<D>::WORK..Layout::<D>::WORK + 1),
+    ];
+    for (quantity, mut columns) in columns {
+        if let Some(found) = columns.find(|&column| !value(column).is_finite()) {
+            return Some((quantity, value(found)));
+        }
+    }
+    let mut elastic = [Lanes::splat(0.0); 6];
+    for (c, elastic) in elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
+        *elastic = Lanes::splat(value(Layout::<D>::LEFT_CAUCHY_GREEN + c));
+    }
+    let ratio = determinant(&elastic).to_array()[0];
+    let is_sound = ratio > 0.0 && ratio.is_finite();
+    (!is_sound).then_some(("squared elastic volume ratio", ratio))
 }
 
 /// Those that enter a leaf finer than they were made for; their destination is [`Destination::Split`] then.
@@ -230,8 +290,4 @@ pub(in crate::solver) fn outside<const D: usize>(
     let mut found = Vec::new();
     list_lanes(0..chunk.len(), &mut found, |first| !leavers.inside(&positions(chunk, first)).bits());
     found
-}
-
-fn too_far<const D: usize>(chunk: &Chunk<D>, p: usize) -> MigrateError {
-    MigrateError::TooFar { id: chunk.ids()[p], position: chunk.position(p).to_vec() }
 }

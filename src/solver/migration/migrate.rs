@@ -6,12 +6,13 @@
 use partition::comm::{Comm, NeighbourExchange, Traffic};
 use rayon::prelude::*;
 
+use super::crossings::{Crossings, FaceRules};
 use super::depart::{Borders, Departed, outside};
 use super::records::{append_all, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
-use crate::boundary::Leaving;
 use crate::grid::{GridPlan, KnownTree};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::Chunk;
+use crate::text::{number, place};
 
 const TAG: u16 = 12;
 
@@ -20,21 +21,38 @@ const TAG: u16 = 12;
 pub enum MigrateError {
     /// A particle has left the domain and the job does not allow it.
     #[error(
-        "particle {id} left the domain at {position:?} m (relative to its lower corner); \
-         `boundaries.leaving` says what to do with such particles"
+        "particle {id} left the domain at {}; `boundaries.leaving` says what to do with such particles, and faces \
+         of kind `outflow` let them go",
+        place(position)
     )]
     Left {
         /// Identifier of the particle.
         id: u64,
-        /// Position relative to the domain's lower corner, m.
+        /// Position in the coordinates of the job, m.
         position: Vec<f64>,
     },
+    /// The state of a particle is not one that material can have.
+    #[error(
+        "particle {id} at {} has {quantity} {}; the run has become unstable",
+        place(position),
+        number(*value, 4)
+    )]
+    Unsound {
+        /// Identifier of the particle.
+        id: u64,
+        /// Position in the coordinates of the job, m.
+        position: Vec<f64>,
+        /// What cannot be.
+        quantity: &'static str,
+        /// Its value, SI units.
+        value: f64,
+    },
     /// A particle moved beyond the leaves around its own in one step, or its position is not finite.
-    #[error("particle {id} moved too far in one step, to {position:?} m; the run has become unstable")]
+    #[error("particle {id} moved too far in one step, to {}; the run has become unstable", place(position))]
     TooFar {
         /// Identifier of the particle.
         id: u64,
-        /// Position relative to the domain's lower corner, m.
+        /// Position in the coordinates of the job, m.
         position: Vec<f64>,
     },
 }
@@ -52,14 +70,17 @@ pub struct Moved {
     pub local: u64,
     /// To another rank.
     pub sent: u64,
-    /// Out of the domain, and removed.
-    pub deleted: u64,
 }
 
 impl<const D: usize> Migration<D> {
     /// Not collective. `neighbours` must be those of the plan's arena exchange.
-    pub fn new(comm: &Comm, plan: &GridPlan<D>, neighbours: Vec<usize>, leaving: Leaving) -> Self {
-        Self { exchange: NeighbourExchange::new(comm, neighbours, TAG), borders: Borders::new(plan, leaving) }
+    pub(in crate::solver) fn new(
+        comm: &Comm,
+        plan: &GridPlan<D>,
+        neighbours: Vec<usize>,
+        rules: FaceRules<D>,
+    ) -> Self {
+        Self { exchange: NeighbourExchange::new(comm, neighbours, TAG), borders: Borders::new(plan, rules) }
     }
 
     /// Messages and bytes so far.
@@ -79,6 +100,7 @@ impl<const D: usize> Migration<D> {
         resampling: Option<&Resampling<'_, D>>,
         may_stray: impl Fn(usize) -> bool + Sync,
         splits: &mut Vec<Splits>,
+        crossings: &mut Crossings,
     ) -> Result<Moved, MigrateError> {
         let borders = &self.borders;
         let leaves = chunks.par_iter_mut().enumerate().with_min_len(4);
@@ -87,7 +109,7 @@ impl<const D: usize> Migration<D> {
             borders.depart(tree, leaf, chunk, &outside, resampling)
         });
         let departed = departed.collect();
-        self.arrive(tree, chunks, departed, splits)
+        self.arrive(tree, chunks, departed, splits, crossings)
     }
 
     /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the places given
@@ -106,11 +128,12 @@ impl<const D: usize> Migration<D> {
             Departed::take(chunk, &leavers.collect::<Vec<_>>())
         });
         let departed = departed.collect();
-        self.arrive(tree, chunks, departed, &mut Vec::new())
+        // None of them leaves the domain.
+        self.arrive(tree, chunks, departed, &mut Vec::new(), &mut Crossings::default())
     }
 
     /// Collective over neighbours. Appends what has departed from each own leaf, here and on other ranks, to where it
-    /// goes. Appends what splits on the way did to `splits`.
+    /// goes. Appends what splits on the way did to `splits`, and books those that crossed faces of the domain in `crossings`.
     ///
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed
@@ -121,11 +144,12 @@ impl<const D: usize> Migration<D> {
         chunks: &mut [Chunk<D>],
         mut departed: Vec<Departed>,
         splits: &mut Vec<Splits>,
+        crossings: &mut Crossings,
     ) -> Result<Moved, MigrateError> {
         let mut error = None;
         let mut moved = Moved::default();
         for departed in &mut departed {
-            moved.deleted += departed.deleted;
+            crossings.book(&departed.crossed);
             splits.extend(departed.splits.take());
             error = error.or(departed.error.take());
         }
@@ -144,7 +168,7 @@ impl<const D: usize> Migration<D> {
                 message.extend_from_slice(bytemuck::cast_slice(&record[1..]));
                 moved.sent += 1;
             } else {
-                error.get_or_insert_with(|| stray::<D>(record));
+                error.get_or_insert_with(|| self.borders.stray(record));
             }
         }
         let pending = self.exchange.begin(outgoing);
@@ -170,11 +194,4 @@ fn of_messages<'a, const D: usize>(
         let leaf = tree.locate(record[0]).and_then(|known| tree.local(known))?;
         Some((leaf as u32, record))
     })
-}
-
-/// The error of a particle whose new leaf belongs to a rank that is no neighbour.
-fn stray<const D: usize>(record: &[u64]) -> MigrateError {
-    let column = |column: usize| f64::from_bits(record[1 + column]);
-    let position = (0..D).map(|axis| column(Layout::<D>::POSITION + axis)).collect();
-    MigrateError::TooFar { id: record[1 + Layout::<D>::REALS], position }
 }

@@ -1,4 +1,5 @@
-//! Particles between leaves and ranks.
+//! Particles between leaves and ranks, and out of the domain.
+pub mod crossings;
 pub mod depart;
 pub mod migrate;
 mod records;

@@ -10,6 +10,7 @@ use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::{Row, spread};
 use crate::memory::Block;
 use crate::particle::Chunk;
+use crate::solver::migration::crossings::FaceRules;
 use crate::solver::migration::migrate::Migration;
 use crate::solver::physics::Physics;
 use crate::solver::sorting::bin_view::BinView;
@@ -51,7 +52,7 @@ impl<const D: usize> Grid<D> {
             arenas: Arenas::default(),
             fields: NodeFields::new(&plan),
             increments: Increments::default(),
-            migration: Migration::new(comm, &plan, neighbours, physics.leaving),
+            migration: Migration::new(comm, &plan, neighbours, FaceRules::new(physics)),
             lists: BinLists::new(&plan),
             seam: exchange.seam(&plan),
             sum_bytes: 0,

@@ -12,6 +12,7 @@ use partition::Forest;
 use partition::comm::{Comm, Traffic};
 
 use self::grid::Grid;
+use super::migration::crossings::Crossings;
 use super::migration::migrate::{MigrateError, Moved};
 use super::sorting::bins::BinMissing;
 use crate::adaptivity::resample::ledger::Books;
@@ -112,8 +113,8 @@ pub struct Solver<const D: usize> {
     pub(super) grid: Grid<D>,
     /// What is noted of each own leaf.
     pub(super) leaf_data: LeafData<D>,
-    /// Particles that this rank deleted because they left the domain.
-    pub deleted: u64,
+    /// Particles that crossed the faces of the domain so far.
+    pub crossings: Crossings,
     /// Splits and merges of particles so far.
     pub books: Books,
     /// Changes of the tree since the start of this process.

@@ -2,7 +2,7 @@
 use partition::comm::Traffic;
 use rayon::prelude::*;
 
-use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
+use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::grid::sums::census::{Census, surface_bytes};
 use crate::solver::migration::depart::Departed;
 use crate::solver::migration::migrate::{MigrateError, Moved};
@@ -104,12 +104,14 @@ impl<const D: usize> Solver<D> {
     ) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, self.grid.plan.extent());
-        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.crossings);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {
-            grid.migration.migrate(&grid.plan.tree, chunks, resampling.as_ref(), may_stray, &mut splits)
+            let (tree, resampling) = (&grid.plan.tree, resampling.as_ref());
+            grid.migration.migrate(tree, chunks, resampling, may_stray, &mut splits, crossings)
         });
-        self.book_migration(moved, &splits)
+        self.book_entries(&splits);
+        moved
     }
 
     /// Collective over neighbours. Particles that have left their leaf go to the leaf, and rank, that contains them.
@@ -120,21 +122,12 @@ impl<const D: usize> Solver<D> {
         &mut self,
         departed: Vec<Departed>,
     ) -> Result<Moved, MigrateError> {
-        let (grid, chunks) = (&mut self.grid, &mut self.chunks);
+        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.crossings);
         let mut splits = Vec::new();
-        let moved = self
-            .phases
-            .time(Phase::Migrate, || grid.migration.arrive(&grid.plan.tree, chunks, departed, &mut splits));
-        self.book_migration(moved, &splits)
-    }
-
-    fn book_migration(
-        &mut self,
-        moved: Result<Moved, MigrateError>,
-        splits: &[Splits],
-    ) -> Result<Moved, MigrateError> {
-        self.book_entries(splits);
-        self.deleted += moved.as_ref().map_or(0, |moved| moved.deleted);
+        let moved = self.phases.time(Phase::Migrate, || {
+            grid.migration.arrive(&grid.plan.tree, chunks, departed, &mut splits, crossings)
+        });
+        self.book_entries(&splits);
         moved
     }
 }

@@ -162,6 +162,11 @@ impl<const D: usize> Sweep<'_, D> {
         self.watch.before(chunk, survey);
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
         self.watch.after(chunk, self.dt, survey);
+        if signal.is_infinite()
+            && let Some(error) = self.borders.unsound(chunk)
+        {
+            return Departed { error: Some(error), ..Departed::default() };
+        }
         let leavers = &scratch.leavers.found;
         let departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
         if !is_empty {

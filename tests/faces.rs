@@ -1,0 +1,160 @@
+//! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is counted; material
+//! lets go of faces that pull; states that no material can have end the run.
+#[path = "mpi_runs/launch.rs"]
+#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
+mod launch;
+#[path = "common/mpirun.rs"]
+mod mpirun;
+#[path = "common/relaunch.rs"]
+mod relaunch;
+
+use std::path::Path;
+
+use agimp::job::{Problem, parse};
+use agimp::particle::chunk::Layout;
+use agimp::setup;
+use agimp::solver::{Requests, Solver};
+use launch::{Outcome, run, succeed};
+use partition::comm::Comm;
+use relaunch::{ran_if_launched, relaunch};
+
+/// A block at rest in a domain whose lower corner lies at (10, 20) m.
+fn block_far_from_the_origin(comm: &Comm) -> Solver<2> {
+    let text = "version = 1\ndimension = 2\n[domain]\nmin = [10, 20]\nsize = [1, 1]\nroot_edge = 1\n[tree]\nbase_level = 2\n\
+                [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+                [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = { kind = 'box', min = [10, 20.25], max = [10.25, 20.5] }\n\
+                [time]\nend = 1e3\n[output]\nevery = 1e3\n";
+    let problem = parse(text, "faces.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+    let problem = Problem::<2>::try_from(problem).unwrap_or_else(|_| panic!("another dimension"));
+    setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A particle that rounding took through a wall is put back and counted, and the run goes on; further away it has left the
+/// domain, and the message has its place in the coordinates of the job.
+#[test]
+fn rounding_takes_no_particle_out_of_the_domain() {
+    let is_test = ran_if_launched(|comm| {
+        let mut solver = block_far_from_the_origin(comm);
+        let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+        chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-15;
+        solver.step(1e3, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((solver.crossings.put_back, solver.crossings.deleted), (1, 0));
+        let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+        assert!((0.0..1e-12).contains(&chunk.position(0)[0]), "{:?}", chunk.position(0));
+        chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-3;
+        let error = solver.step(1e3, Requests::default()).expect_err("a particle has left").to_string();
+        assert!(error.contains("left the domain at (9.99") && error.contains(", 20."), "{error}");
+    });
+    if !is_test {
+        relaunch("rounding_takes_no_particle_out_of_the_domain", 1, 60);
+    }
+}
+
+/// A state that no material can have ends the run in the step in which it arises, with particle, place and quantity.
+#[test]
+fn a_broken_state_is_named() {
+    let is_test = ran_if_launched(|comm| {
+        let cases = [
+            (Layout::<2>::LEFT_CAUCHY_GREEN, -1.0, "squared elastic volume ratio"),
+            (Layout::<2>::LEFT_CAUCHY_GREEN, f64::INFINITY, "left Cauchy-Green tensor"),
+        ];
+        for (column, value, quantity) in cases {
+            let mut solver = block_far_from_the_origin(comm);
+            let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+            let id = chunk.ids()[5];
+            chunk.column_mut(column)[5] = value;
+            let error = solver.step(1e3, Requests::default()).expect_err("it is broken").to_string();
+            assert!(error.contains(&format!("particle {id} at (10.")), "{error}: not particle {id}");
+            assert!(error.contains(&format!(" has {quantity} ")), "{error}: not {quantity}");
+        }
+    });
+    if !is_test {
+        relaunch("a_broken_state_is_named", 1, 60);
+    }
+}
+
+/// A 2D job with a block of 64 particles of 1 kg, which are numbers without rounding, and what `rest` adds.
+fn text(end: f64, velocity: &str, rest: &str) -> String {
+    format!(
+        "version = 1\ndimension = 2\n[domain]\nmin = [-3.0, 7.0]\nsize = [1.0, 1.0]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+         [[materials]]\nname = 'rubber'\ndensity = 1024\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+         [[bodies]]\nname = 'body'\nmaterial = 'rubber'\nvelocity = {velocity}\n\
+         shape = {{ kind = 'box', min = [-2.5, 7.5], max = [-2.25, 7.75] }}\n\
+         [time]\nend = {end}\ndt_max = 1e-3\n[output]\npicture = false\n[history]\nevery_steps = 5\n{rest}\n"
+    )
+}
+
+/// Columns of a history by name, row by row.
+fn history(directory: &Path) -> impl Fn(&str) -> Vec<f64> {
+    let text = std::fs::read_to_string(launch::file(directory, "body", ".history.csv")).expect("history");
+    move |name| {
+        let mut lines = text.lines();
+        let mut names = lines.next().expect("header").split(',');
+        let column = names.position(|cell| cell.split(' ').next() == Some(name)).expect("a column");
+        lines
+            .map(|row| row.split(',').nth(column).and_then(|cell| cell.parse().ok()).expect("number"))
+            .collect()
+    }
+}
+
+/// A block that flies out of the domain through a face of outflow: it keeps its velocity and stays without stress, what is inside and
+/// what has left make up the whole at every time, and nothing is left in the end. The same on any ranks and across a
+/// restart, which goes on counting.
+#[test]
+fn a_body_leaves_through_an_outflow() {
+    let rest = "[checkpoint]\nevery_steps = 60\nkeep = 9\n[boundaries]\nx_max = { kind = 'outflow' }\n";
+    let mut reference: Option<Outcome> = None;
+    for ranks in [1, 2, 3] {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("body.toml");
+        let job = text(0.25, "[4.0, 0.5]", rest).replace("picture = false", "");
+        std::fs::write(&path, job).expect("job");
+        let told = launch::text(&succeed(&mut run(directory.path(), ranks, 1, &path, &[])));
+        assert!(told.contains("64 left through outflow faces (64 kg)"), "{told}");
+        let telemetry = std::fs::read_to_string(launch::file(directory.path(), "body", ".telemetry.jsonl"));
+        assert!(!telemetry.expect("telemetry").contains("null"), "a number is none");
+        let column = history(directory.path());
+        let (mass, left_mass) = (column("mass"), column("left_mass"));
+        let (inside, left) = (column("particles"), column("left"));
+        let momenta = [column("momentum_x"), column("momentum_y")];
+        let (elastic, kinetic) = (column("elastic_energy"), column("kinetic_energy"));
+        for row in 0..mass.len() {
+            assert_eq!((mass[row] + left_mass[row], inside[row] + left[row]), (64.0, 64.0), "row {row}");
+            for (momentum, velocity) in momenta.iter().zip([4.0, 0.5]) {
+                assert!((momentum[row] - velocity * mass[row]).abs() <= 1e-11 * mass[row], "row {row}");
+            }
+            assert!(elastic[row] <= 1e-12 * kinetic[row], "row {row}: {} of {}", elastic[row], kinetic[row]);
+        }
+        assert!(inside.iter().any(|&n| n > 0.0 && n < 64.0) && inside.last() == Some(&0.0), "{inside:?}");
+        let result = Outcome::read(directory.path(), "body");
+        match &reference {
+            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
+            None => reference = Some(result),
+        }
+        if ranks == 2 {
+            let files = launch::contents(&directory.path().join("out").join("body"));
+            let mut checkpoints: Vec<_> =
+                files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
+            checkpoints.sort();
+            // Some particles have left by then.
+            let from = format!("out/body/{}", checkpoints[1]);
+            succeed(&mut run(directory.path(), 3, 1, &path, &["--quiet", "--restart", &from]));
+            let result = Outcome::read(directory.path(), "body");
+            reference.as_ref().expect("a run").assert_same(&result, &format!("restart from {from}"));
+        }
+    }
+}
+
+/// An outflow comes before `leaving`, which holds at the other faces.
+#[test]
+fn other_faces_keep_their_policy() {
+    let rest =
+        "[boundaries]\nleaving = 'delete'\nx_max = { kind = 'outflow' }\ny_max = { kind = 'outflow' }\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("body.toml");
+    std::fs::write(&path, text(0.2, "[4.0, 4.0]", rest)).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let column = history(directory.path());
+    let last = |name: &str| *column(name).last().expect("a row");
+    assert_eq!((last("left"), last("deleted"), last("deleted_mass")), (64.0, 0.0, 0.0));
+}
