@@ -51,6 +51,8 @@ impl History {
 fn elastic(young: f64, gravity: f64, body: &str, end: f64, rest: &str) -> History {
     let text = format!(
         "version = 1\ndimension = 2\ngravity = [0, {gravity}]\n\
+         [boundaries]\nx_min = {{ kind = 'slip' }}\nx_max = {{ kind = 'slip' }}\n\
+         y_min = {{ kind = 'slip' }}\ny_max = {{ kind = 'slip' }}\n\
          [domain]\nsize = [1.6, 0.8]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n\
          [[materials]]\nname = 'rubber'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = {young}\npoisson = 0.2\n\
          [[bodies]]\nname = 'body'\nmaterial = 'rubber'\n{body}\n\

@@ -145,6 +145,26 @@ fn a_body_leaves_through_an_outflow() {
     }
 }
 
+/// Faces let go of what pulls unless the job says otherwise: a block that touches the ceiling falls freely, and one between slip faces
+/// hangs there.
+#[test]
+fn a_block_does_not_hang_from_the_ceiling() {
+    let fall = |rest: &str| {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("body.toml");
+        let job = text(0.1, "[0, 0]", rest).replace("max = [-2.25, 7.75]", "max = [-2.25, 8.0]");
+        std::fs::write(&path, job.replace("dimension = 2", "dimension = 2\ngravity = [0, -10]"))
+            .expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let column = history(directory.path());
+        let last = |name: &str| *column(name).last().expect("a row");
+        last("momentum_y") / (last("mass") * -10.0 * last("time"))
+    };
+    assert!((fall("") - 1.0).abs() < 1e-9, "{}", fall(""));
+    let held = fall("[boundaries]\ny_max = { kind = 'slip' }\n");
+    assert!(held.abs() < 0.2, "{held}");
+}
+
 /// An outflow comes before `leaving`, which holds at the other faces.
 #[test]
 fn other_faces_keep_their_policy() {

@@ -117,7 +117,11 @@ where
             let body = format!(
                 "shape = {{ kind = \"box\", min = {min}, max = {max} }}\nparticles_per_cell = {count:?}"
             );
-            let text = job::<D>(origin, &body, "[numerics]\nboxes = \"fixed\"");
+            // Walls that hold material that pulls as well as what presses.
+            let faces = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"];
+            let slip: String =
+                faces[..2 * D].iter().map(|face| format!("{face} = {{ kind = \"slip\" }}\n")).collect();
+            let text = job::<D>(origin, &body, &format!("[boundaries]\n{slip}[numerics]\nboxes = \"fixed\""));
             let (problem, mut solver) = solver::<D>(comm, &text);
             let mut chunks = std::mem::take(&mut solver.chunks);
             let mut volume = vec![ExactSum::new()];

@@ -1,11 +1,10 @@
 //! Conditions on the faces of the domain.
 /// What happens to material at one face of the domain.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaceCondition {
     /// No motion.
     Sticky,
     /// No motion through the face, free motion along it.
-    #[default]
     Slip,
     /// No motion into the face, free motion away from it; Coulomb friction along it while it is pressed.
     Separating {
@@ -16,6 +15,13 @@ pub enum FaceCondition {
     Symmetric,
     /// None: material moves out as it would without the face, and particles that cross it leave the domain.
     Outflow,
+}
+
+impl Default for FaceCondition {
+    /// Separating, without friction.
+    fn default() -> Self {
+        Self::Separating { friction: 0.0 }
+    }
 }
 
 impl FaceCondition {

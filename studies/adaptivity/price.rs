@@ -95,6 +95,13 @@ impl Case {
         let gravity = if self == Self::Refused { -9.81 } else { 0.0 };
         format!(
             "version = 1\ntitle = \"{self:?}\"\ndimension = 3\ngravity = [0, 0, {gravity}]\n\
+             [boundaries]\n\
+             x_min = {{ kind = \"slip\" }}\n\
+             x_max = {{ kind = \"slip\" }}\n\
+             y_min = {{ kind = \"slip\" }}\n\
+             y_max = {{ kind = \"slip\" }}\n\
+             z_min = {{ kind = \"slip\" }}\n\
+             z_max = {{ kind = \"slip\" }}\n\
              [domain]\nsize = [{size}, {size}, {height}]\n\
              root_edge = {ROOT}\n[tree]\nbase_level = {base}\n[adaptivity]\nevery_steps = {EVERY}\nbuffer = 0\n{criteria}\
              [[materials]]\nname = \"sand\"\ndensity = 1600\npoisson = 0.2\n{material}\n\

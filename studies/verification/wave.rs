@@ -87,6 +87,8 @@ fn job(case: &Case, dt: f64) -> (String, f64) {
     let text = format!(
         "version = 1\ndimension = 2\ngravity = [0, 0]\n\
          [domain]\nsize = [{size}, {edge}]\nroot_edge = {edge}\n\
+         [boundaries]\nx_min = {{ kind = \"slip\" }}\nx_max = {{ kind = \"slip\" }}\n\
+         y_min = {{ kind = \"slip\" }}\ny_max = {{ kind = \"slip\" }}\n\
          [tree]\ngraded = false\nbase_level = {base}\n{regions}\n\
          [[materials]]\nname = \"bar\"\ndensity = 1\nmodel = \"fixed_corotated\"\nyoung = 1\npoisson = 0\n\
          [[bodies]]\nname = \"bar\"\nmaterial = \"bar\"\nshape = {{ kind = \"box\", min = [0, 0], max = [{size}, {edge}] }}\n\

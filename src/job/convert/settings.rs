@@ -25,7 +25,8 @@ pub(in crate::job) fn faces<const D: usize>(
         }
     }
     let condition = |face: &Option<file::Face>| match face {
-        None | Some(file::Face::Slip {}) => FaceCondition::Slip,
+        None => FaceCondition::default(),
+        Some(file::Face::Slip {}) => FaceCondition::Slip,
         Some(file::Face::Sticky {}) => FaceCondition::Sticky,
         Some(file::Face::Separating { friction }) => FaceCondition::Separating { friction: *friction },
         Some(file::Face::Symmetric {}) => FaceCondition::Symmetric,

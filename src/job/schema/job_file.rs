@@ -94,7 +94,7 @@ pub struct Domain {
     pub root_edge: f64,
 }
 
-/// Conditions on the faces of the domain; a face not named is `slip`.
+/// Conditions on the faces of the domain; a face not named is `separating` without friction.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundaries {
