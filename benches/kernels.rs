@@ -144,7 +144,7 @@ const MIXES: [(u32, bool); 5] = [(4, false), (4, true), (3, false), (3, true), (
 /// Two layers of hanging nodes, as beside a face.
 fn constrained() -> ConstrainedNodes {
     let is_hanging: Vec<bool> = (0..arena_nodes(3)).map(|node| node % 7 < 2).collect();
-    ConstrainedNodes::new::<3>([], HangingNodes::new::<3>(&is_hanging))
+    ConstrainedNodes::new::<3>(&[], HangingNodes::new::<3>(&is_hanging))
 }
 
 /// The particles that a block of a level mix has, in each leaf: whole quarters along x, as beside a face.

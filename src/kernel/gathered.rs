@@ -9,9 +9,9 @@ use crate::simd::{F64x4, LANES, Vector};
 /// Constrained nodes of an arena, and first moments of those that have them.
 #[derive(Clone, Copy)]
 pub struct Moments<'a> {
-    /// Hanging nodes, and columns of moments.
+    /// Hanging nodes, and nodes with moments.
     pub nodes: &'a ConstrainedNodes,
-    /// By column; that of axis k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
+    /// By node, one row for each axis; row k is column k of V: `(V_xk, V_yk, V_zk, unused)`.
     pub first: &'a [Row],
 }
 
@@ -158,8 +158,8 @@ impl<const D: usize> Sums<D> {
     fn add_moments(&mut self, weights: &Weights<D>, nodes: &NodeWeights, touched: u32, moments: &Moments) {
         for lane in lanes_in(touched) {
             let mut sums = [F64x4::splat(0.0); D];
-            moments.nodes.for_each(weights, nodes, lane, |column, axis, weight| {
-                sums[axis] = F64x4::splat(weight).mul_add(F64x4::new(moments.first[column].0), sums[axis]);
+            moments.nodes.for_each(weights, nodes, lane, |row, axis, weight| {
+                sums[axis] = F64x4::splat(weight).mul_add(F64x4::new(moments.first[row].0), sums[axis]);
             });
             for axis in 0..D {
                 self.affine[axis][lane] = self.affine[axis][lane] + sums[axis];

@@ -24,9 +24,9 @@ use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 
 /// Constrained nodes of an arena, and first moments `A = Σ w m C` of those that have them.
 pub struct MomentSums<'a> {
-    /// Hanging nodes, and columns of moments with their second moments.
+    /// Hanging nodes, and nodes with moments.
     pub nodes: &'a ConstrainedNodes,
-    /// By column; that of axis k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
+    /// By node, one row for each axis; row k is column k of A: `(A_xk, A_yk, A_zk, 0)`.
     pub sums: &'a mut [Row],
 }
 
@@ -306,8 +306,8 @@ impl<const D: usize> Prepared<D> {
     #[inline(always)]
     fn add_moments(&self, nodes: &NodeWeights, touched: u32, moments: &mut MomentSums) {
         for lane in lanes_in(touched) {
-            moments.nodes.for_each(&self.weights, nodes, lane, |column, axis, weight| {
-                let sum = &mut moments.sums[column].0;
+            moments.nodes.for_each(&self.weights, nodes, lane, |row, axis, weight| {
+                let sum = &mut moments.sums[row].0;
                 let affine = self.affine[axis.min(D - 1)][lane];
                 *sum = F64x4::splat(weight).mul_add(affine, F64x4::new(*sum)).to_array();
             });

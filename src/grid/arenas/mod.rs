@@ -29,7 +29,7 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, Default)]
 pub struct Arenas<const D: usize> {
     rows: Vec<Row>,
-    /// First moments, bin by bin, by number of the column.
+    /// First moments, bin by bin.
     moments: Vec<Row>,
     /// Per bin, its number among the occupied ones.
     number: Vec<u32>,
@@ -49,7 +49,7 @@ pub struct Arenas<const D: usize> {
 #[derive(Clone, Copy, Debug)]
 struct Occupied<const D: usize> {
     bin: u32,
-    /// Its columns of first moments among the plan's constraints.
+    /// Its constrained nodes among the plan's.
     touched: Option<u32>,
     /// Its first moments.
     moments: [u32; 2],
@@ -126,7 +126,7 @@ impl<const D: usize> Arenas<D> {
                 bin.reached().for_each(|block| self.outer_reach[block] = true);
             }
             self.number[number] = self.occupied.len() as u32;
-            let count = bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.len()) as u32;
+            let count = bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.moments()) as u32;
             let (bin, touched) = (number as u32, bin.touched);
             let moments_of_bin = [moments, moments + count];
             self.occupied.push(Occupied { bin, touched, moments: moments_of_bin, window });

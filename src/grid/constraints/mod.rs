@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`constraint`] | parents of a node from its place |
 //! | [`parents`] | the same as tables by parity of a block |
-//! | [`columns`] | which columns of first moments are kept |
-pub mod columns;
+//! | [`moments`] | first moments of the nodes of a block |
 pub mod constraint;
+pub mod moments;
 pub mod parents;

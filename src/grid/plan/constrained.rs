@@ -2,32 +2,29 @@
 use rustc_hash::FxHashMap;
 
 use super::{Block, NO_BLOCK, arena_index};
-use crate::grid::constraints::columns::{Columns, Moments};
+use crate::grid::constraints::moments::{self, Moments, first_row, rows_of};
 use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
-use crate::kernel::constrained::{Column, ConstrainedNodes};
+use crate::kernel::constrained::{ConstrainedNodes, MomentNode};
 use crate::kernel::hanging::HangingNodes;
 use crate::kernel::{Row, arena_nodes};
 
-/// Columns of first moments in the arena of a bin: numbered block by block around the bin, each in the order of [`Columns`].
+/// First moments in the arena of a bin: block by block around the bin, node by node in the order of bits.
 #[derive(Clone, Debug)]
 pub struct ArenaConstraints<const D: usize> {
     /// What the kernels need of them.
     pub nodes: ConstrainedNodes,
-    /// Per offset number of a block, its columns in the arena and the number of the first.
-    parts: Vec<(Columns<D>, u16)>,
-    /// By number, the place of the column among those of its block.
-    places: Vec<u8>,
+    /// Per offset number of a block, its nodes with moments in the arena, and the first row of these.
+    parts: Vec<(u64, u16)>,
 }
 
-/// The columns that the blocks around a bin share with its arena, by offset number.
+/// The nodes with moments that the blocks around a bin share with its arena, by offset number.
 fn shared<const D: usize>(
     blocks: &[Block<D>],
     around: &[u32; 27],
-) -> impl Iterator<Item = (usize, u32, Columns<D>)> {
+) -> impl Iterator<Item = (usize, u32, u64)> {
     let around = around.iter().copied().enumerate().take(offset_count(D));
     around.filter(|(_, block)| *block != NO_BLOCK).map(|(index, block)| {
-        let Block { columns, chained, .. } = &blocks[block as usize];
-        (index, block, columns.within(chained & arena_overlap::<D>(offset(index))))
+        (index, block, blocks[block as usize].chained & arena_overlap::<D>(offset(index)))
     })
 }
 
@@ -40,9 +37,9 @@ pub(super) fn has_constrained<const D: usize>(blocks: &[Block<D>], around: &[u32
 /// Tables of constrained nodes, each kept once: beside level jumps the same patterns occur again and again.
 pub(in crate::grid) struct Tables<'a, const D: usize> {
     blocks: &'a [Block<D>],
-    /// Second moments of all columns.
+    /// Second moments, by row of the first moments.
     second: Vec<f64>,
-    /// By block; blocks with equal nodes, columns and second moments have the same number.
+    /// By block; blocks with equal nodes and second moments have the same number.
     kinds: Vec<u32>,
     /// By kinds of the blocks around a bin.
     of_kinds: FxHashMap<[u32; 27], u32>,
@@ -52,13 +49,13 @@ pub(in crate::grid) struct Tables<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Tables<'a, D> {
-    /// `second` holds the second moments of all columns of the blocks.
+    /// `second` holds the second moments of all blocks, by row of their first moments.
     pub fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
         let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
         let kinds = blocks.iter().map(|block| {
-            let own = &second[block.moments as usize..][..block.columns.len()];
-            let nodes = [block.constrained, block.chained].into_iter().chain(block.columns.along());
-            let content = nodes.chain(own.iter().map(|second| second.to_bits()));
+            let own = &second[block.first_moment as usize..][..rows_of::<D>(block.with_moments)];
+            let nodes = [block.constrained, block.chained, block.with_moments];
+            let content = nodes.into_iter().chain(own.iter().map(|second| second.to_bits()));
             let next = known.len() as u32;
             *known.entry(content.collect()).or_insert(next)
         });
@@ -67,7 +64,7 @@ impl<'a, const D: usize> Tables<'a, D> {
         Self { blocks, second, kinds, of_kinds, of_content, tables }
     }
 
-    /// Number of the table for the columns around a bin.
+    /// Number of the table for the nodes around a bin.
     pub fn number(&mut self, around: &[u32; 27]) -> u32 {
         let kinds = around.map(|block| self.kinds.get(block as usize).copied().unwrap_or(NO_BLOCK));
         if let Some(&number) = self.of_kinds.get(&kinds) {
@@ -80,28 +77,26 @@ impl<'a, const D: usize> Tables<'a, D> {
 
     fn number_by_content(&mut self, around: &[u32; 27]) -> u32 {
         let (blocks, second) = (self.blocks, &self.second);
-        let mut parts = vec![(Columns::NONE, 0); offset_count(D)];
-        let (mut all, mut places): (Vec<Column>, Vec<u8>) = Default::default();
+        let mut parts = vec![(0, 0); offset_count(D)];
+        let mut all: Vec<MomentNode<D>> = Vec::new();
         let mut hanging = vec![0; offset_count(D)];
-        for (index, block, columns) in shared(blocks, around) {
-            parts[index] = (columns, all.len() as u16);
+        for (index, block, nodes) in shared(blocks, around) {
+            parts[index] = (nodes, (D * all.len()) as u16);
             let block = &blocks[block as usize];
             hanging[index] = block.constrained & !block.chained & arena_overlap::<D>(offset(index));
-            let of_block = block.columns.iter().enumerate();
-            for (place, (bit, axis)) in of_block.filter(|(_, (bit, _))| columns.nodes() >> bit & 1 == 1) {
-                let second = second[block.moments as usize + place];
-                all.push(Column { node: arena_index::<D>(index, bit), axis, second });
-                places.push(place as u8);
-            }
+            all.extend(bits(nodes).map(|bit| {
+                let first = block.first_moment as usize + first_row::<D>(block.with_moments, bit);
+                let second = std::array::from_fn(|axis| second[first + axis]);
+                MomentNode { node: arena_index::<D>(index, bit), second }
+            }));
         }
-        let columns = parts.iter().flat_map(|(columns, _)| columns.along());
-        let seconds = all.iter().map(|column| column.second.to_bits());
-        let content = columns.chain(seconds).chain(places.iter().map(|&place| place.into()));
+        let seconds = all.iter().flat_map(|node| node.second.map(f64::to_bits));
+        let content = parts.iter().map(|(nodes, _)| *nodes).chain(seconds);
         let next = self.tables.len() as u32;
         let number = *self.of_content.entry(content.chain(hanging.iter().copied()).collect()).or_insert(next);
         if number == next {
-            let nodes = ConstrainedNodes::new::<D>(all, hanging_nodes::<D>(&hanging));
-            self.tables.push(ArenaConstraints { nodes, parts, places });
+            let nodes = ConstrainedNodes::new(&all, hanging_nodes::<D>(&hanging));
+            self.tables.push(ArenaConstraints { nodes, parts });
         }
         number
     }
@@ -122,35 +117,34 @@ fn hanging_nodes<const D: usize>(hanging: &[u64]) -> HangingNodes {
 }
 
 impl<const D: usize> ArenaConstraints<D> {
-    /// Columns in the arena of the block at offset number `index`, and the number of the first.
+    /// Nodes with moments in the arena of the block at offset number `index`, and the first row of these.
     #[inline(always)]
-    pub fn of_block(&self, index: usize) -> (Columns<D>, usize) {
-        let (columns, first) = self.parts[index];
-        (columns, usize::from(first))
+    pub fn of_block(&self, index: usize) -> (u64, usize) {
+        let (nodes, first) = self.parts[index];
+        (nodes, usize::from(first))
     }
 
-    /// Copies the columns in the arena of the block at offset number `index` from all moments of that block.
+    /// Copies moments into the arena from those of the block at offset number `index`, which are of the nodes `of_block`.
     #[inline(always)]
-    pub fn copy_block(&self, index: usize, from: &[Row], arena: &mut [Row]) {
-        let (columns, first) = self.of_block(index);
-        let here = first..first + columns.len();
-        let to = arena[here.clone()].iter_mut().zip(&self.places[here]);
-        to.for_each(|(to, &place)| *to = from[usize::from(place)]);
+    pub fn copy_block(&self, index: usize, of_block: u64, from: &[Row], arena: &mut [Row]) {
+        let (nodes, first) = self.of_block(index);
+        for (bit, to) in bits(nodes).zip(arena[first..].chunks_exact_mut(D)) {
+            to.copy_from_slice(&from[first_row::<D>(of_block, bit)..][..D]);
+        }
     }
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
-        let parts = self.parts.capacity() * size_of::<(Columns<D>, u16)>();
-        self.nodes.heap_bytes() + parts + self.places.capacity()
+        self.nodes.heap_bytes() + self.parts.capacity() * size_of::<(u64, u16)>()
     }
 }
 
 /// First moments in the arena of a bin.
 #[derive(Clone, Copy, Debug)]
 pub struct ArenaMoments<'a, const D: usize> {
-    /// By number of the column.
+    /// Node by node.
     pub values: &'a [Row],
-    /// The columns.
+    /// The nodes.
     pub constraints: &'a ArenaConstraints<D>,
 }
 
@@ -162,7 +156,7 @@ impl<'a, const D: usize> ArenaMoments<'a, D> {
 
     /// Those of a node of the block at offset number `index`.
     pub fn at(self, index: usize, bit: u32) -> Moments<D> {
-        let (columns, first) = self.constraints.of_block(index);
-        columns.read(&self.values[first..], bit)
+        let (nodes, first) = self.constraints.of_block(index);
+        moments::read(&self.values[first..], nodes, bit)
     }
 }

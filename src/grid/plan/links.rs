@@ -5,11 +5,11 @@ use rustc_hash::FxHashMap;
 
 use super::closure::constrained_nodes;
 use super::{Block, GridPlan, NO_BLOCK};
-use crate::grid::constraints::columns::{Columns, axes_in};
+use crate::grid::constraints::moments::{first_row, rows_of};
 use crate::grid::constraints::parents::{
     ParentTable, children, coarser_at, parents, parity, place_beside, weight_of,
 };
-use crate::grid::mask::{bits, block_nodes, node_of_bit, offset};
+use crate::grid::mask::{bits, offset};
 
 /// A block with constrained nodes.
 #[derive(Clone, Copy, Debug)]
@@ -95,27 +95,23 @@ impl<const D: usize> GridPlan<D> {
         // Where neighbouring leaves differ by one level at most, parents are real.
         let is_graded = self.tree.is_graded();
         if !is_graded || cfg!(debug_assertions) {
-            self.find_columns();
+            self.find_moments();
         }
-        debug_assert!(!is_graded || self.columns == 0, "a parent hangs itself in a graded tree");
+        debug_assert!(!is_graded || self.moments == 0, "a parent hangs itself in a graded tree");
     }
 
-    /// Finds which nodes have constrained parents, and which first moments these and their parents have.
-    fn find_columns(&mut self) {
+    /// Finds which nodes have constrained parents: these and their parents have first moments.
+    fn find_moments(&mut self) {
         let links = std::mem::take(&mut self.links);
         // Nodes that first moments pass through on their way between levels.
         let mut passed = vec![0; self.blocks.len()];
         for fine in links.iter().flat_map(|links| &links.fine) {
             self.find_chained(fine, &mut passed);
         }
-        // Coarser blocks come before finer ones.
-        for fine in links.iter().flat_map(|links| &links.fine) {
-            let index = fine.block as usize;
-            self.blocks[index].columns = self.columns_of(fine, self.blocks[index].chained | passed[index]);
-        }
-        for block in &mut self.blocks {
-            block.moments = self.columns as u32;
-            self.columns += block.columns.len();
+        for (block, passed) in self.blocks.iter_mut().zip(passed) {
+            block.with_moments = block.chained | passed;
+            block.first_moment = self.moments as u32;
+            self.moments += rows_of::<D>(block.with_moments);
         }
         self.links = links;
     }
@@ -145,35 +141,16 @@ impl<const D: usize> GridPlan<D> {
         }
     }
 
-    /// The columns of first moments that constrained nodes of a block have: those along which a parent lies
-    /// beside the node, and those of its parents.
-    fn columns_of(&self, fine: &FineBlock, nodes: u64) -> Columns<D> {
-        let mut columns = Columns::new(odd_nodes::<D>()).within(nodes);
-        let of_parents = fine
-            .parents
-            .map(|block| self.blocks.get(block as usize).map_or(Columns::NONE, |block| block.columns));
-        if of_parents.iter().any(|columns| !columns.is_empty()) {
-            let parity = parity(self.blocks[fine.block as usize].coord);
-            for bit in bits(nodes) {
-                for parent in ParentTable::of::<D>().of_node::<D>(parity, bit) {
-                    let axes = of_parents[usize::from(parent.corner)].axes_of(parent.bit.into());
-                    columns.insert(bit, axes);
-                }
-            }
-        }
-        columns
-    }
-
-    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along the axis of each
-    /// column of first moments; along others they are zero.
+    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along each axis; by row of
+    /// the first moments.
     pub(super) fn constraint_spread(&self) -> Vec<f64> {
         let table = ParentTable::of::<D>();
-        let mut spread = vec![0.0; self.columns];
+        let mut spread = vec![0.0; self.moments];
         for (level, links) in self.links.iter().enumerate() {
             let cell_squared = self.cell(level as u8).powi(2);
             for fine in &links.fine {
                 let block = &self.blocks[fine.block as usize];
-                for bit in bits(block.columns.nodes()) {
+                for (bit, at) in bits(block.with_moments).zip((block.first_moment as usize..).step_by(D)) {
                     let mut sum = [0.0; D];
                     for parent in table.of_node::<D>(parity(block.coord), bit) {
                         let delta = offset::<D>(parent.offset.into());
@@ -183,29 +160,16 @@ impl<const D: usize> GridPlan<D> {
                         }
                         let coarse = fine.parents[usize::from(parent.corner)];
                         let Some(coarse) = self.blocks.get(coarse as usize) else { continue };
-                        let (first, axes) = place_of(coarse, parent.bit.into());
-                        axes_in::<D>(axes)
-                            .zip(first..)
-                            .for_each(|(axis, at)| sum[axis] += weight * spread[at]);
+                        if coarse.with_moments >> parent.bit & 1 == 1 {
+                            let first = first_row::<D>(coarse.with_moments, parent.bit.into());
+                            let of_parent = &spread[coarse.first_moment as usize + first..][..D];
+                            sum.iter_mut().zip(of_parent).for_each(|(sum, spread)| *sum += weight * spread);
+                        }
                     }
-                    let (first, axes) = place_of(block, bit);
-                    axes_in::<D>(axes).zip(first..).for_each(|(axis, at)| spread[at] = sum[axis]);
+                    spread[at..at + D].copy_from_slice(&sum);
                 }
             }
         }
         spread
     }
-}
-
-/// Nodes of a block whose coordinate is odd, by axis.
-fn odd_nodes<const D: usize>() -> [u64; D] {
-    std::array::from_fn(|axis| {
-        let is_odd = |bit: &u32| node_of_bit::<D>(*bit)[axis] % 2 == 1;
-        (0..block_nodes(D) as u32).filter(is_odd).fold(0, |nodes, bit| nodes | 1 << bit)
-    })
-}
-
-/// Number of the first column of a node, and the axes of its columns.
-fn place_of<const D: usize>(block: &Block<D>, bit: u32) -> (usize, u8) {
-    (block.moments as usize + block.columns.first_of(bit), block.columns.axes_of(bit))
 }

@@ -21,8 +21,8 @@ use self::feeders::Feeders;
 use self::known::{Allowance, Cover, KnownTree};
 use self::links::Links;
 use self::sources::{Part, Piece};
-use super::constraints::columns::Columns;
 use super::constraints::constraint::node_coord;
+use super::constraints::moments::rows_of;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use crate::csr::Csr;
 use crate::kernel::constrained::ConstrainedNodes;
@@ -56,10 +56,10 @@ pub struct Block<const D: usize> {
     pub chained: u64,
     /// Real nodes that this rank counts when it sums over the grid.
     pub owned: u64,
-    /// First moments of nodes that are chained, and of those that moments of finer ones pass through.
-    pub columns: Columns<D>,
-    /// Place of these among those of all blocks.
-    pub moments: u32,
+    /// Nodes with first moments: those that are chained, and those that moments of finer ones pass through.
+    pub with_moments: u64,
+    /// First row of their moments among those of all blocks.
+    pub first_moment: u32,
 }
 
 /// A bin: the particles of one leaf, or parts of their boxes, that scatter on one level into the arena of one
@@ -97,14 +97,14 @@ pub struct GridPlan<const D: usize> {
     /// Which own bins reach each block.
     pub feeders: Feeders,
     /// Sums that this rank needs of others, by rank.
-    pub pieces: Vec<Piece<D>>,
+    pub pieces: Vec<Piece>,
     pub(super) parts: Csr<Part>,
     /// Per level, links to the parents of its constrained nodes.
     pub links: Vec<Links>,
     /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
     pub face_nodes: Vec<(u32, u8)>,
-    /// Number of columns of first moments.
-    pub columns: usize,
+    /// Number of rows of first moments.
+    pub moments: usize,
     /// Constrained nodes of arenas, for [`Bin::touched`].
     pub constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Rounds that the ghost layer took to close.
@@ -144,7 +144,7 @@ impl<const D: usize> GridPlan<D> {
             parts: Csr::default(),
             links: Vec::new(),
             face_nodes: Vec::new(),
-            columns: 0,
+            moments: 0,
             constraints: Arc::default(),
             rounds,
             tree,
@@ -228,7 +228,7 @@ impl<const D: usize> GridPlan<D> {
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
             + self.feeders.heap_bytes()
-            + self.pieces.capacity() * size_of::<Piece<D>>()
+            + self.pieces.capacity() * size_of::<Piece>()
             + self.parts.heap_bytes()
             + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
     }
@@ -244,8 +244,8 @@ impl<const D: usize> GridPlan<D> {
                 constrained: sets.constrained,
                 chained: 0,
                 owned: self.owned_nodes(level, coord, sets.value & !sets.constrained),
-                columns: Columns::NONE,
-                moments: 0,
+                with_moments: 0,
+                first_moment: 0,
             })
             .collect();
         blocks.sort_unstable_by_key(|b| (b.level, Octant { level: b.level, coord: b.coord }.key(), b.coord));
@@ -333,13 +333,14 @@ impl<const D: usize> GridPlan<D> {
 
     /// The first moments of a block among those of all.
     pub(super) fn moments_of(&self, block: usize) -> std::ops::Range<usize> {
-        let Block { columns, moments, .. } = &self.blocks[block];
-        *moments as usize..*moments as usize + columns.len()
+        let Block { with_moments, first_moment, .. } = self.blocks[block];
+        let first = first_moment as usize;
+        first..first + rows_of::<D>(with_moments)
     }
 
-    /// Number of the first column of first moments of a level.
-    pub(super) fn first_column(&self, level: usize) -> usize {
-        self.blocks.get(self.level_start[level]).map_or(self.columns, |block| block.moments as usize)
+    /// First row of the first moments of a level.
+    pub(super) fn first_moment(&self, level: usize) -> usize {
+        self.blocks.get(self.level_start[level]).map_or(self.moments, |block| block.first_moment as usize)
     }
 }
 

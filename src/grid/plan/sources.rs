@@ -9,22 +9,21 @@ use super::feeders::NO_BIN;
 use super::reach::bin_sources;
 use super::{Block, GridPlan};
 use crate::csr::Csr;
-use crate::grid::constraints::columns::Columns;
 use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
 use crate::grid::order::each_subtree;
 use crate::grid::order::region::Regions;
 
 /// What another rank's bins in a subtree contribute to nodes of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Piece<const D: usize> {
+pub struct Piece {
     /// The other rank.
     pub rank: usize,
     /// The block.
     pub block: u32,
     /// Nodes that are needed.
     pub nodes: u64,
-    /// Their first moments.
-    pub columns: Columns<D>,
+    /// Those of them whose first moments are needed.
+    pub with_moments: u64,
     /// Least key in the subtree; 0 and the greatest possible key where the subtree holds all that the rank
     /// contributes.
     pub first: u64,
@@ -87,7 +86,7 @@ impl<const D: usize> GridPlan<D> {
     pub(super) fn list_pieces(&mut self, rank: usize) {
         let mut search = RemoteBins::default();
         // Pieces as they are found, and where they enter: block and part.
-        let mut pieces: Vec<Piece<D>> = Vec::new();
+        let mut pieces: Vec<Piece> = Vec::new();
         let mut parts: Vec<(u32, Part)> = Vec::new();
         let mut candidates = Vec::new();
         // A rank that knows no leaves of others needs nothing of them.
@@ -138,11 +137,11 @@ impl<const D: usize> GridPlan<D> {
         rank: usize,
         block: usize,
         candidates: &[Candidate],
-        pieces: &mut Vec<Piece<D>>,
+        pieces: &mut Vec<Piece>,
         parts: &mut Vec<(u32, Part)>,
     ) {
         let regions = Regions::of::<D>();
-        let Block { sum, columns, chained, .. } = self.blocks[block];
+        let Block { sum, chained, .. } = self.blocks[block];
         let known = pieces.len();
         let mut found: Vec<(usize, u64, u64, u8)> = Vec::new();
         for region in 0..offset_count(D) {
@@ -167,7 +166,7 @@ impl<const D: usize> GridPlan<D> {
             for &(owner, first, last, home) in &found {
                 let is_all = found.iter().filter(|(other, ..)| *other == owner).count() == 1;
                 let (from, to) = if is_all { (0, u64::MAX) } else { (first, last) };
-                let is_same = |piece: &Piece<D>| (piece.rank, piece.first, piece.last) == (owner, from, to);
+                let is_same = |piece: &Piece| (piece.rank, piece.first, piece.last) == (owner, from, to);
                 let piece = known + pieces[known..].iter().position(is_same).unwrap_or(pieces.len() - known);
                 if piece == pieces.len() {
                     let block = block as u32;
@@ -175,13 +174,13 @@ impl<const D: usize> GridPlan<D> {
                         rank: owner,
                         block,
                         nodes: 0,
-                        columns: Columns::NONE,
+                        with_moments: 0,
                         first: from,
                         last: to,
                     });
                 }
                 pieces[piece].nodes |= nodes;
-                pieces[piece].columns = pieces[piece].columns.union(&columns.within(chained & nodes));
+                pieces[piece].with_moments |= chained & nodes;
                 let is_only = found.len() == 1 && own <= 1;
                 let (block, region, piece) = (block as u32, region as u8, piece as u32);
                 parts.push((block, Part { region, piece, key: first, home, is_only }));

@@ -5,7 +5,7 @@ use super::exchange::ReceivedSums;
 use super::mixed::{Mixed, Other};
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::window::Window;
-use crate::grid::constraints::columns::axes_in;
+use crate::grid::constraints::moments::{first_row, rows_of};
 use crate::grid::mask::{bits, block_nodes, opposite};
 use crate::grid::order::Origin;
 use crate::grid::order::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
@@ -246,7 +246,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
 
     /// Writes the sums of first moments at those of `nodes` that have any. `to` has all moments of the block.
     pub fn sum_moments(&mut self, nodes: u64, to: &mut [Row]) {
-        let nodes = nodes & self.plan.blocks[self.block].columns.nodes();
+        let nodes = nodes & self.plan.blocks[self.block].with_moments;
         if nodes == 0 {
             return;
         }
@@ -271,12 +271,10 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     /// The moments at nodes of a region in the fixed pattern; `from` has those of each position.
     fn add_moments(&self, region: usize, nodes: u64, is_mixed: bool, from: &[&[Row]; 32], to: &mut [Row]) {
         let none = [ZERO; D];
-        let Block { columns, chained, .. } = &self.plan.blocks[self.block];
+        let Block { with_moments, chained, .. } = self.plan.blocks[self.block];
         let count = self.regions.bins[region];
         for bit in bits(nodes) {
-            let (first, axes) = (columns.first_of(bit), columns.axes_of(bit));
-            let below = columns.within(chained & ((1 << bit) - 1));
-            let here = axes.count_ones() as usize;
+            let below = chained & ((1 << bit) - 1);
             let mut at = [&none[..]; MOST_BINS];
             for (at, slot) in at.iter_mut().zip(&self.order[region]).take(count) {
                 let position = slot.position as usize % 32;
@@ -284,23 +282,21 @@ impl<'a, const D: usize> BlockSum<'a, D> {
                     continue;
                 }
                 // The whole arena has moments; they are zero where particles touch nothing.
-                let first = below.within(self.regions.overlap[position]).len();
-                if let Some(found) = from[position].get(first..first + here) {
+                let first = rows_of::<D>(below & self.regions.overlap[position]);
+                if let Some(found) = from[position].get(first..first + D) {
                     *at = found;
                 }
             }
             let mut others = [none; MOST_BINS];
             if is_mixed {
                 for placed in &self.scratch.placed {
-                    let all = self.moments(placed.origin, bit).unwrap_or(none);
-                    let those = axes_in::<D>(axes).map(|axis| all[axis]);
-                    others[placed.slot].iter_mut().zip(those).for_each(|(to, column)| *to = column);
+                    others[placed.slot] = self.moments(placed.origin, bit).unwrap_or(none);
                 }
                 for placed in &self.scratch.placed {
                     at[placed.slot] = &others[placed.slot];
                 }
             }
-            for (i, to) in to[first..][..here].iter_mut().enumerate() {
+            for (i, to) in to[first_row::<D>(with_moments, bit)..][..D].iter_mut().enumerate() {
                 let pair = |slot: usize| at[slot][i].plus(&at[slot + 1][i]);
                 let sum = match count {
                     1 => at[0][i],

@@ -5,7 +5,6 @@ use super::block_sum::Sources;
 use super::exchange::ArenaExchange;
 use super::mixed::Mixed;
 use crate::grid::arenas::Arenas;
-use crate::grid::constraints::columns::Columns;
 use crate::grid::plan::GridPlan;
 
 /// Counts of one rank.
@@ -27,9 +26,9 @@ pub struct Census {
 
 /// What one receiver needs of a block: nodes, and their first moments.
 #[derive(Clone, Copy)]
-struct Needed<const D: usize> {
+struct Needed {
     rows: u64,
-    moments: Columns<D>,
+    moments: u64,
 }
 
 /// Not collective. Bytes that the surface between partitions needs: for every pair of ranks, the distinct nodes that the
@@ -45,16 +44,16 @@ pub fn surface_bytes<const D: usize>(
     let mut scratch = Mixed::default();
     let mut total = 0;
     for pieces in exchange.sent() {
-        let mut needed: FxHashMap<u32, Needed<D>> = FxHashMap::default();
+        let mut needed: FxHashMap<u32, Needed> = FxHashMap::default();
         for piece in pieces {
             let nodes = piece.find(own, &mut scratch).own_nodes() & piece.nodes;
-            let block = needed.entry(piece.block).or_insert(Needed { rows: 0, moments: Columns::NONE });
+            let block = needed.entry(piece.block).or_insert(Needed { rows: 0, moments: 0 });
             block.rows |= nodes;
-            block.moments = block.moments.union(&piece.columns.within(nodes));
+            block.moments |= piece.with_moments & nodes;
         }
-        let (row, column) = (8 * (D as u64 + 1), 8 * D as u64);
-        let bytes = |needed: &Needed<D>| {
-            row * u64::from(needed.rows.count_ones()) + column * needed.moments.len() as u64
+        let (row, moments) = (8 * (D as u64 + 1), 8 * (D * D) as u64);
+        let bytes = |needed: &Needed| {
+            row * u64::from(needed.rows.count_ones()) + moments * u64::from(needed.moments.count_ones())
         };
         total += needed.values().map(bytes).sum::<u64>();
     }

@@ -12,7 +12,7 @@ use super::fields::NodeFields;
 use super::mixed::Mixed;
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::waves::Seam;
-use crate::grid::constraints::columns::{Columns, Moments, axes_in};
+use crate::grid::constraints::moments::{self, Moments, rows_of};
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::order::region::Regions;
 use crate::grid::plan::GridPlan;
@@ -27,13 +27,13 @@ const TASK: usize = 16;
 
 /// A sum that one neighbour needs of own bins.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SentPiece<const D: usize> {
+pub(super) struct SentPiece {
     /// The block.
     pub block: u32,
     /// Nodes that the neighbour needs.
     pub nodes: u64,
-    /// Their first moments.
-    pub columns: Columns<D>,
+    /// Those of them whose first moments it needs.
+    pub with_moments: u64,
     /// Keys of the bins, if not all that reach the block.
     keys: Option<(u64, u64)>,
 }
@@ -41,7 +41,7 @@ pub(super) struct SentPiece<const D: usize> {
 /// Exchange of partial sums for one plan.
 pub struct ArenaExchange<const D: usize> {
     exchange: NeighbourExchange,
-    sent: Vec<Vec<SentPiece<D>>>,
+    sent: Vec<Vec<SentPiece>>,
     received_from: Vec<std::ops::Range<usize>>,
 }
 
@@ -50,16 +50,16 @@ pub struct ArenaExchange<const D: usize> {
 pub struct ReceivedSums<const D: usize> {
     rows: Vec<Row>,
     moments: Vec<Row>,
-    pieces: Vec<Place<D>>,
+    pieces: Vec<Place>,
     /// Nodes of each piece that have values.
     touched: Vec<u64>,
 }
 
 /// Where a received piece is kept.
 #[derive(Clone, Copy, Debug)]
-struct Place<const D: usize> {
+struct Place {
     nodes: u64,
-    columns: Columns<D>,
+    with_moments: u64,
     first_row: usize,
     first_moment: usize,
 }
@@ -95,11 +95,11 @@ impl<const D: usize> ArenaExchange<D> {
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();
         ranks.dedup();
-        let mut sent: Vec<Vec<SentPiece<D>>> = ranks.iter().map(|_| Vec::new()).collect();
+        let mut sent: Vec<Vec<SentPiece>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
                 sent[neighbour] =
-                    words.chunks_exact(4 + 2 * D).map(|words| read_request(words, plan)).collect();
+                    words.chunks_exact(5 + D).map(|words| read_request(words, plan)).collect();
             }
         }
         let received_from = ranks
@@ -154,7 +154,7 @@ impl<const D: usize> ArenaExchange<D> {
     }
 
     /// What each neighbour needs of the own bins.
-    pub(super) fn sent(&self) -> &[Vec<SentPiece<D>>] {
+    pub(super) fn sent(&self) -> &[Vec<SentPiece>] {
         &self.sent
     }
 
@@ -162,7 +162,7 @@ impl<const D: usize> ArenaExchange<D> {
     /// the blocks asked for; the rest is added up here.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>, fields: &NodeFields<D>) -> Vec<Vec<u8>> {
         let own = Sources { plan, arenas, received: None };
-        let tasks: Vec<&[SentPiece<D>]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
+        let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
         let sums = tasks.into_par_iter().map_init(Packing::default, |packing, pieces| {
             let mut extents = 0u64;
             let mut values = Vec::new();
@@ -177,7 +177,7 @@ impl<const D: usize> ArenaExchange<D> {
         });
         let sums: Vec<(u64, Vec<f64>)> = sums.collect();
         let mut sums = &sums[..];
-        let message = |pieces: &Vec<SentPiece<D>>| {
+        let message = |pieces: &Vec<SentPiece>| {
             let (own, rest) = sums.split_at(pieces.len().div_ceil(TASK));
             sums = rest;
             let mut message: Vec<u8> = Vec::new();
@@ -202,9 +202,9 @@ impl<const D: usize> ArenaExchange<D> {
     }
 }
 
-impl<const D: usize> SentPiece<D> {
+impl SentPiece {
     /// What reaches the block of the piece from the bins that it asks for.
-    pub fn find<'a>(&self, own: Sources<'a, D>, scratch: &'a mut Mixed<D>) -> BlockSum<'a, D> {
+    pub fn find<'a, const D: usize>(&self, own: Sources<'a, D>, scratch: &'a mut Mixed<D>) -> BlockSum<'a, D> {
         let keys = self.keys.map(|(first, last)| first..=last);
         BlockSum::find(own, scratch, self.block as usize, keys)
     }
@@ -227,19 +227,19 @@ impl<const D: usize> Default for Packing<D> {
 
 impl<const D: usize> Packing<D> {
     /// Adds up a piece and appends it to a message.
-    fn pack(&mut self, piece: &SentPiece<D>, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
+    fn pack(&mut self, piece: &SentPiece, own: Sources<'_, D>, values: &mut Vec<f64>) -> Extent {
         let mut sum = piece.find(own, &mut self.scratch);
         let nodes = sum.own_nodes() & piece.nodes;
         sum.sum_rows(Regions::of::<D>().meeting::<D>(nodes), &mut self.rows);
-        sum.sum_moments(nodes & piece.columns.nodes(), &mut self.moments);
-        let columns = own.plan.blocks[piece.block as usize].columns;
-        append(piece, nodes, &self.rows, (columns, &self.moments), values)
+        sum.sum_moments(nodes & piece.with_moments, &mut self.moments);
+        let of_block = own.plan.blocks[piece.block as usize].with_moments;
+        append::<D>(piece, nodes, &self.rows, (of_block, &self.moments), values)
     }
 }
 
 /// Appends a piece to a message whose sums `fields` have.
 fn pack<const D: usize>(
-    piece: &SentPiece<D>,
+    piece: &SentPiece,
     plan: &GridPlan<D>,
     fields: &NodeFields<D>,
     values: &mut Vec<f64>,
@@ -247,15 +247,15 @@ fn pack<const D: usize>(
     let block = piece.block as usize;
     let nodes = fields.touched(block) & piece.nodes;
     let rows = &fields.rows[block * block_nodes(D)..][..block_nodes(D)];
-    append(piece, nodes, rows, (plan.blocks[block].columns, fields.moments_of(plan, block)), values)
+    append::<D>(piece, nodes, rows, (plan.blocks[block].with_moments, fields.moments_of(plan, block)), values)
 }
 
-/// Appends the sums at `nodes` to a message, from the rows and the first moments of the block.
+/// Appends the sums at `nodes` to a message, from the rows and the first moments of the block, with the nodes that have such.
 fn append<const D: usize>(
-    piece: &SentPiece<D>,
+    piece: &SentPiece,
     nodes: u64,
     rows: &[Row],
-    (columns, moments): (Columns<D>, &[Row]),
+    (of_block, moments): (u64, &[Row]),
     values: &mut Vec<f64>,
 ) -> Extent {
     if nodes == 0 {
@@ -273,10 +273,9 @@ fn append<const D: usize>(
             values.extend_from_slice(&[x, y, mass]);
         }
     }
-    let wanted = piece.columns.within(nodes);
-    for bit in bits(wanted.nodes()) {
-        let moments = columns.read(moments, bit);
-        axes_in::<D>(wanted.axes_of(bit)).for_each(|axis| values.extend_from_slice(&moments[axis].0[..D]));
+    for bit in bits(piece.with_moments & nodes) {
+        let moments: Moments<D> = moments::read(moments, of_block, bit);
+        moments.iter().for_each(|row| values.extend_from_slice(&row.0[..D]));
     }
     if is_all { Extent::All } else { Extent::Some }
 }
@@ -284,13 +283,13 @@ fn append<const D: usize>(
 impl<const D: usize> ReceivedSums<D> {
     fn new(plan: &GridPlan<D>) -> Self {
         let (mut rows, mut moments) = (0, 0);
-        let place = |piece: &Piece<D>| {
+        let place = |piece: &Piece| {
             let (first_row, first_moment) = (rows, moments);
             rows += piece.nodes.count_ones() as usize;
-            moments += piece.columns.len();
-            Place { nodes: piece.nodes, columns: piece.columns, first_row, first_moment }
+            moments += rows_of::<D>(piece.with_moments);
+            Place { nodes: piece.nodes, with_moments: piece.with_moments, first_row, first_moment }
         };
-        let pieces: Vec<Place<D>> = plan.pieces.iter().map(place).collect();
+        let pieces: Vec<Place> = plan.pieces.iter().map(place).collect();
         Self { rows: vec![ZERO; rows], moments: vec![ZERO; moments], touched: vec![0; pieces.len()], pieces }
     }
 
@@ -312,7 +311,7 @@ impl<const D: usize> ReceivedSums<D> {
     /// First moments that it adds to a node.
     pub(in crate::grid) fn moments(&self, piece: u32, bit: u32) -> Moments<D> {
         let (place, touched) = (&self.pieces[piece as usize], self.touched[piece as usize]);
-        place.columns.within(touched).read(&self.moments[place.first_moment..], bit)
+        moments::read(&self.moments[place.first_moment..], place.with_moments & touched, bit)
     }
 
     fn unpack(&mut self, message: &[u8], pieces: std::ops::Range<usize>) {
@@ -335,9 +334,9 @@ impl<const D: usize> ReceivedSums<D> {
                     Row([x, y, 0.0, mass])
                 };
             }
-            let moments = place.columns.within(touched).len();
-            for column in &mut self.moments[place.first_moment..][..moments] {
-                column.0[..D].copy_from_slice(&values.take::<D>());
+            let moments = rows_of::<D>(place.with_moments & touched);
+            for row in &mut self.moments[place.first_moment..][..moments] {
+                row.0[..D].copy_from_slice(&values.take::<D>());
             }
         }
     }
@@ -358,28 +357,25 @@ impl Values<'_> {
     }
 }
 
-fn push_request<const D: usize>(words: &mut Vec<u64>, piece: &Piece<D>, plan: &GridPlan<D>) {
+fn push_request<const D: usize>(words: &mut Vec<u64>, piece: &Piece, plan: &GridPlan<D>) {
     let block = &plan.blocks[piece.block as usize];
     words.push(u64::from(block.level));
     words.extend(block.coord.map(u64::from));
-    words.push(piece.nodes);
-    words.extend(piece.columns.along());
-    words.extend([piece.first, piece.last]);
+    words.extend([piece.nodes, piece.with_moments, piece.first, piece.last]);
 }
 
 /// The piece that a neighbour asks for. Bins of this rank reach the nodes, so that it has their block.
-fn read_request<const D: usize>(words: &[u64], plan: &GridPlan<D>) -> SentPiece<D> {
+fn read_request<const D: usize>(words: &[u64], plan: &GridPlan<D>) -> SentPiece {
     let level = words[0].min(u64::from(MAX_LEVEL)) as u8;
     let coord = std::array::from_fn(|axis| words[1 + axis] as u32);
-    let (nodes, columns) = (words[1 + D], Columns::new(std::array::from_fn(|axis| words[2 + D + axis])));
-    let [first, last] = std::array::from_fn(|i| words[2 + 2 * D + i]);
+    let [nodes, with_moments, first, last] = std::array::from_fn(|i| words[1 + D + i]);
     let place = |level: u8, coord: [u32; D]| (level, Octant { level, coord }.key(), coord);
     let found =
         plan.blocks.binary_search_by_key(&place(level, coord), |block| place(block.level, block.coord));
     debug_assert!(found.is_ok(), "a sum of nodes that no own bin reaches");
     let keys = (last != u64::MAX).then_some((first, last));
     match found {
-        Ok(block) => SentPiece { block: block as u32, nodes, columns, keys },
-        Err(_) => SentPiece { block: 0, nodes: 0, columns: Columns::NONE, keys },
+        Ok(block) => SentPiece { block: block as u32, nodes, with_moments, keys },
+        Err(_) => SentPiece { block: 0, nodes: 0, with_moments: 0, keys },
     }
 }

@@ -11,7 +11,7 @@ use crate::grid::arenas::Arenas;
 use crate::grid::arenas::cutter::Cutter;
 use crate::grid::arenas::waves::FIRST;
 use crate::grid::arenas::window::{Shared, Window};
-use crate::grid::constraints::columns::axes_in;
+use crate::grid::constraints::moments::first_row;
 use crate::grid::mask::{bits, block_nodes, offset_count};
 use crate::grid::order::region::Regions;
 use crate::grid::plan::{Bin, GridPlan, NO_BLOCK};
@@ -25,7 +25,7 @@ pub(super) const ZERO: Row = Row([0.0; 4]);
 pub struct NodeFields<const D: usize> {
     /// One row per node, block by block. Those of blocks that nothing ever reaches take no memory.
     pub rows: Block<Row>,
-    /// First moments, block by block, by number of the column.
+    /// First moments, block by block.
     pub moments: Block<Row>,
     /// Per block, whether something was summed in it in this step.
     pub active: Vec<bool>,
@@ -55,7 +55,7 @@ impl<const D: usize> NodeFields<D> {
         let nodes = block_nodes(D);
         Self {
             rows: Block::zeroed(plan.blocks.len() * nodes),
-            moments: Block::zeroed(plan.columns),
+            moments: Block::zeroed(plan.moments),
             active: vec![false; plan.blocks.len()],
             touched: vec![0; plan.blocks.len()],
             needed: vec![false; plan.blocks.len()],
@@ -130,7 +130,7 @@ impl<const D: usize> NodeFields<D> {
         let regions = Regions::of::<D>();
         self.for_each_block(plan, &blocks, |scratch, place, slot| {
             let index = blocks[place] as usize;
-            let (mut rest, columns) = (0, plan.blocks[index].columns);
+            let (mut rest, with_moments) = (0, plan.blocks[index].with_moments);
             for part in plan.parts(index) {
                 let touched = received.touched(part.piece) & regions.nodes[part.region as usize];
                 if touched == 0 {
@@ -144,10 +144,10 @@ impl<const D: usize> NodeFields<D> {
                 for bit in bits(touched) {
                     slot.rows[bit as usize].add(&received.row(part.piece, bit));
                 }
-                for bit in bits(touched & columns.nodes()) {
+                for bit in bits(touched & with_moments) {
                     let more = received.moments(part.piece, bit);
-                    let own = slot.moments[columns.first_of(bit)..].iter_mut();
-                    own.zip(axes_in::<D>(columns.axes_of(bit))).for_each(|(own, axis)| own.add(&more[axis]));
+                    let own = slot.moments[first_row::<D>(with_moments, bit)..].iter_mut();
+                    own.zip(&more).for_each(|(own, more)| own.add(more));
                 }
             }
             if rest != 0 {
@@ -218,7 +218,8 @@ impl<const D: usize> NodeFields<D> {
         for (index, block, shared) in shared_blocks(bin, window) {
             copy_rows(shared, &self.rows[block * nodes..][..nodes], &mut arena.rows);
             if let Some(constraints) = constraints {
-                constraints.copy_block(index, self.moments_of(plan, block), &mut arena.moments);
+                let of_block = plan.blocks[block].with_moments;
+                constraints.copy_block(index, of_block, self.moments_of(plan, block), &mut arena.moments);
             }
         }
         let (next, window) = arenas.after(number)?;
@@ -278,7 +279,7 @@ fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`, by number of the column in the arena.
+    /// First moments `V_j`, in the order of [`ArenaConstraints`](crate::grid::plan::constrained::ArenaConstraints).
     pub moments: Vec<Row>,
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::fields::NodeFields;
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::cutter::Cutter;
-use crate::grid::constraints::columns::axes_in;
+use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::constraints::parents::{ParentNode, ParentTable, parity, weight_of};
 use crate::grid::mask::{bits, block_nodes, offset};
 use crate::grid::plan::links::{Child, FineBlock};
@@ -86,32 +86,29 @@ fn hand_up<const D: usize>(
     to: &mut BlockMut<'_>,
 ) {
     let table = ParentTable::of::<D>();
-    let (fine, Block { sum, columns, .. }) =
+    let (fine, Block { sum, with_moments: passing, .. }) =
         (&plan.blocks[child.block as usize], &plan.blocks[coarse as usize]);
     let (parity, (rows, moments)) = (parity(fine.coord), from.of_block(plan, child.block));
     let is_here = |parent: &&ParentNode| parent.corner == child.corner && sum >> parent.bit & 1 == 1;
-    let (with_moments, passing) = (fine.columns.nodes(), columns.nodes());
     for bit in bits(fine.sum & fine.constrained & table.having(parity, child.corner)) {
         let row = F64x4::new(rows[bit as usize].0);
         let parents = table.of_node::<D>(parity, bit).iter().filter(is_here);
-        if with_moments >> bit & 1 == 0 {
+        if fine.with_moments >> bit & 1 == 0 {
             parents.for_each(|parent| {
                 steps[usize::from(parent.offset)].add(row, &mut to.rows[usize::from(parent.bit)]);
             });
             continue;
         }
-        let own = &moments[fine.columns.first_of(bit)..];
-        let own = || axes_in::<D>(fine.columns.axes_of(bit)).zip(own);
+        let own: Moments<D> = moments::read(moments, fine.with_moments, bit);
         for parent in parents {
             let step = &steps[usize::from(parent.offset)];
-            let value = own()
-                .fold(row, |value, (axis, column)| F64x4::new(column.0).mul_add(step.delta[axis], value));
+            let value = (0..D).fold(row, |value, k| F64x4::new(own[k].0).mul_add(step.delta[k], value));
             step.add(value, &mut to.rows[usize::from(parent.bit)]);
             // Real nodes have no moments.
             if passing >> parent.bit & 1 == 1 {
-                let mut sums = columns.read(to.moments, parent.bit.into());
-                own().for_each(|(axis, column)| step.add(F64x4::new(column.0), &mut sums[axis]));
-                columns.write(to.moments, parent.bit.into(), &sums);
+                let mut sums: Moments<D> = moments::read(to.moments, *passing, parent.bit.into());
+                sums.iter_mut().zip(&own).for_each(|(sum, own)| step.add(F64x4::new(own.0), sum));
+                moments::write(to.moments, *passing, parent.bit.into(), &sums);
             }
         }
     }
@@ -129,9 +126,8 @@ fn interpolate<const D: usize>(
     let block = &plan.blocks[fine.block as usize];
     let (table, parity) = (ParentTable::of::<D>(), parity(block.coord));
     let parents = fine.parents.map(|parent| {
-        (parent != NO_BLOCK).then(|| (from.of_block(plan, parent), &plan.blocks[parent as usize].columns))
+        (parent != NO_BLOCK).then(|| (from.of_block(plan, parent), plan.blocks[parent as usize].with_moments))
     });
-    let with_moments = block.columns.nodes();
     for bit in bits(block.value & block.constrained) {
         let mut row = F64x4::splat(0.0);
         for parent in table.of_node::<D>(parity, bit) {
@@ -140,23 +136,22 @@ fn interpolate<const D: usize>(
             row = steps[usize::from(parent.offset)].weight.mul_add(F64x4::new([x, y, z, 0.0]), row);
         }
         to.rows[bit as usize] = Row(row.to_array());
-        if with_moments >> bit & 1 == 0 {
+        if block.with_moments >> bit & 1 == 0 {
             continue;
         }
-        let axes = block.columns.axes_of(bit);
         let mut sums = [F64x4::splat(0.0); D];
         for parent in table.of_node::<D>(parity, bit) {
-            let Some(((rows, moments), columns)) = parents[usize::from(parent.corner) % 8] else { continue };
+            let Some(((rows, moments), nodes)) = parents[usize::from(parent.corner) % 8] else { continue };
             let step = &steps[usize::from(parent.offset)];
             let [x, y, z, _] = rows[usize::from(parent.bit)].0;
             // Of real nodes these are zero.
-            let of_parent = columns.read(moments, parent.bit.into());
-            for axis in axes_in::<D>(axes) {
+            let of_parent: Moments<D> = moments::read(moments, nodes, parent.bit.into());
+            for axis in 0..D {
                 sums[axis] = step.weighted_delta[axis].mul_add(F64x4::new([x, y, z, 0.0]), sums[axis]);
                 sums[axis] = step.weight.mul_add(F64x4::new(of_parent[axis].0), sums[axis]);
             }
         }
-        block.columns.write(to.moments, bit, &sums.map(|sum| Row(sum.to_array())));
+        moments::write(to.moments, block.with_moments, bit, &sums.map(|sum| Row(sum.to_array())));
     }
 }
 
@@ -167,12 +162,12 @@ fn split<'a, const D: usize>(
     plan: &GridPlan<D>,
     level: usize,
 ) -> (Half<'a, D>, Half<'a, D>) {
-    let (nodes, block, column) = (block_nodes(D), plan.level_start[level], plan.first_column(level));
+    let (nodes, block, moment) = (block_nodes(D), plan.level_start[level], plan.first_moment(level));
     let (coarse_rows, fine_rows) = rows.split_at_mut(block * nodes);
-    let (coarse_moments, fine_moments) = moments.split_at_mut(column);
+    let (coarse_moments, fine_moments) = moments.split_at_mut(moment);
     (
-        Half { rows: coarse_rows, moments: coarse_moments, first_block: 0, first_column: 0 },
-        Half { rows: fine_rows, moments: fine_moments, first_block: block, first_column: column },
+        Half { rows: coarse_rows, moments: coarse_moments, first_block: 0, first_moment: 0 },
+        Half { rows: fine_rows, moments: fine_moments, first_block: block, first_moment: moment },
     )
 }
 
@@ -181,16 +176,16 @@ struct Half<'a, const D: usize> {
     rows: &'a mut [Row],
     moments: &'a mut [Row],
     first_block: usize,
-    first_column: usize,
+    first_moment: usize,
 }
 
 impl<const D: usize> Half<'_, D> {
     /// Rows and first moments of a block.
     #[inline(always)]
     fn of_block(&self, plan: &GridPlan<D>, block: u32) -> (&[Row], &[Row]) {
-        let (nodes, columns) = (block_nodes(D), plan.moments_of(block as usize));
+        let (nodes, moments) = (block_nodes(D), plan.moments_of(block as usize));
         let rows = &self.rows[(block as usize - self.first_block) * nodes..][..nodes];
-        (rows, &self.moments[columns.start - self.first_column..columns.end - self.first_column])
+        (rows, &self.moments[moments.start - self.first_moment..moments.end - self.first_moment])
     }
 }
 
@@ -236,7 +231,7 @@ fn for_each_linked<'a, const D: usize, T: Sync + 'a>(
 ) {
     let nodes = block_nodes(D);
     let mut rows = Cutter::new(half.rows, half.first_block * nodes);
-    let mut moments = Cutter::new(half.moments, half.first_column);
+    let mut moments = Cutter::new(half.moments, half.first_moment);
     let tasks: Vec<_> = blocks
         .map(|(block, with)| {
             let block = block as usize;

@@ -4,7 +4,7 @@
 //! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
 //! does not fit is listed and added up along the tree of keys.
 use super::block_sum::{BlockSum, ZERO, ZEROS};
-use crate::grid::constraints::columns::Moments;
+use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::mask::{bits, offset_count, opposite};
 use crate::grid::order::region::{MOST_BINS, SPAN, arena_node};
 use crate::grid::order::{Origin, Term, arrange, fold};
@@ -144,7 +144,7 @@ impl<const D: usize> BlockSum<'_, D> {
             };
             let sum = fold(&self.scratch.terms, &mut stack, load, add_moments);
             let sum = sum.unwrap_or([ZERO; D]).map(|row| row.plus(&ZERO));
-            self.plan.blocks[self.block].columns.write(to, bit, &sum);
+            moments::write(to, self.plan.blocks[self.block].with_moments, bit, &sum);
         }
         self.scratch.moments = stack;
     }

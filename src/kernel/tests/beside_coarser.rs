@@ -60,25 +60,26 @@ fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
     let (materials, frame) = (materials(), frame::<D>());
     let scheme = scheme(&materials, Transfer::Apic);
     let BesideCoarser { is_hanging, velocity, moments } = BesideCoarser::new::<D>(coarse, seed);
-    let columns: Vec<(usize, usize)> = (0..arena_nodes(D))
-        .filter(|&node| is_hanging[node])
-        .flat_map(|node| (0..D).map(move |axis| (node, axis)))
-        .filter(|(node, axis)| (node / ARENA_EDGE.pow(*axis as u32) % ARENA_EDGE).is_multiple_of(2))
-        .collect();
-    let with_columns = ConstrainedNodes::new::<D>(
-        columns.iter().map(|&(node, axis)| Column { node, axis, second: CELL * CELL }),
-        HangingNodes::new::<D>(&vec![false; arena_nodes(D)]),
-    );
-    let hanging = ConstrainedNodes::new::<D>([], HangingNodes::new::<D>(&is_hanging));
+    // Parents lie beside nodes with an odd coordinate, and the lowest node of an arena has odd ones.
+    let second = |node: usize| {
+        let is_odd = |axis: usize| (node / ARENA_EDGE.pow(axis as u32) % ARENA_EDGE).is_multiple_of(2);
+        std::array::from_fn(|axis| if is_odd(axis) { CELL * CELL } else { 0.0 })
+    };
+    let listed: Vec<usize> = (0..arena_nodes(D)).filter(|&node| is_hanging[node]).collect();
+    let nodes: Vec<MomentNode<D>> =
+        listed.iter().map(|&node| MomentNode { node, second: second(node) }).collect();
+    let with_moments =
+        ConstrainedNodes::new(&nodes, HangingNodes::new::<D>(&vec![false; arena_nodes(D)]));
+    let hanging = ConstrainedNodes::new::<D>(&[], HangingNodes::new::<D>(&is_hanging));
     let start = particles::<D>(61, seed, 1);
-    let first: Vec<Row> = columns.iter().map(|&(node, axis)| moments[node][axis]).collect();
+    let first: Vec<Row> = listed.iter().flat_map(|&node| moments[node][..D].to_vec()).collect();
     let gathered = |moments: Moments| {
         let mut chunk = start.clone();
         let fields = Fields { velocity: &velocity, increment: None, moments: Some(moments) };
         gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
         chunk
     };
-    let expected = gathered(Moments { nodes: &with_columns, first: &first });
+    let expected = gathered(Moments { nodes: &with_moments, first: &first });
     let found = gathered(Moments { nodes: &hanging, first: &[] });
     for column in 0..Layout::<D>::REALS {
         for (a, b) in expected.column(column).iter().zip(found.column(column)) {
@@ -93,7 +94,7 @@ fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
         let pairs = arena.iter().zip(&velocity).chain(sums.iter().zip(&first));
         pairs.fold((0.0, 0.0), |(sum, size): (f64, f64), (a, v)| (sum + dot(a, v), size + dot(a, v).abs()))
     };
-    let (expected, size) = work(&with_columns, &mut vec![Row::default(); columns.len()]);
+    let (expected, size) = work(&with_moments, &mut vec![Row::default(); first.len()]);
     let (found, _) = work(&hanging, &mut []);
     assert!((found - expected).abs() <= 1e-14 * size, "{coarse:b}: {found} {expected}");
 }

@@ -1,5 +1,5 @@
 //! Scatter and gather together, against a plain scalar definition.
-use super::constrained::{Column, ConstrainedNodes};
+use super::constrained::{ConstrainedNodes, MomentNode};
 use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
 use super::leavers::Leavers;

@@ -90,15 +90,13 @@ fn moments_follow<const D: usize>() {
     domain::half_widths(&start, Select::All, CELL, &frame.extent, &scheme, &mut half);
     let nodes = arena_nodes(D);
     let listed: Vec<usize> = (0..nodes).filter(|node| node % 3 != 1).rev().collect();
-    // Some nodes have all columns, some not.
-    let columns: Vec<(usize, usize)> = listed
-        .iter()
-        .flat_map(|&node| (0..D).map(move |axis| (node, axis)))
-        .filter(|(n, k)| (n + k) % 4 != 0)
-        .collect();
+    let columns: Vec<(usize, usize)> =
+        listed.iter().flat_map(|&node| (0..D).map(move |axis| (node, axis))).collect();
     let constrained = |second: &[Row]| {
-        let column = |&(node, axis): &(usize, usize)| Column { node, axis, second: second[node].0[axis] };
-        ConstrainedNodes::new::<D>(columns.iter().map(column), HangingNodes::new::<D>(&vec![false; nodes]))
+        let second = |node: usize| std::array::from_fn(|axis| second[node].0[axis]);
+        let with_moments: Vec<MomentNode<D>> =
+            listed.iter().map(|&node| MomentNode { node, second: second(node) }).collect();
+        ConstrainedNodes::new(&with_moments, HangingNodes::new::<D>(&vec![false; nodes]))
     };
     let scattered = |second: &[Row]| {
         let constrained = constrained(second);
