@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use agimp::grid::GridPlan;
-use agimp::grid::plan::known::Allowance;
+use agimp::grid::plan::ghost_layer::Allowance;
 use divan::Bencher;
 use partition::comm::World;
 use partition::{Brick, Forest};

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use agimp::grid::arenas::Arenas;
-use agimp::grid::arenas::waves;
+use agimp::grid::arenas::arena_schedule;
 use agimp::grid::mask::{block_nodes, offset_count};
 use agimp::grid::plan::NO_BLOCK;
 use agimp::grid::{GridPlan, NodeFields};
@@ -55,7 +55,7 @@ fn main() {
             let mut plain = vec![0.0; 4 * plan.blocks.len() * block_nodes(D)];
             pool.install(|| {
                 // All own bins are in one wave behind the first, which is empty.
-                let wave = waves::FIRST + 1;
+                let wave = arena_schedule::FIRST + 1;
                 ordered.sum(plan, arenas, wave);
                 times[1].push(timed(|| ordered.sum(plan, arenas, wave)));
                 if threads == 1 {
@@ -98,7 +98,7 @@ fn median(mut times: Vec<f64>) -> f64 {
 fn each_node(plan: &GridPlan<D>, arenas: &Arenas<D>, bin: usize, mut add: impl FnMut(usize, &[f64; 4])) {
     let Some(arena) = arenas.get(bin as u32) else { return };
     for (towards, &block) in plan.bins[bin].around.iter().enumerate().take(offset_count(D)) {
-        if block == NO_BLOCK || plan.blocks[block as usize].sum == 0 {
+        if block == NO_BLOCK || plan.blocks[block as usize].needs_sum == 0 {
             continue;
         }
         let Some(shared) = arena.window.shared(towards) else { continue };

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Failure;
 use super::shared::message::together;
 use crate::grid::direct;
-use crate::grid::plan::known::KnownTree;
+use crate::grid::plan::ghost_layer::KnownTree;
 use crate::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 
 /// Arguments of `agimp weights`.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use partition::{MAX_LEVEL, Octant};
 
-use super::plan::known::KnownTree;
+use super::plan::ghost_layer::KnownTree;
 use crate::kernel::BLOCK;
 
 /// Weight of one real node.

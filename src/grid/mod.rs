@@ -23,9 +23,9 @@ pub mod order;
 pub mod plan;
 pub mod sums;
 
-pub use arenas::waves::Seam;
+pub use arenas::arena_schedule::Seam;
 pub use arenas::window::Window;
 pub use plan::GridPlan;
-pub use plan::known::{Cover, KnownTree};
+pub use plan::ghost_layer::{Cover, KnownTree};
 pub use sums::exchange::ArenaExchange;
-pub use sums::fields::NodeFields;
+pub use sums::node_fields::NodeFields;

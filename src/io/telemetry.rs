@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hdf5_file::FileError;
 use super::lines::{Lines, Verdict, system};
-use crate::grid::sums::census::Census;
+use crate::grid::sums::statistics::Statistics;
 use crate::particle::chunk::Chunk;
 
 /// A quantity over the ranks.
@@ -175,7 +175,7 @@ pub struct Contribution<'a, const D: usize> {
     /// Their particles.
     pub chunks: &'a [Chunk<D>],
     /// What this rank holds and sends.
-    pub census: Census,
+    pub statistics: Statistics,
     /// Largest cost of a rank over the mean cost (the same on all ranks).
     pub imbalance: f64,
     /// The same for new cuts.
@@ -191,7 +191,8 @@ pub struct Contribution<'a, const D: usize> {
 impl<const D: usize> Contribution<'_, D> {
     /// The entries of [`PerRank`], in their order.
     fn counts(&self) -> [f64; 9] {
-        let Census { leaves, ghost_leaves, neighbours, arena_bytes, surface_bytes, grid_bytes } = self.census;
+        let Statistics { leaves, ghost_leaves, neighbours, arena_bytes, surface_bytes, grid_bytes } =
+            self.statistics;
         let particles: u64 = self.chunks.iter().map(|chunk| chunk.len() as u64).sum();
         let per_step = |count: u64| count as f64 / self.steps.max(1) as f64;
         [

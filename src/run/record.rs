@@ -229,7 +229,7 @@ impl Recorder {
                 },
                 leaves: solver.forest.leaves(),
                 chunks: &solver.chunks,
-                census: solver.census(),
+                statistics: solver.statistics(),
                 imbalance: solver.imbalance().0,
                 possible_imbalance: solver.possible_imbalance().0,
                 partitions: solver.partitions,

@@ -1,5 +1,5 @@
 //! Particles follow the size of the cells of their leaf.
-use super::patience::Turn;
+use super::merge_backoff::RetrySlot;
 use super::{Setting, ids, needs_split, split};
 use crate::adaptivity::Adaptivity;
 use crate::kernel::{Scheme, domain};
@@ -43,11 +43,11 @@ impl<'a, const D: usize> Resampling<'a, D> {
 
     fn setting(&self, level: u8) -> Setting<'a, D> {
         let (scheme, extent, nominal) = (self.scheme, self.extent, self.nominal);
-        Setting { scheme, extent, level, nominal, turn: Turn::ALL }
+        Setting { scheme, extent, level, nominal, turn: RetrySlot::ALL }
     }
 
     /// For merges in a leaf of a level.
-    pub fn setting_at(&self, level: u8, turn: Turn) -> Setting<'a, D> {
+    pub fn setting_at(&self, level: u8, turn: RetrySlot) -> Setting<'a, D> {
         Setting { turn, ..self.setting(level) }
     }
 

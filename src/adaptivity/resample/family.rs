@@ -10,7 +10,7 @@
 //! to cross to the leaf on the lower side for a while. It cannot know which faces cut a family that is near several, so
 //! the caller tries the combinations of axes in turn.
 use super::merge::{Limits, of_level};
-use super::{Setting, ids, patience};
+use super::{Setting, ids, merge_backoff};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Tag};
 
@@ -126,7 +126,7 @@ pub(super) fn waiting<const D: usize>(
             waiting.extend(family.iter().map(|sibling| sibling.p));
         } else if family.iter().all(|sibling| beside_leaf(chunk.position(sibling.p as usize))) {
             let patient = family.iter().map(|sibling| sibling.p);
-            waiting.extend(patient.filter(|&p| !patience::has_given_up(chunk.tags()[p as usize])));
+            waiting.extend(patient.filter(|&p| !merge_backoff::has_given_up(chunk.tags()[p as usize])));
         }
     }
     waiting
@@ -144,8 +144,8 @@ pub fn separated<const D: usize>(
     let finest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).max().unwrap_or(0);
     let mut separated = Vec::new();
     for level in setting.level + 1..=finest {
-        let due = patience::due(chunk, level, setting.turn).into_iter();
-        let due = parents(chunk, due.filter(|&p| !patience::has_given_up(chunk.tags()[p as usize])));
+        let due = merge_backoff::due(chunk, level, setting.turn).into_iter();
+        let due = parents(chunk, due.filter(|&p| !merge_backoff::has_given_up(chunk.tags()[p as usize])));
         if due.is_empty() {
             continue;
         }

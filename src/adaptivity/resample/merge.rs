@@ -2,8 +2,8 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::family::{self, Bounds};
-use super::mix::{Group, mixtures};
-use super::{Setting, patience, volume};
+use super::mixture::{Group, mixtures};
+use super::{Setting, merge_backoff, volume};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -77,7 +77,7 @@ pub fn merge<const D: usize>(
     let mut unnamed = Vec::new();
     for level in (setting.level + 1..=finest).rev() {
         for among_strangers in [false, true] {
-            let due = patience::due(chunk, level, setting.turn);
+            let due = merge_backoff::due(chunk, level, setting.turn);
             let refused = &mut report.refused;
             let mut groups = match bounds {
                 _ if due.is_empty() => continue,
@@ -189,7 +189,7 @@ fn strangers<const D: usize>(
         (tag, chunk.position(p as usize).iter().fold(0, |cell, &x| cell << 42 | place(x)))
     };
     let mut cells: FxHashMap<(u64, u128), u32> = FxHashMap::default();
-    let of_given = with.iter().map(|&p| cell_of(p, patience::plain(chunk.tags()[p as usize])));
+    let of_given = with.iter().map(|&p| cell_of(p, merge_backoff::plain(chunk.tags()[p as usize])));
     let mut in_order: Vec<(u64, u128)> = of_given.filter(|&cell| cells.insert(cell, 0).is_none()).collect();
     in_order.sort_unstable();
     (0..).zip(&in_order).for_each(|(number, cell)| *cells.entry(*cell).or_default() = number);
@@ -243,6 +243,6 @@ fn close<const D: usize>(
 
 /// Index and packed tag, without count, of the particles made for a level.
 pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
-    let tags = (0..).zip(chunk.tags().iter().copied().map(patience::plain));
+    let tags = (0..).zip(chunk.tags().iter().copied().map(merge_backoff::plain));
     tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

@@ -12,8 +12,8 @@ pub mod family;
 pub mod ids;
 pub mod ledger;
 mod merge;
-mod mix;
-pub mod patience;
+pub mod merge_backoff;
+mod mixture;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -34,7 +34,7 @@ pub struct Setting<'a, const D: usize> {
     /// and direction. On level k it is this over 2^k.
     pub nominal: &'a [f64],
     /// Who is tried for a merge.
-    pub turn: patience::Turn,
+    pub turn: merge_backoff::RetrySlot,
 }
 
 impl<const D: usize> Setting<'_, D> {

@@ -3,20 +3,20 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`window`] | which nodes of an arena particles can touch |
-//! | [`waves`] | when which arena is in use, so that few are held |
-//! | `cutter` | disjoint mutable parts of one slice |
+//! | [`arena_schedule`] | when which arena is in use, so that few are held |
+//! | `disjoint_slices` | disjoint mutable parts of one slice |
 use std::sync::Arc;
 
-use self::cutter::Cutter;
-use self::waves::{Seam, Waves};
+use self::arena_schedule::{ArenaSchedule, Seam};
+use self::disjoint_slices::DisjointSlices;
 use self::window::Window;
 use super::plan::GridPlan;
-use super::plan::constrained::{ArenaConstraints, ArenaMoments};
+use super::plan::arena_tables::{ArenaConstraints, ArenaMoments};
 use crate::kernel::{Row, arena_nodes};
 use crate::simd::prefetch;
 
-pub(super) mod cutter;
-pub mod waves;
+pub mod arena_schedule;
+pub(super) mod disjoint_slices;
 pub mod window;
 
 /// Cache lines of an arena that are prefetched: all in 2D; in 3D the processor foresees the rest.
@@ -24,7 +24,7 @@ const PREFETCHED: usize = 25;
 /// No arena.
 const NONE: u32 = u32::MAX;
 
-/// Arenas of the bins that are occupied in a step; empty bins hold no memory. Bins of one wave (see [`Waves`]) leave
+/// Arenas of the bins that are occupied in a step; empty bins hold no memory. Bins of one wave (see [`ArenaSchedule`]) leave
 /// theirs to those of later ones.
 #[derive(Clone, Debug, Default)]
 pub struct Arenas<const D: usize> {
@@ -37,7 +37,7 @@ pub struct Arenas<const D: usize> {
     slot: Vec<u32>,
     /// Occupied bins, ascending.
     occupied: Vec<Occupied<D>>,
-    waves: Waves,
+    schedule: ArenaSchedule,
     keep: bool,
     constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Per block, whether a bin reaches it whose block lies outside its leaf; in most steps few do: boxes must be wide, or
@@ -126,32 +126,34 @@ impl<const D: usize> Arenas<D> {
                 bin.reached().for_each(|block| self.outer_reach[block] = true);
             }
             self.number[number] = self.occupied.len() as u32;
-            let count = bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.moments()) as u32;
+            let count =
+                bin.touched.map_or(0, |table| plan.constraints[table as usize].nodes.moments()) as u32;
             let (bin, touched) = (number as u32, bin.touched);
             let moments_of_bin = [moments, moments + count];
             self.occupied.push(Occupied { bin, touched, moments: moments_of_bin, window });
             moments += count;
         }
-        let size = (!self.keep).then(Waves::usual_size::<D>);
+        let size = (!self.keep).then(ArenaSchedule::usual_size::<D>);
         let reached = |bin: u32| plan.bins[bin as usize].reached();
-        self.waves.plan(size, seam, reached, self.occupied.iter().map(|arena| arena.bin));
+        self.schedule.plan(size, seam, reached, self.occupied.iter().map(|arena| arena.bin));
         for (number, arena) in self.occupied.iter().enumerate() {
-            self.slot[arena.bin as usize] = self.waves.slot(number);
+            self.slot[arena.bin as usize] = self.schedule.slot(number);
         }
-        grow(&mut self.rows, self.waves.arenas() * arena_nodes(D), Row([0.0; 4]));
+        grow(&mut self.rows, self.schedule.arenas() * arena_nodes(D), Row([0.0; 4]));
         grow(&mut self.moments, moments as usize, Row([0.0; 4]));
     }
 
     /// In which order bins scatter and blocks are summed up.
-    pub fn waves(&self) -> &Waves {
-        &self.waves
+    pub fn schedule(&self) -> &ArenaSchedule {
+        &self.schedule
     }
 
     /// The arenas of the bins of a wave, mutable and disjoint, in bin order.
     pub fn of_wave(&mut self, wave: usize) -> Vec<ArenaMut<'_, D>> {
         let nodes = arena_nodes(D);
-        let (mut rows, mut moments) = (Cutter::new(&mut self.rows, 0), Cutter::new(&mut self.moments, 0));
-        let own = self.waves.bins(wave).iter().map(|&number| &self.occupied[number as usize]);
+        let (mut rows, mut moments) =
+            (DisjointSlices::new(&mut self.rows, 0), DisjointSlices::new(&mut self.moments, 0));
+        let own = self.schedule.bins(wave).iter().map(|&number| &self.occupied[number as usize]);
         let mut arenas: Vec<ArenaMut<'_, D>> = own
             .map(|arena| {
                 let slot = self.slot[arena.bin as usize] as usize;
@@ -179,7 +181,7 @@ impl<const D: usize> Arenas<D> {
 
     /// Whether an occupied bin reaches a block.
     pub fn reach(&self, block: usize) -> bool {
-        self.waves.reach(block)
+        self.schedule.reach(block)
     }
 
     /// Whether one does whose block lies outside its leaf.

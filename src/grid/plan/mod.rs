@@ -2,25 +2,25 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`known`] | the leaves of this rank and its ghost layer |
-//! | [`reach`] | which leaves feed a bin |
-//! | [`closure`] | which nodes this rank needs |
-//! | [`feeders`] | bins by the blocks that they reach |
-//! | [`sources`] | sums that other ranks are asked for |
-//! | [`links`] | pairs of blocks of two levels |
-//! | [`constrained`] | constrained nodes in the arena of a bin |
+//! | [`ghost_layer`] | the leaves of this rank and its ghost layer |
+//! | [`bin_reach`] | which leaves feed a bin |
+//! | [`needed_nodes`] | which nodes this rank needs |
+//! | [`bins_by_block`] | bins by the blocks that they reach |
+//! | [`remote_sums`] | sums that other ranks are asked for |
+//! | [`block_links`] | pairs of blocks of two levels |
+//! | [`arena_tables`] | constrained nodes in the arena of a bin |
 use std::sync::Arc;
 
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
-use self::closure::{Closure, NodeSets, nodes_in_domain};
-use self::constrained::{ArenaConstraints, Tables, has_constrained};
-use self::feeders::Feeders;
-use self::known::{Allowance, Cover, KnownTree};
-use self::links::Links;
-use self::sources::{Part, Piece};
+use self::arena_tables::{ArenaConstraints, Tables, has_constrained};
+use self::bins_by_block::BinsByBlock;
+use self::block_links::Links;
+use self::ghost_layer::{Allowance, Cover, KnownTree};
+use self::needed_nodes::{Closure, NodeSets, nodes_in_domain};
+use self::remote_sums::{Part, Piece};
 use super::constraints::constraint::node_coord;
 use super::constraints::moments::rows_of;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
@@ -28,13 +28,13 @@ use crate::csr::Csr;
 use crate::kernel::constrained::ConstrainedNodes;
 use crate::kernel::{ARENA_EDGE, Frame};
 
-pub mod closure;
-pub mod constrained;
-pub mod feeders;
-pub mod known;
-pub mod links;
-pub mod reach;
-pub mod sources;
+pub mod arena_tables;
+pub mod bin_reach;
+pub mod bins_by_block;
+pub mod block_links;
+pub mod ghost_layer;
+pub mod needed_nodes;
+pub mod remote_sums;
 
 /// No block: outside the domain, or not needed by this rank.
 pub const NO_BLOCK: u32 = u32::MAX;
@@ -47,9 +47,9 @@ pub struct Block<const D: usize> {
     /// Coordinate in blocks; one past the last octant for nodes on the upper faces of the domain.
     pub coord: [u32; D],
     /// Nodes whose velocity this rank needs.
-    pub value: u64,
+    pub needs_velocity: u64,
     /// Nodes whose complete sum this rank needs.
-    pub sum: u64,
+    pub needs_sum: u64,
     /// Nodes that touch a coarser leaf.
     pub constrained: u64,
     /// Nodes needed that have constrained parents.
@@ -95,7 +95,7 @@ pub struct GridPlan<const D: usize> {
     /// First bin of each own leaf, and the number of bins at the end.
     pub leaf_start: Vec<u32>,
     /// Which own bins reach each block.
-    pub feeders: Feeders,
+    pub bins_by_block: BinsByBlock,
     /// Sums that this rank needs of others, by rank.
     pub pieces: Vec<Piece>,
     pub(super) parts: Csr<Part>,
@@ -109,6 +109,13 @@ pub struct GridPlan<const D: usize> {
     pub constraints: Arc<Vec<ArenaConstraints<D>>>,
     /// Rounds that the ghost layer took to close.
     pub rounds: usize,
+}
+
+impl<const D: usize> Block<D> {
+    /// Real nodes whose velocity this rank needs.
+    pub fn real_nodes(&self) -> u64 {
+        self.needs_velocity & !self.constrained
+    }
 }
 
 impl<const D: usize> Bin<D> {
@@ -139,7 +146,7 @@ impl<const D: usize> GridPlan<D> {
             level_start: Vec::new(),
             bins: Vec::new(),
             leaf_start: Vec::new(),
-            feeders: Feeders::default(),
+            bins_by_block: BinsByBlock::default(),
             pieces: Vec::new(),
             parts: Csr::default(),
             links: Vec::new(),
@@ -154,7 +161,7 @@ impl<const D: usize> GridPlan<D> {
             plan.blocks.iter().enumerate().map(|(i, b)| ((b.level, b.coord), i as u32)).collect();
         plan.link_levels(&number);
         plan.list_bins(&number, &bins);
-        plan.feeders = Feeders::new(&plan.bins, plan.blocks.len());
+        plan.bins_by_block = BinsByBlock::new(&plan.bins, plan.blocks.len());
         plan.list_pieces(comm.rank());
         plan.find_face_nodes();
         let mut tables = Tables::new(&plan.blocks, plan.constraint_spread());
@@ -227,7 +234,7 @@ impl<const D: usize> GridPlan<D> {
         self.tree.heap_bytes()
             + self.blocks.capacity() * size_of::<Block<D>>()
             + self.bins.capacity() * size_of::<Bin<D>>()
-            + self.feeders.heap_bytes()
+            + self.bins_by_block.heap_bytes()
             + self.pieces.capacity() * size_of::<Piece>()
             + self.parts.heap_bytes()
             + self.constraints.iter().map(ArenaConstraints::heap_bytes).sum::<usize>()
@@ -239,11 +246,11 @@ impl<const D: usize> GridPlan<D> {
             .map(|&(Octant { level, coord }, sets)| Block {
                 level,
                 coord,
-                value: sets.value,
-                sum: sets.sum,
+                needs_velocity: sets.needs_velocity,
+                needs_sum: sets.needs_sum,
                 constrained: sets.constrained,
                 chained: 0,
-                owned: self.owned_nodes(level, coord, sets.value & !sets.constrained),
+                owned: self.owned_nodes(level, coord, sets.needs_velocity & !sets.constrained),
                 with_moments: 0,
                 first_moment: 0,
             })
@@ -314,8 +321,7 @@ impl<const D: usize> GridPlan<D> {
             if (0..D).all(|axis| ![0, roots[axis] << block.level].contains(&block.coord[axis])) {
                 continue;
             }
-            let real =
-                block.value & !block.constrained & nodes_in_domain(&self.tree, block.level, block.coord);
+            let real = block.real_nodes() & nodes_in_domain(&self.tree, block.level, block.coord);
             for bit in bits(real) {
                 let node = node_coord(block.coord, bit);
                 let mut faces = 0u8;

@@ -2,14 +2,14 @@
 use std::ops::RangeInclusive;
 
 use super::exchange::ReceivedSums;
-use super::mixed::{Mixed, Other};
+use super::irregular::{Irregular, Other};
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::window::Window;
 use crate::grid::constraints::moments::{first_row, rows_of};
 use crate::grid::mask::{bits, block_nodes, opposite};
 use crate::grid::order::Origin;
 use crate::grid::order::region::{MOST_BINS, Order, Regions, SPAN, arena_node, part_bins, part_len};
-use crate::grid::plan::feeders::NO_BIN;
+use crate::grid::plan::bins_by_block::NO_BIN;
 use crate::grid::plan::{Block, GridPlan};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 
@@ -31,7 +31,7 @@ pub(super) struct BlockSum<'a, const D: usize> {
     pub(in crate::grid) plan: &'a GridPlan<D>,
     pub(in crate::grid) arenas: &'a Arenas<D>,
     pub(super) received: Option<&'a ReceivedSums<D>>,
-    pub(in crate::grid) scratch: &'a mut Mixed<D>,
+    pub(in crate::grid) scratch: &'a mut Irregular<D>,
     pub(in crate::grid) block: usize,
     pub(in crate::grid) regions: &'static Regions,
     pub(in crate::grid) order: &'static Order,
@@ -51,7 +51,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and from other ranks.
     pub fn find(
         sources: Sources<'a, D>,
-        scratch: &'a mut Mixed<D>,
+        scratch: &'a mut Irregular<D>,
         block: usize,
         keys: Option<RangeInclusive<u64>>,
     ) -> Self {
@@ -73,7 +73,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             regions,
         };
         let is_wanted = |key: u64| keys.as_ref().is_none_or(|keys| keys.contains(&key));
-        for (position, &bin) in plan.feeders.inner::<D>(block).iter().enumerate() {
+        for (position, &bin) in plan.bins_by_block.inner::<D>(block).iter().enumerate() {
             if bin == NO_BIN {
                 continue;
             }
@@ -93,7 +93,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
             sum.rows[position] = rows;
             sum.occupied |= 1 << position;
         }
-        let outer = if arenas.outer_reach(block) { plan.feeders.outer(block) } else { &[] };
+        let outer = if arenas.outer_reach(block) { plan.bins_by_block.outer(block) } else { &[] };
         for outer in outer {
             if !arenas.is_occupied(outer.bin as usize) {
                 continue;
@@ -252,7 +252,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         }
         let mut from: [&[Row]; 32] = [&[]; 32];
         for position in bits(u64::from(self.occupied)) {
-            let bin = self.plan.feeders.inner::<D>(self.block)[position as usize];
+            let bin = self.plan.bins_by_block.inner::<D>(self.block)[position as usize];
             if let Some(moments) = self.arenas.get(bin).and_then(|arena| arena.moments) {
                 from[position as usize] = moments.from_block(opposite(D, position as usize));
             }
@@ -314,7 +314,7 @@ impl<const D: usize> Sources<'_, D> {
     /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the processor to
     /// foresee them.
     pub fn read_ahead(&self, block: usize) {
-        for (position, &bin) in self.plan.feeders.inner::<D>(block).iter().enumerate() {
+        for (position, &bin) in self.plan.bins_by_block.inner::<D>(block).iter().enumerate() {
             if bin == NO_BIN {
                 continue;
             }

@@ -8,16 +8,16 @@ use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use super::block_sum::{BlockSum, Sources};
-use super::fields::NodeFields;
-use super::mixed::Mixed;
+use super::irregular::Irregular;
+use super::node_fields::NodeFields;
 use crate::grid::arenas::Arenas;
-use crate::grid::arenas::waves::Seam;
+use crate::grid::arenas::arena_schedule::Seam;
 use crate::grid::constraints::moments::{self, Moments, rows_of};
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::order::region::Regions;
 use crate::grid::plan::GridPlan;
-use crate::grid::plan::feeders::NO_BIN;
-use crate::grid::plan::sources::Piece;
+use crate::grid::plan::bins_by_block::NO_BIN;
+use crate::grid::plan::remote_sums::Piece;
 use crate::kernel::Row;
 
 const ZERO: Row = Row([0.0; 4]);
@@ -98,8 +98,7 @@ impl<const D: usize> ArenaExchange<D> {
         let mut sent: Vec<Vec<SentPiece>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
-                sent[neighbour] =
-                    words.chunks_exact(5 + D).map(|words| read_request(words, plan)).collect();
+                sent[neighbour] = words.chunks_exact(5 + D).map(|words| read_request(words, plan)).collect();
             }
         }
         let received_from = ranks
@@ -133,8 +132,8 @@ impl<const D: usize> ArenaExchange<D> {
         let mut sent = vec![false; plan.bins.len()];
         let overlap = &Regions::of::<D>().overlap;
         for piece in self.sent.iter().flatten() {
-            let inner = plan.feeders.inner::<D>(piece.block as usize).iter().copied().zip(0u8..);
-            let outer = plan.feeders.outer(piece.block as usize).iter();
+            let inner = plan.bins_by_block.inner::<D>(piece.block as usize).iter().copied().zip(0u8..);
+            let outer = plan.bins_by_block.outer(piece.block as usize).iter();
             let outer = outer.map(|outer| (outer.bin, outer.position));
             for (bin, position) in inner.filter(|(bin, _)| *bin != NO_BIN).chain(outer) {
                 // Blocks are summed as a whole, pieces with keys by themselves.
@@ -204,7 +203,11 @@ impl<const D: usize> ArenaExchange<D> {
 
 impl SentPiece {
     /// What reaches the block of the piece from the bins that it asks for.
-    pub fn find<'a, const D: usize>(&self, own: Sources<'a, D>, scratch: &'a mut Mixed<D>) -> BlockSum<'a, D> {
+    pub fn find<'a, const D: usize>(
+        &self,
+        own: Sources<'a, D>,
+        scratch: &'a mut Irregular<D>,
+    ) -> BlockSum<'a, D> {
         let keys = self.keys.map(|(first, last)| first..=last);
         BlockSum::find(own, scratch, self.block as usize, keys)
     }
@@ -212,7 +215,7 @@ impl SentPiece {
 
 /// Memory that a thread reuses from piece to piece.
 struct Packing<const D: usize> {
-    scratch: Mixed<D>,
+    scratch: Irregular<D>,
     rows: Vec<Row>,
     /// First moments of the present block.
     moments: Vec<Row>,
@@ -221,7 +224,7 @@ struct Packing<const D: usize> {
 impl<const D: usize> Default for Packing<D> {
     fn default() -> Self {
         let nodes = block_nodes(D);
-        Self { scratch: Mixed::default(), rows: vec![ZERO; nodes], moments: vec![ZERO; D * nodes] }
+        Self { scratch: Irregular::default(), rows: vec![ZERO; nodes], moments: vec![ZERO; D * nodes] }
     }
 }
 

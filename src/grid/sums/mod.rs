@@ -2,14 +2,14 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`fields`] | values of all nodes of a rank; sums of its blocks |
-//! | `block_sum`, `mixed` | the sum of one block, by regions of nodes; terms outside the fixed pattern |
+//! | [`node_fields`] | values of all nodes of a rank; sums of its blocks |
+//! | `block_sum`, `irregular` | the sum of one block, by regions of nodes; terms outside the fixed pattern |
 //! | [`exchange`] | sums for other ranks, and theirs |
-//! | `levels` | restriction and prolongation |
-//! | [`census`] | counts for telemetry |
+//! | `restrict_prolong` | restriction and prolongation |
+//! | [`statistics`] | counts for telemetry |
 mod block_sum;
-pub mod census;
 pub mod exchange;
-pub mod fields;
-mod levels;
-mod mixed;
+mod irregular;
+pub mod node_fields;
+mod restrict_prolong;
+pub mod statistics;

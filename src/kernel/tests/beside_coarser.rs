@@ -68,8 +68,7 @@ fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
     let listed: Vec<usize> = (0..arena_nodes(D)).filter(|&node| is_hanging[node]).collect();
     let nodes: Vec<MomentNode<D>> =
         listed.iter().map(|&node| MomentNode { node, second: second(node) }).collect();
-    let with_moments =
-        ConstrainedNodes::new(&nodes, HangingNodes::new::<D>(&vec![false; arena_nodes(D)]));
+    let with_moments = ConstrainedNodes::new(&nodes, HangingNodes::new::<D>(&vec![false; arena_nodes(D)]));
     let hanging = ConstrainedNodes::new::<D>(&[], HangingNodes::new::<D>(&is_hanging));
     let start = particles::<D>(61, seed, 1);
     let first: Vec<Row> = listed.iter().flat_map(|&node| moments[node][..D].to_vec()).collect();

@@ -100,7 +100,7 @@ impl<const D: usize> State<'_, D> {
     fn velocity_gradient(&self, leaf: usize) -> f64 {
         let Some(number) = self.own_block(leaf) else { return 0.0 };
         let block = &self.plan.blocks[number];
-        let real = block.value & !block.constrained;
+        let real = block.real_nodes();
         let rows = &self.fields.rows[number * block_nodes(D)..][..block_nodes(D)];
         let per_cell = 1.0 / self.plan.cell(block.level);
         let mut sum_of_axes = 0.0;

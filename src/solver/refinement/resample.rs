@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
-use crate::adaptivity::resample::patience::{self, Look, Turn};
+use crate::adaptivity::resample::merge_backoff::{self, BackoffState, RetrySlot};
 use crate::adaptivity::resample::{Merged, ids, merge};
 use crate::grid::leaf_geometry::leaf_box;
 use crate::kernel::BoxPolicy;
@@ -15,7 +15,7 @@ use crate::solver::step::exchange::reach_of_width;
 
 impl<const D: usize> Solver<D> {
     /// Not collective. How the particles of each own leaf fit it.
-    pub(super) fn look_at_levels(&self) -> Vec<Look> {
+    pub(super) fn look_at_levels(&self) -> Vec<BackoffState> {
         if self.physics.adaptivity.is_none() {
             return Vec::new();
         }
@@ -25,14 +25,14 @@ impl<const D: usize> Solver<D> {
         let each = leaves.with_min_len(64).map(|(number, ((chunk, leaf), &turn))| {
             // Who came in this very step can wait for the next time.
             let known = surveys.and_then(|surveys| surveys[number].levels?.look(leaf.level, turn));
-            known.unwrap_or_else(|| patience::look(chunk, leaf.level, turn))
+            known.unwrap_or_else(|| merge_backoff::look(chunk, leaf.level, turn))
         });
         each.collect()
     }
 
     /// Not collective. Who is to be tried in each own leaf. While the grid is not that of the tree, leaves count as not
     /// beside finer ones.
-    pub(super) fn turns(&self) -> Vec<Turn> {
+    pub(super) fn turns(&self) -> Vec<RetrySlot> {
         let every = self.physics.adaptivity.as_ref().map_or(1, |adaptivity| adaptivity.every);
         let regrid = self.clock.step / every;
         let (lists, root_edge) = (&self.grid.lists, self.physics.root_edge);
@@ -43,14 +43,14 @@ impl<const D: usize> Solver<D> {
             let centre = std::array::from_fn(|a| 0.5 * (lower[a] + upper[a]));
             let beside_finer =
                 is_of_tree && lists.is_finer_within(number, &centre, 0.75 * (upper[0] - lower[0]));
-            Turn::new(regrid, leaf.key(), beside_finer)
+            RetrySlot::new(regrid, leaf.key(), beside_finer)
         });
         each.collect()
     }
 
     /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the cells that
     /// the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any was split.
-    pub(super) fn split_particles(&mut self, looks: &[Look], from: Option<&[u8]>) -> Vec<bool> {
+    pub(super) fn split_particles(&mut self, looks: &[BackoffState], from: Option<&[u8]>) -> Vec<bool> {
         let scheme = self.physics.scheme();
         let extent = self.grid.plan.extent();
         let Some(resampling) = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, extent) else {
@@ -113,7 +113,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Merges particles in leaves that are coarser than they are. Returns what was done in each own leaf.
-    pub(super) fn merge_particles(&mut self, looks: &[Look]) -> Vec<Merged> {
+    pub(super) fn merge_particles(&mut self, looks: &[BackoffState]) -> Vec<Merged> {
         let reports = self.merge_in_leaves(true, |leaf| looks[leaf].due);
         // Groups that are no family get roots of their own, counted along the curve.
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
@@ -133,14 +133,14 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. After all merges of a regrid: counts those that were tried in vain.
-    pub(super) fn count_tries(&mut self, looks: &[Look], reports: &[Merged]) {
+    pub(super) fn count_tries(&mut self, looks: &[BackoffState], reports: &[Merged]) {
         let turns = self.turns();
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).enumerate();
         let tried = leaves.with_min_len(64).filter(|(_, (_, look))| look.due || look.stale);
         tried.for_each(|(number, ((chunk, leaf), _))| {
             let nobody = FxHashSet::default();
             let refused = reports.get(number).map_or(&nobody, |report| &report.refused);
-            patience::count(chunk, leaf.level, turns[number], refused);
+            merge_backoff::count(chunk, leaf.level, turns[number], refused);
         });
     }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::adaptivity::resample::family::separated;
-use crate::adaptivity::resample::patience::{self, Look};
+use crate::adaptivity::resample::merge_backoff::{self, BackoffState};
 use crate::grid::leaf_geometry::leaf_box;
 use crate::particle::Chunk;
 use crate::solver::migration::migrate::Moved;
@@ -17,7 +17,7 @@ impl<const D: usize> Solver<D> {
     ///
     /// # Errors
     /// On all ranks when a particle could not be moved.
-    pub(super) fn reunite_families(&mut self, looks: &[Look]) -> Result<bool, Disagreement> {
+    pub(super) fn reunite_families(&mut self, looks: &[BackoffState]) -> Result<bool, Disagreement> {
         let Some(adaptivity) = &self.physics.adaptivity else { return Ok(false) };
         let Some(limits) = adaptivity.merge else { return Ok(false) };
         let axes = ((self.clock.step / adaptivity.every) % ((1 << D) - 1) + 1) as usize;
@@ -51,7 +51,7 @@ impl<const D: usize> Solver<D> {
         self.chunks
             .iter_mut()
             .zip(&reports)
-            .for_each(|(chunk, report)| patience::met(chunk, &report.refused));
+            .for_each(|(chunk, report)| merge_backoff::met(chunk, &report.refused));
         let merged = reports.iter().any(|report| report.merged > 0);
         let returned = self.send_home(|leaf| came[leaf]);
         self.comm.agree(gathered.and(returned))?;

@@ -11,7 +11,7 @@ use super::bins::{BinMissing, BoxWidths};
 use super::members::Members;
 use super::sides::{NearLeaf, Side, Sides, near_leaf};
 use crate::grid::mask::{offset, offset_count};
-use crate::grid::plan::reach::leaves_around;
+use crate::grid::plan::bin_reach::leaves_around;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::kernel::domain::softening_at;

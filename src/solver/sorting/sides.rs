@@ -195,7 +195,7 @@ mod tests {
     use partition::Brick;
 
     use super::*;
-    use crate::grid::plan::reach::leaves_around;
+    use crate::grid::plan::bin_reach::leaves_around;
 
     /// Leaves of two levels, some of the coarser ones alone among finer ones.
     fn tree<const D: usize>() -> KnownTree<D> {

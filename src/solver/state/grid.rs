@@ -3,8 +3,8 @@ use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
 
-use crate::grid::arenas::{ArenaMut, Arenas, waves};
-use crate::grid::plan::known::Allowance;
+use crate::grid::arenas::{ArenaMut, Arenas, arena_schedule};
+use crate::grid::plan::ghost_layer::Allowance;
 use crate::grid::sums::exchange::ReceivedSums;
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::{Row, spread};
@@ -105,9 +105,9 @@ impl<const D: usize> Grid<D> {
         scatter: impl Fn(&mut S, &BinView<'_, D>, ArenaMut<'_, D>) + Sync + Send,
     ) {
         // Neighbours wait for the sums of the first wave, which travel while the others scatter.
-        self.scatter_wave(phases, chunks, waves::FIRST, &scatter);
+        self.scatter_wave(phases, chunks, arena_schedule::FIRST, &scatter);
         let pending = self.send_sums(phases);
-        for wave in waves::FIRST + 1..self.arenas.waves().count() {
+        for wave in arena_schedule::FIRST + 1..self.arenas.schedule().count() {
             self.scatter_wave(phases, chunks, wave, &scatter);
         }
         let Self { plan, arenas, fields, exchange, received, .. } = self;

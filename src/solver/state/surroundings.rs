@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count, product, shifted};
 use crate::grid::plan::NO_BLOCK;
-use crate::grid::plan::known::{Cover, KnownTree};
+use crate::grid::plan::ghost_layer::{Cover, KnownTree};
 use crate::grid::{GridPlan, NodeFields};
 use crate::particle::Chunk;
 
@@ -93,7 +93,7 @@ impl Surroundings {
         let range_of = |index: usize, number: u32, mask: u64| {
             let block = &plan.blocks[number as usize];
             let on_leaf = if of_level >> index & 1 == 1 { u64::MAX } else { on_leaf::<D>(index) };
-            MassRange::of::<D>(fields, number, block.value & !block.constrained & mask & on_leaf)
+            MassRange::of::<D>(fields, number, block.real_nodes() & mask & on_leaf)
         };
         // Most leaves have as much mass on all nodes of all blocks around, the nodes beyond the arena included.
         let wide =
@@ -194,8 +194,6 @@ impl MassRange {
     /// Of all real nodes of each block.
     pub fn of_blocks<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<Self> {
         let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
-        blocks
-            .map(|(number, block)| Self::of::<D>(fields, number as u32, block.value & !block.constrained))
-            .collect()
+        blocks.map(|(number, block)| Self::of::<D>(fields, number as u32, block.real_nodes())).collect()
     }
 }

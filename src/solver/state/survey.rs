@@ -1,7 +1,7 @@
 //! What the solver notes of each leaf's particles right after G2P, while they are in the cache: what refinement
 //! criteria and splitting will ask for. Looking at them again later would cost more than all the rest of a regrid that
 //! changes nothing.
-use crate::adaptivity::resample::patience::Levels;
+use crate::adaptivity::resample::merge_backoff::Levels;
 use crate::adaptivity::{Adaptivity, Kind};
 use crate::kernel::domain;
 use crate::particle::chunk::{Chunk, Layout};

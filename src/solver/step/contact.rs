@@ -40,7 +40,7 @@ fn apply_colliders<const D: usize>(
             if collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
                 continue;
             }
-            let real = block.value & !block.constrained;
+            let real = block.real_nodes();
             for (bit, row) in rows.iter_mut().enumerate() {
                 let mass = row.0[3];
                 if real >> bit & 1 == 0 || mass <= 0.0 {

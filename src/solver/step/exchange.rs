@@ -3,7 +3,7 @@ use partition::comm::Traffic;
 use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
-use crate::grid::sums::census::{Census, surface_bytes};
+use crate::grid::sums::statistics::{Statistics, surface_bytes};
 use crate::solver::migration::depart::Departed;
 use crate::solver::migration::migrate::{MigrateError, Moved};
 use crate::solver::sorting::bins::BoxWidths;
@@ -84,9 +84,9 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. What this rank holds of the tree and sends in the exchange done last.
-    pub fn census(&self) -> Census {
+    pub fn statistics(&self) -> Statistics {
         let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
-        Census {
+        Statistics {
             leaves: self.forest.leaves().len() as u64,
             ghost_leaves: tree.ghost_len() as u64,
             neighbours: exchange.neighbours().len() as u64,

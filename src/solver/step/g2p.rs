@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::grid::arenas::Arenas;
-use crate::grid::sums::fields::{VelocityArena, load_rows};
+use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;

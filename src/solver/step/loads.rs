@@ -30,7 +30,7 @@ fn apply<const D: usize>(
     let active = blocks.with_min_len(32).filter(|(_, (_, active))| **active);
     let pushed = active.map(|(index, ((rows, block), _))| {
         let mut pushes = Vec::new();
-        let (cell, real) = (plan.cell(block.level), block.value & !block.constrained);
+        let (cell, real) = (plan.cell(block.level), block.real_nodes());
         for (bit, row) in rows.iter_mut().enumerate() {
             let mass = row.0[3];
             if real >> bit & 1 == 0 || mass <= 0.0 {

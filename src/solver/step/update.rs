@@ -55,7 +55,7 @@ pub fn update_velocity<const D: usize>(
     let nodes = block_nodes(D);
     let blocks = fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).zip(&fields.active);
     blocks.with_min_len(32).filter(|(_, active)| **active).for_each(|((rows, block), _)| {
-        let real = block.value & !block.constrained;
+        let real = block.real_nodes();
         for (bit, row) in rows.iter_mut().enumerate() {
             let [.., mass] = row.0;
             if real >> bit & 1 == 0 || mass <= 0.0 {

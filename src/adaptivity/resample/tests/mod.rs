@@ -33,7 +33,7 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
-    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: patience::Turn::ALL }
+    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: merge_backoff::RetrySlot::ALL }
 }
 
 /// The domain as one leaf.

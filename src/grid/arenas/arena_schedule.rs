@@ -34,7 +34,7 @@ impl Seam {
 
 /// The waves of one step.
 #[derive(Clone, Debug, Default)]
-pub struct Waves {
+pub struct ArenaSchedule {
     /// Numbers of the bins among the occupied ones, by wave.
     bins: Csr<u32>,
     /// Blocks that bins reach, by the wave with which they are summed up.
@@ -57,7 +57,7 @@ const NONE: u32 = u32::MAX;
 /// Wave of bins that other ranks need, and of the sums these ask for.
 pub const FIRST: usize = 0;
 
-impl Waves {
+impl ArenaSchedule {
     /// Bins of a wave for all threads.
     pub fn usual_size<const D: usize>() -> usize {
         BYTES_PER_THREAD / (size_of::<Row>() * arena_nodes(D)) * rayon::current_num_threads()
@@ -222,7 +222,7 @@ mod tests {
     fn arenas_last_until_all_that_needs_them_is_summed() {
         let some = |bin: &u32| bin.wrapping_mul(2_654_435_761) >> 29 != 0;
         for (layers, size) in [(0, Some(1)), (0, Some(40)), (2, Some(40)), (3, Some(100_000)), (1, None)] {
-            let (seam, mut waves) = (seam(layers), Waves::default());
+            let (seam, mut waves) = (seam(layers), ArenaSchedule::default());
             let occupied: Vec<u32> = (0..EDGE.pow(3) as u32).filter(some).collect();
             // The second plan finds what the first has left.
             for _ in 0..2 {

@@ -3,7 +3,7 @@
 //! Where the parents of a node lie is in a table for all blocks (`parents.rs`); a plan lists pairs of blocks only.
 use rustc_hash::FxHashMap;
 
-use super::closure::constrained_nodes;
+use super::needed_nodes::constrained_nodes;
 use super::{Block, GridPlan, NO_BLOCK};
 use crate::grid::constraints::moments::{first_row, rows_of};
 use crate::grid::constraints::parents::{
@@ -76,14 +76,16 @@ impl<const D: usize> GridPlan<D> {
         for index in 0..self.blocks.len() {
             let block = &self.blocks[index];
             let (level, parity) = (block.level, parity(block.coord));
-            let (summed, needed) =
-                (block.sum & block.constrained, (block.sum | block.value) & block.constrained);
+            let (summed, needed) = (
+                block.needs_sum & block.constrained,
+                (block.needs_sum | block.needs_velocity) & block.constrained,
+            );
             let mut fine = FineBlock { block: index as u32, parents: [NO_BLOCK; 8] };
             for corner in (0..1u8 << D).filter(|&corner| table.having(parity, corner) & needed != 0) {
                 let coord = coarser_at(block.coord, corner);
                 let Some(&coarse) = number.get(&(level - 1, coord)) else { continue };
                 fine.parents[usize::from(corner)] = coarse;
-                if table.having(parity, corner) & summed != 0 && self.blocks[coarse as usize].sum != 0 {
+                if table.having(parity, corner) & summed != 0 && self.blocks[coarse as usize].needs_sum != 0 {
                     pairs[usize::from(level)].push((coarse, Child { block: index as u32, corner }));
                 }
             }
@@ -119,7 +121,8 @@ impl<const D: usize> GridPlan<D> {
     /// Finds the nodes of a block with constrained parents, and notes these parents.
     fn find_chained(&mut self, fine: &FineBlock, passed: &mut [u64]) {
         let table = ParentTable::of::<D>();
-        let Block { level, coord, sum, value, constrained, .. } = self.blocks[fine.block as usize];
+        let Block { level, coord, needs_sum: sum, needs_velocity: value, constrained, .. } =
+            self.blocks[fine.block as usize];
         let needed = (sum | value) & constrained;
         for corner in (0..1u8 << D).filter(|&corner| table.having(parity(coord), corner) & needed != 0) {
             let coarse = coarser_at(coord, corner);

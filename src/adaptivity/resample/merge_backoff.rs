@@ -47,14 +47,14 @@ pub fn plain(tag: u64) -> u64 {
 
 /// Who in a leaf is tried at a regrid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct RetrySlot {
     /// One bit for each interval between tries.
     intervals: u32,
     /// Whether finer leaves touch the leaf.
     beside_finer: bool,
 }
 
-impl Turn {
+impl RetrySlot {
     /// Everybody, in a leaf that is not beside finer ones.
     pub const ALL: Self = Self { intervals: u32::MAX, beside_finer: false };
 
@@ -92,7 +92,7 @@ pub fn has_given_up(tag: u64) -> bool {
 }
 
 /// Particles of a chunk made for a level that are due.
-pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Vec<u32> {
+pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: RetrySlot) -> Vec<u32> {
     let level = u64::from(level) << 32;
     let each = (0..).zip(chunk.tags());
     each.filter(|(_, tag)| **tag & LEVEL == level && turn.has(**tag)).map(|(p, _)| p).collect()
@@ -137,21 +137,21 @@ impl Levels {
     }
 
     /// What this means in a leaf of a level; `None` if particles of the leaf's level cannot be told from others.
-    pub fn look(self, level: u8, turn: Turn) -> Option<Look> {
+    pub fn look(self, level: u8, turn: RetrySlot) -> Option<BackoffState> {
         let (finer, stale) = match self.coarsest.cmp(&(u64::from(level) << 32)) {
             _ if self.of_coarsest == 0 => (0, false),
             std::cmp::Ordering::Less => return None,
             std::cmp::Ordering::Equal => (self.of_finer, self.tried),
             std::cmp::Ordering::Greater => (self.of_finer | self.of_coarsest, false),
         };
-        Some(Look { coarser: false, due: turn.intervals & finer != 0, stale })
+        Some(BackoffState { coarser: false, due: turn.intervals & finer != 0, stale })
     }
 }
 
 /// How the particles of a chunk fit a leaf of a level.
-pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Look {
+pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: RetrySlot) -> BackoffState {
     let own = u64::from(level) << 32;
-    let mut look = Look::default();
+    let mut look = BackoffState::default();
     if are_plain(chunk.tags(), own) {
         return look;
     }
@@ -166,7 +166,7 @@ pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: Turn) -> Look {
 
 /// What [`look`] sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Look {
+pub struct BackoffState {
     /// Particles made for coarser leaves.
     pub coarser: bool,
     /// Particles made for finer leaves, some of them due.
@@ -177,7 +177,7 @@ pub struct Look {
 
 /// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf. `refused`: identifiers
 /// of those that the limits keep apart.
-pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: Turn, refused: &FxHashSet<u64>) {
+pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: RetrySlot, refused: &FxHashSet<u64>) {
     for p in 0..chunk.len() {
         let (tag, id) = (chunk.tags()[p], chunk.ids()[p]);
         if Tag::unpack(tag).level <= level {
@@ -224,7 +224,7 @@ mod tests {
         let mut tried = Vec::new();
         let refused = if refused { FxHashSet::from_iter([id]) } else { FxHashSet::default() };
         for number in 0..1100 {
-            let turn = Turn::new(number, leaf, beside_finer(number));
+            let turn = RetrySlot::new(number, leaf, beside_finer(number));
             let look = look(&chunk, 2, turn);
             assert!(!look.coarser && !look.stale);
             assert_eq!(Levels::of(chunk.tags()).look(2, turn), Some(look));
@@ -235,11 +235,14 @@ mod tests {
             }
         }
         let fits = Levels::of(chunk.tags());
-        assert!(look(&chunk, 3, Turn::ALL).stale && fits.look(3, Turn::ALL).is_some_and(|look| look.stale));
-        assert!(look(&chunk, 4, Turn::ALL).coarser && fits.look(4, Turn::ALL).is_none());
-        count(&mut chunk, 3, Turn::ALL, &FxHashSet::default());
+        assert!(
+            look(&chunk, 3, RetrySlot::ALL).stale
+                && fits.look(3, RetrySlot::ALL).is_some_and(|look| look.stale)
+        );
+        assert!(look(&chunk, 4, RetrySlot::ALL).coarser && fits.look(4, RetrySlot::ALL).is_none());
+        count(&mut chunk, 3, RetrySlot::ALL, &FxHashSet::default());
         assert_eq!(chunk.tags()[0], tag.pack());
-        assert_eq!(Levels::of(chunk.tags()).look(3, Turn::ALL), Some(Look::default()));
+        assert_eq!(Levels::of(chunk.tags()).look(3, RetrySlot::ALL), Some(BackoffState::default()));
         tried
     }
 
@@ -267,13 +270,13 @@ mod tests {
     #[test]
     fn levels_of_several() {
         let mut chunk = Chunk::<3>::new();
-        assert_eq!(Levels::of(chunk.tags()).look(0, Turn::ALL), Some(Look::default()));
+        assert_eq!(Levels::of(chunk.tags()).look(0, RetrySlot::ALL), Some(BackoffState::default()));
         for (id, level) in [4, 2, 3, 2].into_iter().enumerate() {
             chunk.push_zeroed(id as u64, Tag { material: 0, body: 0, level });
         }
         for number in 0..40 {
             for level in 1..=2 {
-                let turn = Turn::new(number, 0, false);
+                let turn = RetrySlot::new(number, 0, false);
                 let seen = look(&chunk, level, turn);
                 assert_eq!(Levels::of(chunk.tags()).look(level, turn), Some(seen));
                 count(&mut chunk, 2, turn, &FxHashSet::from_iter([1, 2]));

@@ -1,13 +1,13 @@
 //! Node fields between levels: sums go from constrained nodes to their parents, velocities back.
 use rayon::prelude::*;
 
-use super::fields::NodeFields;
+use super::node_fields::NodeFields;
 use crate::grid::arenas::Arenas;
-use crate::grid::arenas::cutter::Cutter;
+use crate::grid::arenas::disjoint_slices::DisjointSlices;
 use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::constraints::parents::{ParentNode, ParentTable, parity, weight_of};
 use crate::grid::mask::{bits, block_nodes, offset};
-use crate::grid::plan::links::{Child, FineBlock};
+use crate::grid::plan::block_links::{Child, FineBlock};
 use crate::grid::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
 use crate::simd::F64x4;
@@ -86,11 +86,11 @@ fn hand_up<const D: usize>(
     to: &mut BlockMut<'_>,
 ) {
     let table = ParentTable::of::<D>();
-    let (fine, Block { sum, with_moments: passing, .. }) =
+    let (fine, Block { needs_sum: sum, with_moments: passing, .. }) =
         (&plan.blocks[child.block as usize], &plan.blocks[coarse as usize]);
     let (parity, (rows, moments)) = (parity(fine.coord), from.of_block(plan, child.block));
     let is_here = |parent: &&ParentNode| parent.corner == child.corner && sum >> parent.bit & 1 == 1;
-    for bit in bits(fine.sum & fine.constrained & table.having(parity, child.corner)) {
+    for bit in bits(fine.needs_sum & fine.constrained & table.having(parity, child.corner)) {
         let row = F64x4::new(rows[bit as usize].0);
         let parents = table.of_node::<D>(parity, bit).iter().filter(is_here);
         if fine.with_moments >> bit & 1 == 0 {
@@ -128,7 +128,7 @@ fn interpolate<const D: usize>(
     let parents = fine.parents.map(|parent| {
         (parent != NO_BLOCK).then(|| (from.of_block(plan, parent), plan.blocks[parent as usize].with_moments))
     });
-    for bit in bits(block.value & block.constrained) {
+    for bit in bits(block.needs_velocity & block.constrained) {
         let mut row = F64x4::splat(0.0);
         for parent in table.of_node::<D>(parity, bit) {
             let Some(((rows, _), _)) = parents[usize::from(parent.corner) % 8] else { continue };
@@ -230,8 +230,8 @@ fn for_each_linked<'a, const D: usize, T: Sync + 'a>(
     work: impl Fn(BlockMut<'_>, &T) + Sync,
 ) {
     let nodes = block_nodes(D);
-    let mut rows = Cutter::new(half.rows, half.first_block * nodes);
-    let mut moments = Cutter::new(half.moments, half.first_moment);
+    let mut rows = DisjointSlices::new(half.rows, half.first_block * nodes);
+    let mut moments = DisjointSlices::new(half.moments, half.first_moment);
     let tasks: Vec<_> = blocks
         .map(|(block, with)| {
             let block = block as usize;

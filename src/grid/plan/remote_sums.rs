@@ -5,8 +5,8 @@
 use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
-use super::feeders::NO_BIN;
-use super::reach::bin_sources;
+use super::bin_reach::bin_sources;
+use super::bins_by_block::NO_BIN;
 use super::{Block, GridPlan};
 use crate::csr::Csr;
 use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
@@ -122,9 +122,9 @@ impl<const D: usize> GridPlan<D> {
 
     /// Own bins that may contribute to a block.
     fn add_own(&self, rank: usize, block: usize, candidates: &mut Vec<Candidate>) {
-        let inner = self.feeders.inner::<D>(block).iter().copied().zip(0u8..);
+        let inner = self.bins_by_block.inner::<D>(block).iter().copied().zip(0u8..);
         let inner = inner.filter(|(bin, _)| *bin != NO_BIN);
-        let outer = self.feeders.outer(block).iter().map(|outer| (outer.bin, outer.position));
+        let outer = self.bins_by_block.outer(block).iter().map(|outer| (outer.bin, outer.position));
         candidates.extend(inner.chain(outer).map(|(bin, position)| {
             let (key, tie) = self.source_key(bin);
             Candidate { key, tie, rank, position, is_inner: self.bins[bin as usize].is_inner }
@@ -141,7 +141,7 @@ impl<const D: usize> GridPlan<D> {
         parts: &mut Vec<(u32, Part)>,
     ) {
         let regions = Regions::of::<D>();
-        let Block { sum, chained, .. } = self.blocks[block];
+        let Block { needs_sum: sum, chained, .. } = self.blocks[block];
         let known = pieces.len();
         let mut found: Vec<(usize, u64, u64, u8)> = Vec::new();
         for region in 0..offset_count(D) {
@@ -216,7 +216,7 @@ impl<const D: usize> RemoteBins<D> {
         let (tree, block) = (&plan.tree, &plan.blocks[block]);
         let regions = Regions::of::<D>();
         for position in 0..offset_count(D) {
-            if block.sum & regions.overlap[position] == 0 {
+            if block.needs_sum & regions.overlap[position] == 0 {
                 continue;
             }
             let Some(coord) = shifted(block.coord, offset::<D>(position)) else { continue };

@@ -8,7 +8,7 @@ use std::cell::OnceCell;
 use partition::{MAX_LEVEL, Octant, Region};
 use rayon::prelude::*;
 
-use super::known::{Cover, KnownTree};
+use super::ghost_layer::{Cover, KnownTree};
 use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
 
 /// Bins of known leaf `leaf` inside itself: its own block first, then every block inside it, on the level of

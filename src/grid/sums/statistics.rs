@@ -3,13 +3,13 @@ use rustc_hash::FxHashMap;
 
 use super::block_sum::Sources;
 use super::exchange::ArenaExchange;
-use super::mixed::Mixed;
+use super::irregular::Irregular;
 use crate::grid::arenas::Arenas;
 use crate::grid::plan::GridPlan;
 
 /// Counts of one rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Census {
+pub struct Statistics {
     /// Own leaves.
     pub leaves: u64,
     /// Leaves of other ranks that it knows.
@@ -41,7 +41,7 @@ pub fn surface_bytes<const D: usize>(
     arenas: &Arenas<D>,
 ) -> u64 {
     let own = Sources { plan, arenas, received: None };
-    let mut scratch = Mixed::default();
+    let mut scratch = Irregular::default();
     let mut total = 0;
     for pieces in exchange.sent() {
         let mut needed: FxHashMap<u32, Needed> = FxHashMap::default();

@@ -8,7 +8,7 @@ pub const NO_BIN: u32 = u32::MAX;
 
 /// Own bins by the blocks that they reach.
 #[derive(Clone, Debug, Default)]
-pub struct Feeders {
+pub struct BinsByBlock {
     /// By block and position, the bin whose block lies in its source leaf.
     inner: Vec<u32>,
     /// By block, the others.
@@ -24,7 +24,7 @@ pub struct Outer {
     pub position: u8,
 }
 
-impl Feeders {
+impl BinsByBlock {
     /// Not collective. The bins around each of `blocks` blocks.
     pub fn new<const D: usize>(bins: &[Bin<D>], blocks: usize) -> Self {
         let positions = offset_count(D);

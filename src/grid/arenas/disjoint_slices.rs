@@ -2,13 +2,13 @@
 use std::ops::Range;
 
 /// Cuts pieces out of a slice from its beginning to its end.
-pub(in crate::grid) struct Cutter<'a, T> {
+pub(in crate::grid) struct DisjointSlices<'a, T> {
     rest: &'a mut [T],
     /// Index of the first element of the rest.
     first: usize,
 }
 
-impl<'a, T> Cutter<'a, T> {
+impl<'a, T> DisjointSlices<'a, T> {
     /// Of a slice whose first element has the index `first`.
     pub fn new(slice: &'a mut [T], first: usize) -> Self {
         Self { rest: slice, first }
@@ -30,7 +30,7 @@ mod tests {
     #[test]
     fn pieces_are_those_asked_for() {
         let mut values: Vec<usize> = (10..30).collect();
-        let mut cutter = Cutter::new(&mut values, 10);
+        let mut cutter = DisjointSlices::new(&mut values, 10);
         let pieces = [10..12, 12..12, 15..20, 29..30].map(|range| (range.clone(), cutter.cut(range)));
         for (range, piece) in pieces {
             assert!(piece.iter().copied().eq(range));

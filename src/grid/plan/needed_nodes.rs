@@ -11,8 +11,8 @@
 use partition::{Octant, Region};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::known::{Cover, KnownTree};
-use super::reach::{SourceSearch, bin_container, interior, own_bins};
+use super::bin_reach::{SourceSearch, bin_container, interior, own_bins};
+use super::ghost_layer::{Cover, KnownTree};
 use crate::grid::constraints::parents::{ParentTable, children, coarser_at, parents, parity, place_beside};
 use crate::grid::mask::{
     arena_overlap, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
@@ -22,9 +22,9 @@ use crate::grid::mask::{
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeSets {
     /// Nodes whose velocity is needed.
-    pub value: u64,
+    pub needs_velocity: u64,
     /// Nodes whose complete sum is needed.
-    pub sum: u64,
+    pub needs_sum: u64,
     /// Nodes that touch a coarser leaf: no degrees of freedom on this level.
     pub constrained: u64,
 }
@@ -125,7 +125,7 @@ impl<const D: usize> Builder<'_, D> {
                     let Some(coord) = shifted(bin.coord, offset::<D>(index)) else { continue };
                     let inside = self.overlaps[index] & nodes_in_domain(self.tree, bin.level, coord);
                     if inside != 0 {
-                        self.sets(bin.level, coord).value |= inside;
+                        self.sets(bin.level, coord).needs_velocity |= inside;
                     }
                 }
             }
@@ -137,7 +137,7 @@ impl<const D: usize> Builder<'_, D> {
         for level in (1..self.levels.len()).rev() {
             let blocks: Vec<([u32; D], u64)> = self.levels[level]
                 .iter()
-                .map(|(&coord, sets)| (coord, sets.value & sets.constrained))
+                .map(|(&coord, sets)| (coord, sets.needs_velocity & sets.constrained))
                 .filter(|&(_, mask)| mask != 0)
                 .collect();
             for (coord, mask) in blocks {
@@ -147,7 +147,7 @@ impl<const D: usize> Builder<'_, D> {
                     }
                     let coarse = coarser_at(coord, corner);
                     let parents = parents::<D>(place_beside(coord, coarse), mask);
-                    self.sets(level as u8 - 1, coarse).value |= parents;
+                    self.sets(level as u8 - 1, coarse).needs_velocity |= parents;
                 }
             }
         }
@@ -159,8 +159,8 @@ impl<const D: usize> Builder<'_, D> {
             let blocks: Vec<([u32; D], u64)> = self.levels[level as usize]
                 .iter_mut()
                 .map(|(&coord, sets)| {
-                    sets.sum |= sets.value & !sets.constrained;
-                    (coord, sets.sum)
+                    sets.needs_sum |= sets.needs_velocity & !sets.constrained;
+                    (coord, sets.needs_sum)
                 })
                 .filter(|&(_, sum)| sum != 0)
                 .collect();
@@ -176,7 +176,7 @@ impl<const D: usize> Builder<'_, D> {
                     }
                     let children = children & self.restricted(level + 1, fine);
                     if children != 0 {
-                        self.sets(level + 1, fine).sum |= children;
+                        self.sets(level + 1, fine).needs_sum |= children;
                     }
                 }
             }
@@ -277,7 +277,7 @@ impl<const D: usize> Builder<'_, D> {
         let mut looked: FxHashSet<(u8, [u32; D])> = FxHashSet::default();
         for (level, blocks) in self.levels.iter().enumerate() {
             let mut with_sums: Vec<[u32; D]> =
-                blocks.iter().filter(|(_, sets)| sets.sum != 0).map(|(&coord, _)| coord).collect();
+                blocks.iter().filter(|(_, sets)| sets.needs_sum != 0).map(|(&coord, _)| coord).collect();
             with_sums.sort_unstable();
             for coord in with_sums {
                 for beside in box_offsets::<D>(1).filter_map(|offset| shifted(coord, offset)) {

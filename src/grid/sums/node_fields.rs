@@ -1,4 +1,4 @@
-//! Node fields of one time step: sums of arenas, and what the gather reads; `levels.rs` has restriction and prolongation.
+//! Node fields of one time step: sums of arenas, and what the gather reads; `restrict_prolong.rs` has restriction and prolongation.
 //!
 //! Every sum runs in the order that the plan fixes from tree and particles, so its bits do not depend on
 //! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::block_sum::{BlockSum, Sources};
 use super::exchange::ReceivedSums;
-use super::mixed::Mixed;
+use super::irregular::Irregular;
 use crate::grid::arenas::Arenas;
-use crate::grid::arenas::cutter::Cutter;
-use crate::grid::arenas::waves::FIRST;
+use crate::grid::arenas::arena_schedule::FIRST;
+use crate::grid::arenas::disjoint_slices::DisjointSlices;
 use crate::grid::arenas::window::{Shared, Window};
 use crate::grid::constraints::moments::first_row;
 use crate::grid::mask::{bits, block_nodes, offset_count};
@@ -79,7 +79,7 @@ impl<const D: usize> NodeFields<D> {
             self.clear(plan, arenas);
         }
         let sources = Sources { plan, arenas, received: None };
-        let blocks = arenas.waves().blocks(wave);
+        let blocks = arenas.schedule().blocks(wave);
         self.for_each_block(plan, blocks, |scratch, place, slot| {
             if let Some(&next) = blocks.get(place + 1) {
                 sources.read_ahead(next as usize);
@@ -88,7 +88,7 @@ impl<const D: usize> NodeFields<D> {
             let block = &plan.blocks[index];
             let mut is_reached = false;
             *slot.touched = 0;
-            if wave == FIRST || block.sum != 0 {
+            if wave == FIRST || block.needs_sum != 0 {
                 let mut sum = BlockSum::find(sources, scratch, index, None);
                 is_reached = !sum.is_empty();
                 if is_reached {
@@ -103,7 +103,7 @@ impl<const D: usize> NodeFields<D> {
                 slot.rows.fill(ZERO);
                 slot.moments.fill(ZERO);
             }
-            *slot.active = is_reached && block.sum != 0;
+            *slot.active = is_reached && block.needs_sum != 0;
             *slot.dirty = is_reached;
         });
     }
@@ -163,18 +163,20 @@ impl<const D: usize> NodeFields<D> {
         &mut self,
         plan: &GridPlan<D>,
         blocks: &[u32],
-        work: impl Fn(&mut Mixed<D>, usize, Slot<'_>) + Sync,
+        work: impl Fn(&mut Irregular<D>, usize, Slot<'_>) + Sync,
     ) {
         let slots = self.slots(plan, blocks).into_par_iter().enumerate().with_min_len(TASK);
-        slots.for_each_init(Mixed::default, |scratch, (place, slot)| work(scratch, place, slot));
+        slots.for_each_init(Irregular::default, |scratch, (place, slot)| work(scratch, place, slot));
     }
 
     /// Some blocks, which ascend.
     fn slots(&mut self, plan: &GridPlan<D>, blocks: &[u32]) -> Vec<Slot<'_>> {
         let nodes = block_nodes(D);
-        let (mut rows, mut moments) = (Cutter::new(&mut self.rows, 0), Cutter::new(&mut self.moments, 0));
-        let (mut active, mut dirty) = (Cutter::new(&mut self.active, 0), Cutter::new(&mut self.dirty, 0));
-        let mut touched = Cutter::new(&mut self.touched, 0);
+        let (mut rows, mut moments) =
+            (DisjointSlices::new(&mut self.rows, 0), DisjointSlices::new(&mut self.moments, 0));
+        let (mut active, mut dirty) =
+            (DisjointSlices::new(&mut self.active, 0), DisjointSlices::new(&mut self.dirty, 0));
+        let mut touched = DisjointSlices::new(&mut self.touched, 0);
         let slot = |&block: &u32| {
             let block = block as usize;
             Slot {
@@ -279,7 +281,7 @@ fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`, in the order of [`ArenaConstraints`](crate::grid::plan::constrained::ArenaConstraints).
+    /// First moments `V_j`, in the order of [`ArenaConstraints`](crate::grid::plan::arena_tables::ArenaConstraints).
     pub moments: Vec<Row>,
 }
 

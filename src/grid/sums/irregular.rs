@@ -8,7 +8,7 @@ use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::mask::{bits, offset_count, opposite};
 use crate::grid::order::region::{MOST_BINS, SPAN, arena_node};
 use crate::grid::order::{Origin, Term, arrange, fold};
-use crate::grid::plan::sources::{NO_HOME, Part};
+use crate::grid::plan::remote_sums::{NO_HOME, Part};
 use crate::kernel::Row;
 
 /// A bin outside its leaf that reaches a block.
@@ -33,7 +33,7 @@ pub(super) struct Placed {
 
 /// What else than whole arenas reaches a block; memory that a thread reuses from block to block.
 #[derive(Debug)]
-pub(super) struct Mixed<const D: usize> {
+pub(super) struct Irregular<const D: usize> {
     /// Bins outside their leaves.
     pub outer: Vec<Other>,
     /// What takes the place of arenas in the present region.
@@ -45,7 +45,7 @@ pub(super) struct Mixed<const D: usize> {
     moments: Vec<(u32, Moments<D>)>,
 }
 
-impl<const D: usize> Default for Mixed<D> {
+impl<const D: usize> Default for Irregular<D> {
     fn default() -> Self {
         Self {
             outer: Vec::new(),
@@ -102,7 +102,7 @@ impl<const D: usize> BlockSum<'_, D> {
     pub fn copy_pieces(&mut self, region: usize) {
         let nodes = self.regions.nodes[region];
         let Some(received) = self.received else { return };
-        let Mixed { placed, pieces, .. } = &mut *self.scratch;
+        let Irregular { placed, pieces, .. } = &mut *self.scratch;
         // Distances between nodes are the same in all arenas.
         let node = |bit| arena_node::<D>(offset_count(D) / 2, bit);
         let first = node(nodes.trailing_zeros());
@@ -154,7 +154,7 @@ impl<const D: usize> BlockSum<'_, D> {
         let mut terms = std::mem::take(&mut self.scratch.terms);
         terms.clear();
         let nodes = self.regions.nodes[region];
-        let bins = self.plan.feeders.inner::<D>(self.block);
+        let bins = self.plan.bins_by_block.inner::<D>(self.block);
         for position in bits(u64::from(self.occupied & self.regions.positions[region])) {
             let bin = bins[position as usize];
             let key = self.plan.bins[bin as usize].block.key();
