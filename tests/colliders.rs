@@ -1,51 +1,17 @@
 //! Colliders through the whole program: exact solutions of sliding, resting, pushing and falling, and the same bits
 //! on any ranks and threads and across restarts.
+#[path = "common/history.rs"]
+mod history;
 #[path = "mpi_runs/launch.rs"]
 #[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
 mod launch;
 #[path = "common/mpirun.rs"]
 mod mpirun;
 
-use std::collections::HashMap;
 use std::path::Path;
 
+use history::History;
 use launch::{Outcome, agimp, job, run, succeed};
-
-/// Columns of a history by name, without units.
-struct History(HashMap<String, Vec<f64>>);
-
-impl History {
-    fn read(directory: &Path, name: &str) -> Self {
-        let text = std::fs::read_to_string(launch::file(directory, name, ".history.csv")).expect("history");
-        let mut lines = text.lines();
-        let names = lines.next().expect("header").split(',');
-        let rows: Vec<Vec<f64>> =
-            lines.map(|row| row.split(',').map(|cell| cell.parse().expect("number")).collect()).collect();
-        let column = |i: usize| rows.iter().map(|row| row[i]).collect();
-        let name = |cell: &str| cell.split(' ').next().unwrap_or_default().to_owned();
-        Self(names.enumerate().map(|(i, cell)| (name(cell), column(i))).collect())
-    }
-
-    fn column(&self, name: &str) -> &[f64] {
-        self.0.get(name).unwrap_or_else(|| panic!("no column {name}: {:?}", self.0.keys()))
-    }
-
-    fn last(&self, name: &str) -> f64 {
-        *self.column(name).last().expect("a row")
-    }
-
-    /// Integral over time of a column of means since the row before, from the first row at or after `start`.
-    fn integral(&self, name: &str, start: f64) -> f64 {
-        let (time, values) = (self.column("time"), self.column(name));
-        (1..time.len()).filter(|&i| time[i - 1] >= start).map(|i| values[i] * (time[i] - time[i - 1])).sum()
-    }
-
-    /// Value of a column in the first row at or after `start`, with its time.
-    fn at(&self, name: &str, start: f64) -> (f64, f64) {
-        let row = self.column("time").iter().position(|&time| time >= start).expect("a row");
-        (self.column("time")[row], self.column(name)[row])
-    }
-}
 
 /// Runs a 2D job on one rank: an elastic body of 1000 kg/m³ and what `rest` adds.
 fn elastic(young: f64, gravity: f64, body: &str, end: f64, rest: &str) -> History {

@@ -1,0 +1,43 @@
+//! The history that a run has written. The test has the module `launch`.
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Columns of a history by name, without units.
+pub struct History(HashMap<String, Vec<f64>>);
+
+impl History {
+    /// Of the run of this name in a directory.
+    pub fn read(directory: &Path, name: &str) -> Self {
+        let text =
+            std::fs::read_to_string(crate::launch::file(directory, name, ".history.csv")).expect("history");
+        let mut lines = text.lines();
+        let names = lines.next().expect("header").split(',');
+        let rows: Vec<Vec<f64>> =
+            lines.map(|row| row.split(',').map(|cell| cell.parse().expect("number")).collect()).collect();
+        let column = |i: usize| rows.iter().map(|row| row[i]).collect();
+        let name = |cell: &str| cell.split(' ').next().unwrap_or_default().to_owned();
+        Self(names.enumerate().map(|(i, cell)| (name(cell), column(i))).collect())
+    }
+
+    /// Values of a column, row by row.
+    pub fn column(&self, name: &str) -> &[f64] {
+        self.0.get(name).unwrap_or_else(|| panic!("no column {name}: {:?}", self.0.keys()))
+    }
+
+    /// Value of a column in the last row.
+    pub fn last(&self, name: &str) -> f64 {
+        *self.column(name).last().expect("a row")
+    }
+
+    /// Integral over time of a column of means since the row before, from the first row at or after `start`.
+    pub fn integral(&self, name: &str, start: f64) -> f64 {
+        let (time, values) = (self.column("time"), self.column(name));
+        (1..time.len()).filter(|&i| time[i - 1] >= start).map(|i| values[i] * (time[i] - time[i - 1])).sum()
+    }
+
+    /// Value of a column in the first row at or after `start`, with its time.
+    pub fn at(&self, name: &str, start: f64) -> (f64, f64) {
+        let row = self.column("time").iter().position(|&time| time >= start).expect("a row");
+        (self.column("time")[row], self.column(name)[row])
+    }
+}
