@@ -6,58 +6,75 @@ use serde::{Deserialize, Serialize};
 use super::View;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// A field of the particles that an output file can show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PointField {
+/// Makes [`PointField`] of the table of fields: variant, name in job and output files, unit (empty for pure numbers), values of all
+/// particles of a view in order.
+macro_rules! fields {
+    ($($(#[$doc:meta])* $field:ident, $name:literal, $unit:literal, $values:expr;)*) => {
+        /// A field of the particles that an output file can show.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+        pub enum PointField {
+            $($(#[$doc])* #[serde(rename = $name)] $field,)*
+        }
+
+        impl PointField {
+            /// All fields.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$field),*];
+
+            /// Name in job and output files.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$field => $name,)* }
+            }
+
+            /// Unit, empty for pure numbers.
+            pub const fn unit(self) -> &'static str {
+                match self { $(Self::$field => $unit,)* }
+            }
+
+            /// Values of all particles of the view, in order.
+            pub(crate) fn values<const D: usize>(self, view: &View<'_, D>) -> Values {
+                let values: fn(&View<'_, D>) -> Values = match self { $(Self::$field => $values,)* };
+                values(view)
+            }
+        }
+    };
+}
+
+fields! {
     /// Velocity, m/s.
-    Velocity,
+    Velocity, "velocity", "m/s", |view| each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p)));
     /// Magnitude of the velocity, m/s.
-    Speed,
+    Speed, "speed", "m/s", |view| scalars(view, speed);
     /// Identifier of the particle.
-    Id,
+    Id, "id", "", |view| Values::Id(view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect());
     /// Number of the material.
-    Material,
+    Material, "material", "", |view| of_tags(view, |tag| tag.material);
     /// Number of the body.
-    Body,
+    Body, "body", "", |view| of_tags(view, |tag| tag.body);
     /// Tree level that the particle was made for.
-    ParticleLevel,
+    ParticleLevel, "particle_level", "", |view| of_tags(view, |tag| u16::from(tag.level));
     /// Level of the leaf that holds the particle.
-    LeafLevel,
+    LeafLevel, "leaf_level", "", |view| {
+        let leaves = view.leaves.iter().zip(view.chunks);
+        let levels = leaves.flat_map(|(leaf, chunk)| vec![i32::from(leaf.level); chunk.len()]);
+        Values::Integer(levels.collect())
+    };
     /// First history variable of the material, as a rule the accumulated plastic strain.
-    PlasticStrain,
+    PlasticStrain, "plastic_strain", "", |view| scalars(view, plastic_strain);
     /// Mean of the Cauchy stress with the sign changed, Pa; compression is positive.
-    Pressure,
+    Pressure, "pressure", "Pa", |view| scalars(view, |chunk, p| -mean(&cauchy_stress(chunk, p)));
     /// Von Mises equivalent of the Cauchy stress, Pa.
-    VonMises,
+    VonMises, "von_mises", "Pa", |view| scalars(view, |chunk, p| von_mises(&cauchy_stress(chunk, p)));
     /// Cauchy stress, Pa; components xx, yy, zz, xy, yz, xz as VTK orders them.
-    Stress,
+    Stress, "stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(cauchy_stress(chunk, p)));
     /// Mass, kg (per metre of thickness in plane strain).
-    Mass,
+    Mass, "mass", "kg", |view| scalars(view, |chunk, p| chunk.column(Layout::<D>::MASS)[p]);
     /// Density, kg/m³.
-    Density,
+    Density, "density", "kg/m³", |view| scalars(view, density);
     /// Volume over reference volume, det F.
-    VolumeRatio,
+    VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
 }
 
 impl PointField {
-    /// All fields.
-    pub const ALL: [Self; 14] = [
-        Self::Velocity,
-        Self::Speed,
-        Self::Id,
-        Self::Material,
-        Self::Body,
-        Self::ParticleLevel,
-        Self::LeafLevel,
-        Self::PlasticStrain,
-        Self::Pressure,
-        Self::VonMises,
-        Self::Stress,
-        Self::Mass,
-        Self::Density,
-        Self::VolumeRatio,
-    ];
     /// The fields of a run that names none.
     pub const USUAL: [Self; 8] = [
         Self::Velocity,
@@ -70,72 +87,9 @@ impl PointField {
         Self::Density,
     ];
 
-    /// Name in job and output files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Velocity => "velocity",
-            Self::Speed => "speed",
-            Self::Id => "id",
-            Self::Material => "material",
-            Self::Body => "body",
-            Self::ParticleLevel => "particle_level",
-            Self::LeafLevel => "leaf_level",
-            Self::PlasticStrain => "plastic_strain",
-            Self::Pressure => "pressure",
-            Self::VonMises => "von_mises",
-            Self::Stress => "stress",
-            Self::Mass => "mass",
-            Self::Density => "density",
-            Self::VolumeRatio => "volume_ratio",
-        }
-    }
-
     /// The field of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|field| field.name() == name)
-    }
-
-    /// Unit, empty for pure numbers.
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Self::Velocity | Self::Speed => "m/s",
-            Self::Pressure | Self::VonMises | Self::Stress => "Pa",
-            Self::Mass => "kg",
-            Self::Density => "kg/m³",
-            _ => "",
-        }
-    }
-
-    /// Values of all particles of the view, in order.
-    pub(crate) fn values<const D: usize>(self, view: &View<D>) -> Values {
-        let tag = |get: fn(Tag) -> u16| {
-            let tags = view.chunks.iter().flat_map(|chunk| chunk.tags());
-            Values::Integer(tags.map(|&bits| i32::from(get(Tag::unpack(bits)))).collect())
-        };
-        match self {
-            Self::Id => Values::Id(view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect()),
-            Self::Material => tag(|tag| tag.material),
-            Self::Body => tag(|tag| tag.body),
-            Self::ParticleLevel => tag(|tag| u16::from(tag.level)),
-            Self::LeafLevel => {
-                let leaves = view.leaves.iter().zip(view.chunks);
-                let levels = leaves.flat_map(|(leaf, chunk)| vec![i32::from(leaf.level); chunk.len()]);
-                Values::Integer(levels.collect())
-            }
-            Self::Velocity => each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p))),
-            Self::Speed => each(view, 0, |chunk, p, out| out.push(speed(chunk, p))),
-            Self::PlasticStrain => each(view, 0, |chunk, p, out| out.push(plastic_strain(chunk, p))),
-            Self::Mass => each(view, 0, |chunk, p, out| out.push(chunk.column(Layout::<D>::MASS)[p])),
-            Self::VolumeRatio => each(view, 0, |chunk, p, out| out.push(volume_ratio(chunk, p))),
-            Self::Density => each(view, 0, |chunk, p, out| {
-                let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
-                let volume = (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p);
-                out.push(chunk.column(Layout::<D>::MASS)[p] / volume);
-            }),
-            Self::Pressure => each(view, 0, |chunk, p, out| out.push(-mean(&cauchy_stress(chunk, p)))),
-            Self::VonMises => each(view, 0, |chunk, p, out| out.push(von_mises(&cauchy_stress(chunk, p)))),
-            Self::Stress => each(view, 6, |chunk, p, out| out.extend(cauchy_stress(chunk, p))),
-        }
     }
 }
 
@@ -177,6 +131,17 @@ fn each<const D: usize>(
     Values::Real(out, components)
 }
 
+/// One number for each particle.
+fn scalars<const D: usize>(view: &View<D>, value: impl Fn(&Chunk<D>, usize) -> f64) -> Values {
+    each(view, 0, |chunk, p, out| out.push(value(chunk, p)))
+}
+
+/// A number of each particle's tag.
+fn of_tags<const D: usize>(view: &View<D>, get: fn(Tag) -> u16) -> Values {
+    let tags = view.chunks.iter().flat_map(|chunk| chunk.tags());
+    Values::Integer(tags.map(|&bits| i32::from(get(Tag::unpack(bits)))).collect())
+}
+
 /// Velocity with three components.
 fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
@@ -197,6 +162,13 @@ fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 
     let at = |component: usize| chunk.column(first + component)[p];
     let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
     [at(0), at(1), at(2), at(3), yz, xz]
+}
+
+/// Mass over current volume, kg/m³.
+fn density<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
+    let volume = (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p);
+    chunk.column(Layout::<D>::MASS)[p] / volume
 }
 
 fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
