@@ -56,3 +56,20 @@ fn declared_sizes_are_compared_with_the_file() {
         assert!(error.contains("hostile.vtkhdf: coord is in pieces"), "{error}");
     }
 }
+
+/// A pipe under the name of a state is no file: nobody waits for what another program might write to it.
+#[test]
+fn pipes_are_refused_at_once() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("pipe.hdf");
+    let name = std::ffi::CString::new(path.to_str().expect("UTF-8")).expect("no zero byte");
+    // SAFETY: a terminated name that lives through the call.
+    assert_eq!(unsafe { libc::mkfifo(name.as_ptr(), 0o600) }, 0, "the pipe is made");
+    let error = Reader::open_alone(&path).map(drop).expect_err("a pipe").to_string();
+    assert!(error.contains("pipe.hdf") && error.contains("neither a file nor a link to one"), "{error}");
+    // Among the states that a run may go on from it does not count.
+    let checkpoint = directory.path().join("col.checkpoint_000000010.hdf");
+    std::fs::rename(&path, checkpoint).expect("renamed");
+    let found = agimp::io::snapshot::directory::candidates(directory.path(), "col", None).expect("listed");
+    assert!(found.whole.is_empty() && found.damaged.is_empty(), "{found:?}");
+}

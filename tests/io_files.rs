@@ -7,11 +7,11 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use agimp::io::hdf5_file::Writer;
+use agimp::io::hdf5_file::{Reader, Writer};
 use agimp::io::picture::{Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
-use agimp::io::snapshot::{self, Limits, Options, Outputs, PointField, Scalars, View};
+use agimp::io::snapshot::{self, Header, Limits, Options, Outputs, PointField, Scalars, View};
 use agimp::particle::chunk::{Chunk, Layout, Tag};
 use partition::comm::{Comm, World, is_launched};
 use partition::{Brick, Octant};
@@ -63,6 +63,7 @@ struct Run<const D: usize> {
     chunks: Vec<Chunk<D>>,
     leaf_fields: Vec<(String, Vec<f64>)>,
     materials: Vec<String>,
+    bodies: Vec<String>,
     histories: Vec<String>,
     scalars: Scalars,
 }
@@ -106,6 +107,7 @@ impl<const D: usize> Run<D> {
             chunks: leaves.map(chunk).collect(),
             leaf_fields: vec![("wear".into(), wear)],
             materials: vec!["sand".into(), "steel".into()],
+            bodies: vec!["heap".into(), "wall".into()],
             histories: vec!["plastic_strain".into(), "volume_gain".into()],
             scalars: Scalars {
                 reals: vec![("mass at start".into(), 0.1)],
@@ -124,6 +126,7 @@ impl<const D: usize> Run<D> {
             root_edge: ROOT_EDGE,
             brick: Brick { roots: [1; D] },
             materials: &self.materials,
+            bodies: &self.bodies,
             histories: &self.histories,
             job_digest: 0xfeed_face_dead_beef,
             job_text: "title = \"a job\"\n",
@@ -174,14 +177,15 @@ fn write_read_write<const D: usize>(comm: &Comm, directory: &Path) {
     // Back from the file that the first launch has written, on this number of ranks.
     let source = directory.join(format!("run{D}_1.hdf"));
     let back = snapshot::read::<D>(comm, &source, Some(0xfeed_face_dead_beef), LIMITS).expect("read");
-    let names = (back.header.materials.clone(), back.header.histories.clone());
+    let header = back.header;
     let again = Run {
         leaves: back.leaves,
         chunks: back.chunks,
         leaf_fields: back.leaf_fields,
-        materials: names.0,
-        histories: names.1,
-        scalars: back.header.scalars,
+        materials: header.materials,
+        bodies: header.bodies,
+        histories: header.histories,
+        scalars: header.scalars,
     };
     snapshot::write(comm, &path("again"), &again.view(), &options()).expect("written");
 
@@ -216,6 +220,56 @@ fn files_are_the_same_on_any_ranks_and_come_back() {
                 assert_eq!(whole, digest(&path("again", 4)).expect("digest").whole);
                 assert_eq!(diff(&path("run", 1), &path("again", 3)).expect("compared"), []);
             }
+        },
+    );
+}
+
+/// Whoever opens a file with nothing but HDF5 learns what is in it: each data set stands in the guide, each field of the particles
+/// and each column of the state says its unit and what it is, and the job is there as text.
+#[test]
+fn files_explain_themselves() {
+    on_ranks(
+        "files_explain_themselves",
+        &[2],
+        |comm, directory| {
+            let run = Run::<3>::example(share(comm, 12, 0), 9);
+            snapshot::write(comm, &directory.join("run.hdf"), &run.view(), &options()).expect("written");
+            let light = Options { restart: false, ..options() };
+            snapshot::write(comm, &directory.join("light.hdf"), &run.view(), &light).expect("written");
+            snapshot::write_tree(comm, &directory.join("tree.hdf"), &run.view()).expect("written");
+        },
+        |directory| {
+            let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide/files.md");
+            let guide = std::fs::read_to_string(guide).expect("the guide");
+            for name in ["run.hdf", "light.hdf", "tree.hdf"] {
+                let file = Reader::open_alone(&directory.join(name)).expect("opened");
+                let header = Header::read(&file).expect("header");
+                assert_eq!(header.bodies, ["heap", "wall"]);
+                for (set, _) in &header.checksums {
+                    let last = set.rsplit('/').next().expect("a name");
+                    assert!(
+                        [format!("`{last}`"), format!("/{last}`")]
+                            .iter()
+                            .any(|name| last == "wear" || guide.contains(name)),
+                        "{set} is not in the guide"
+                    );
+                    if ["PointData", "CellData", "state/particles"].iter().any(|group| set.contains(group))
+                        && last != "wear"
+                    {
+                        let units = file.text(set, "units").expect("units");
+                        assert!(!file.text(set, "description").expect("description").is_empty(), "{set}");
+                        assert!(
+                            units.is_empty() || guide.contains(&format!("| {units} |")),
+                            "{set}: {units}"
+                        );
+                    }
+                }
+            }
+            let light = Reader::open_alone(&directory.join("light.hdf")).expect("opened");
+            assert_eq!(light.text("VTKHDF/PointData/density", "units").expect("units"), "kg/m³");
+            assert_eq!(light.text("VTKHDF/PointData/body", "names").expect("names"), "heap\nwall");
+            let text = snapshot::job_text(&directory.join("light.hdf"));
+            assert_eq!(text.as_deref(), Some("title = \"a job\"\n"));
         },
     );
 }
@@ -364,6 +418,42 @@ fn a_failing_rank_leaves_no_file() {
             comm.barrier();
             let left = std::fs::read_dir(directory).expect("listed").count();
             assert_eq!(left, 0, "no file and no temporary file");
+        },
+        |_| {},
+    );
+}
+
+/// A state that has blown up gets no file: the message names particle and quantity, and the file of that name stays as it was.
+#[test]
+fn numbers_that_are_not_finite_are_not_written() {
+    on_ranks(
+        "numbers_that_are_not_finite_are_not_written",
+        &[1, 2, 3],
+        |comm, directory| {
+            let path = directory.join("kept.hdf");
+            let run = Run::<2>::example(share(comm, 12, 0), 9);
+            snapshot::write(comm, &path, &run.view(), &options()).expect("written");
+            let before = bytes(&path);
+            comm.barrier();
+            for (column, name) in
+                [(Layout::<2>::MASS, "mass"), (Layout::<2>::LEFT_CAUCHY_GREEN, "left_cauchy_green")]
+            {
+                for value in [f64::NAN, f64::INFINITY] {
+                    let mut run = Run::<2>::example(share(comm, 12, 0), 9);
+                    if comm.rank() + 1 == comm.size() {
+                        let chunk =
+                            run.chunks.iter_mut().rfind(|chunk| !chunk.is_empty()).expect("particles");
+                        chunk.column_mut(column)[0] = value;
+                    }
+                    let error =
+                        snapshot::write(comm, &path, &run.view(), &options()).expect_err("not finite");
+                    let message = error.to_string();
+                    assert!(message.contains(&format!("not written: {name} of particle ")), "{message}");
+                }
+            }
+            comm.barrier();
+            assert_eq!(bytes(&path), before, "on rank {}", comm.rank());
+            assert_eq!(std::fs::read_dir(directory).expect("listed").count(), 1, "no temporary file");
         },
         |_| {},
     );

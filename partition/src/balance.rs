@@ -50,7 +50,7 @@ struct Ripple<'a, const D: usize> {
     /// By level: subdivided octants whose neighbours have not been looked at.
     work: Vec<Vec<Octant<D>>>,
     /// Codes that have been sent.
-    told: HashSet<u64>,
+    sent: HashSet<u64>,
     /// Codes to send, by owner.
     outgoing: BTreeMap<usize, Vec<u64>>,
 }
@@ -70,7 +70,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
             }
             previous = Some(leaf);
         }
-        Ripple { forest, rank, added: HashSet::new(), work, told: HashSet::new(), outgoing: BTreeMap::new() }
+        Ripple { forest, rank, added: HashSet::new(), work, sent: HashSet::new(), outgoing: BTreeMap::new() }
     }
 
     /// Applies the rule until it holds on this rank. Returns what other ranks must know.
@@ -120,7 +120,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
         }
         // An octant with leaves of several ranks is subdivided already, and they all know.
         let owner = self.forest.owner(first);
-        if end <= markers[owner + 1] && self.told.insert(octant.code()) {
+        if end <= markers[owner + 1] && self.sent.insert(octant.code()) {
             self.outgoing.entry(owner).or_default().push(octant.code());
         }
     }

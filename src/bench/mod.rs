@@ -195,7 +195,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Processor time of this process so far, s; `None` where the system does not tell.
+/// Processor time of this process so far, s; `None` where the system does not say.
 fn busy_seconds() -> Option<f64> {
     let mut total = 0.0;
     for thread in std::fs::read_dir("/proc/self/task").ok()? {

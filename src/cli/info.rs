@@ -89,6 +89,7 @@ fn write(out: &mut impl Write, contents: &Contents) -> std::io::Result<()> {
         writeln!(out, "  level {level:<2}       {leaves} leaves, {particles} particles")?;
     }
     writeln!(out, "materials        {}", printable(&header.materials.join(", ")))?;
+    writeln!(out, "bodies           {}", printable(&header.bodies.join(", ")))?;
     if !fields.is_empty() {
         writeln!(out, "fields           {}", fields.join(", "))?;
     }

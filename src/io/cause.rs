@@ -1,10 +1,10 @@
-//! Why the system has refused a file, in words that tell what to do.
+//! Why the system has refused a file, in words that say what to do.
 use std::io::Error;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// The reason of an error on a path. Looks at the file system where the error alone does not tell.
+/// The reason of an error on a path. Looks at the file system where the error alone does not say enough.
 pub fn explain(path: &Path, error: &Error) -> String {
     let Some(code) = error.raw_os_error() else { return error.to_string() };
     let words = match code {
@@ -56,11 +56,11 @@ mod tests {
     fn reasons_are_told_in_words() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a");
-        let told = |code| explain(&path, &Error::from_raw_os_error(code));
-        assert_eq!(told(libc::ENOSPC), "no space left on device (os error 28)");
-        assert!(told(libc::EFBIG).contains("ulimit -f"));
-        assert!(told(libc::EROFS).contains("read-only"));
-        assert!(told(libc::EIO).contains("os error 5"));
+        let words = |code| explain(&path, &Error::from_raw_os_error(code));
+        assert_eq!(words(libc::ENOSPC), "no space left on device (os error 28)");
+        assert!(words(libc::EFBIG).contains("ulimit -f"));
+        assert!(words(libc::EROFS).contains("read-only"));
+        assert!(words(libc::EIO).contains("os error 5"));
         let nowhere = explain(&path.join("b"), &Error::from_raw_os_error(libc::ENOENT));
         assert!(nowhere.contains("the directory is not there"), "{nowhere}");
     }

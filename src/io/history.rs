@@ -51,7 +51,7 @@ impl History {
     }
 
     /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that the finished file
-    /// equals that of an uninterrupted run. What is damaged is cut out, and what is missing for that reason is told.
+    /// equals that of an uninterrupted run. What is damaged is cut out, and a warning names what is missing for that reason.
     /// Starts a new file if there is none, or nothing of it is whole.
     ///
     /// # Errors
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }
 
-    /// Whatever a crash leaves: what is whole stays, and what is missing is told.
+    /// Whatever a crash leaves: what is whole stays, and a warning names what is missing.
     #[test]
     fn damage_is_cut_out_and_told() {
         let dir = tempfile::tempdir().unwrap();

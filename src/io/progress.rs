@@ -140,13 +140,13 @@ impl Progress {
 
 /// Warns the user while no progress is shown. To be called on one rank.
 pub fn warn(text: &str) {
-    // In one piece, or `mpirun` may put its own words between pieces; if nobody listens, nobody is told.
+    // In one piece, or `mpirun` may put its own words between pieces; a closed pipe is no error.
     let _ = std::io::stderr().write_all(format!("agimp: warning: {text}\n").as_bytes());
 }
 
 /// Wall time that is left when the part `done` took `elapsed`.
 fn remaining(elapsed: Duration, done: f64) -> Option<Duration> {
-    // Too early to tell in the first thousandth.
+    // Too early for an estimate in the first thousandth.
     (done > 1e-3).then(|| elapsed.mul_f64((1.0 - done) / done))
 }
 

@@ -276,7 +276,7 @@ impl Record {
     }
 }
 
-/// Resident memory of this process, bytes; `None` where the system does not tell.
+/// Resident memory of this process, bytes; `None` where the system does not say.
 pub fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -17,7 +17,7 @@ const PAGE: usize = 4096;
 pub(super) struct Batch {
     /// Those of lanes that are no members are of use for their material.
     index: [u32; LANES],
-    /// Bit i tells whether lane i is a member.
+    /// Bit i says whether lane i is a member.
     lanes: u32,
     /// The tile whose lanes are those of the batch; brought together from several otherwise.
     tile: Option<u32>,

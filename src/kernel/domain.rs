@@ -288,7 +288,7 @@ fn stretches<V: Vector, const D: usize>(
     stretch
 }
 
-/// Bit i tells whether lane i is of a plastic material. `index` gives the materials, and is called only if some are plastic.
+/// Bit i says whether lane i is of a plastic material. `index` gives the materials, and is called only if some are plastic.
 #[inline(always)]
 pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -> u32 {
     if !scheme.is_plastic {

@@ -64,7 +64,7 @@ impl State {
     }
 }
 
-/// What a law is told of the step.
+/// What a law gets to know of the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Length of the step, s; 0 for an update without increment, in which nothing flows by its rate.

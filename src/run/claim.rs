@@ -92,7 +92,7 @@ fn lock(path: &Path) -> Result<Held, Refusal> {
             }
             Err(TryLockError::WouldBlock) => {
                 let mut holder = String::new();
-                // What cannot be read is not told.
+                // What cannot be read is left out.
                 let _ = file.take(200).read_to_string(&mut holder);
                 let holder = holder.trim().escape_debug().to_string();
                 return Err(Refusal::Taken { path: path.into(), holder });

@@ -34,7 +34,7 @@ pub struct Options {
     pub restart: Option<From>,
     /// Whether a new run may replace the results of another job, or checkpoints.
     pub overwrite: bool,
-    /// Whether this process tells the user how the run goes on.
+    /// Whether this process shows the progress of the run.
     pub speaks: bool,
     /// Threads of this rank.
     pub threads: usize,
@@ -132,6 +132,23 @@ pub fn run<const D: usize>(
     Ok(outcome)
 }
 
+/// Names that files carry, in the order of the numbers in tags.
+struct Names {
+    materials: Vec<String>,
+    bodies: Vec<String>,
+    histories: Vec<String>,
+}
+
+impl Names {
+    fn of<const D: usize>(problem: &Problem<D>, solver: &Solver<D>) -> Self {
+        Self {
+            materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
+            bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
+            histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
+        }
+    }
+}
+
 /// A run under way.
 struct Run<'a, const D: usize> {
     comm: &'a Comm,
@@ -140,8 +157,7 @@ struct Run<'a, const D: usize> {
     outputs: Outputs,
     schedule: Schedule,
     recorder: Recorder,
-    materials: Vec<String>,
-    histories: Vec<String>,
+    names: Names,
     /// Step of the last output.
     output_step: Option<u64>,
     /// Until the last file has its name.
@@ -225,16 +241,14 @@ impl<'a, const D: usize> Run<'a, D> {
                  count as one here)"
             ));
         }
-        let histories = solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect();
         Ok(Self {
             comm,
             problem,
             schedule: Schedule::new(problem, solver.clock.time),
+            names: Names::of(problem, &solver),
             solver,
             outputs,
             recorder,
-            materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
-            histories,
             output_step,
             _claim: claim,
         })
@@ -307,7 +321,7 @@ impl<'a, const D: usize> Run<'a, D> {
         Ok(Summary { series: self.outputs.series().to_owned(), picture, collapse })
     }
 
-    /// Collective. Draws the last state. All results are on disk by now, so a failure is only told.
+    /// Collective. Draws the last state. All results are on disk by now, so a failure is only a message.
     fn picture(&self) -> Result<Option<PathBuf>, String> {
         let problem = self.problem;
         if !problem.output.picture {
@@ -319,7 +333,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
         let path = problem.output.directory.join(format!("{}.png", problem.name));
         let scalars = Scalars::default();
-        let view = view(problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let view = view(problem, &self.solver, &self.names, &scalars);
         picture::draw(self.comm, &view, field, &picture::Settings::new(title), &path)
             .map_err(|error| error.to_string())?;
         Ok(Some(path))
@@ -333,7 +347,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let next = self.outputs.next() + u64::from(is_due);
         let scalars = self.scalars(next, step);
         let fields = self.leaf_fields();
-        let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let view = view(self.problem, &self.solver, &self.names, &scalars);
         let view = View { leaf_fields: &fields, ..view };
         self.comm.agree(self.recorder.sync())?;
         self.outputs.write(self.comm, &view)?;
@@ -379,7 +393,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let start = Instant::now();
         self.settle(true)?;
         let scalars = self.scalars(self.outputs.next(), self.output_step);
-        let view = view(self.problem, &self.solver, &self.materials, &self.histories, &scalars);
+        let view = view(self.problem, &self.solver, &self.names, &scalars);
         let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
         self.schedule.checkpoint_written(self.solver.clock.time);
         self.solver.phases.book(Phase::Output, start.elapsed());
@@ -396,8 +410,7 @@ fn available_cores() -> usize {
 fn view<'a, const D: usize>(
     problem: &'a Problem<D>,
     solver: &'a Solver<D>,
-    materials: &'a [String],
-    histories: &'a [String],
+    names: &'a Names,
     scalars: &'a Scalars,
 ) -> View<'a, D> {
     View {
@@ -407,8 +420,9 @@ fn view<'a, const D: usize>(
         origin: problem.origin,
         root_edge: problem.root_edge,
         brick: problem.brick,
-        materials,
-        histories,
+        materials: &names.materials,
+        bodies: &names.bodies,
+        histories: &names.histories,
         job_digest: problem.digest,
         job_text: &problem.text,
         step: solver.clock.step,

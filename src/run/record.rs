@@ -13,7 +13,7 @@ use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 
-/// Writes what a run tells about itself. Rank 0 holds the files, all ranks make the same calls.
+/// Writes history, telemetry and messages of a run. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {
     history: Option<History>,
     telemetry: Option<Telemetry>,
@@ -66,7 +66,7 @@ impl Recorder {
         let (history, gaps): (Option<History>, _) = history.unzip();
         let last = history.as_ref().and_then(History::last_step);
         let last_row = match kept {
-            // Even if it is missing: files shall not depend on damage to the history.
+            // Even if it is missing: files must not depend on damage to the history.
             Some(Kept { to, expected }) if expected == Some(to) => expected,
             _ => on_all_ranks(comm, last),
         };

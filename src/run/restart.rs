@@ -195,7 +195,7 @@ fn restore_colliders<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
 }
 
 /// Collective. Reads the state and spreads it over the ranks. Of the files that `--restart latest` may mean, the latest is
-/// taken that is whole; what is passed over is told.
+/// taken that is whole; a warning names what is passed over.
 ///
 /// # Errors
 /// There is no file, or none that can be trusted, or the run ends before it; the same on all ranks.
@@ -313,25 +313,25 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
         return None;
     }
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
-    let mut told: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
+    let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
     match found.len() {
-        0 => told.push("the texts agree, so defaults of the program have changed".into()),
-        all if all > MOST_KEYS => told.push(format!("and {} more", all - MOST_KEYS)),
+        0 => reasons.push("the texts agree, so defaults of the program have changed".into()),
+        all if all > MOST_KEYS => reasons.push(format!("and {} more", all - MOST_KEYS)),
         _ => {}
     }
     Some(format!(
         "{}: the file belongs to another job: {} (title, output, checkpoint, history, telemetry, report and time.end \
          may differ, all else must not)",
         path.display(),
-        told.join("; ")
+        reasons.join("; ")
     ))
 }
 
 /// Keys that a message names.
 const MOST_KEYS: usize = 8;
 
-/// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and tells the others. If
-/// there is none, a file of another job stands for those: it tells why it cannot be used.
+/// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and sends the list to the others. If
+/// there is none, a file of another job takes their place: the error says why it cannot be used.
 fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathBuf>, RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {
@@ -343,7 +343,7 @@ fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathB
     if paths.is_empty() {
         paths.extend(other.filter(|_| damaged.is_empty()));
     }
-    // The reason of one that is left alone is told as the error.
+    // The reason of a single one becomes the error.
     let only = if paths.is_empty() { damaged.pop() } else { None };
     damaged.iter().for_each(|error| warn(&format!("passed over: {error}")));
     comm.agree(only.map_or(Ok(()), Err)).map_err(|disagreement| RunError::Refused(disagreement.message))?;

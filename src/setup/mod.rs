@@ -128,7 +128,7 @@ fn partition_by_seeds<const D: usize>(
     problem: &Problem<D>,
     forest: &mut Forest<D>,
 ) -> Result<Size, SeedError> {
-    // Counted, not filled: leaves that go to other ranks shall take no memory here.
+    // Counted, not filled: leaves of other ranks must take no memory here.
     let count = |leaf: &Octant<D>| {
         let mut counts = vec![0; problem.bodies.len()];
         count_leaf(problem, leaf, &mut counts).map(|()| counts.iter().sum())

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;
 
-/// `jobs/environment`, which has what `mpirun` must be told.
+/// `jobs/environment`, which has the settings of `mpirun`.
 pub fn environment() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of_the_workspace = |folder: &Path| Some(folder.join("jobs/environment")).filter(|path| path.exists());

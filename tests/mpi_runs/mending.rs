@@ -1,5 +1,5 @@
 //! What a crash of the machine may leave: tables without their last rows, with garbage or empty, and damaged states. A run
-//! goes on from what is whole, and tells what it has passed over.
+//! goes on from what is whole, and says what it has passed over.
 use std::path::Path;
 
 use crate::in_turn;
@@ -29,7 +29,7 @@ fn rows(history: &[u8]) -> Vec<String> {
     String::from_utf8_lossy(history).lines().map(str::to_owned).collect()
 }
 
-/// What is left of the history, how many of its lines (header and rows) are whole, and what is told.
+/// What is left of the history, how many of its lines (header and rows) are whole, and the warning.
 type Case<'a> = (&'a str, Option<&'a [u8]>, usize, Option<String>);
 
 #[test]
@@ -119,7 +119,7 @@ fn a_damaged_state_is_passed_over() {
         assert!(line.contains(&newest) && line.contains(reason), "{line}");
         Outcome::read(parts.path(), NAME).assert_same(&whole, reason);
     }
-    // Nothing is whole: the reasons are told, and nothing is changed.
+    // Nothing is whole: the reasons are given, and nothing is changed.
     let parts = tempfile::tempdir().expect("temporary directory");
     copy(home.path(), parts.path());
     for entry in std::fs::read_dir(parts.path().join("out").join(NAME)).expect("directory").flatten() {

@@ -49,7 +49,7 @@ fn check_counts(ranks: usize) {
     }
 }
 
-/// `agimp check` tells the memory of a run before it runs.
+/// `agimp check` estimates the memory of a run.
 #[test]
 fn memory_is_foretold() {
     let _turn = in_turn();

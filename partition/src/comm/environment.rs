@@ -1,4 +1,4 @@
-//! What the MPI library is told by environment variables, before it starts, and what its launcher tells us.
+//! Settings of the MPI library in environment variables, made before it starts, and what its launcher sets for ranks.
 //!
 //! What must be known before `mpirun` itself starts (running as root, more ranks than cores) stands in `jobs/environment`.
 

@@ -32,7 +32,7 @@ impl<T: Pod> Outgoing<T> {
     /// Not collective. Starts to send `buffer` to rank `to`.
     ///
     /// Sent in pieces of [`Comm::piece_len`] items; the last piece is shorter than that (maybe
-    /// empty), which tells the receiver that the message is complete.
+    /// empty), from which the receiver sees that the message is complete.
     pub(super) fn start(comm: &Comm, to: usize, tag: i32, mode: Mode, buffer: Vec<T>) -> Self {
         assert!(to < comm.size(), "no rank {to} among {}", comm.size());
         let limit = comm.piece_len::<T>();

@@ -183,5 +183,5 @@ def read(path: str | PathLike[str]) -> Output:
 def _describe(name: str, dataset: Any) -> _fields.Field:
     known = _fields.KNOWN.get(name, _fields.Field("", name.replace("_", " ")))
     return _fields.Field(
-        text(dataset.attrs.get("unit", known.unit)), text(dataset.attrs.get("description", known.description))
+        text(dataset.attrs.get("units", known.unit)), text(dataset.attrs.get("description", known.description))
     )

@@ -10,8 +10,8 @@ use hdf5_sys::h5o::{H5Oclose, H5Oopen};
 use hdf5_sys::h5p::H5P_DEFAULT;
 use hdf5_sys::h5s::{H5S_SCALAR, H5Sclose, H5Screate, H5Screate_simple, H5Sget_simple_extent_npoints};
 use hdf5_sys::h5t::{
-    H5T_C_S1, H5T_STR_NULLPAD, H5T_STRING, H5Tclose, H5Tcopy, H5Tget_class, H5Tget_size, H5Tis_variable_str,
-    H5Tset_size, H5Tset_strpad,
+    H5T_C_S1, H5T_CSET_ASCII, H5T_CSET_UTF8, H5T_STR_NULLPAD, H5T_STRING, H5Tclose, H5Tcopy, H5Tget_class,
+    H5Tget_size, H5Tis_variable_str, H5Tset_cset, H5Tset_size, H5Tset_strpad,
 };
 
 use super::{Complaint, Element, FileError, Handle, Kind, Reader, Writer, c_text, check, library};
@@ -30,23 +30,36 @@ impl Writer {
         set.map(drop)
     }
 
-    /// Collective. Attaches a text to an object as a scalar of fixed length in ASCII, which is what VTK expects.
+    /// Collective. Attaches a text to an object as a scalar of fixed length, in ASCII where that is enough: VTK expects
+    /// it.
     pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<(), FileError> {
+        self.set_texts(object, &[(name, text)])
+    }
+
+    /// Collective. Attaches texts by name to an object, as [`set_text`](Self::set_text) does.
+    pub fn set_texts(&self, object: &str, texts: &[(&str, &str)]) -> Result<(), FileError> {
         let set = self.on_rank_0(|file, path| {
-            let failed = |words: Complaint| words.into_error(path, "set", name);
-            // A string of length 0 is no valid type.
-            let bytes = if text.is_empty() { b"\0" } else { text.as_bytes() };
-            // SAFETY: a copy of a library type and a scalar space; the size of the type is above 0.
-            let (kind, space) = unsafe {
-                let kind = Handle::new(H5Tcopy(*H5T_C_S1), H5Tclose).map_err(failed)?;
-                let code = H5Tset_size(kind.id, bytes.len()).min(H5Tset_strpad(kind.id, H5T_STR_NULLPAD));
-                check(code, path, "set", name)?;
-                (kind, Handle::new(H5Screate(H5S_SCALAR), H5Sclose).map_err(failed)?)
-            };
-            attach(file, path, object, name, kind.id, &space, bytes)
+            texts.iter().try_for_each(|(name, text)| attach_text(file, path, object, name, text))
         });
         set.map(drop)
     }
+}
+
+fn attach_text(file: hid_t, path: &Path, object: &str, name: &str, text: &str) -> Result<(), FileError> {
+    let failed = |words: Complaint| words.into_error(path, "set", name);
+    // A string of length 0 is no valid type.
+    let bytes = if text.is_empty() { b"\0" } else { text.as_bytes() };
+    let letters = if text.is_ascii() { H5T_CSET_ASCII } else { H5T_CSET_UTF8 };
+    // SAFETY: a copy of a library type and a scalar space; the size of the type is above 0.
+    let (kind, space) = unsafe {
+        let kind = Handle::new(H5Tcopy(*H5T_C_S1), H5Tclose).map_err(failed)?;
+        let code = H5Tset_size(kind.id, bytes.len())
+            .min(H5Tset_strpad(kind.id, H5T_STR_NULLPAD))
+            .min(H5Tset_cset(kind.id, letters));
+        check(code, path, "set", name)?;
+        (kind, Handle::new(H5Screate(H5S_SCALAR), H5Sclose).map_err(failed)?)
+    };
+    attach(file, path, object, name, kind.id, &space, bytes)
 }
 
 /// Attaches values of a type to an object; `space` says how many elements of that type `bytes` has.

@@ -63,7 +63,7 @@ impl Drop for Handle {
     }
 }
 
-/// Starts the library. To be called before MPI starts where a program shall survive a file that cannot be closed: a library
+/// Starts the library. To be called before MPI starts where a program must survive a file that cannot be closed: a library
 /// for parallel files that starts later ends itself with MPI, and tries to write such a file again.
 pub fn prepare() {
     drop(library());
@@ -75,7 +75,7 @@ fn library() -> impl Drop {
     let turn = hdf5_sys::LOCK.lock();
     START.call_once(|| {
         // SAFETY: plain calls, the first before all others. What stays open when the program ends could not be written,
-        // and trying again then would crash; error messages are fetched by us, so the library shall not print them.
+        // and trying again then would crash; error messages are fetched by us, so the library must not print them.
         unsafe {
             H5dont_atexit();
             H5open();

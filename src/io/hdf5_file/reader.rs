@@ -115,7 +115,7 @@ impl Reader {
     }
 
     /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it; returns its
-    /// bytes. To be asked before memory is taken whose size the file tells.
+    /// bytes. To be asked before memory is taken whose size the file declares.
     pub(super) fn held_bytes(&self, object: &str, count: u64, element: usize) -> Result<u64, FileError> {
         match count.checked_mul(element as u64) {
             Some(bytes) if bytes <= self.size && usize::try_from(bytes).is_ok() => Ok(bytes),

@@ -30,7 +30,7 @@ const MOST_COMPACT: std::ffi::c_uint = 255;
 /// A new file of all ranks. Rank 0 alone keeps names, shapes and attributes; every rank writes its own rows.
 ///
 /// Every method is collective and gives an error on all ranks if any rank fails, so that callers may use `?`. A file
-/// that shall not be is to be [abandoned](Writer::abandon).
+/// that is not wanted after all must be [abandoned](Writer::abandon).
 pub struct Writer {
     path: PathBuf,
     comm: Comm,
@@ -65,7 +65,7 @@ impl Writer {
         Ok(Self { path: path.into(), comm: comm.clone(), layout, rows })
     }
 
-    /// An error of what shall be written.
+    /// An error of what is to be written.
     pub fn refuse(&self, reason: impl Into<String>) -> FileError {
         FileError::Refused { path: self.path.clone(), reason: reason.into() }
     }
@@ -158,7 +158,7 @@ impl Writer {
         agreed(Some(&comm), closed.map(|()| rows))
     }
 
-    /// Not collective; after an error on any rank. Gives up a file that shall not be; the caller removes it.
+    /// Not collective; after an error on any rank. Gives up an unwanted file; the caller removes it.
     pub fn abandon(self) {
         if self.layout.is_some() {
             // The library keeps it open, so that its space would not come free by the removal. If giving that back fails

@@ -64,7 +64,7 @@ impl Canvas {
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let part = path.with_added_extension("part");
         let save = || -> std::io::Result<()> {
-            // In memory first, as a writer with a buffer tells no error of its last piece.
+            // In memory first, as a buffered writer hides the error of its last piece.
             let mut bytes = Vec::new();
             let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
             encoder.set_color(png::ColorType::Rgb);

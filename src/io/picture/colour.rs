@@ -7,7 +7,7 @@ pub type Rgb = [u8; 3];
 const SEQUENCE: [Rgb; 6] =
     [[68, 1, 84], [65, 68, 135], [42, 120, 142], [34, 168, 132], [122, 209, 81], [253, 231, 37]];
 
-/// Colours that tell small whole numbers apart.
+/// Colours that distinguish small whole numbers.
 const CLASSES: [Rgb; 8] = [
     [94, 110, 160],
     [226, 152, 58],

@@ -37,7 +37,7 @@ pub(in crate::io) fn points(file: &Reader, header: &Header) -> Result<Vec<f64>, 
 }
 
 /// Half widths of the particles: of the restart state, or a quarter of a cell of their leaf, or of the
-/// root octants where the file does not tell.
+/// root octants where the file does not say.
 pub(in crate::io) fn radii(file: &Reader, header: &Header) -> Result<Vec<f64>, FileError> {
     let n = header.particles;
     let (state, level) = ("state/particles/half_width", "VTKHDF/PointData/leaf_level");

@@ -37,6 +37,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         root_edge: 1.0,
         brick: Brick { roots: [1; 3] },
         materials: &[],
+        bodies: &[],
         histories: &[],
         job_digest: 0,
         job_text: "",

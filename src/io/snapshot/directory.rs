@@ -61,7 +61,7 @@ pub struct Candidates {
     pub other: Option<PathBuf>,
 }
 
-/// Not collective. The checkpoints and outputs of the run `name` that hold a restart state, as their headers tell.
+/// Not collective. The checkpoints and outputs of the run `name` that hold a restart state, by their headers.
 ///
 /// A directory may still hold files of an earlier run of that name. Outputs that the index of the run does not
 /// list are such files, as are files of a job with another digest if `job_digest` is given; neither counts.

@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use super::View;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// Makes [`PointField`] of the table of fields: variant, name in job and output files, unit (empty for pure numbers), values of all
+/// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit (empty for pure numbers), values of all
 /// particles of a view in order.
 macro_rules! fields {
-    ($($(#[$doc:meta])* $field:ident, $name:literal, $unit:literal, $values:expr;)*) => {
+    ($($(#[doc = $meaning:literal])+ $field:ident, $name:literal, $unit:literal, $values:expr;)*) => {
         /// A field of the particles that an output file can show.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         pub enum PointField {
-            $($(#[$doc])* #[serde(rename = $name)] $field,)*
+            $($(#[doc = $meaning])+ #[serde(rename = $name)] $field,)*
         }
 
         impl PointField {
@@ -28,6 +28,11 @@ macro_rules! fields {
             /// Unit, empty for pure numbers.
             pub const fn unit(self) -> &'static str {
                 match self { $(Self::$field => $unit,)* }
+            }
+
+            /// What it is, in a sentence.
+            pub const fn meaning(self) -> &'static str {
+                match self { $(Self::$field => concat!($($meaning),+).trim_ascii(),)* }
             }
 
             /// Values of all particles of the view, in order.

@@ -77,6 +77,8 @@ pub struct Header {
     pub restart: bool,
     /// Names of the materials, in the order of the material numbers.
     pub materials: Vec<String>,
+    /// Names of the bodies, in the order of the body numbers.
+    pub bodies: Vec<String>,
     /// Names of the history variables.
     pub histories: Vec<String>,
     /// Names of the extra fields of leaves.
@@ -113,6 +115,7 @@ impl Header {
             particles,
             restart,
             materials: view.materials.to_vec(),
+            bodies: view.bodies.to_vec(),
             histories: view.histories.to_vec(),
             leaf_fields: view.leaf_fields.iter().map(|(name, _)| name.clone()).collect(),
             scalars: view.scalars.clone(),
@@ -130,7 +133,7 @@ impl Header {
         self.root_edge / f64::from(1_u32 << octant.level)
     }
 
-    /// All attributes in a fixed order. Those with a leading `true` tell one state from another and
+    /// All attributes in a fixed order. Those with a leading `true` distinguish states and
     /// enter the digest.
     fn entries(&self) -> Vec<(bool, &'static str, Value)> {
         let names =
@@ -152,6 +155,7 @@ impl Header {
             (true, "particles", Value::Count(vec![self.particles])),
             (false, "restart", Value::Count(vec![u64::from(self.restart)])),
             (true, "materials", names(self.materials.iter().collect())),
+            (false, "bodies", names(self.bodies.iter().collect())),
             (true, "histories", names(self.histories.iter().collect())),
             (true, "leaf_fields", names(self.leaf_fields.iter().collect())),
             (false, "real_names", names(s.reals.iter().map(|(name, _)| name).collect())),
@@ -192,7 +196,7 @@ impl Header {
         crc.finalize()
     }
 
-    /// CRC-32 of what tells one state from another: not the program, and not the bookkeeping of a run.
+    /// CRC-32 of what distinguishes states: not the program, and not the bookkeeping of a run.
     pub fn state_checksum(&self) -> u32 {
         self.crc(true)
     }
@@ -268,6 +272,7 @@ impl Header {
             particles: one("particles")?,
             restart: one("restart")? != 0,
             materials: names("materials")?,
+            bodies: names("bodies")?,
             histories: names("histories")?,
             leaf_fields: names("leaf_fields")?,
             scalars,

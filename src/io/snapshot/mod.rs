@@ -47,6 +47,8 @@ pub struct View<'a, const D: usize> {
     pub brick: Brick<D>,
     /// Names of the materials.
     pub materials: &'a [String],
+    /// Names of the bodies.
+    pub bodies: &'a [String],
     /// Names of the history variables.
     pub histories: &'a [String],
     /// Digest of the job.
@@ -113,9 +115,10 @@ pub fn start_write<const D: usize>(
         let (leaves, particles) = totals(comm, file, view)?;
         Header::make_group(file)?;
         let mut recorded = Recorded::new(comm, file);
+        state::write_job(&mut recorded, comm, view)?;
         // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
-            state::write(file, &mut recorded, comm, view, leaves, particles)?;
+            state::write(file, &mut recorded, view, leaves, particles)?;
         }
         vtkhdf::write_particles(file, &mut recorded, comm, view, particles, options)?;
         let header = Header::new(view, leaves.total, particles.total, options.restart);

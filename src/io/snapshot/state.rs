@@ -4,6 +4,7 @@ use partition::comm::Comm;
 use partition::{MAX_LEVEL, Octant};
 
 use super::checked::{Checked, Recorded, Rows};
+use super::fields::PointField;
 use super::header::{GROUP, Header};
 use super::sane::{self, Limits};
 use super::{Restored, View};
@@ -14,6 +15,10 @@ use crate::particle::chunk::{Chunk, Layout, TILE};
 pub(super) struct Columns {
     /// Name of the data set.
     pub name: &'static str,
+    /// Unit, empty for pure numbers.
+    pub unit: &'static str,
+    /// What it is, in a sentence.
+    pub meaning: &'static str,
     /// First column.
     pub first: usize,
     /// Number of columns.
@@ -29,21 +34,31 @@ impl Columns {
 
 /// The data sets that hold the columns of [`Layout`], in its order.
 pub(super) fn columns<const D: usize>() -> [Columns; 9] {
-    let mut first = 0;
+    let (mut first, symmetric) = (0, Layout::<D>::SYMMETRIC);
     let columns = [
-        ("position", D),
-        ("velocity", D),
-        ("affine", D * D),
-        ("left_cauchy_green", Layout::<D>::SYMMETRIC),
-        ("stress", Layout::<D>::SYMMETRIC),
-        ("mass", 1),
-        ("half_width", 1),
-        ("history", Layout::<D>::HISTORIES),
-        ("plastic_work", 1),
+        ("position", D, "m", "Position relative to the domain's lower corner."),
+        ("velocity", D, "m/s", "Velocity."),
+        (
+            "affine",
+            D * D,
+            "m²/s",
+            "Affine state, row by row: B of APIC; with TPIC the velocity gradient, 1/s.",
+        ),
+        (
+            "left_cauchy_green",
+            symmetric,
+            "",
+            "Elastic left Cauchy-Green tensor b: xx, yy, zz, xy (and xz, yz).",
+        ),
+        ("stress", symmetric, "Pa", "Kirchhoff stress: xx, yy, zz, xy (and xz, yz)."),
+        ("mass", 1, "kg", "Mass (per metre of thickness in plane strain)."),
+        ("half_width", 1, "m", "Half of the edge of the undeformed box."),
+        ("history", Layout::<D>::HISTORIES, "", "History variables of the material."),
+        ("plastic_work", 1, "J/m³", "Plastic work dissipated since the start, per reference volume."),
     ]
-    .map(|(name, count)| {
+    .map(|(name, count, unit, meaning)| {
         first += count;
-        Columns { name, first: first - count, count }
+        Columns { name, unit, meaning, first: first - count, count }
     });
     assert_eq!(first, Layout::<D>::REALS, "every column is saved");
     columns
@@ -57,18 +72,24 @@ pub(super) fn path(kind: &str, name: &str) -> String {
     format!("{GROUP}/{kind}/{name}")
 }
 
+/// Collective. Writes the text of the job, all of it by rank 0.
+pub(super) fn write_job<const D: usize>(
+    recorded: &mut Recorded,
+    comm: &Comm,
+    view: &View<D>,
+) -> Result<(), FileError> {
+    let text = if comm.rank() == 0 { view.job_text.as_bytes() } else { &[] };
+    recorded.write(JOB, Rows::place(comm, text.len() as u64), 0, text)
+}
+
 /// Collective. Writes tree and particles below the header's group.
 pub(super) fn write<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
-    comm: &Comm,
     view: &View<D>,
     leaves: Rows,
     particles: Rows,
 ) -> Result<(), FileError> {
-    // Rank 0 writes all of it.
-    let text = if comm.rank() == 0 { view.job_text.as_bytes() } else { &[] };
-    recorded.write(JOB, Rows::place(comm, text.len() as u64), 0, text)?;
     for kind in ["tree", "leaf", "particles"] {
         file.create_group(&format!("{GROUP}/{kind}"))?;
     }
@@ -82,7 +103,7 @@ pub(super) fn write<const D: usize>(
         recorded.write(&path("leaf", name), leaves, 0, values)?;
     }
     for set in columns::<D>() {
-        let Columns { name, first, count } = set;
+        let Columns { name, first, count, .. } = set;
         let mut values = Vec::with_capacity(particles.count as usize * count);
         for chunk in view.chunks {
             for p in 0..chunk.len() {
@@ -90,11 +111,17 @@ pub(super) fn write<const D: usize>(
             }
         }
         recorded.write(&path("particles", name), particles, set.components(), &values)?;
+        let texts = [("units", set.unit), ("description", set.meaning)];
+        file.set_texts(&path("particles", name), &texts)?;
     }
     let ids: Vec<u64> = view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect();
     recorded.write(&path("particles", "id"), particles, 0, &ids)?;
+    let texts = [("units", ""), ("description", PointField::Id.meaning())];
+    file.set_texts(&path("particles", "id"), &texts)?;
     let tags: Vec<u64> = view.chunks.iter().flat_map(|chunk| chunk.tags()).copied().collect();
-    recorded.write(&path("particles", "tag"), particles, 0, &tags)
+    recorded.write(&path("particles", "tag"), particles, 0, &tags)?;
+    let meaning = "Numbers of material (bits 0 to 15), body (16 to 31) and level (32 to 39).";
+    file.set_texts(&path("particles", "tag"), &[("units", ""), ("description", meaning)])
 }
 
 /// Collective. Reads tree and particles; each rank gets a contiguous share of the curve with about
@@ -129,7 +156,7 @@ pub(super) fn read<const D: usize>(
         })
         .collect();
     for set in columns::<D>() {
-        let Columns { name, first, count } = set;
+        let Columns { name, first, count, .. } = set;
         let values: Vec<f64> = checked.read(&path("particles", name), particles, set.components())?;
         sane(sane::reals(name, &values, count))?;
         if name == "position" {

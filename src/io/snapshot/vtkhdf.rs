@@ -116,6 +116,15 @@ pub(super) fn write_particles<const D: usize>(
         let values = if options.single { values.into_single() } else { values };
         file.agree(sane::finite_field(view, *chosen, &values).map_err(|reason| file.refuse(reason)))?;
         field(recorded, &name, particles, &values)?;
+        let names = match chosen {
+            PointField::Material => Some(view.materials),
+            PointField::Body => Some(view.bodies),
+            _ => None,
+        };
+        let names = names.map(|names| ("names", names.join("\n")));
+        let mut texts = vec![("units", chosen.unit()), ("description", chosen.meaning())];
+        texts.extend(names.iter().map(|(key, names)| (*key, names.as_str())));
+        file.set_texts(&format!("{GROUP}/{name}"), &texts)?;
     }
     Ok(())
 }
@@ -163,6 +172,10 @@ pub(super) fn write_leaves<const D: usize>(
     recorded.write(&format!("{GROUP}/CellData/particles"), leaves, 0, &counts)?;
     for (name, values) in view.leaf_fields {
         recorded.write(&format!("{GROUP}/CellData/{name}"), leaves, 0, values)?;
+    }
+    for (name, meaning) in [("level", "Level of the leaf."), ("particles", "Particles in the leaf.")] {
+        let texts = [("units", ""), ("description", meaning)];
+        file.set_texts(&format!("{GROUP}/CellData/{name}"), &texts)?;
     }
     Ok(())
 }

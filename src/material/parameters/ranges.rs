@@ -49,7 +49,7 @@ impl<'a> Ranges<'a> {
         Ok(())
     }
 
-    /// Whether an option of a choice is that of a value: tables are told apart by a key with a constant.
+    /// Whether an option of a choice is that of a value: tables are distinguished by a key with a constant.
     fn means(&self, option: &Value, value: &Value) -> bool {
         if let Some(name) = option["$ref"].as_str() {
             let target = self.root.pointer(name.trim_start_matches('#'));
