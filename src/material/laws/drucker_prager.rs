@@ -18,7 +18,7 @@ use super::von_mises::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.
@@ -124,16 +124,22 @@ fn cone(p: &Parameters) -> [f64; 3] {
     }
 }
 
-/// Drucker-Prager granular material.
+/// Drucker-Prager material.
 #[derive(Clone, Debug)]
 pub struct DruckerPrager {
+    dry: Dry,
+    /// Cohesion and all else.
+    cohesive: Option<Cohesive>,
+}
+
+/// Dry friction without dilation.
+#[derive(Clone, Copy, Debug)]
+struct Dry {
     solid: Hencky,
     /// `(3λ + 2μ)/(2μ) α`.
     slope: f64,
     /// 1 with volume correction, 0 without.
     correction: f64,
-    /// Cohesion and all else.
-    cohesive: Option<Cohesive>,
 }
 
 impl Model for DruckerPrager {
@@ -149,12 +155,13 @@ impl Model for DruckerPrager {
         };
         let slope = (3.0 * lame.lambda + 2.0 * lame.mu) / (2.0 * lame.mu) * alpha;
         let correction = if p.volume_correction { 1.0 } else { 0.0 };
-        Self {
-            solid: Hencky::of(p.young, p.poisson, density),
-            slope,
-            correction,
-            cohesive: Cohesive::new(p, lame, density),
-        }
+        let dry = Dry { solid: Hencky::of(p.young, p.poisson, density), slope, correction };
+        Self { dry, cohesive: Cohesive::new(p, lame, density) }
+    }
+
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+        let whole = Self::new(p, density);
+        if whole.cohesive.is_none() { Box::new(whole.dry) } else { Box::new(whole) }
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
@@ -180,28 +187,28 @@ impl Law for DruckerPrager {
     #[inline(always)]
     fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
         match &self.cohesive {
-            None => self.return_dry(state, step.plane),
-            Some(cohesive) => cohesive.respond(&self.solid, state, step),
+            None => self.dry.respond(state, step),
+            Some(cohesive) => cohesive.respond(&self.dry.solid, state, step),
         }
     }
 
     #[inline(always)]
     fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
-        self.solid.energy(state, plane)
+        self.dry.solid.energy(state, plane)
     }
 
     fn density(&self) -> f64 {
-        Law::density(&self.solid)
+        Law::density(&self.dry.solid)
     }
 
     fn wave_speed(&self) -> f64 {
-        Law::wave_speed(&self.solid)
+        Law::wave_speed(&self.dry.solid)
     }
 
     fn history_names(&self) -> &'static [&'static str] {
         match &self.cohesive {
             Some(own) => own.cohesion.frictional_history(own.books_apart()),
-            None => &["plastic_shear_strain", "volume_gain"],
+            None => self.dry.history_names(),
         }
     }
 
@@ -214,14 +221,15 @@ impl Law for DruckerPrager {
     }
 }
 
-impl DruckerPrager {
-    /// Dry friction without dilation.
+impl Law for Dry {
+    const HISTORIES: usize = PLASTIC_VOLUME + 1;
+
     #[inline(always)]
-    fn return_dry<V: Vector>(&self, state: &mut State<V>, plane: bool) {
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
         let zero = V::splat(0.0);
         let one = V::splat(1.0);
         let (shear, gain) = (state.history[PLASTIC_STRAIN], state.history[PLASTIC_VOLUME]);
-        let trial = Strain::of(&state.elastic, plane);
+        let trial = Strain::of(&state.elastic, step.plane);
         let booked = gain * self.correction;
         let trace = trial.trace + booked;
         let norm = trial.norm;
@@ -246,7 +254,24 @@ impl DruckerPrager {
             state.work = flows.select(retained * excess * (2.0 * self.solid.shear_modulus()), zero);
         }
         let trace = apart.select(zero, trace);
-        trial.finish(&self.solid, state, [trace, kept], changed, apart, plane);
+        trial.finish(&self.solid, state, [trace, kept], changed, apart, step.plane);
+    }
+
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
+        self.solid.energy(state, plane)
+    }
+
+    fn density(&self) -> f64 {
+        Law::density(&self.solid)
+    }
+
+    fn wave_speed(&self) -> f64 {
+        Law::wave_speed(&self.solid)
+    }
+
+    fn history_names(&self) -> &'static [&'static str] {
+        &["plastic_shear_strain", "volume_gain"]
     }
 }
 

@@ -40,6 +40,14 @@ pub trait Model: Law {
     /// The model with these parameters and the density of the undeformed material, kg/m³.
     fn new(parameters: &Self::Parameters, density: f64) -> Self;
 
+    /// The same, as the solver calls it: a model may choose a law with less history for parameters that need no more.
+    fn boxed(parameters: &Self::Parameters, density: f64) -> Box<dyn Material>
+    where
+        Self: Sized + 'static,
+    {
+        Box::new(Self::new(parameters, density))
+    }
+
     /// Checks what the ranges of single keys cannot say.
     fn check(_parameters: &Self::Parameters) -> Result<(), OutOfRange> {
         Ok(())
@@ -73,7 +81,7 @@ macro_rules! materials {
             /// The model with these parameters and the density of the undeformed material, kg/m³.
             pub fn build(&self, density: f64) -> Box<dyn Material> {
                 match self {
-                    $(Self::$name(parameters) => Box::new(<$law as Model>::new(parameters, density)),)*
+                    $(Self::$name(parameters) => <$law as Model>::boxed(parameters, density),)*
                 }
             }
 
