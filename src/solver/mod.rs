@@ -37,9 +37,9 @@ use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
-use crate::solver::state::parts::Parts;
 use crate::solver::state::phases::{Phase, Phases, thread_time};
-use crate::solver::state::recall::Recall;
+use crate::solver::state::regrid_cache::RegridCache;
+use crate::solver::state::regrid_timers::RegridTimers;
 
 impl<const D: usize> Solver<D> {
     /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state read
@@ -68,8 +68,8 @@ impl<const D: usize> Solver<D> {
             crossings: Crossings::default(),
             books: Books::default(),
             regrids: 0,
-            parts: Parts::default(),
-            recall: Recall::default(),
+            parts: RegridTimers::default(),
+            regrid_cache: RegridCache::default(),
             sent_before: Traffic::default(),
             surface_bytes: 0,
             costs: Costs::new(clock.step),

@@ -170,7 +170,7 @@ impl Scale {
 }
 
 /// What a first look at all frames finds.
-pub(super) struct Survey {
+pub(super) struct LeafMaxima {
     /// Lower and upper corner of the box round all particles, m.
     pub bounds: [[f64; 3]; 2],
     /// Smallest half width, m.
@@ -192,7 +192,7 @@ pub(super) struct First {
 /// Values of a column that are kept of each frame.
 const SAMPLES: usize = 4096;
 
-impl Survey {
+impl LeafMaxima {
     pub fn new(columns: usize) -> Self {
         Self {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],

@@ -4,7 +4,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::Options;
-use super::columns::{Column, Scale, Survey};
+use super::columns::{Column, LeafMaxima, Scale};
 use super::pack::STEPS_PER_DOUBLING;
 use crate::io::snapshot::{Header, PointField};
 
@@ -68,7 +68,7 @@ impl Meta {
         options: &Options,
         columns: &[Column],
         scales: &[Scale],
-        survey: &Survey,
+        survey: &LeafMaxima,
         frames: Vec<FrameMeta>,
     ) -> Self {
         let domain = survey.first.as_ref().map_or([[0.0; 3]; 2], |first| first.domain);

@@ -23,7 +23,7 @@ mod columns;
 mod meta;
 mod pack;
 
-use columns::{Column, Survey};
+use columns::{Column, LeafMaxima};
 use meta::{FrameMeta, Meta};
 
 /// What goes into a view.
@@ -79,7 +79,7 @@ fn fill(
     let first = files.first().ok_or_else(|| failed(io::Error::other("no output was given")))?;
     let columns = Column::chosen(&shown_in(first)?, options.fields.as_deref(), first)?;
     let wanted = columns::sources(&columns);
-    let mut survey = Survey::new(columns.len());
+    let mut survey = LeafMaxima::new(columns.len());
     for path in files {
         survey.look(path, &Frame::read(path, &wanted, true)?, &columns)?;
     }

@@ -8,14 +8,14 @@ use std::io::Write as _;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::columns::{Column, Scale, Survey};
+use super::columns::{Column, LeafMaxima, Scale};
 use crate::io::frame::{Frame, Leaves};
 
 /// Steps of the half widths for each doubling.
 pub(super) const STEPS_PER_DOUBLING: f64 = 16.0;
 
 /// Columns of a frame: x, y, z (2 bytes each), half width (1), then the columns (2; identifiers 8).
-pub(super) fn particles(frame: &Frame, columns: &[Column], scales: &[Scale], survey: &Survey) -> Vec<u8> {
+pub(super) fn particles(frame: &Frame, columns: &[Column], scales: &[Scale], survey: &LeafMaxima) -> Vec<u8> {
     let (resolution, [low, _]) = (survey.resolution(), survey.bounds);
     let packed: Vec<[u16; 3]> = frame
         .positions

@@ -10,7 +10,7 @@ use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::Chunk;
 use agimp::run::restart::{self, From};
 use agimp::setup;
-use agimp::solver::state::parts::Part;
+use agimp::solver::state::regrid_timers::Part;
 use agimp::solver::{Requests, Solver};
 use partition::comm::{Comm, World};
 

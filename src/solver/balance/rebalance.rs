@@ -13,8 +13,8 @@ use crate::particle::Chunk;
 use crate::solver::state::Solver;
 pub use crate::solver::state::cost::{leaf_cost, leaf_weight};
 use crate::solver::state::last_partition::LastPartition;
-use crate::solver::state::parts::Part;
 use crate::solver::state::phases::{Phase, thread_time};
+use crate::solver::state::regrid_timers::Part;
 
 /// Steps between looks at the imbalance.
 const LOOK_EVERY: u64 = 10;

@@ -18,7 +18,7 @@ use crate::simd::{Lanes, Vector};
 use crate::solver::physics::{Physics, StepControl};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
-use crate::solver::step::update::update_velocity;
+use crate::solver::step::node_update::update_velocity;
 
 /// A particle with its box. Lengths in m, relative to the domain's lower corner.
 #[derive(Clone, Copy, Debug)]

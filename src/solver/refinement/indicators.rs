@@ -16,8 +16,8 @@ use crate::kernel::{Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
-use crate::solver::state::surroundings::{MassRange, Surroundings};
-use crate::solver::state::survey::Survey;
+use crate::solver::state::free_surface::{MassRange, Surroundings};
+use crate::solver::state::leaf_maxima::LeafMaxima;
 
 /// What the values follow from: the state of one rank after a step.
 #[derive(Clone, Copy)]
@@ -28,7 +28,7 @@ struct State<'a, const D: usize> {
     colliders: &'a [ColliderState<D>],
     plan: &'a GridPlan<D>,
     fields: &'a NodeFields<D>,
-    surveys: &'a [Survey<D>],
+    maxima: &'a [LeafMaxima<D>],
     surroundings: &'a Surroundings,
     masses: &'a [MassRange],
     beside_empty: &'a [bool],
@@ -77,10 +77,10 @@ impl<const D: usize> State<'_, D> {
             Kind::Region { .. } | Kind::Collider(_) => f64::INFINITY,
             Kind::FreeSurface => f64::from(u8::from(self.is_exposed(leaf))),
             Kind::VelocityGradient => self.velocity_gradient(leaf),
-            Kind::PlasticStrain => self.surveys[leaf].plastic_strain,
-            Kind::PlasticStrainRate => self.surveys[leaf].plastic_rate,
+            Kind::PlasticStrain => self.maxima[leaf].plastic_strain,
+            Kind::PlasticStrainRate => self.maxima[leaf].plastic_rate,
             // Only leaves that may have something to say get a close look.
-            Kind::Stretch if self.surveys[leaf].stretch < criterion.coarsen => self.surveys[leaf].stretch,
+            Kind::Stretch if self.maxima[leaf].stretch < criterion.coarsen => self.maxima[leaf].stretch,
             Kind::Stretch => self.greatest_stretch(leaf),
             Kind::Material(material) => {
                 let found = chunk.tags().iter().any(|&tag| Tag::unpack(tag).material == *material);
@@ -152,8 +152,8 @@ impl<const D: usize> Solver<D> {
             colliders: &self.contacts.states,
             plan: &self.grid.plan,
             fields: &self.grid.fields,
-            surveys: &self.leaf_data.surveys,
-            surroundings: &self.recall.surroundings,
+            maxima: &self.leaf_data.maxima,
+            surroundings: &self.regrid_cache.surroundings,
             masses: &[],
             beside_empty: &[],
             time: self.clock.time,
@@ -167,7 +167,7 @@ impl<const D: usize> Solver<D> {
         let criteria = &adaptivity.criteria;
         let is_asked = criteria.iter().any(|criterion| matches!(criterion.kind, Kind::FreeSurface));
         let (mut beside_empty, mut masses) = (Vec::new(), Vec::new());
-        let surroundings = &mut self.recall.surroundings;
+        let surroundings = &mut self.regrid_cache.surroundings;
         if is_asked {
             surroundings.update(&self.forest, &self.grid.plan);
             // A leaf cannot see it from its nodes where the empty one is coarser.

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | [`regrid`] | one regrid |
 //! | `indicators` | values of criteria |
-//! | [`resample`] | splitting and merging |
-//! | `reunion` | families that a face cuts in two |
+//! | [`split_merge`] | splitting and merging |
+//! | `merge_across_leaves` | families that a face cuts in two |
 mod indicators;
+mod merge_across_leaves;
 pub mod regrid;
-pub mod resample;
-mod reunion;
+pub mod split_merge;

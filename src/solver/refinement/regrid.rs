@@ -10,10 +10,10 @@ use crate::geometry::Aabb;
 use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::particle::Chunk;
 use crate::solver::migration::migrate::{MigrateError, Moved};
-use crate::solver::state::parts::Part;
+use crate::solver::state::leaf_maxima::{LeafMaxima, Watch};
 use crate::solver::state::phases::Phase;
-use crate::solver::state::recall::{Settled, Wish};
-use crate::solver::state::survey::{Survey, Watch};
+use crate::solver::state::regrid_cache::{SettledTree, Wish};
+use crate::solver::state::regrid_timers::Part;
 use crate::solver::state::{Solver, StepError};
 
 /// A region with the level that all leaves which meet it must have at least.
@@ -47,12 +47,12 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn survey_now(&mut self) {
         let Some(adaptivity) = &self.physics.adaptivity else { return };
         let watch = Watch::after_step(adaptivity, 0);
-        self.leaf_data.surveys.resize(self.chunks.len(), Survey::default());
+        self.leaf_data.maxima.resize(self.chunks.len(), LeafMaxima::default());
         self.leaf_data
-            .surveys
+            .maxima
             .iter_mut()
             .zip(&self.chunks)
-            .for_each(|(survey, chunk)| watch.look(chunk, survey));
+            .for_each(|(maxima, chunk)| watch.look(chunk, maxima));
     }
 }
 
@@ -69,7 +69,7 @@ impl<const D: usize> Solver<D> {
         };
         let (start, phases) = (Instant::now(), self.phases);
         self.parts.begin();
-        if self.leaf_data.surveys.len() != self.chunks.len() {
+        if self.leaf_data.maxima.len() != self.chunks.len() {
             self.survey_now();
         }
         let levels_before = self.change_tree(every);
@@ -159,7 +159,7 @@ impl<const D: usize> Solver<D> {
         let wishes = self.wishes(steps);
         self.parts.end(Part::Criteria);
         let revision = self.forest.revision();
-        let settled = self.recall.settled.as_ref().filter(|settled| settled.revision == revision);
+        let settled = self.regrid_cache.settled.as_ref().filter(|settled| settled.revision == revision);
         if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
             self.parts.end(Part::Tree);
             return None;
@@ -173,7 +173,7 @@ impl<const D: usize> Solver<D> {
         // 2:1 balance may take back what was coarsened.
         let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
         let Some(followed) = followed else {
-            self.recall.settled = Some(Settled { revision, wishes, marks });
+            self.regrid_cache.settled = Some(SettledTree { revision, wishes, marks });
             self.parts.end(Part::Tree);
             return None;
         };
@@ -193,13 +193,13 @@ impl<const D: usize> Solver<D> {
         let way =
             |velocity: f64| f64::mul_add(velocity.abs() * interval, per_edge, -CREEP).ceil().max(0.0) as u32;
         let leaves =
-            self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.leaf_data.surveys).enumerate();
-        let each = leaves.with_min_len(64).map(|(number, ((leaf, chunk), survey))| {
+            self.forest.leaves().par_iter().zip(&self.chunks).zip(&self.leaf_data.maxima).enumerate();
+        let each = leaves.with_min_len(64).map(|(number, ((leaf, chunk), maxima))| {
             let values = &values[number * count..][..count];
             let levels = if chunk.is_empty() { 0 } else { wanted_levels(adaptivity, leaf.level, values) };
             match levels {
                 0 => Wish::NONE,
-                _ => Wish { levels, way: survey.velocity.map(|side| side.map(way)) },
+                _ => Wish { levels, way: maxima.velocity.map(|side| side.map(way)) },
             }
         });
         each.collect()
@@ -286,14 +286,14 @@ impl<const D: usize> Solver<D> {
         let mut levels = vec![0; new.len()];
         let mut chunks: Vec<Chunk<D>> = new.iter().map(|_| Chunk::new()).collect();
         // Nothing is known of leaves that change: they get a closer look.
-        let mut surveys = vec![Survey { width: f64::INFINITY, ..Survey::default() }; new.len()];
+        let mut maxima = vec![LeafMaxima { width: f64::INFINITY, ..LeafMaxima::default() }; new.len()];
         let (roots, root_edge) = (self.forest.brick().roots, self.physics.root_edge);
         for (from, to) in correspondence(old, new) {
             let finest = old[from.clone()].iter().map(|leaf| leaf.level).max().unwrap_or(0);
             levels[to.clone()].fill(finest);
             if from.len() == 1 && to.len() == 1 {
                 chunks[to.start] = std::mem::take(&mut sources[from.start]);
-                surveys[to.start] = self.leaf_data.surveys[from.start];
+                maxima[to.start] = self.leaf_data.maxima[from.start];
                 continue;
             }
             let room = sources[from.clone()].iter().map(Chunk::len).sum::<usize>();
@@ -309,7 +309,7 @@ impl<const D: usize> Solver<D> {
             }
         }
         self.chunks = chunks;
-        self.leaf_data.surveys = surveys;
+        self.leaf_data.maxima = maxima;
         levels
     }
 

@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::leaf_bins::{LeafBins, Scratch, Sorting};
-use super::sides::{NearLeaf, near_leaf};
+use super::leaf_faces::{NearLeaf, near_leaf};
 use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;

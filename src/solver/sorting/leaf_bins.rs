@@ -7,9 +7,9 @@
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
 
+use super::bin_members::BinMembers;
 use super::bins::{BinMissing, BoxWidths};
-use super::members::Members;
-use super::sides::{NearLeaf, Side, Sides, near_leaf};
+use super::leaf_faces::{LeafFaces, NearLeaf, Side, near_leaf};
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::bin_reach::leaves_around;
 use crate::grid::{GridPlan, Window};
@@ -21,7 +21,7 @@ use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
 /// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
 /// more than it saves.
-const fn crowded(d: usize) -> usize {
+const fn touches_all_nodes(d: usize) -> usize {
     if d == 2 { 32 } else { 128 }
 }
 
@@ -29,7 +29,7 @@ const fn crowded(d: usize) -> usize {
 #[derive(Clone, Debug, Default)]
 pub struct LeafBins<const D: usize> {
     /// Members of each bin of the leaf.
-    pub members: Vec<Members<D>>,
+    pub members: Vec<BinMembers<D>>,
     /// Particles whose box is cut, in order; a part's slot points here.
     pub cut: Vec<u32>,
     /// Finer leaves around.
@@ -37,9 +37,9 @@ pub struct LeafBins<const D: usize> {
     /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
     around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
-    pub(super) sides: Option<Sides<D>>,
+    pub(super) sides: Option<LeafFaces<D>>,
     /// Particles that are not whole in the leaf's own bin, with their bin; they ascend.
-    elsewhere: Vec<(u32, u32)>,
+    outside_own_bin: Vec<(u32, u32)>,
     /// What is sorted already: so many of the first particles, as long as the chunk has the revision.
     presorted: Option<(Revision, usize)>,
 }
@@ -81,13 +81,13 @@ impl<const D: usize> LeafBins<D> {
         let leaf = known - tree.first_own();
         let bins = &plan.bins[plan.leaf_bins(leaf)];
         let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
-        let sides = Some(Sides::new(own, here, cell, &finer, bins));
+        let sides = Some(LeafFaces::new(own, here, cell, &finer, bins));
         Some(Box::new(Self { finer, around, sides, ..Self::beside_others(plan, leaf) }))
     }
 
     /// Of an own leaf beside leaves of its level and coarser ones.
     pub(super) fn beside_others(plan: &GridPlan<D>, leaf: usize) -> Self {
-        Self { members: vec![Members::default(); plan.leaf_bins(leaf).len()], ..Self::default() }
+        Self { members: vec![BinMembers::default(); plan.leaf_bins(leaf).len()], ..Self::default() }
     }
 
     /// Whether leaves around are finer.
@@ -112,8 +112,8 @@ impl<const D: usize> LeafBins<D> {
             known == 0 || looked.is_err() || self.are_as_new(chunk, sorting),
             "particles have changed since they were sorted"
         );
-        let crowded = chunk.len() >= crowded(D);
-        if crowded && self.elsewhere.is_empty() {
+        let touches_all_nodes = chunk.len() >= touches_all_nodes(D);
+        if touches_all_nodes && self.outside_own_bin.is_empty() {
             return Ok(false);
         }
         self.list(chunk.len() as u32);
@@ -121,7 +121,7 @@ impl<const D: usize> LeafBins<D> {
         for (members, bin) in self.members.iter_mut().zip(&plan.bins[plan.leaf_bins(leaf)]) {
             members.close(plan, bin);
         }
-        if crowded {
+        if touches_all_nodes {
             self.members[0].window = Window::FULL;
         }
         looked.map(|()| true)
@@ -135,7 +135,7 @@ impl<const D: usize> LeafBins<D> {
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
     ) {
-        if chunk.len() < crowded(D) {
+        if chunk.len() < touches_all_nodes(D) {
             return;
         }
         self.begin();
@@ -149,13 +149,13 @@ impl<const D: usize> LeafBins<D> {
         let mut new = self.clone();
         new.begin();
         let looked = new.look(chunk, 0, sorting, &mut Scratch::default());
-        looked.is_ok() && new.elsewhere == self.elsewhere && new.cut == self.cut
+        looked.is_ok() && new.outside_own_bin == self.outside_own_bin && new.cut == self.cut
     }
 
     fn begin(&mut self) {
         self.cut.clear();
-        self.elsewhere.clear();
-        self.members.iter_mut().for_each(Members::clear);
+        self.outside_own_bin.clear();
+        self.members.iter_mut().for_each(BinMembers::clear);
     }
 
     /// Finds the bins of the particles from the one numbered `from` on.
@@ -172,7 +172,7 @@ impl<const D: usize> LeafBins<D> {
             let around = leaves_around(tree, tree.first_own() + leaf);
             self.around = around.into_iter().map(|leaf| near_leaf(tree, leaf, edge)).collect();
         }
-        let crowded = chunk.len() >= crowded(D);
+        let touches_all_nodes = chunk.len() >= touches_all_nodes(D);
         let own_cell = plan.cell(own.level);
         let given = !widths.are_known_to_kernels();
         let sides = if given { None } else { self.sides.take() };
@@ -180,7 +180,7 @@ impl<const D: usize> LeafBins<D> {
         let limit = Lanes::splat(narrow_limit(own_cell));
         scratch.undecided.clear();
         list_lanes(from..chunk.len(), &mut scratch.undecided, |first| {
-            if given || !crowded {
+            if given || !touches_all_nodes {
                 return !0;
             }
             let half = widths.bounds(chunk, first);
@@ -211,10 +211,10 @@ impl<const D: usize> LeafBins<D> {
                     CUT
                 });
                 if bin != 0 {
-                    self.elsewhere.push((p, bin));
+                    self.outside_own_bin.push((p, bin));
                 }
                 // The window of a crowded leaf's own bin is known.
-                if bin != CUT && !(bin == 0 && crowded) {
+                if bin != CUT && !(bin == 0 && touches_all_nodes) {
                     let cell = plan.cell(plan.bins[plan.leaf_bins(leaf)][bin as usize].block.level);
                     self.members[bin as usize].include(cell, centre, half);
                 }
@@ -229,7 +229,7 @@ impl<const D: usize> LeafBins<D> {
     /// Makes the lists of whole boxes of a leaf with so many particles.
     fn list(&mut self, particles: u32) {
         let mut next = 0;
-        for &(p, bin) in &self.elsewhere {
+        for &(p, bin) in &self.outside_own_bin {
             self.members[0].whole.extend(next..p);
             next = p + 1;
             if bin != CUT {
@@ -239,13 +239,13 @@ impl<const D: usize> LeafBins<D> {
         self.members[0].whole.extend(next..particles);
     }
 
-    /// Finds the bin of one box that [`Sides::bins`] does not tell, or cuts it.
+    /// Finds the bin of one box that [`LeafFaces::bins`] does not tell, or cuts it.
     fn sort_one(
         &mut self,
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
+        sides: Option<&LeafFaces<D>>,
         particle: u32,
         centre: [f64; D],
         half: [f64; D],
@@ -279,7 +279,7 @@ impl<const D: usize> LeafBins<D> {
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
+        sides: Option<&LeafFaces<D>>,
         part: SubBox<D>,
     ) -> Result<(), ()> {
         let level = self.finest_level(own, sides, part.centre, part.half);
@@ -311,7 +311,7 @@ impl<const D: usize> LeafBins<D> {
     fn finest_level(
         &self,
         own: &NearLeaf<D>,
-        sides: Option<&Sides<D>>,
+        sides: Option<&LeafFaces<D>>,
         centre: [f64; D],
         half: [f64; D],
     ) -> u8 {

@@ -5,12 +5,12 @@
 //! | [`bin_view`] | one bin with its members, as the kernels take them |
 //! | [`bins`] | the bins of all leaves |
 //! | `leaf_bins` | the bins of one leaf |
-//! | `sides` | levels across the faces of a leaf |
-//! | `members` | the content of a bin |
-//! | `widths` | boxes of particles |
+//! | `leaf_faces` | levels across the faces of a leaf |
+//! | `bin_members` | the content of a bin |
+//! | `box_bounds` | boxes of particles |
+mod bin_members;
 pub mod bin_view;
 pub mod bins;
+pub mod box_bounds;
 pub(super) mod leaf_bins;
-mod members;
-mod sides;
-pub mod widths;
+mod leaf_faces;

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
+use crate::solver::state::leaf_maxima::LeafMaxima;
 use crate::solver::state::phases::thread_time;
-use crate::solver::state::survey::Survey;
 
 /// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
 /// processor time takes as long as several particles.
@@ -18,7 +18,7 @@ pub struct LeafData<const D: usize> {
     /// Greatest sum of wave speed and particle speed after the last step, m/s; 0 if that is not known.
     pub(in crate::solver) signal: Vec<f64>,
     /// Bounds on the particles, noted in the last step; none where it is not that of these leaves.
-    pub(in crate::solver) surveys: Vec<Survey<D>>,
+    pub(in crate::solver) maxima: Vec<LeafMaxima<D>>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,
     /// Time that the particles took.
@@ -30,7 +30,7 @@ impl<const D: usize> LeafData<D> {
     pub(in crate::solver) fn reset(&mut self, leaves: usize) {
         self.signal.clear();
         self.signal.resize(leaves, 0.0);
-        self.surveys.clear();
+        self.maxima.clear();
         self.places.clear();
         self.times.reset(leaves);
     }
@@ -48,7 +48,7 @@ impl<const D: usize> LeafData<D> {
     /// Not collective. Makes room for what G2P notes.
     pub(in crate::solver) fn begin_gather(&mut self, chunks: &[Chunk<D>]) {
         self.signal.resize(chunks.len(), 0.0);
-        self.surveys.resize(chunks.len(), Survey::default());
+        self.maxima.resize(chunks.len(), LeafMaxima::default());
         self.places.clear();
         self.places.extend(chunks.iter().map(Chunk::place));
     }
@@ -124,7 +124,7 @@ mod tests {
         data.times.nanoseconds[1].store(9, Ordering::Relaxed);
         data.reset(3);
         assert_eq!(data.signal, [0.0; 3]);
-        assert!(data.surveys.is_empty() && data.places.is_empty() && data.times.steps.is_empty());
+        assert!(data.maxima.is_empty() && data.places.is_empty() && data.times.steps.is_empty());
         assert!(data.times.nanoseconds.iter().all(|time| time.load(Ordering::Relaxed) == 0));
     }
 }

@@ -4,10 +4,10 @@
 //! |---|---|
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
-//! | [`leaf_data`], `survey` | what is noted of each leaf; bounds on its particles |
-//! | `recall`, `surroundings` | what regrids remember |
+//! | [`leaf_data`], `leaf_maxima` | what is noted of each leaf; bounds on its particles |
+//! | `regrid_cache`, `free_surface` | what regrids remember |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
-//! | [`phases`], [`parts`] | timers |
+//! | [`phases`], [`regrid_timers`] | timers |
 use partition::Forest;
 use partition::comm::{Comm, Traffic};
 
@@ -23,20 +23,20 @@ use crate::solver::state::bookings::{Contacts, LoadBooks};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
-use crate::solver::state::parts::Parts;
 use crate::solver::state::phases::Phases;
-use crate::solver::state::recall::Recall;
+use crate::solver::state::regrid_cache::RegridCache;
+use crate::solver::state::regrid_timers::RegridTimers;
 
 pub mod bookings;
 pub mod cost;
+pub(super) mod free_surface;
 pub mod grid;
 pub(super) mod last_partition;
 pub mod leaf_data;
-pub mod parts;
+pub(super) mod leaf_maxima;
 pub mod phases;
-pub(super) mod recall;
-pub(super) mod surroundings;
-pub(super) mod survey;
+pub(super) mod regrid_cache;
+pub mod regrid_timers;
 
 /// Why a step failed on this rank.
 #[derive(Debug, thiserror::Error)]
@@ -120,9 +120,9 @@ pub struct Solver<const D: usize> {
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
     /// Where the time of regrids went since the start of this process.
-    pub parts: Parts,
+    pub parts: RegridTimers,
     /// What regrids remember; nothing that a bit depends on.
-    pub(super) recall: Recall<D>,
+    pub(super) regrid_cache: RegridCache<D>,
     /// What grids of earlier trees and partitions have sent.
     pub(super) sent_before: Traffic,
     /// Least bytes that these nodes need, as of the last step that was weighed.

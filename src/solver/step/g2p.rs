@@ -15,12 +15,12 @@ use crate::particle::chunk::Place;
 use crate::solver::migration::depart::{Borders, Departed};
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::bins::OfLeaf;
+use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
-use crate::solver::sorting::widths::Widths;
 use crate::solver::state::Solver;
 use crate::solver::state::leaf_data::LeafData;
+use crate::solver::state::leaf_maxima::{LeafMaxima, Watch};
 use crate::solver::state::phases::Phase;
-use crate::solver::state::survey::{Survey, Watch};
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -85,7 +85,7 @@ impl<const D: usize> Solver<D> {
         let widths = self.physics.widths(&self.grid.plan);
         let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
         self.leaf_data.begin_gather(&self.chunks);
-        let LeafData { signal, surveys, places, times } = &mut self.leaf_data;
+        let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
         let sweep = Sweep {
             dt,
             scheme: &scheme,
@@ -101,12 +101,12 @@ impl<const D: usize> Solver<D> {
         };
         let (chunks, lists) = (&mut self.chunks, &mut self.grid.lists);
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(surveys).zip(signal).enumerate();
+            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).enumerate();
             let departed =
-                leaves.map_init(Scratch::default, |scratch, (leaf, (((chunk, bins), survey), signal))| {
+                leaves.map_init(Scratch::default, |scratch, (leaf, (((chunk, bins), maxima), signal))| {
                     // Of empty leaves there may be very many, and to take the time costs more than they do.
                     let is_empty = chunk.is_empty();
-                    let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, survey, signal);
+                    let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, maxima, signal);
                     if is_empty { advance() } else { times.time(leaf, advance) }
                 });
             departed.filter(Departed::is_any).collect()
@@ -155,13 +155,13 @@ impl<const D: usize> Sweep<'_, D> {
         leaf: usize,
         chunk: &mut Chunk<D>,
         bins: OfLeaf<'_, D>,
-        survey: &mut Survey<D>,
+        maxima: &mut LeafMaxima<D>,
         signal: &mut f64,
     ) -> Departed {
         let is_empty = chunk.is_empty();
-        self.watch.before(chunk, survey);
+        self.watch.before(chunk, maxima);
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
-        self.watch.after(chunk, self.dt, survey);
+        self.watch.after(chunk, self.dt, maxima);
         if signal.is_infinite()
             && let Some(error) = self.borders.unsound(chunk)
         {

@@ -21,10 +21,10 @@ impl<const D: usize> Solver<D> {
         }
         let turns = self.turns();
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&turns).enumerate();
-        let surveys = Some(&self.leaf_data.surveys).filter(|surveys| surveys.len() == self.chunks.len());
+        let maxima = Some(&self.leaf_data.maxima).filter(|maxima| maxima.len() == self.chunks.len());
         let each = leaves.with_min_len(64).map(|(number, ((chunk, leaf), &turn))| {
             // Who came in this very step can wait for the next time.
-            let known = surveys.and_then(|surveys| surveys[number].levels?.look(leaf.level, turn));
+            let known = maxima.and_then(|maxima| maxima[number].levels?.look(leaf.level, turn));
             known.unwrap_or_else(|| merge_backoff::look(chunk, leaf.level, turn))
         });
         each.collect()
@@ -57,9 +57,9 @@ impl<const D: usize> Solver<D> {
             return Vec::new();
         };
         let leaves =
-            self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.surveys).enumerate();
-        let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), survey))| {
-            let too_wide = |stretch| resampling.may_exceed(survey.width, leaf.level, stretch);
+            self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.maxima).enumerate();
+        let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), maxima))| {
+            let too_wide = |stretch| resampling.may_exceed(maxima.width, leaf.level, stretch);
             let is_wanted = looks[number].coarser || resampling.stretch().is_some_and(too_wide);
             let from = from.map_or(leaf.level, |from| from[number]);
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))

@@ -10,7 +10,7 @@
 //! more exchange, so FLIP pays for one and XPIC(m) for m beside the usual one; APIC and TPIC pay nothing.
 use rayon::prelude::*;
 
-use super::update::{apply_faces, update_velocity};
+use super::node_update::{apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;

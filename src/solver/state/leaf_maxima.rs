@@ -9,7 +9,7 @@ use crate::particle::chunk::{Chunk, Layout};
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::solver) struct Survey<const D: usize> {
+pub(in crate::solver) struct LeafMaxima<const D: usize> {
     /// Least and greatest velocity along each axis, 0 among them, m/s. Nodes would not do: those with next to no mass
     /// may be very fast.
     pub velocity: [[f64; D]; 2],
@@ -25,7 +25,7 @@ pub(in crate::solver) struct Survey<const D: usize> {
     pub levels: Option<Levels>,
 }
 
-impl<const D: usize> Default for Survey<D> {
+impl<const D: usize> Default for LeafMaxima<D> {
     fn default() -> Self {
         Self {
             velocity: [[0.0; D]; 2],
@@ -66,35 +66,35 @@ impl Watch {
     }
 
     /// To be called before the leaf's particles advance.
-    pub fn before<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
+    pub fn before<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.rate {
-            survey.plastic_rate = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum();
+            maxima.plastic_rate = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum();
         }
     }
 
     /// To be called after the leaf's particles have advanced by `dt` (s).
-    pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, survey: &mut Survey<D>) {
+    pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, maxima: &mut LeafMaxima<D>) {
         if self.rate {
-            let gain = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum() - survey.plastic_rate;
-            survey.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
+            let gain = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum() - maxima.plastic_rate;
+            maxima.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
         }
-        self.look(chunk, survey);
+        self.look(chunk, maxima);
     }
 
     /// What follows from the state alone.
-    pub(in crate::solver) fn look<const D: usize>(self, chunk: &Chunk<D>, survey: &mut Survey<D>) {
+    pub(in crate::solver) fn look<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.velocity {
             let ranges: [[f64; 2]; D] =
                 std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis).range());
-            survey.velocity = std::array::from_fn(|side| ranges.map(|range| range[side]));
-            survey.levels = Some(Levels::of(chunk.tags()));
+            maxima.velocity = std::array::from_fn(|side| ranges.map(|range| range[side]));
+            maxima.levels = Some(Levels::of(chunk.tags()));
         }
         if self.strain {
-            survey.plastic_strain = chunk.column(Layout::<D>::PLASTIC_STRAIN).greatest();
+            maxima.plastic_strain = chunk.column(Layout::<D>::PLASTIC_STRAIN).greatest();
         }
         if self.width {
-            survey.stretch = domain::greatest_stretch(chunk);
-            survey.width = survey.stretch * chunk.column(Layout::<D>::HALF).greatest();
+            maxima.stretch = domain::greatest_stretch(chunk);
+            maxima.width = maxima.stretch * chunk.column(Layout::<D>::HALF).greatest();
         }
     }
 }

@@ -50,8 +50,8 @@ pub(super) enum Side {
 
 /// The leaves across the faces of one leaf.
 #[derive(Clone, Debug)]
-pub(super) struct Sides<const D: usize> {
-    /// By the faces that a box crosses, see [`Sides::faces`].
+pub(super) struct LeafFaces<const D: usize> {
+    /// By the faces that a box crosses, see [`LeafFaces::faces`].
     sides: [Side; 64],
     /// Faces, a bit each, that some box must cross for its side to be what it is.
     decisive: u32,
@@ -63,7 +63,7 @@ pub(super) struct Sides<const D: usize> {
     children: [Option<u32>; 8],
 }
 
-impl<const D: usize> Sides<D> {
+impl<const D: usize> LeafFaces<D> {
     /// The sides of `leaf`, which is the octant `here` with cells of edge `cell` and has the given bins; `near` are the
     /// finer leaves around.
     pub fn new(leaf: NearLeaf<D>, here: Octant<D>, cell: f64, near: &[NearLeaf<D>], bins: &[Bin<D>]) -> Self {
@@ -164,7 +164,7 @@ impl<const D: usize> Sides<D> {
         })
     }
 
-    /// [`Sides::faces`] of the boxes of a batch.
+    /// [`LeafFaces::faces`] of the boxes of a batch.
     #[inline(always)]
     fn faces_of_batch(&self, centre: &[Lanes; D], half: &[Lanes; D]) -> [u8; LANES] {
         let mut faces = 0;
@@ -221,7 +221,7 @@ mod tests {
         for (known, leaf) in all.iter().enumerate().filter(|(_, leaf)| leaf.level == 1) {
             let around = leaves_around(&tree, known).into_iter().map(|other| all[other]);
             let finer: Vec<NearLeaf<D>> = around.filter(|other| other.level > 1).collect();
-            let sides = Sides::new(*leaf, tree.leaves()[known], cell, &finer, &[]);
+            let sides = LeafFaces::new(*leaf, tree.leaves()[known], cell, &finer, &[]);
             for index in 0..offset_count(D) {
                 let direction = offset::<D>(index);
                 let centre: [f64; D] =

@@ -5,7 +5,7 @@ use crate::kernel::SubBox;
 
 /// Particles and parts of boxes in one bin, in canonical order.
 #[derive(Clone, Debug)]
-pub struct Members<const D: usize> {
+pub struct BinMembers<const D: usize> {
     /// Particles whose box is transferred whole.
     pub whole: Vec<u32>,
     /// Parts of boxes; their slots count the leaf's particles that are cut.
@@ -16,13 +16,13 @@ pub struct Members<const D: usize> {
     lower_faces: [[f64; D]; 2],
 }
 
-impl<const D: usize> Default for Members<D> {
+impl<const D: usize> Default for BinMembers<D> {
     fn default() -> Self {
         Self { whole: Vec::new(), parts: Vec::new(), window: Window::EMPTY, lower_faces: Self::NO_FACES }
     }
 }
 
-impl<const D: usize> Members<D> {
+impl<const D: usize> BinMembers<D> {
     const NO_FACES: [[f64; D]; 2] = [[f64::INFINITY; D], [f64::NEG_INFINITY; D]];
 
     /// Whether there are no members.

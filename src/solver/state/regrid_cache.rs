@@ -1,5 +1,5 @@
 //! What regrids remember from one time to the next.
-use crate::solver::state::surroundings::Surroundings;
+use crate::solver::state::free_surface::Surroundings;
 use partition::Mark;
 
 /// What a leaf wants for itself and the leaves around.
@@ -18,16 +18,16 @@ impl<const D: usize> Wish<D> {
 
 /// What regrids remember from one time to the next. It saves work and changes no bit.
 #[derive(Clone, Debug, Default)]
-pub(in crate::solver) struct Recall<const D: usize> {
+pub(in crate::solver) struct RegridCache<const D: usize> {
     /// See there.
     pub surroundings: Surroundings,
     /// With what the tree stays as it is.
-    pub(in crate::solver) settled: Option<Settled<D>>,
+    pub(in crate::solver) settled: Option<SettledTree<D>>,
 }
 
 /// What was wanted when nothing came of it.
 #[derive(Clone, Debug)]
-pub(in crate::solver) struct Settled<const D: usize> {
+pub(in crate::solver) struct SettledTree<const D: usize> {
     /// Revision of the forest.
     pub(in crate::solver) revision: u64,
     /// Wishes of own leaves.

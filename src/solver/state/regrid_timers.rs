@@ -41,18 +41,18 @@ impl Part {
 
 /// Seconds of wall time that each part of the regrids so far took.
 #[derive(Clone, Copy, Debug)]
-pub struct Parts {
+pub struct RegridTimers {
     seconds: [f64; Part::ALL.len()],
     since: Instant,
 }
 
-impl Default for Parts {
+impl Default for RegridTimers {
     fn default() -> Self {
         Self { seconds: [0.0; Part::ALL.len()], since: Instant::now() }
     }
 }
 
-impl Parts {
+impl RegridTimers {
     /// A part begins now.
     pub(in crate::solver) fn begin(&mut self) {
         self.since = Instant::now();
