@@ -8,7 +8,7 @@
 //! | `page/` | the page itself: HTML, style and scripts, which stand in the file as they are |
 //!
 //! Positions keep a 32nd of the smallest particle's half width; fields keep a given number of bits on a scale that is
-//! fine near zero ([`columns::Scale`]). Both are far below what a picture shows; `agimp export` has exact numbers.
+//! fine near zero (`columns::Scale`). Both are far below what a picture shows; `agimp export` has exact numbers.
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
