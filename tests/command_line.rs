@@ -381,7 +381,7 @@ fn a_file_without_end_is_no_job() {
     let output = agimp(directory.path(), &["check", "/dev/zero"]);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("/dev/zero:1:1: found more than 16 MB"), "{message}");
+    assert!(message.contains("/dev/zero:1:1: found more than 2 MB"), "{message}");
 }
 
 #[test]
@@ -516,6 +516,10 @@ fn settings_decide_what_is_run() {
     printed(&run(&["--end", "2e-3", "--out", "set", "--restart", "latest"]));
     printed(&run(&["--out", "whole"]));
     assert_eq!(file("set/job.history.csv"), file("whole/job.history.csv"));
+    // What a run warns of is not said again by its restart.
+    let again = run(&["--end", "2e-3", "--out", "set", "--restart", "latest"]);
+    let message = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert!(again.status.code() == Some(0) && !message.contains("boundaries"), "{message}");
     let refused = agimp(directory.path(), &["run", "job.toml", "--out", "set", "--restart", "latest"]);
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(2), "{message}");

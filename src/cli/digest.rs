@@ -1,4 +1,4 @@
-//! `agimp digest`: one number that tells the states in files apart, whatever the ranks that wrote them.
+//! `agimp digest`: one number that is equal for equal states, whatever the ranks that wrote them.
 use super::Failure;
 use crate::io::snapshot::compare::digest;
 use std::io::Write;

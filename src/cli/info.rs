@@ -17,7 +17,7 @@ pub struct Arguments {
     verify: bool,
 }
 
-/// What the file tells.
+/// What the file holds.
 struct Contents {
     header: Header,
     size: u64,

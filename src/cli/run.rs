@@ -75,8 +75,8 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
         threads,
     };
     let warned = match &problem {
-        AnyProblem::Two(problem) => warned(comm, problem),
-        AnyProblem::Three(problem) => warned(comm, problem),
+        AnyProblem::Two(problem) => warned(comm, problem, arguments.restart.is_none()),
+        AnyProblem::Three(problem) => warned(comm, problem, arguments.restart.is_none()),
     };
     together(comm, warned)?;
     let outcome = match &problem {
@@ -86,10 +86,10 @@ pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     together(comm, conclude(outcome, options.speaks))
 }
 
-/// Collective. Warns of what is likely not meant in the job, once.
-fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<(), Failure> {
+/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew.
+fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Result<(), Failure> {
     let (_, steps) = steps(problem).map_err(|error| Failure::Usage(error.to_string()))?;
-    if comm.rank() == 0 {
+    if comm.rank() == 0 && is_new {
         warn_of(&warnings(problem, steps));
     }
     Ok(())

@@ -39,8 +39,8 @@ pub fn load_with(path: &Path, settings: &Settings) -> Result<AnyProblem, JobErro
     from_bytes(read(path)?, path, settings)
 }
 
-/// Longest job file, bytes.
-const MOST_BYTES: u64 = 16_000_000;
+/// Longest job file, bytes. Reading it takes up to a hundred times as much memory.
+const MOST_BYTES: u64 = 2_000_000;
 
 /// The bytes of a job file. Not collective.
 ///

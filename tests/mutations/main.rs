@@ -2,7 +2,8 @@
 //! good ones with fixed seeds; each goes through what `agimp check` and `agimp info` do, in this process.
 //!
 //! The long forms are run by hand:
-//! `cargo test --release --test mutations -- --ignored --nocapture --test-threads 1`
+//! `cargo test --release --test mutations -- --ignored --nocapture --test-threads 1`; `AGIMP_MUTATIONS` sets the number of
+//! cases.
 mod mutate;
 
 use std::path::{Path, PathBuf};
@@ -77,6 +78,14 @@ impl Worst {
     }
 }
 
+/// Cases of a long form.
+fn wanted(default: u64) -> u64 {
+    std::env::var("AGIMP_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+}
+
+/// Cases between two lines of progress.
+const PROGRESS: u64 = 20_000;
+
 /// All job files of the project.
 fn jobs() -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -127,6 +136,9 @@ fn job_texts(cases: u64, seed: u64) {
         let mut random = Random::new(seed ^ case);
         let bytes = mutated_text(&mut random, &jobs);
         let shown = bytes.clone();
+        if case > 0 && case.is_multiple_of(PROGRESS) {
+            worst.report("mutated job texts", case, start);
+        }
         worst.measure(|| check(bytes), || format!("case {case}:\n{}", String::from_utf8_lossy(&shown)));
     }
     worst.report("mutated job texts", cases, start);
@@ -140,7 +152,7 @@ fn mutated_job_texts_are_refused_or_estimated_at_once() {
 #[test]
 #[ignore = "long: run by hand"]
 fn a_million_mutated_job_texts() {
-    job_texts(1_000_000, 0x1_0000_0000);
+    job_texts(wanted(1_000_000), 0x1_0000_0000);
 }
 
 /// The state files of a small run.
@@ -178,6 +190,9 @@ fn state_headers(cases: u64, seed: u64, whole: bool) {
     assert!(files.len() >= 2);
     let path = home.path().join("mutated.hdf");
     for case in 0..cases {
+        if case > 0 && case.is_multiple_of(PROGRESS) {
+            worst.report("mutated files", case, start);
+        }
         let mut random = Random::new(seed ^ case);
         std::fs::write(&path, mutated_bytes(&mut random, &files, b"agimp state")).expect("written");
         let read = || {
@@ -210,5 +225,5 @@ fn mutated_state_files_are_refused_or_verified_at_once() {
 #[test]
 #[ignore = "long: run by hand"]
 fn two_hundred_thousand_mutated_headers() {
-    state_headers(200_000, 0x2_0000_0000, false);
+    state_headers(wanted(200_000), 0x2_0000_0000, false);
 }

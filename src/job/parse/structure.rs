@@ -309,7 +309,7 @@ impl<'s> Checker<'s> {
     }
 }
 
-/// The key whose constant tells variants of tables apart.
+/// The key whose constant names the variant of a table.
 fn tag_of(option: &Value) -> Option<&str> {
     let properties = option.get("properties")?.as_object()?;
     properties.iter().find(|(_, schema)| schema.get("const").is_some()).map(|(key, _)| key.as_str())
