@@ -204,7 +204,7 @@ impl Recorder {
         }
         // Where the row of this step has been written already, there is nothing to forget.
         solver.forget_reactions();
-        solver.load_books.forget_forces(clock.time);
+        solver.load_books.forget(3, clock.time);
         written
     }
 

@@ -19,6 +19,7 @@ use crate::particle::Chunk;
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
+use crate::solver::state::bookings::ExactBooks;
 use crate::solver::state::cost::leaf_weight;
 use crate::solver::{Clock, Solver};
 
@@ -67,18 +68,8 @@ pub fn scalars<const D: usize>(
         .zip(&mut crossings.masses)
         .map(|(name, sum)| ((*name).into(), sum.words().to_vec()))
         .collect();
-    if !solver.contacts.states.is_empty() {
-        reals.push((SINCE.into(), solver.contacts.since));
-        let mut sums: Vec<ExactSum> = solver.contacts.sums.iter().flatten().cloned().collect();
-        ExactSum::sum_over_ranks(comm, &mut sums);
-        exact.extend(sums.iter_mut().enumerate().map(|(i, sum)| (sum_name(i), sum.words().to_vec())));
-    }
-    if !solver.load_books.sums.is_empty() {
-        reals.push((LOADS_SINCE.into(), solver.load_books.since));
-        let mut sums: Vec<ExactSum> = solver.load_books.sums.iter().flatten().cloned().collect();
-        ExactSum::sum_over_ranks(comm, &mut sums);
-        exact.extend(sums.iter_mut().enumerate().map(|(i, sum)| (load_sum(i), sum.words().to_vec())));
-    }
+    write_exact_books("collider", &solver.contacts.books, comm, &mut reals, &mut exact);
+    write_exact_books("load", &solver.load_books, comm, &mut reals, &mut exact);
     if solver.physics.adaptivity.is_some() {
         let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
         let numbers = [splits, merges, removed, solver.books.next_root];
@@ -98,23 +89,37 @@ pub fn scalars<const D: usize>(
     Scalars { reals, counts, exact }
 }
 
-/// Name of the time since which impulses of loads are summed.
-const LOADS_SINCE: &str = "load_sums_since";
-
-/// Name of an exact sum of loads, counted through all of them.
-fn load_sum(number: usize) -> String {
-    format!("load_sum_{number}")
+/// Collective. Appends the exact sums of some kind of thing: those of all ranks, counted through all things.
+fn write_exact_books<const N: usize>(
+    kind: &str,
+    books: &ExactBooks<N>,
+    comm: &Comm,
+    reals: &mut Vec<(String, f64)>,
+    exact: &mut Vec<(String, Vec<i64>)>,
+) {
+    if books.sums.is_empty() {
+        return;
+    }
+    reals.push((format!("{kind}_sums_since"), books.since));
+    let mut sums = books.exact_totals(comm);
+    exact.extend(
+        sums.iter_mut().enumerate().map(|(i, sum)| (format!("{kind}_sum_{i}"), sum.words().to_vec())),
+    );
 }
 
-/// Takes over what is booked of the loads; the sums are on rank 0. `None` if the file lacks one.
-fn restore_loads<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
-    let books = &mut solver.load_books;
+/// Takes over the exact sums of some kind of thing, which are on rank 0. `None` if the file lacks one.
+fn restore_exact_books<const N: usize>(
+    kind: &str,
+    books: &mut ExactBooks<N>,
+    rank: usize,
+    scalars: &Scalars,
+) -> Option<()> {
     if books.sums.is_empty() {
         return Some(());
     }
-    books.since = scalars.real(LOADS_SINCE)?;
+    books.since = scalars.real(&format!("{kind}_sums_since"))?;
     for (number, sum) in books.sums.iter_mut().flatten().enumerate() {
-        let read = ExactSum::from_words(scalars.exact(&load_sum(number))?)?;
+        let read = ExactSum::from_words(scalars.exact(&format!("{kind}_sum_{number}"))?)?;
         if rank == 0 {
             *sum = read;
         }
@@ -156,27 +161,15 @@ fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
     Some(())
 }
 
-/// Name of the time since which impulses on colliders are summed.
-const SINCE: &str = "collider_sums_since";
-
-/// Name of an exact sum of colliders, counted through all of them.
-fn sum_name(number: usize) -> String {
-    format!("collider_sum_{number}")
-}
-
 /// Name of a number of the state of a free collider: translation, velocity, angle, angular velocity.
 fn state_name(collider: usize, number: usize) -> String {
     format!("collider_{collider}_state_{number}")
 }
 
-/// Puts the colliders back where the file has them. The sums are on rank 0. `None` if the file lacks a number.
-fn restore_colliders<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
-    let colliders = &solver.physics.colliders;
-    if colliders.is_empty() {
-        return Some(());
-    }
-    solver.contacts.since = scalars.real(SINCE)?;
-    for (index, collider) in colliders.iter().enumerate().filter(|(_, collider)| collider.free().is_some()) {
+/// Puts the free colliders back where the file has them. `None` if the file lacks a number.
+fn restore_colliders<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    let colliders = solver.physics.colliders.iter();
+    for (index, collider) in colliders.enumerate().filter(|(_, collider)| collider.free().is_some()) {
         let number = |i: usize| scalars.real(&state_name(index, i));
         let (mut translation, mut velocity) = ([0.0; D], [0.0; D]);
         for a in 0..D {
@@ -184,12 +177,6 @@ fn restore_colliders<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
         }
         let rate = Rate { velocity, spin: number(2 * D + 1)? };
         solver.contacts.states[index] = collider.state((translation, number(2 * D)?), rate);
-    }
-    for (number, sum) in solver.contacts.sums.iter_mut().flatten().enumerate() {
-        let read = ExactSum::from_words(scalars.exact(&sum_name(number))?)?;
-        if rank == 0 {
-            *sum = read;
-        }
     }
     Some(())
 }
@@ -275,9 +262,11 @@ fn restored<const D: usize>(
     };
     let mut solver = Solver::new(comm, setup::physics(problem), forest, chunks, clock);
     // Every rank has read the same header.
-    restore_colliders(comm.rank(), &mut solver, &header.scalars)
+    let (rank, scalars) = (comm.rank(), &header.scalars);
+    restore_colliders(&mut solver, scalars)
+        .and_then(|()| restore_exact_books("collider", &mut solver.contacts.books, rank, scalars))
         .ok_or_else(|| refused("the state of a collider is missing"))?;
-    restore_loads(comm.rank(), &mut solver, &header.scalars)
+    restore_exact_books("load", &mut solver.load_books, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
     restore_books(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the books of splits and merges are missing"))?;

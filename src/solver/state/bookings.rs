@@ -17,15 +17,56 @@ pub struct Reaction {
     pub torque: [f64; 3],
 }
 
-/// States of the colliders and what has been summed up of their reactions.
+/// Exact sums of some things on this rank, `N` for each, of which some go over the time since a row of the history.
+#[derive(Clone, Debug, Default)]
+pub struct ExactBooks<const N: usize> {
+    /// Sums of each thing.
+    pub sums: Vec<[ExactSum; N]>,
+    /// Time of the last row of the history, s.
+    pub since: f64,
+}
+
+impl<const N: usize> ExactBooks<N> {
+    /// Nothing is booked of so many things.
+    pub(in crate::solver) fn new(things: usize, time: f64) -> Self {
+        Self { sums: vec![std::array::from_fn(|_| ExactSum::new()); things], since: time }
+    }
+
+    /// Collective. Totals over all ranks, exact before they are rounded once.
+    pub fn totals(&self, comm: &Comm) -> Vec<[f64; N]> {
+        let all = self.exact_totals(comm);
+        all.chunks_exact(N).map(|sums| std::array::from_fn(|i| sums[i].to_f64())).collect()
+    }
+
+    /// Collective. As [`ExactBooks::totals`], not rounded: those of one thing after those of another.
+    pub fn exact_totals(&self, comm: &Comm) -> Vec<ExactSum> {
+        let mut all: Vec<ExactSum> = self.sums.iter().flatten().cloned().collect();
+        if !all.is_empty() {
+            ExactSum::sum_over_ranks(comm, &mut all);
+        }
+        all
+    }
+
+    /// Mean rate of a sum since the last row, per second; 0 at the time of that row.
+    pub fn mean(&self, sum: f64, time: f64) -> f64 {
+        let elapsed = time - self.since;
+        if elapsed > 0.0 { sum / elapsed } else { 0.0 }
+    }
+
+    /// Not collective. Starts the first sums of each thing anew at a time, s.
+    pub fn forget(&mut self, first: usize, time: f64) {
+        self.sums.iter_mut().for_each(|sums| sums[..first].fill_with(ExactSum::new));
+        self.since = time;
+    }
+}
+
+/// The colliders, and per collider impulse and angular impulse since the last row, from the nodes of this rank.
 #[derive(Clone, Debug)]
 pub struct Contacts<const D: usize> {
     /// State of each collider; the same on all ranks.
     pub states: Vec<ColliderState<D>>,
-    /// Per collider, impulse and angular impulse from the nodes of this rank since [`Contacts::since`].
-    pub sums: Vec<[ExactSum; SUMS]>,
-    /// Time of the last row of the history, s.
-    pub since: f64,
+    /// What is booked of them.
+    pub books: ExactBooks<SUMS>,
 }
 
 impl<const D: usize> Contacts<D> {
@@ -33,50 +74,14 @@ impl<const D: usize> Contacts<D> {
     pub(in crate::solver) fn new(physics: &Physics<D>, time: f64) -> Self {
         Self {
             states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
-            sums: vec![std::array::from_fn(|_| ExactSum::new()); physics.colliders.len()],
-            since: time,
+            books: ExactBooks::new(physics.colliders.len(), time),
         }
     }
 }
 
-/// Sums of a load: three components of the impulse, and the work.
+/// Sums of a load: three components of the impulse since the last row (kg m/s), and the work since the start (J), of the nodes
+/// that this rank counts.
 pub const LOAD_SUMS: usize = 4;
-
-/// What is booked of the loads of a run on this rank.
-#[derive(Clone, Debug, Default)]
-pub struct LoadBooks {
-    /// Per load, impulse since [`LoadBooks::since`] (kg m/s) and work since the start (J), of the nodes that this rank counts.
-    pub sums: Vec<[ExactSum; LOAD_SUMS]>,
-    /// Time of the last row of the history, s.
-    pub since: f64,
-}
-
-impl LoadBooks {
-    /// Nothing booked.
-    pub(in crate::solver) fn new(loads: usize, time: f64) -> Self {
-        Self { sums: vec![std::array::from_fn(|_| ExactSum::new()); loads], since: time }
-    }
-
-    /// Collective. Mean force since the last row (N) and work since the start (J) of each load.
-    pub fn totals(&self, comm: &Comm, time: f64) -> Vec<LoadTotals> {
-        if self.sums.is_empty() {
-            return Vec::new();
-        }
-        let mut flat: Vec<ExactSum> = self.sums.iter().flatten().cloned().collect();
-        ExactSum::sum_over_ranks(comm, &mut flat);
-        let elapsed = time - self.since;
-        let mean = |impulse: &ExactSum| if elapsed > 0.0 { impulse.to_f64() / elapsed } else { 0.0 };
-        flat.chunks_exact(LOAD_SUMS)
-            .map(|sums| LoadTotals { force: std::array::from_fn(|a| mean(&sums[a])), work: sums[3].to_f64() })
-            .collect()
-    }
-
-    /// Not collective. Starts the mean forces anew at a time, s.
-    pub fn forget_forces(&mut self, time: f64) {
-        self.sums.iter_mut().for_each(|sums| sums[..3].fill_with(ExactSum::new));
-        self.since = time;
-    }
-}
 
 /// Mean force and work of a load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -19,7 +19,7 @@ use crate::adaptivity::resample::ledger::Books;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{Contacts, LoadBooks};
+use crate::solver::state::bookings::{Contacts, ExactBooks, LOAD_SUMS};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
@@ -107,7 +107,7 @@ pub struct Solver<const D: usize> {
     /// Where the colliders are, and their reactions.
     pub contacts: Contacts<D>,
     /// What is booked of the loads.
-    pub load_books: LoadBooks,
+    pub load_books: ExactBooks<LOAD_SUMS>,
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,

@@ -82,6 +82,8 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Mean force and work of each load.
     pub fn load_totals(&self) -> Vec<LoadTotals> {
-        self.load_books.totals(&self.comm, self.clock.time)
+        let mean = |impulse: f64| self.load_books.mean(impulse, self.clock.time);
+        let all = self.load_books.totals(&self.comm).into_iter();
+        all.map(|[x, y, z, work]| LoadTotals { force: [x, y, z].map(mean), work }).collect()
     }
 }
