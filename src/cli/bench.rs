@@ -43,7 +43,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// No job of that name, or a run failed.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let names = || JOBS.map(|job| job.name).join(", ");
     if let Some(name) = &arguments.show {
         let job = JOBS.iter().find(|job| job.name == *name);

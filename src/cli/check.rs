@@ -31,7 +31,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// The job is wrong.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let settings = arguments.changes.settings()?;
     let mut world = launched()?;
     let problem = match &world {

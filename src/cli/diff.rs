@@ -17,7 +17,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A file cannot be read, or the states differ.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let differences =
         diff(&arguments.first, &arguments.second).map_err(|error| Failure::Usage(error.to_string()))?;
     let mut out = std::io::stdout().lock();

@@ -19,7 +19,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A file is damaged or holds no restart state.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     for path in &arguments.files {
         let digest = digest(path).map_err(|error| Failure::Usage(error.to_string()))?;

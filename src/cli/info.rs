@@ -30,7 +30,7 @@ struct Contents {
 ///
 /// # Errors
 /// The file is damaged or not of this program.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: FileError| Failure::Usage(error.to_string());
     let contents = read(arguments).map_err(failed)?;
     let mut out = std::io::stdout().lock();

@@ -32,7 +32,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// No such template, the file exists already, or it cannot be written.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let Some(name) = arguments.template.as_deref().filter(|_| !arguments.list) else {
         for (name, text) in TEMPLATES {

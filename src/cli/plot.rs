@@ -37,7 +37,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
     let mut settings = Settings::new(arguments.title.as_deref().unwrap_or(&name));
     (settings.width, settings.height) = (arguments.width as usize, arguments.height as usize);

@@ -57,7 +57,7 @@ impl Arguments {
 ///
 /// # Errors
 /// The job is wrong, or the run failed; the same on all ranks.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let settings = arguments.changes.settings()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;

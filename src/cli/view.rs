@@ -39,7 +39,7 @@ fn field(name: &str) -> Result<PointField, String> {
 ///
 /// # Errors
 /// A file cannot be read or does not show a field, or the page cannot be written.
-pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
     let files = expand(&arguments.files).map_err(failed)?;
     let (first, out) = (&arguments.files[0], arguments.out.as_deref());

@@ -29,14 +29,14 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Not collective. Starts a new file in the place of an old one.
-    pub fn create(path: &Path) -> Result<Self, FileError> {
+    pub(super) fn create(path: &Path) -> Result<Self, FileError> {
         let file = create_new(path).map_err(|source| system(path, "create", source))?;
         Ok(Self { file, path: path.into() })
     }
 
     /// Not collective. Opens a file to go on with. `judge` sees its whole lines, without the newline, from the first on;
     /// one without a newline at the end goes.
-    pub fn resume(path: &Path, mut judge: impl FnMut(&[u8]) -> Verdict) -> Result<Self, FileError> {
+    pub(super) fn resume(path: &Path, mut judge: impl FnMut(&[u8]) -> Verdict) -> Result<Self, FileError> {
         let failed = |source| system(path, "resume", source);
         let mut options = OpenOptions::new();
         let mut file =
@@ -67,17 +67,17 @@ impl Lines {
     }
 
     /// Name of the file.
-    pub fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Not collective. Appends a line, which ends in a newline, and hands it to the operating system.
-    pub fn append(&mut self, line: &str) -> Result<(), FileError> {
+    pub(super) fn append(&mut self, line: &str) -> Result<(), FileError> {
         self.file.write_all(line.as_bytes()).map_err(|source| system(&self.path, "write", source))
     }
 
     /// Not collective. Waits until all lines are on disk.
-    pub fn sync(&self) -> Result<(), FileError> {
+    pub(super) fn sync(&self) -> Result<(), FileError> {
         self.file.sync_data().map_err(|source| system(&self.path, "bring to disk", source))
     }
 }

@@ -37,7 +37,7 @@ const MOST: usize = Layout::<3>::REALS;
 pub(super) struct Tile([[f64; LANES]; MOST]);
 
 impl Tile {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self([[0.0; LANES]; MOST])
     }
 }
@@ -55,7 +55,7 @@ pub(super) struct Batches<'a, const D: usize> {
 
 impl<'a, const D: usize> Batches<'a, D> {
     /// Batches of a selection from a chunk. `next` is the place of the chunk to be read after it.
-    pub fn new(select: Select<'a>, chunk: &Chunk<D>, next: Place) -> Self {
+    pub(super) fn new(select: Select<'a>, chunk: &Chunk<D>, next: Place) -> Self {
         Self { select, len: chunk.len(), taken: 0, place: chunk.place(), next }
     }
 
@@ -73,7 +73,7 @@ impl<'a, const D: usize> Batches<'a, D> {
     /// several pages at the same time, but waits for each that a single line is asked for on. In line: with a call
     /// between batches, constants would not stay in registers.
     #[inline(always)]
-    pub fn look_up_pages(&self) {
+    pub(super) fn look_up_pages(&self) {
         let is_due = self.taken % (GROUP * TILE) == TILE && self.len > GROUP * TILE;
         if is_due && matches!(self.select, Select::All) {
             let tiles = (GROUP..2 * GROUP).step_by(PAGE / (Layout::<D>::REALS * size_of::<[f64; TILE]>()));
@@ -127,7 +127,7 @@ impl<const D: usize> Iterator for Batches<'_, D> {
 impl Batch {
     /// Up to [`LANES`] particles, at least one, lane by lane.
     #[inline(always)]
-    pub fn of_particles(list: &[u32]) -> Self {
+    pub(super) fn of_particles(list: &[u32]) -> Self {
         match list.first_chunk() {
             Some(next) if is_tile(next) => Self::whole_tile(next),
             _ => Self::from_indices(list, |&p| p),
@@ -173,7 +173,7 @@ impl Batch {
 
     /// The first particles of a list of anything that names a particle, which may do so several times.
     #[inline(always)]
-    pub fn from_indices<T>(list: &[T], particle: impl Fn(&T) -> u32) -> Self {
+    pub(super) fn from_indices<T>(list: &[T], particle: impl Fn(&T) -> u32) -> Self {
         let count = list.len().min(LANES);
         let index: [u32; LANES] = std::array::from_fn(|lane| particle(&list[lane.min(count - 1)]));
         Self { index, lanes: ALL >> (LANES - count), tile: None, ahead: Place::default() }
@@ -181,7 +181,7 @@ impl Batch {
 
     /// The particles' tile; `columns` are those that will be read where it has to be brought together in `spare`.
     #[inline(always)]
-    pub fn tile<'a, const D: usize>(
+    pub(super) fn tile<'a, const D: usize>(
         &self,
         tiles: &'a [[f64; LANES]],
         columns: impl Iterator<Item = usize>,
@@ -196,7 +196,7 @@ impl Batch {
 
     /// The particles' tile, all columns, to be changed. What was brought together has to be put back.
     #[inline(always)]
-    pub fn tile_mut<'a, const D: usize>(
+    pub(super) fn tile_mut<'a, const D: usize>(
         &self,
         tiles: &'a mut [[f64; LANES]],
         spare: &'a mut Tile,
@@ -223,7 +223,7 @@ impl Batch {
 
     /// Writes members back that were brought together in `spare`.
     #[inline(always)]
-    pub fn put_back<const D: usize>(&self, tiles: &mut [[f64; LANES]], spare: &Tile) {
+    pub(super) fn put_back<const D: usize>(&self, tiles: &mut [[f64; LANES]], spare: &Tile) {
         if self.tile.is_none() {
             self.scatter_back::<D>(tiles, spare);
         }
@@ -240,19 +240,19 @@ impl Batch {
 
     /// Lanes that are members, in order.
     #[inline(always)]
-    pub fn members(&self) -> impl Iterator<Item = usize> + use<> {
+    pub(super) fn members(&self) -> impl Iterator<Item = usize> + use<> {
         lanes_in(self.lanes)
     }
 
     /// Which of some lanes, a bit each, are members.
     #[inline(always)]
-    pub fn members_among(&self, lanes: u32) -> u32 {
+    pub(super) fn members_among(&self, lanes: u32) -> u32 {
         self.lanes & lanes
     }
 
     /// `values` of members, 0 elsewhere.
     #[inline(always)]
-    pub fn of_members<V: Vector>(&self, values: V) -> V {
+    pub(super) fn of_members<V: Vector>(&self, values: V) -> V {
         self.merged(values, V::splat(0.0))
     }
 
@@ -264,7 +264,7 @@ impl Batch {
 
     /// Particle of a lane.
     #[inline(always)]
-    pub fn particle(&self, lane: usize) -> usize {
+    pub(super) fn particle(&self, lane: usize) -> usize {
         self.index[lane] as usize
     }
 
@@ -276,14 +276,14 @@ impl Batch {
 
     /// Reads a column of the particles' tile.
     #[inline(always)]
-    pub fn load<V: Vector>(&self, tile: &[[f64; LANES]], column: usize) -> V {
+    pub(super) fn load<V: Vector>(&self, tile: &[[f64; LANES]], column: usize) -> V {
         self.read_ahead(column);
         V::load(&tile[column])
     }
 
     /// Writes a column of members in the particles' tile.
     #[inline(always)]
-    pub fn store<V: Vector>(&self, tile: &mut [[f64; LANES]], column: usize, values: V) {
+    pub(super) fn store<V: Vector>(&self, tile: &mut [[f64; LANES]], column: usize, values: V) {
         self.read_ahead(column);
         let line = &mut tile[column];
         self.merged(values, V::load(line)).store(line);
@@ -291,7 +291,7 @@ impl Batch {
 
     /// Positions.
     #[inline(always)]
-    pub fn positions<V: Vector, const D: usize>(&self, tile: &[[f64; LANES]]) -> [V; D] {
+    pub(super) fn positions<V: Vector, const D: usize>(&self, tile: &[[f64; LANES]]) -> [V; D] {
         let mut position = [V::splat(0.0); D];
         for axis in 0..D {
             position[axis] = self.load(tile, Layout::<D>::POSITION + axis);
@@ -301,7 +301,7 @@ impl Batch {
 
     /// Material index of each lane.
     #[inline(always)]
-    pub fn materials(&self, tags: &[u64]) -> [u16; LANES] {
+    pub(super) fn materials(&self, tags: &[u64]) -> [u16; LANES] {
         prefetch(self.ahead.tags);
         // The material is the low half word of a packed tag.
         std::array::from_fn(|lane| tags[self.particle(lane)] as u16)

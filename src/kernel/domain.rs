@@ -153,7 +153,7 @@ impl<V: Vector, const D: usize> AtWall<'_, V, D> {
     /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept, C grows like `1/d`, and
     /// a particle that drifts to the wall would come with ever faster nodes and pass through. So B falls with the distance.
     #[inline(always)]
-    pub fn kept_affine_velocity(&self, moved: &[V; D]) -> Option<[V; D]> {
+    pub(super) fn kept_affine_velocity(&self, moved: &[V; D]) -> Option<[V; D]> {
         if !is_cut(&self.whole, &self.half) {
             return None;
         }

@@ -78,12 +78,12 @@ pub(super) struct Sums<const D: usize> {
 }
 
 impl<const D: usize> Sums<D> {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         let zero = [F64x4::splat(0.0); LANES];
         Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
     }
 
-    pub fn row(&self, lane: usize) -> Gathered<D> {
+    pub(super) fn row(&self, lane: usize) -> Gathered<D> {
         Gathered {
             velocity: self.velocity[lane],
             gradient: std::array::from_fn(|k| self.gradient[k][lane]),
@@ -92,7 +92,7 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    pub fn set(&mut self, lane: usize, row: &Gathered<D>) {
+    pub(super) fn set(&mut self, lane: usize, row: &Gathered<D>) {
         self.velocity[lane] = row.velocity;
         self.increment[lane] = row.increment;
         for k in 0..D {
@@ -104,7 +104,7 @@ impl<const D: usize> Sums<D> {
     /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes` is of use where they
     /// have moments.
     #[inline(always)]
-    pub fn gather<V: Vector>(
+    pub(super) fn gather<V: Vector>(
         &mut self,
         weights: &Weights<D>,
         nodes: &mut NodeWeights,

@@ -35,7 +35,7 @@ pub(super) struct NodeWeights(pub [[f64; LANES]; 32]);
 const TWO_52: f64 = 4_503_599_627_370_496.0;
 
 impl<const D: usize> Weights<D> {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         let none = [[0.0; LANES]; 3];
         Self {
             first: [TWO_52; LANES],
@@ -48,7 +48,13 @@ impl<const D: usize> Weights<D> {
 
     /// Boxes around `centre`, arms relative to `position`.
     #[inline(always)]
-    pub fn fill<V: Vector>(&mut self, frame: &Frame<D>, position: &[V; D], centre: &[V; D], half: &[V; D]) {
+    pub(super) fn fill<V: Vector>(
+        &mut self,
+        frame: &Frame<D>,
+        position: &[V; D],
+        centre: &[V; D],
+        half: &[V; D],
+    ) {
         let inverse = 1.0 / frame.cell;
         let mut first = V::splat(0.0);
         let mut base = first;
@@ -84,7 +90,7 @@ impl<const D: usize> Weights<D> {
 
     /// Multiplies slopes and arms along each axis by a factor.
     #[inline(always)]
-    pub fn soften<V: Vector>(&mut self, factors: &[V; D]) {
+    pub(super) fn soften<V: Vector>(&mut self, factors: &[V; D]) {
         for (axis, factor) in self.axis.iter_mut().zip(factors) {
             for lanes in axis.slope.iter_mut().chain(&mut axis.arm) {
                 (V::load(lanes) * *factor).store(lanes);
@@ -94,19 +100,19 @@ impl<const D: usize> Weights<D> {
 
     /// Index of the lowest node in the arena.
     #[inline(always)]
-    pub fn first(&self, lane: usize) -> usize {
+    pub(super) fn first(&self, lane: usize) -> usize {
         self.first[lane].to_bits() as u16 as usize
     }
 
     /// Index in a table of stencils.
     #[inline(always)]
-    pub fn base(&self, lane: usize) -> usize {
+    pub(super) fn base(&self, lane: usize) -> usize {
         self.base[lane].to_bits() as u16 as usize
     }
 
     /// Calls `f` with the place in the arena, relative to the first node, and the weight of all nodes of a stencil.
     #[inline(always)]
-    pub fn for_each_node(&self, lane: usize, mut f: impl FnMut(usize, F64x4)) {
+    pub(super) fn for_each_node(&self, lane: usize, mut f: impl FnMut(usize, F64x4)) {
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let x = &self.axis[0].weight;
         let along = [of(&x[0]), of(&x[1]), of(&x[2])];
@@ -191,13 +197,13 @@ pub(super) fn dot(factors: &[F64x4; 3], pencil: &[F64x4; 3]) -> F64x4 {
 }
 
 impl NodeWeights {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self([[0.0; LANES]; 32])
     }
 
     /// Multiplies out the weights of all nodes.
     #[inline(never)]
-    pub fn fill<const D: usize>(&mut self, weights: &Weights<D>) {
+    pub(super) fn fill<const D: usize>(&mut self, weights: &Weights<D>) {
         let Weights { product, axis, .. } = weights;
         for c in 0..if D == 3 { 3 } else { 1 } {
             for b in 0..3 {

@@ -9,7 +9,7 @@ use crate::simd::{Vector, VectorMask};
 
 /// A pyramid, for each particle.
 #[derive(Clone, Copy)]
-pub struct Pyramid<V> {
+pub(super) struct Pyramid<V> {
     /// sin φ.
     pub friction: V,
     /// sin ψ.
@@ -22,7 +22,7 @@ pub struct Pyramid<V> {
 
 /// Returned principal stresses.
 #[derive(Clone, Copy)]
-pub struct Returned<V: Vector> {
+pub(super) struct Returned<V: Vector> {
     /// Greatest first, Pa.
     pub stress: [V; 3],
     /// Where the trial stress lies outside the pyramid.
@@ -34,14 +34,14 @@ pub struct Returned<V: Vector> {
 impl<V: Vector> Pyramid<V> {
     /// Mean stress of the apex, Pa; infinite without friction.
     #[inline(always)]
-    pub fn apex(&self) -> V {
+    pub(super) fn apex(&self) -> V {
         let zero = V::splat(0.0);
         zero.lt(self.friction).select(self.strength * 0.5 / self.friction, V::splat(f64::INFINITY))
     }
 
     /// Whether a stress with this mean and this norm of the deviator may lie outside. A cheap test that errs to the safe side.
     #[inline(always)]
-    pub fn may_flow(&self, mean: V, norm: V) -> V::Mask {
+    pub(super) fn may_flow(&self, mean: V, norm: V) -> V::Mask {
         // s₁ - s₃ <= √2 |dev|, and no principal stress is further from the mean than √(2/3) |dev|.
         let far = norm * (2.0_f64 / 3.0).sqrt();
         let least = norm.mul_add(V::splat(2.0_f64.sqrt()), (mean + mean + far) * self.friction);
@@ -56,7 +56,7 @@ impl<V: Vector> Pyramid<V> {
 
     /// The stress to which a trial stress, greatest first, returns.
     #[inline(always)]
-    pub fn returned(&self, trial: &[V; 3], elastic: &Lame) -> Returned<V> {
+    pub(super) fn returned(&self, trial: &[V; 3], elastic: &Lame) -> Returned<V> {
         let one = V::splat(1.0);
         let [s1, s2, s3] = *trial;
         let (friction, dilation) = (self.friction, self.dilation);
@@ -212,18 +212,18 @@ mod tests {
 
     /// Elimination with pivots, for three equations at most.
     mod nalgebra_free {
-        pub struct Matrix(usize, Vec<f64>);
+        pub(super) struct Matrix(usize, Vec<f64>);
 
         impl Matrix {
-            pub fn new(n: usize) -> Self {
+            pub(super) fn new(n: usize) -> Self {
                 Self(n, vec![0.0; n * n])
             }
 
-            pub fn set(&mut self, row: usize, column: usize, value: f64) {
+            pub(super) fn set(&mut self, row: usize, column: usize, value: f64) {
                 self.1[row * self.0 + column] = value;
             }
 
-            pub fn solve(mut self, mut rhs: Vec<f64>) -> Option<Vec<f64>> {
+            pub(super) fn solve(mut self, mut rhs: Vec<f64>) -> Option<Vec<f64>> {
                 let n = self.0;
                 let largest = self.1.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
                 for k in 0..n {

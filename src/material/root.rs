@@ -13,7 +13,13 @@ const TOLERANCE: f64 = 4.0 * f64::EPSILON;
 /// `function` gives value and slope; its value is positive at 0 and not positive at `high`. A value of at most `noise` counts as
 /// zero. The first point is `guess`, above 0 and at most `high`; lanes that are not `active` stay there.
 #[inline(always)]
-pub fn newton<V: Vector>(function: impl Fn(V) -> [V; 2], guess: V, high: V, noise: V, active: V::Mask) -> V {
+pub(super) fn newton<V: Vector>(
+    function: impl Fn(V) -> [V; 2],
+    guess: V,
+    high: V,
+    noise: V,
+    active: V::Mask,
+) -> V {
     let zero = V::splat(0.0);
     let (mut low, mut above) = (zero, high);
     let mut x = guess;
@@ -44,7 +50,7 @@ pub fn newton<V: Vector>(function: impl Fn(V) -> [V; 2], guess: V, high: V, nois
 ///
 /// A value of at most `noise` counts as zero. Lanes that are not `active` stay at 0.
 #[inline(always)]
-pub fn bracketed<V: Vector>(function: impl Fn(V) -> V, high: V, noise: V, active: V::Mask) -> V {
+pub(super) fn bracketed<V: Vector>(function: impl Fn(V) -> V, high: V, noise: V, active: V::Mask) -> V {
     let zero = V::splat(0.0);
     let half = V::splat(0.5);
     let (mut low, mut above) = (zero, high);

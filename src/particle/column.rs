@@ -27,9 +27,9 @@ pub struct ColumnMut<'a> {
 }
 
 /// Values of a column in order.
-pub type Values<'a> = Take<Flatten<StepBy<slice::Iter<'a, [f64; TILE]>>>>;
+pub(super) type Values<'a> = Take<Flatten<StepBy<slice::Iter<'a, [f64; TILE]>>>>;
 /// Values of a column in order, to be written.
-pub type ValuesMut<'a> = Take<Flatten<StepBy<slice::IterMut<'a, [f64; TILE]>>>>;
+pub(super) type ValuesMut<'a> = Take<Flatten<StepBy<slice::IterMut<'a, [f64; TILE]>>>>;
 
 impl<'a> Column<'a> {
     pub(super) fn new(lines: &'a [[f64; TILE]], step: usize, len: usize) -> Self {
@@ -191,7 +191,7 @@ pub(super) mod tests {
     }
 
     /// Tiles that consist of one column.
-    pub fn lines(values: &[f64]) -> Vec<[f64; TILE]> {
+    pub(crate) fn lines(values: &[f64]) -> Vec<[f64; TILE]> {
         let line = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(f64::NAN));
         values.chunks(TILE).map(line).collect()
     }

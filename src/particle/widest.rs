@@ -11,21 +11,21 @@ pub(super) struct Widest {
 
 impl Widest {
     /// To be found anew.
-    pub const UNKNOWN: Self = Self { half: f64::NAN, count: 0 };
+    pub(super) const UNKNOWN: Self = Self { half: f64::NAN, count: 0 };
 
     /// Looks at all half widths.
-    pub fn of(halves: Column) -> Self {
+    pub(super) fn of(halves: Column) -> Self {
         let half = halves.greatest();
         Self { half, count: halves.iter().filter(|&&h| h == half).count() as u32 }
     }
 
     /// The half width, unless it has to be found anew.
-    pub fn known(self) -> Option<f64> {
+    pub(super) fn known(self) -> Option<f64> {
         (!self.half.is_nan()).then_some(self.half)
     }
 
     /// A particle has come.
-    pub fn add(&mut self, half: f64) {
+    pub(super) fn add(&mut self, half: f64) {
         if half > self.half {
             *self = Self { half, count: 1 };
         } else if half == self.half {
@@ -34,7 +34,7 @@ impl Widest {
     }
 
     /// A particle has gone.
-    pub fn remove(&mut self, half: f64) {
+    pub(super) fn remove(&mut self, half: f64) {
         if half == self.half {
             self.count -= 1;
             if self.count == 0 {

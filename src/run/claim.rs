@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// The lock of a run, `JOB.lock` in its directory. Rank 0 holds it; other ranks have an empty one. It ends with the
 /// process, however that ends, so that a file left by a crash is in nobody's way.
 #[derive(Debug, Default)]
-pub struct Claim(Option<Held>);
+pub(super) struct Claim(Option<Held>);
 
 #[derive(Debug)]
 struct Held {
@@ -44,7 +44,7 @@ impl Claim {
     ///
     /// # Errors
     /// Another run has the lock, or its file cannot be written; the same on all ranks.
-    pub fn take<const D: usize>(&mut self, comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
+    pub(super) fn take<const D: usize>(&mut self, comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
         let directory = &problem.output.directory;
         let mut is_taken = false;
         let mut taken = Ok(None);
@@ -132,7 +132,7 @@ fn host() -> String {
 ///
 /// # Errors
 /// The directory holds checkpoints of this name, or outputs of another job; the same on all ranks.
-pub fn spare_results<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
+pub(super) fn spare_results<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {
         0 if directory.is_dir() => at_stake(directory, &problem.name, problem.digest),

@@ -31,7 +31,7 @@ pub(super) enum Part {
 impl Column {
     /// The columns for the fields asked for; by default for all that the files show but identifiers, of the velocity
     /// its magnitude and of the stress nothing, as its measures are fields of their own.
-    pub fn chosen(
+    pub(super) fn chosen(
         shown: &[PointField],
         asked: Option<&[PointField]>,
         path: &Path,
@@ -86,12 +86,12 @@ impl Column {
     }
 
     /// Whether it holds small whole numbers.
-    pub fn is_integer(&self) -> bool {
+    pub(super) fn is_integer(&self) -> bool {
         is_integer(self.source)
     }
 
     /// Its values in a frame; empty if the frame lacks the field.
-    pub fn values(&self, frame: &Frame) -> Vec<f64> {
+    pub(super) fn values(&self, frame: &Frame) -> Vec<f64> {
         match frame.fields.iter().find(|(field, _)| *field == self.source).map(|(_, values)| values) {
             Some(Values::Id(ids)) => ids.iter().map(|&id| id as f64).collect(),
             Some(Values::Integer(numbers)) => numbers.iter().copied().map(f64::from).collect(),
@@ -114,7 +114,7 @@ impl Column {
     }
 
     /// Identifiers in a frame, if that is what the column holds.
-    pub fn ids<'a>(&self, frame: &'a Frame) -> Option<&'a [u64]> {
+    pub(super) fn ids<'a>(&self, frame: &'a Frame) -> Option<&'a [u64]> {
         frame.fields.iter().find(|(field, _)| *field == self.source).and_then(|(_, values)| match values {
             Values::Id(ids) => Some(ids.as_slice()),
             _ => None,
@@ -146,7 +146,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// The level of a value; what is not a number gets the lowest.
-    pub fn level(&self, value: f64) -> u16 {
+    pub(super) fn level(&self, value: f64) -> u16 {
         let most = f64::from(self.levels - 1);
         let place = if self.integer {
             value - self.low
@@ -160,7 +160,7 @@ impl Scale {
 
     /// What a level stands for.
     #[cfg(test)]
-    pub fn value(&self, level: u16) -> f64 {
+    pub(super) fn value(&self, level: u16) -> f64 {
         if self.integer {
             return self.low + f64::from(level);
         }
@@ -193,7 +193,7 @@ pub(super) struct First {
 const SAMPLES: usize = 4096;
 
 impl LeafMaxima {
-    pub fn new(columns: usize) -> Self {
+    pub(super) fn new(columns: usize) -> Self {
         Self {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             half_width: f64::INFINITY,
@@ -204,7 +204,7 @@ impl LeafMaxima {
     }
 
     /// Takes a frame into account. Refuses one of another domain than the first.
-    pub fn look(&mut self, path: &Path, frame: &Frame, columns: &[Column]) -> Result<(), FileError> {
+    pub(super) fn look(&mut self, path: &Path, frame: &Frame, columns: &[Column]) -> Result<(), FileError> {
         let domain = frame.domain();
         let first = self.first.get_or_insert_with(|| First { header: frame.header.clone(), domain });
         if first.domain != domain || first.header.dimension != frame.header.dimension {
@@ -236,7 +236,7 @@ impl LeafMaxima {
     }
 
     /// The scales of the columns.
-    pub fn scales(&self, columns: &[Column], bits: u8) -> Vec<Scale> {
+    pub(super) fn scales(&self, columns: &[Column], bits: u8) -> Vec<Scale> {
         let scale = |((column, range), samples): ((&Column, &[f64; 2]), &Vec<f64>)| {
             let [low, high] = if range[0] <= range[1] { *range } else { [0.0, 0.0] };
             if column.is_integer() {
@@ -261,7 +261,7 @@ impl LeafMaxima {
     }
 
     /// The range of a column without its outermost half percents.
-    pub fn usual(&self, column: usize) -> [f64; 2] {
+    pub(super) fn usual(&self, column: usize) -> [f64; 2] {
         let samples = &self.samples[column];
         let outer = samples.len() / 200;
         match (samples.get(outer), samples.iter().rev().nth(outer)) {
@@ -271,7 +271,7 @@ impl LeafMaxima {
     }
 
     /// Edge of a unit of the packed positions, m.
-    pub fn resolution(&self) -> f64 {
+    pub(super) fn resolution(&self) -> f64 {
         const PARTS: f64 = 32.0;
         let extent = (0..3).map(|axis| self.bounds[1][axis] - self.bounds[0][axis]).fold(0.0, f64::max);
         let resolution = (extent / 65535.0).max(self.half_width / PARTS);

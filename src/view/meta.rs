@@ -57,14 +57,14 @@ pub(super) struct FrameMeta {
 }
 
 impl FrameMeta {
-    pub fn new(path: &Path, header: &Header, tree: usize, leaves: usize) -> Self {
+    pub(super) fn new(path: &Path, header: &Header, tree: usize, leaves: usize) -> Self {
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Self { file, time: header.time, step: header.step, particles: header.particles, tree, leaves }
     }
 }
 
 impl Meta {
-    pub fn new(
+    pub(super) fn new(
         options: &Options,
         columns: &[Column],
         scales: &[Scale],
@@ -106,7 +106,7 @@ impl Meta {
     }
 
     /// JSON in which HTML sees no markup.
-    pub fn json(&self) -> String {
+    pub(super) fn json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
     }
 }

@@ -2,7 +2,7 @@
 use toml::{Table, Value};
 
 /// Coarsest and finest level of a job.
-pub struct Levels {
+pub(crate) struct Levels {
     /// Coarsest.
     pub base: i64,
     /// Finest that any criterion or region wants.
@@ -11,7 +11,7 @@ pub struct Levels {
 
 impl Levels {
     /// Of the job, or of its quick version.
-    pub fn of(job: &Table, quick: bool) -> Result<Self, String> {
+    pub(crate) fn of(job: &Table, quick: bool) -> Result<Self, String> {
         let base = base_level(job);
         let finest = wishes(job).into_iter().filter_map(level).max();
         let finest = finest.ok_or("expected [adaptivity] with criteria; found none")?;
@@ -39,7 +39,7 @@ fn wishes(job: &Table) -> Vec<&Value> {
 }
 
 /// The job with the outputs that a comparison needs, with all levels one lower if `quick`.
-pub fn adaptive(job: &Table, quick: bool) -> Table {
+pub(crate) fn adaptive(job: &Table, quick: bool) -> Table {
     let mut job = with_few_outputs(job);
     if quick {
         let lower = |value: &mut Value| {
@@ -57,7 +57,7 @@ pub fn adaptive(job: &Table, quick: bool) -> Table {
 }
 
 /// The job without refinement and with the finest cells everywhere.
-pub fn uniform(job: &Table, levels: &Levels) -> Table {
+pub(crate) fn uniform(job: &Table, levels: &Levels) -> Table {
     let mut job = with_few_outputs(job);
     job.remove("adaptivity");
     let tree = Table::from_iter([("base_level".to_owned(), Value::Integer(levels.finest))]);

@@ -7,7 +7,7 @@ use crate::runs::Run;
 
 /// Which quantities.
 #[derive(Clone, Copy)]
-pub enum Headline {
+pub(crate) enum Headline {
     /// Run-out and height of a column about the z axis.
     Collapse,
     /// Depth of the lowest point of the falling cylinder.
@@ -33,7 +33,7 @@ struct Grain {
 
 impl Headline {
     /// Names and values, m.
-    pub fn values(self, job: &Table, run: &Run) -> Result<Vec<(&'static str, f64)>, String> {
+    pub(crate) fn values(self, job: &Table, run: &Run) -> Result<Vec<(&'static str, f64)>, String> {
         if let Self::Penetration = self {
             return penetration(job, run).map(|depth| vec![("penetration", depth)]);
         }

@@ -8,10 +8,10 @@ use crate::derive::Levels;
 use crate::runs::Run;
 
 /// A run with its headline quantities.
-pub type Result = (Run, Vec<(&'static str, f64)>);
+pub(crate) type Result = (Run, Vec<(&'static str, f64)>);
 
 /// What the page is about. `floor`: resident memory of an empty job, bytes.
-pub fn head(floor: f64) -> String {
+pub(crate) fn head(floor: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     format!(
         "# What refinement gains\n\n\
@@ -27,7 +27,7 @@ pub fn head(floor: f64) -> String {
 }
 
 /// The section of a scene.
-pub fn section(
+pub(crate) fn section(
     scene: &Scene,
     about: &str,
     job: &Table,

@@ -11,7 +11,7 @@ use crate::checked;
 const TICKS: f64 = 100.0;
 
 /// A run that has ended.
-pub struct Run {
+pub(crate) struct Run {
     /// Its records, in order.
     pub records: Vec<Record>,
     /// Wall time, s.
@@ -26,40 +26,40 @@ pub struct Run {
 
 impl Run {
     /// Particles at the start, at most, and at the end.
-    pub fn particles(&self) -> [u64; 3] {
+    pub(crate) fn particles(&self) -> [u64; 3] {
         let counts = || self.records.iter().map(|record| record.particles);
         [counts().next(), counts().max(), counts().next_back()].map(Option::unwrap_or_default)
     }
 
     /// Steps.
-    pub fn steps(&self) -> u64 {
+    pub(crate) fn steps(&self) -> u64 {
         self.records.last().map_or(0, |record| record.step)
     }
 
     /// Sum of the particles over all steps.
-    pub fn particle_steps(&self) -> f64 {
+    pub(crate) fn particle_steps(&self) -> f64 {
         self.records.iter().map(|record| record.steps as f64 * record.particles as f64).sum()
     }
 
     /// Greatest resident memory in a record, bytes.
-    pub fn memory(&self) -> f64 {
+    pub(crate) fn memory(&self) -> f64 {
         self.records.iter().map(|record| record.memory.max).fold(0.0, f64::max)
     }
 
     /// Wall time of the named phase, s.
-    pub fn phase(&self, name: &str) -> f64 {
+    pub(crate) fn phase(&self, name: &str) -> f64 {
         let phases = self.records.iter().flat_map(|record| &record.phases);
         phases.filter(|phase| phase.phase == name).map(|phase| phase.seconds.max).sum()
     }
 
     /// Wall time that the records account for, s.
-    pub fn recorded(&self) -> f64 {
+    pub(crate) fn recorded(&self) -> f64 {
         self.records.iter().map(|record| record.wall_seconds).sum()
     }
 }
 
 /// Runs a job with all cores of the machine.
-pub fn run(job: &toml::Table, name: &str, folder: &Path) -> Run {
+pub(crate) fn run(job: &toml::Table, name: &str, folder: &Path) -> Run {
     let file = folder.join(name).with_extension("toml");
     let results = folder.join(name);
     let mut job = job.clone();
@@ -106,7 +106,7 @@ fn last_row(path: &Path) -> Vec<(String, f64)> {
 }
 
 /// Resident memory of a job with next to no particles, bytes.
-pub fn memory_of_an_empty_job(folder: &Path) -> f64 {
+pub(crate) fn memory_of_an_empty_job(folder: &Path) -> f64 {
     let text = r#"
         version = 1
         title = "Next to nothing"

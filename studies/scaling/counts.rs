@@ -109,7 +109,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Runs all cases and writes the page.
-pub fn write_page(page: &Path) -> Result<(), Failure> {
+pub(crate) fn write_page(page: &Path) -> Result<(), Failure> {
     let mut counts = Vec::new();
     for (kind, block, ranks) in cases() {
         let records = run(&block, &format!("counts_{kind}_{ranks}"), ranks, 1)?;

@@ -5,7 +5,7 @@ use partition::{Brick, MAX_LEVEL, Octant};
 
 /// A way through the tree that visits every octant's descendants one after another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Curve {
+pub(crate) enum Curve {
     /// The order of the forest.
     Morton,
     /// Neighbours along the curve share a face.
@@ -14,7 +14,7 @@ pub enum Curve {
 
 /// Surface of a partition.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// Ghost leaves with particles, summed over all ranks: leaves that touch a leaf of another rank.
     pub ghosts: usize,
     /// Faces of cells between ranks, of the finer side, where both sides have particles.
@@ -62,7 +62,7 @@ fn hilbert<const D: usize>(octant: &Octant<D>, bits: u32) -> u128 {
 }
 
 /// Cuts the tree along a curve into `ranks` parts of equal weight, families whole, and measures their surface.
-pub fn surface<const D: usize>(
+pub(crate) fn surface<const D: usize>(
     curve: Curve,
     brick: &Brick<D>,
     leaves: &[Octant<D>],

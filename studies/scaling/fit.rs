@@ -2,7 +2,7 @@
 
 /// Coefficients `c` that minimise `Σ (Σ c_k rows[i][k] - values[i])²`, by the normal equations; each row and its
 /// value are divided by the value, so that relative errors count.
-pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> [f64; N] {
+pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> [f64; N] {
     let mut a = [[0.0; N]; N];
     let mut b = [0.0; N];
     for (row, value) in rows.iter().zip(values).filter(|(_, value)| **value > 0.0) {
@@ -38,7 +38,7 @@ pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> [f64;
 }
 
 /// As [`least_squares`], of two terms that cannot be negative: one that would be is left out.
-pub fn positive(rows: &[[f64; 2]], values: &[f64]) -> [f64; 2] {
+pub(crate) fn positive(rows: &[[f64; 2]], values: &[f64]) -> [f64; 2] {
     let both = least_squares(rows, values);
     if both.iter().all(|c| *c >= 0.0) {
         return both;
@@ -54,7 +54,7 @@ pub fn positive(rows: &[[f64; 2]], values: &[f64]) -> [f64; 2] {
 }
 
 /// Greatest relative error of a fit.
-pub fn worst<const N: usize>(c: &[f64; N], rows: &[[f64; N]], values: &[f64]) -> f64 {
+pub(crate) fn worst<const N: usize>(c: &[f64; N], rows: &[[f64; N]], values: &[f64]) -> f64 {
     let value = |row: &[f64; N]| row.iter().zip(c).map(|(x, c)| x * c).sum::<f64>();
     let pairs = rows.iter().zip(values).filter(|(_, v)| **v > 0.0);
     pairs.map(|(row, v)| (value(row) / v - 1.0).abs()).fold(0.0, f64::max)

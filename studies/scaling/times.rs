@@ -8,7 +8,7 @@ use crate::{Block, Failure, markdown, number, records, run};
 
 /// The block for so many ranks: large for a cluster (three million particles per rank), small for a
 /// workstation.
-pub fn block(ranks: usize, large: bool) -> Block {
+pub(crate) fn block(ranks: usize, large: bool) -> Block {
     let roots = Block::roots(ranks);
     match large {
         true => Block { roots, level: 4, per_cell: 2, steps: 200, every: 20 },
@@ -60,7 +60,7 @@ impl Time {
 }
 
 /// Runs both series on this machine and prints their table.
-pub fn measure(ways: &[&str]) -> Result<(), Failure> {
+pub(crate) fn measure(ways: &[&str]) -> Result<(), Failure> {
     let ways = if ways.is_empty() { &["1x1", "1x2", "2x1"][..] } else { ways };
     let mut parsed = Vec::new();
     for way in ways {
@@ -93,7 +93,7 @@ fn best(mut all: Vec<Time>) -> Vec<Time> {
 }
 
 /// Prints the table of finished runs, `strong_…` and `weak_…` by the names of their files.
-pub fn table(files: &[&str]) -> Result<(), Failure> {
+pub(crate) fn table(files: &[&str]) -> Result<(), Failure> {
     let mut found = Vec::new();
     for file in files {
         let name = Path::new(file).file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -86,7 +86,7 @@ fn picture(solver: &Solver<2>, start: &[[f64; 2]]) -> String {
 }
 
 /// Runs all cases and writes their section.
-pub fn section(comm: &Comm, page: &mut Page) {
+pub(crate) fn section(comm: &Comm, page: &mut Page) {
     page.text(
         "## A block carried through level jumps\n\n\
          A free elastic block (E = 10 kPa, 1000 kg/m3) flies 2.5 m with (1, 0.125) m/s. Exact: every particle moves by \

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::plot::Chart;
 
 /// Markdown text with tables, plots beside it, and the outcome of all checks.
-pub struct Page {
+pub(crate) struct Page {
     path: PathBuf,
     body: String,
     failed: usize,
@@ -13,7 +13,7 @@ pub struct Page {
 
 impl Page {
     /// A page to be written to `path`; plots go to a folder beside it.
-    pub fn new(path: &Path) -> Self {
+    pub(crate) fn new(path: &Path) -> Self {
         Self { path: path.to_path_buf(), body: String::new(), failed: 0 }
     }
 
@@ -22,13 +22,13 @@ impl Page {
     }
 
     /// Adds text.
-    pub fn text(&mut self, text: &str) {
+    pub(crate) fn text(&mut self, text: &str) {
         self.body.push_str(text);
         self.body.push('\n');
     }
 
     /// Adds a table.
-    pub fn table(&mut self, heads: &[&str], rows: &[Vec<String>]) {
+    pub(crate) fn table(&mut self, heads: &[&str], rows: &[Vec<String>]) {
         let _ = writeln!(self.body, "| {} |\n|{}", heads.join(" | "), " --- |".repeat(heads.len()));
         for row in rows {
             let _ = writeln!(self.body, "| {} |", row.join(" | "));
@@ -37,12 +37,12 @@ impl Page {
     }
 
     /// Adds a plot.
-    pub fn plot(&mut self, name: &str, chart: &Chart) {
+    pub(crate) fn plot(&mut self, name: &str, chart: &Chart) {
         self.picture(name, chart.title, &chart.svg());
     }
 
     /// Adds a picture.
-    pub fn picture(&mut self, name: &str, title: &str, svg: &str) {
+    pub(crate) fn picture(&mut self, name: &str, title: &str, svg: &str) {
         let folder = self.plots();
         let written = std::fs::create_dir_all(&folder)
             .and_then(|()| std::fs::write(folder.join(name).with_extension("svg"), svg));
@@ -52,7 +52,7 @@ impl Page {
     }
 
     /// Adds a line that says whether something holds.
-    pub fn check(&mut self, what: &str, found: f64, holds: bool) {
+    pub(crate) fn check(&mut self, what: &str, found: f64, holds: bool) {
         let verdict = if holds { "holds" } else { "**fails**" };
         let line = format!("- {what}: {found:.3e}, {verdict}");
         println!("{line}");
@@ -61,7 +61,7 @@ impl Page {
     }
 
     /// Writes the page; returns the number of checks that failed.
-    pub fn finish(self) -> usize {
+    pub(crate) fn finish(self) -> usize {
         let head = "# Verification\n\n\
                     Written by `studies/verification/run`, which runs every case below anew.\n\n";
         checked_write(&self.path, &(head.to_string() + &self.body));

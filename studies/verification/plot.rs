@@ -7,7 +7,7 @@ const MARGIN: [f64; 4] = [84.0, 24.0, 40.0, 56.0];
 const COLOURS: [&str; 7] = ["#111111", "#1b6ca8", "#c8502d", "#3c8d40", "#8450a8", "#a07d1c", "#555555"];
 
 /// A curve or, with `marks`, points.
-pub struct Series {
+pub(crate) struct Series {
     /// Name in the legend.
     pub name: String,
     /// Points.
@@ -17,7 +17,7 @@ pub struct Series {
 }
 
 /// A chart with two axes.
-pub struct Chart<'a> {
+pub(crate) struct Chart<'a> {
     /// Title.
     pub title: &'a str,
     /// Labels of the axes.
@@ -30,7 +30,7 @@ pub struct Chart<'a> {
 
 impl Chart<'_> {
     /// The chart as an SVG document.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let axes: [Axis; 2] = std::array::from_fn(|i| {
             let values = self.series.iter().flat_map(|s| &s.points).map(|p| p[i]);
             Axis::new(values, self.logarithmic[i])

@@ -102,7 +102,7 @@ where
 }
 
 /// Runs all cases and writes their section.
-pub fn section(comm: &Comm, page: &mut Page) {
+pub(crate) fn section(comm: &Comm, page: &mut Page) {
     page.text(
         "## Free spin across level jumps\n\n\
          A square (plane strain) and a cube of edge 1 m (1000 kg/m3, E = 1 MPa, 10 rad/s) spin freely about a point \

@@ -164,7 +164,7 @@ fn lumped_elements(length: f64, ratio: f64) -> f64 {
 }
 
 /// Runs all cases and writes their section.
-pub fn section(comm: &Comm, page: &mut Page) {
+pub(crate) fn section(comm: &Comm, page: &mut Page) {
     page.text(
         "## Pressure waves across a level jump\n\n\
          A wave packet (Gaussian envelope, standard deviation 1.5 wave lengths, cut at 2.8 of them by a smooth window; \

@@ -8,7 +8,7 @@ use crate::relaunch::{ran_if_launched, relaunch};
 use agimp::solver::{Requests, Solver};
 
 /// Runs `body` on each number of ranks. MPI starts once per process, so each is a process group of its own.
-pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
+pub(crate) fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
     if ran_if_launched(body) {
         return;
     }
@@ -19,7 +19,7 @@ pub fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
 }
 
 /// A job with one body of an elastic material in a domain of leaves of 0.25 m on level 0; its last table is `time`.
-pub fn one_body(dimension: usize, size: &str, adaptivity: &str, model: &str, body: &str) -> String {
+pub(crate) fn one_body(dimension: usize, size: &str, adaptivity: &str, model: &str, body: &str) -> String {
     format!(
         r#"
 version = 1
@@ -45,7 +45,7 @@ end = 1e3
 }
 
 /// The job with its first tree and particles.
-pub fn solver<const D: usize>(comm: &Comm, text: &str) -> Solver<D>
+pub(crate) fn solver<const D: usize>(comm: &Comm, text: &str) -> Solver<D>
 where
     Problem<D>: TryFrom<AnyProblem>,
 {
@@ -55,7 +55,7 @@ where
 }
 
 /// Steps, each followed by what is due to tree and particles.
-pub fn advance<const D: usize>(solver: &mut Solver<D>, steps: u64) {
+pub(crate) fn advance<const D: usize>(solver: &mut Solver<D>, steps: u64) {
     for _ in 0..steps {
         solver.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
         solver.regrid().unwrap_or_else(|error| panic!("{error}"));
@@ -63,13 +63,13 @@ pub fn advance<const D: usize>(solver: &mut Solver<D>, steps: u64) {
 }
 
 /// Number of particles of all ranks.
-pub fn count<const D: usize>(solver: &Solver<D>) -> u64 {
+pub(crate) fn count<const D: usize>(solver: &Solver<D>) -> u64 {
     solver.particle_totals().count
 }
 
 /// A leaf with particles.
 #[derive(Clone, Copy, Debug)]
-pub struct Filled<const D: usize> {
+pub(crate) struct Filled<const D: usize> {
     /// Level.
     pub level: u8,
     /// Lower corner, m.
@@ -83,7 +83,7 @@ pub struct Filled<const D: usize> {
 }
 
 /// Own leaves with particles.
-pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
+pub(crate) fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
     let leaves = solver.forest.leaves().iter().zip(&solver.chunks).filter(|(_, chunk)| !chunk.is_empty());
     leaves
         .map(|(leaf, chunk)| {
@@ -96,7 +96,7 @@ pub fn filled<const D: usize>(solver: &Solver<D>) -> Vec<Filled<D>> {
 }
 
 /// Number of own particles made for a level coarser than their leaf: those that enter it split on the way.
-pub fn too_coarse<const D: usize>(solver: &Solver<D>) -> usize {
+pub(crate) fn too_coarse<const D: usize>(solver: &Solver<D>) -> usize {
     let leaves = solver.forest.leaves().iter().zip(&solver.chunks);
     let in_leaf =
         |level: u8, tags: &[u64]| tags.iter().filter(|&&tag| Tag::unpack(tag).level < level).count();
@@ -104,14 +104,14 @@ pub fn too_coarse<const D: usize>(solver: &Solver<D>) -> usize {
 }
 
 /// Greatest component of stress of any own particle, Pa.
-pub fn greatest_stress<const D: usize>(solver: &Solver<D>) -> f64 {
+pub(crate) fn greatest_stress<const D: usize>(solver: &Solver<D>) -> f64 {
     let columns = (Layout::<D>::STRESS..Layout::<D>::MASS).collect::<Vec<_>>();
     let of = |column: usize| solver.chunks.iter().flat_map(move |chunk| chunk.column(column));
     columns.into_iter().flat_map(of).fold(0.0, |greatest, stress| f64::max(greatest, stress.abs()))
 }
 
 /// Lower and upper corner of a box about the boxes of all own particles, m.
-pub fn extents<const D: usize>(solver: &Solver<D>) -> ([f64; D], [f64; D]) {
+pub(crate) fn extents<const D: usize>(solver: &Solver<D>) -> ([f64; D], [f64; D]) {
     let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
     for chunk in &solver.chunks {
         for p in 0..chunk.len() {

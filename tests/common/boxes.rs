@@ -7,34 +7,34 @@ use partition::{Brick, MAX_LEVEL, Octant};
 use std::collections::BTreeMap;
 
 /// Position of a node, root edges.
-pub fn position<const D: usize>(place: [u32; D]) -> [f64; D] {
+pub(crate) fn position<const D: usize>(place: [u32; D]) -> [f64; D] {
     place.map(|x| f64::from(x) / f64::from(1u32 << (MAX_LEVEL + 2)))
 }
 
 /// A particle of mass 1 whose nodal mass is its weight, and nodal momentum the weight's gradient for a step
 /// of -1.
-pub fn unit<const D: usize>(centre: [f64; D], half: [f64; D]) -> GivenParticle<D> {
+pub(crate) fn unit<const D: usize>(centre: [f64; D], half: [f64; D]) -> GivenParticle<D> {
     let (velocity, affine) = ([0.0; D], [[0.0; D]; D]);
     GivenParticle { position: centre, half, mass: 1.0, velocity, affine, energy: 1.0 }
 }
 
 /// Errors of double arithmetic grow with this number of a box (see the README of the golden data).
-pub fn kappa<const D: usize>(centre: [f64; D], half: [f64; D]) -> f64 {
+pub(crate) fn kappa<const D: usize>(centre: [f64; D], half: [f64; D]) -> f64 {
     (0..D).map(|a| ((centre[a].abs() + 1.0) / half[a]).max(1.0)).sum()
 }
 
 /// Edge of the cells of the leaf that holds a position.
-pub fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64 {
+pub(crate) fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64 {
     let leaf = leaves.iter().find(|leaf| contains(leaf, at)).expect("the tree fills its brick");
     0.25 * 0.5f64.powi(i32::from(leaf.level))
 }
 
 /// A box, by centre and half widths, and its share of the volume of the one that it was cut from.
-pub type Part<const D: usize> = ([f64; D], [f64; D], f64);
+pub(crate) type Part<const D: usize> = ([f64; D], [f64; D], f64);
 
 /// The boxes that are transferred in place of one: equal parts, cut along the axes on which they are wider than the
 /// finest cell that they overlap.
-pub fn parts<const D: usize>(leaves: &[Octant<D>], whole: Part<D>) -> Vec<Part<D>> {
+pub(crate) fn parts<const D: usize>(leaves: &[Octant<D>], whole: Part<D>) -> Vec<Part<D>> {
     let (centre, half, share) = whole;
     let overlaps = |leaf: &Octant<D>| {
         let edge = 0.5f64.powi(i32::from(leaf.level));
@@ -59,7 +59,7 @@ pub fn parts<const D: usize>(leaves: &[Octant<D>], whole: Part<D>) -> Vec<Part<D
 }
 
 /// `Σ V |∇w|` at each node: over the boxes that are transferred, and over the boxes as given.
-pub fn gradient_sums<const D: usize>(
+pub(crate) fn gradient_sums<const D: usize>(
     brick: Brick<D>,
     leaves: &[Octant<D>],
     boxes: &[GivenParticle<D>],
@@ -81,14 +81,14 @@ pub fn gradient_sums<const D: usize>(
 }
 
 /// All kinds of boxes.
-pub const ALL: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 7, 8];
+pub(crate) const ALL: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 7, 8];
 /// Kinds of boxes at most one cell wide.
-pub const NARROW: &[u64] = &[0, 1, 2, 5, 7, 8];
+pub(crate) const NARROW: &[u64] = &[0, 1, 2, 5, 7, 8];
 /// Kinds of boxes at most a few cells wide.
-pub const WIDE: &[u64] = &[0, 1, 2, 3, 4, 5, 7, 8];
+pub(crate) const WIDE: &[u64] = &[0, 1, 2, 3, 4, 5, 7, 8];
 
 /// A box of a random kind inside the brick.
-pub fn random_box<const D: usize>(
+pub(crate) fn random_box<const D: usize>(
     random: &mut Random,
     brick: Brick<D>,
     leaves: &[Octant<D>],
@@ -133,7 +133,7 @@ pub fn random_box<const D: usize>(
 }
 
 /// Bricks and trees in turn, half of them graded.
-pub fn random_tree<const D: usize>(
+pub(crate) fn random_tree<const D: usize>(
     random: &mut Random,
     number: usize,
     deepest: u8,
@@ -147,7 +147,7 @@ pub fn random_tree<const D: usize>(
 }
 
 /// A tree in which some leaves of level 1 touch leaves `jump` levels finer.
-pub fn tree_with_jump<const D: usize>(random: &mut Random, jump: u8) -> (Brick<D>, Vec<Octant<D>>) {
+pub(crate) fn tree_with_jump<const D: usize>(random: &mut Random, jump: u8) -> (Brick<D>, Vec<Octant<D>>) {
     let brick = Brick { roots: [1; D] };
     let mut leaves: Vec<Octant<D>> =
         (0..1 << D).map(|i| Octant { level: 0, coord: [0; D] }.child(i)).collect();

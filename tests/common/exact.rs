@@ -8,7 +8,7 @@ use partition::Octant;
 
 /// Units of length along a root edge, as a power of two: boxes of 1e-9 root edges have 4 digits, and all
 /// coordinates are exact in double precision.
-pub const UNIT: u32 = 45;
+pub(crate) const UNIT: u32 = 45;
 /// Spare binary digits for the fractions of constraints.
 const SPARE: u32 = 64;
 
@@ -77,20 +77,20 @@ impl Whole {
 
 /// A box in units.
 #[derive(Clone, Copy, Debug)]
-pub struct UnitBox<const D: usize> {
+pub(crate) struct UnitBox<const D: usize> {
     pub centre: [u64; D],
     pub half: [u64; D],
 }
 
 impl<const D: usize> UnitBox<D> {
     /// Centre and half widths in root edges, exact.
-    pub fn reals(&self) -> [[f64; D]; 2] {
+    pub(crate) fn reals(&self) -> [[f64; D]; 2] {
         [self.centre, self.half].map(|list| list.map(|x| x as f64 * 2f64.powi(-(UNIT as i32))))
     }
 }
 
 /// Weight and gradient in root edges of each real node, by place on the lattice of `level`.
-pub fn weights<const D: usize>(
+pub(crate) fn weights<const D: usize>(
     leaves: &[Octant<D>],
     level: u32,
     given: &UnitBox<D>,

@@ -3,11 +3,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Columns of a history by name, without units.
-pub struct History(HashMap<String, Vec<f64>>);
+pub(crate) struct History(HashMap<String, Vec<f64>>);
 
 impl History {
     /// Of the run of this name in a directory.
-    pub fn read(directory: &Path, name: &str) -> Self {
+    pub(crate) fn read(directory: &Path, name: &str) -> Self {
         let text =
             std::fs::read_to_string(crate::launch::file(directory, name, ".history.csv")).expect("history");
         let mut lines = text.lines();
@@ -20,23 +20,23 @@ impl History {
     }
 
     /// Values of a column, row by row.
-    pub fn column(&self, name: &str) -> &[f64] {
+    pub(crate) fn column(&self, name: &str) -> &[f64] {
         self.0.get(name).unwrap_or_else(|| panic!("no column {name}: {:?}", self.0.keys()))
     }
 
     /// Value of a column in the last row.
-    pub fn last(&self, name: &str) -> f64 {
+    pub(crate) fn last(&self, name: &str) -> f64 {
         *self.column(name).last().expect("a row")
     }
 
     /// Integral over time of a column of means since the row before, from the first row at or after `start`.
-    pub fn integral(&self, name: &str, start: f64) -> f64 {
+    pub(crate) fn integral(&self, name: &str, start: f64) -> f64 {
         let (time, values) = (self.column("time"), self.column(name));
         (1..time.len()).filter(|&i| time[i - 1] >= start).map(|i| values[i] * (time[i] - time[i - 1])).sum()
     }
 
     /// Value of a column in the first row at or after `start`, with its time.
-    pub fn at(&self, name: &str, start: f64) -> (f64, f64) {
+    pub(crate) fn at(&self, name: &str, start: f64) -> (f64, f64) {
         let row = self.column("time").iter().position(|&time| time >= start).expect("a row");
         (self.column("time")[row], self.column(name)[row])
     }

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 /// What each rank runs.
-pub type Scenario = fn(&Comm);
+pub(crate) type Scenario = fn(&Comm);
 
 /// Environment variable that names the scenario of a launched process.
 const SCENARIO: &str = "AGIMP_TEST_SCENARIO";
@@ -17,14 +17,14 @@ const RESULT: &str = "result: ";
 const LIMIT: u32 = 120;
 
 /// Prints what must not depend on the number of ranks.
-pub fn report(comm: &Comm, text: impl std::fmt::Display) {
+pub(crate) fn report(comm: &Comm, text: impl std::fmt::Display) {
     if comm.rank() == 0 {
         println!("\n{RESULT}{text}");
     }
 }
 
 /// Entry of the launched processes.
-pub fn work(scenarios: &[(&str, Scenario)]) {
+pub(crate) fn work(scenarios: &[(&str, Scenario)]) {
     let Ok(name) = std::env::var(SCENARIO) else { return };
     let (_, scenario) = scenarios.iter().find(|(n, _)| *n == name).expect("a scenario of this name");
     let world = World::init().expect("MPI starts");
@@ -33,7 +33,7 @@ pub fn work(scenarios: &[(&str, Scenario)]) {
 }
 
 /// Runs the scenario with each number of ranks; it must succeed and report the same.
-pub fn agrees_for(scenario: &str, ranks: &[usize]) {
+pub(crate) fn agrees_for(scenario: &str, ranks: &[usize]) {
     if is_launched() {
         return; // somebody has started the tests themselves under mpirun
     }
@@ -47,7 +47,7 @@ pub fn agrees_for(scenario: &str, ranks: &[usize]) {
 }
 
 /// Runs the scenario in one process without `mpirun`; it must succeed.
-pub fn alone(scenario: &str) {
+pub(crate) fn alone(scenario: &str) {
     if is_launched() {
         return;
     }
@@ -56,7 +56,7 @@ pub fn alone(scenario: &str) {
 }
 
 /// Runs the scenario, which must end soon, with one line of explanation that names a place in `comm.rs`.
-pub fn fails(scenario: &str, ranks: usize, explanation: &str) {
+pub(crate) fn fails(scenario: &str, ranks: usize, explanation: &str) {
     if is_launched() {
         return;
     }

@@ -1,8 +1,8 @@
 //! What tests on several ranks share.
 #![allow(dead_code, reason = "each test uses its part")]
-pub mod boxes;
-pub mod exact;
-pub mod launch;
-pub mod mpirun;
-pub mod random;
-pub mod tree;
+pub(crate) mod boxes;
+pub(crate) mod exact;
+pub(crate) mod launch;
+pub(crate) mod mpirun;
+pub(crate) mod random;
+pub(crate) mod tree;

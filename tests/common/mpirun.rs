@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 use std::sync::Mutex;
 
 /// `jobs/environment`, which has the settings of `mpirun`.
-pub fn environment() -> PathBuf {
+pub(crate) fn environment() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of_the_workspace = |folder: &Path| Some(folder.join("jobs/environment")).filter(|path| path.exists());
     of_the_workspace(package)
@@ -15,7 +15,7 @@ pub fn environment() -> PathBuf {
 
 /// `mpirun` for that many ranks, which may share cores; what follows is the program with its arguments. The process
 /// becomes `mpirun`, so that its identifier and signals are those of the launcher. Ended after `seconds`.
-pub fn command(ranks: usize, seconds: u32) -> Command {
+pub(crate) fn command(ranks: usize, seconds: u32) -> Command {
     let mut command = Command::new("bash");
     command
         .args(["-c", r#"source "$0" && exec mpirun --bind-to none "$@""#])
@@ -26,13 +26,13 @@ pub fn command(ranks: usize, seconds: u32) -> Command {
 }
 
 /// Runs a command of [`command`] to its end. One at a time in this process: more would only compete for the same cores.
-pub fn finish(command: &mut Command) -> Output {
+pub(crate) fn finish(command: &mut Command) -> Output {
     static ONE_LAUNCH: Mutex<()> = Mutex::new(());
     let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     command.output().expect("bash starts")
 }
 
 /// Both streams of a process, for messages.
-pub fn text(output: &Output) -> String {
+pub(crate) fn text(output: &Output) -> String {
     (String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr)).into_owned()
 }

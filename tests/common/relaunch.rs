@@ -7,7 +7,7 @@ use partition::comm::{Comm, World, is_launched};
 const STARTED: &str = "this process runs the test";
 
 /// Runs `body` on one thread if this process is one of those that [`relaunch`] started; says whether it is.
-pub fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
+pub(crate) fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
     if !is_launched() {
         return false;
     }
@@ -21,7 +21,7 @@ pub fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
 }
 
 /// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it printed.
-pub fn relaunch(test: &str, ranks: usize, seconds: u32) -> String {
+pub(crate) fn relaunch(test: &str, ranks: usize, seconds: u32) -> String {
     let mut command = mpirun::command(ranks, seconds);
     command.arg(std::env::current_exe().expect("own path")).args([
         "--exact",

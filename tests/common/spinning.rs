@@ -1,7 +1,7 @@
 //! Free bodies that spin where regions of three levels meet, level 0 touching level 2.
 
 /// A square of side 1 in the middle of 3 m x 3 m.
-pub const SQUARE: &str = r#"
+pub(crate) const SQUARE: &str = r#"
 version = 1
 dimension = 2
 gravity = [0, 0]
@@ -35,7 +35,7 @@ every = 1e3
 "#;
 
 /// A cube of side 1 likewise.
-pub const CUBE: &str = r#"
+pub(crate) const CUBE: &str = r#"
 version = 1
 dimension = 3
 gravity = [0, 0, 0]

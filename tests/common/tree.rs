@@ -4,7 +4,11 @@ use partition::{Brick, Comm, Forest, Octant};
 use serde_json::Value;
 
 /// Collective. A forest of the leaves in equal shares.
-pub fn forest_of<const D: usize>(comm: &Comm, brick: Brick<D>, mut leaves: Vec<Octant<D>>) -> Forest<D> {
+pub(crate) fn forest_of<const D: usize>(
+    comm: &Comm,
+    brick: Brick<D>,
+    mut leaves: Vec<Octant<D>>,
+) -> Forest<D> {
     leaves.sort_unstable();
     let cut = |rank: usize| rank * leaves.len() / comm.size();
     let own = leaves[cut(comm.rank())..cut(comm.rank() + 1)].to_vec();
@@ -12,7 +16,7 @@ pub fn forest_of<const D: usize>(comm: &Comm, brick: Brick<D>, mut leaves: Vec<O
 }
 
 /// Octants `[level, i, j(, k)]` of a file.
-pub fn octants<const D: usize>(list: &Value) -> Vec<Octant<D>> {
+pub(crate) fn octants<const D: usize>(list: &Value) -> Vec<Octant<D>> {
     let number = |value: &Value| value.as_u64().expect("a number") as u32;
     let octant = |entry: &Value| Octant {
         level: number(&entry[0]) as u8,
@@ -23,7 +27,7 @@ pub fn octants<const D: usize>(list: &Value) -> Vec<Octant<D>> {
 
 /// A random tree: leaves around `points` points are split down to random levels, at most `deepest`, so that
 /// neighbouring leaves differ by any number of levels.
-pub fn random_leaves<const D: usize>(
+pub(crate) fn random_leaves<const D: usize>(
     random: &mut Random,
     brick: Brick<D>,
     points: u64,
@@ -44,13 +48,13 @@ pub fn random_leaves<const D: usize>(
 }
 
 /// Whether a position in root edges lies in the octant.
-pub fn contains<const D: usize>(octant: &Octant<D>, at: [f64; D]) -> bool {
+pub(crate) fn contains<const D: usize>(octant: &Octant<D>, at: [f64; D]) -> bool {
     let scale = f64::from(1u32 << octant.level);
     (0..D).all(|axis| (at[axis] * scale) as u32 == octant.coord[axis])
 }
 
 /// Splits each leaf that touches one more than a level finer, until there is none.
-pub fn graded<const D: usize>(mut leaves: Vec<Octant<D>>) -> Vec<Octant<D>> {
+pub(crate) fn graded<const D: usize>(mut leaves: Vec<Octant<D>>) -> Vec<Octant<D>> {
     while let Some(index) = (0..leaves.len())
         .find(|&i| leaves.iter().any(|other| other.level > leaves[i].level + 1 && other.touches(&leaves[i])))
     {

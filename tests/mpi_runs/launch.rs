@@ -10,12 +10,12 @@ use super::mpirun;
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A job of `tests/jobs/runs`.
-pub fn job(name: &str) -> PathBuf {
+pub(crate) fn job(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/jobs/runs/{name}.toml"))
 }
 
 /// The small collapse with one text of its job replaced, in a directory of its own.
-pub fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> PathBuf {
+pub(crate) fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> PathBuf {
     let text = std::fs::read_to_string(job("collapse_2d")).expect("job");
     assert!(text.contains(from));
     let path = directory.join(folder).join("collapse_2d.toml");
@@ -25,21 +25,21 @@ pub fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) -> Path
 }
 
 /// The program, in a directory.
-pub fn agimp(directory: &Path) -> Command {
+pub(crate) fn agimp(directory: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_agimp"));
     command.current_dir(directory);
     command
 }
 
 /// `mpirun` in a directory. What the program needs of the MPI library it has to set itself.
-pub fn mpirun(directory: &Path, ranks: usize) -> Command {
+pub(crate) fn mpirun(directory: &Path, ranks: usize) -> Command {
     let mut command = mpirun::command(ranks, PATIENCE.as_secs() as u32);
     command.current_dir(directory).env_remove("OMPI_MCA_mpi_yield_when_idle");
     command
 }
 
 /// `agimp run JOB --threads THREADS ARGUMENTS…` on that many ranks; one rank is started without `mpirun`.
-pub fn run(directory: &Path, ranks: usize, threads: usize, job: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn run(directory: &Path, ranks: usize, threads: usize, job: &Path, arguments: &[&str]) -> Command {
     let mut command = if ranks == 1 {
         agimp(directory)
     } else {
@@ -52,13 +52,13 @@ pub fn run(directory: &Path, ranks: usize, threads: usize, job: &Path, arguments
 }
 
 /// A command under way; killed if dropped early.
-pub struct Running {
+pub(crate) struct Running {
     child: Child,
     what: String,
 }
 
 impl Running {
-    pub fn start(command: &mut Command) -> Self {
+    pub(crate) fn start(command: &mut Command) -> Self {
         let what = format!("{command:?}");
         let child = command
             .stdin(Stdio::null())
@@ -70,7 +70,7 @@ impl Running {
     }
 
     /// Process identifiers of the ranks: the process itself, or what `mpirun` has started.
-    pub fn ranks(&self) -> Vec<u32> {
+    pub(crate) fn ranks(&self) -> Vec<u32> {
         let launcher = self.child.id();
         let is_rank = |process: &u32| {
             std::fs::read_link(format!("/proc/{process}/exe"))
@@ -84,12 +84,12 @@ impl Running {
         }
     }
 
-    pub fn launcher(&self) -> u32 {
+    pub(crate) fn launcher(&self) -> u32 {
         self.child.id()
     }
 
     /// Waits until the run in `directory` has reached a step, by its history.
-    pub fn wait_for_step(&mut self, directory: &Path, name: &str, step: u64) {
+    pub(crate) fn wait_for_step(&mut self, directory: &Path, name: &str, step: u64) {
         let started = Instant::now();
         while last_step(directory, name) < step {
             if let Some(status) = self.child.try_wait().expect("child") {
@@ -101,7 +101,7 @@ impl Running {
     }
 
     /// Waits for the end; not longer than `limit`.
-    pub fn finish_within(mut self, limit: Duration) -> Output {
+    pub(crate) fn finish_within(mut self, limit: Duration) -> Output {
         let started = Instant::now();
         // The output is short enough for the pipes, so it can be read at the end.
         while self.child.try_wait().expect("child").is_none() {
@@ -118,7 +118,7 @@ impl Running {
         output
     }
 
-    pub fn finish(self) -> Output {
+    pub(crate) fn finish(self) -> Output {
         self.finish_within(PATIENCE)
     }
 }
@@ -150,20 +150,20 @@ fn children(parent: u32) -> Vec<u32> {
 }
 
 /// Whether a process is there and not merely waiting to be collected.
-pub fn is_alive(process: u32) -> bool {
+pub(crate) fn is_alive(process: u32) -> bool {
     std::fs::read_to_string(format!("/proc/{process}/stat"))
         .is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or_default().trim_start().starts_with('Z'))
 }
 
 /// Sends a signal, given as `kill` names it.
-pub fn signal(process: u32, name: &str) {
+pub(crate) fn signal(process: u32, name: &str) {
     // The shell's own `kill`: small systems have no other.
     let status = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
     assert!(status.expect("sh starts").success(), "no process {process}");
 }
 
 /// Text of both streams, for messages of tests.
-pub fn text(output: &Output) -> String {
+pub(crate) fn text(output: &Output) -> String {
     format!(
         "{}\n{}{}",
         output.status,
@@ -173,26 +173,26 @@ pub fn text(output: &Output) -> String {
 }
 
 /// Runs to the end, which must be a good one.
-pub fn succeed(command: &mut Command) -> Output {
+pub(crate) fn succeed(command: &mut Command) -> Output {
     let output = Running::start(command).finish();
     assert!(output.status.success(), "{command:?}\n{}", text(&output));
     output
 }
 
 /// Path of a file of the run.
-pub fn file(directory: &Path, name: &str, suffix: &str) -> PathBuf {
+pub(crate) fn file(directory: &Path, name: &str, suffix: &str) -> PathBuf {
     directory.join(format!("out/{name}/{name}{suffix}"))
 }
 
 /// Step of the last whole row of the history; 0 while there is none.
-pub fn last_step(directory: &Path, name: &str) -> u64 {
+pub(crate) fn last_step(directory: &Path, name: &str) -> u64 {
     let history = std::fs::read_to_string(file(directory, name, ".history.csv")).unwrap_or_default();
     let whole = history.rfind('\n').map_or("", |end| &history[..end]);
     whole.lines().last().and_then(|row| row.split(',').next()?.parse().ok()).unwrap_or(0)
 }
 
 /// Files of a directory by name, with their contents.
-pub fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(directory).expect("directory").flatten();
     let read = |path: PathBuf| std::fs::read(&path).expect("file");
     entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
@@ -200,7 +200,7 @@ pub fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
 
 /// What a run to the end leaves, but for times measured. Files with a state, which hold the text of the job too, stand
 /// there with their digests; of checkpoints the last counts.
-pub fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
     let results = directory.join("out").join(name);
     let mut files = contents(&results);
     files.retain(|file, _| !file.contains("telemetry"));
@@ -220,7 +220,7 @@ pub fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
 
 /// What has to be the same however a run was carried out.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// What `agimp digest --parts` prints of the last output.
     pub digest: String,
     /// The whole history.
@@ -233,7 +233,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Reads what a finished run has left.
-    pub fn read(directory: &Path, name: &str) -> Self {
+    pub(crate) fn read(directory: &Path, name: &str) -> Self {
         let files = contents(&directory.join("out").join(name));
         let output = |file: &&String| {
             file.strip_prefix(name)
@@ -257,7 +257,7 @@ impl Outcome {
 
     /// Fails unless both are the same, telling what is not.
     #[track_caller]
-    pub fn assert_same(&self, other: &Self, what: &str) {
+    pub(crate) fn assert_same(&self, other: &Self, what: &str) {
         assert_eq!(self.digest, other.digest, "{what}: digest");
         let rows = |result: &Self| String::from_utf8_lossy(&result.history).into_owned();
         for (ours, theirs) in rows(self).lines().zip(rows(other).lines()) {

@@ -1,10 +1,10 @@
 //! Mutations of texts and files, each decided by its seed alone.
 
 /// Numbers that follow from a seed (splitmix64).
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -16,7 +16,7 @@ impl Random {
     }
 
     /// A number below `limit`; 0 if that is 0.
-    pub fn below(&mut self, limit: usize) -> usize {
+    pub(crate) fn below(&mut self, limit: usize) -> usize {
         (self.next() % limit.max(1) as u64) as usize
     }
 
@@ -167,7 +167,7 @@ fn replaced(text: &str, (from, to): (usize, usize), new: &str) -> String {
 }
 
 /// One of the jobs with up to three mutations.
-pub fn mutated_text(random: &mut Random, jobs: &[String]) -> Vec<u8> {
+pub(crate) fn mutated_text(random: &mut Random, jobs: &[String]) -> Vec<u8> {
     let mut text = jobs[random.below(jobs.len())].clone();
     for _ in 0..=random.below(3) {
         text = once(random, text, jobs);
@@ -278,7 +278,7 @@ fn bytes(random: &mut Random, mut bytes: Vec<u8>) -> Vec<u8> {
 }
 
 /// One of the files with changed bytes: half of the time near `mark`, where the header is.
-pub fn mutated_bytes(random: &mut Random, files: &[Vec<u8>], mark: &[u8]) -> Vec<u8> {
+pub(crate) fn mutated_bytes(random: &mut Random, files: &[Vec<u8>], mark: &[u8]) -> Vec<u8> {
     let mut file = files[random.below(files.len())].clone();
     let near = file.windows(mark.len()).position(|window| window == mark).filter(|_| random.below(2) == 0);
     let range = near.map_or(0..file.len(), |at| at.saturating_sub(4000)..(at + 8000).min(file.len()));

@@ -6,7 +6,7 @@ use partition::{Comm, NeighbourExchange};
 
 use crate::random::{Random, hash};
 
-pub fn reductions(comm: &Comm) {
+pub(crate) fn reductions(comm: &Comm) {
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
     assert_eq!(comm.min_f64(rank as f64 - 1.5), -1.5);
     assert_eq!(comm.max_f64(rank as f64 - 1.5), size as f64 - 2.5);
@@ -56,7 +56,7 @@ pub fn reductions(comm: &Comm) {
     }
 }
 
-pub fn agree(comm: &Comm) {
+pub(crate) fn agree(comm: &Comm) {
     let (rank, size) = (comm.rank(), comm.size());
     assert_eq!(comm.agree::<_, String>(Ok(rank)).expect("all agree"), rank);
     for failing in 0..size {
@@ -69,7 +69,7 @@ pub fn agree(comm: &Comm) {
 }
 
 /// Random patterns, many rounds without a barrier between them, with ranks held up at random.
-pub fn sparse(comm: &Comm) {
+pub(crate) fn sparse(comm: &Comm) {
     let (rank, size) = (comm.rank(), comm.size());
     // Messages of `from` in this round, as every rank can know.
     let messages = |round: u64, from: usize| {
@@ -106,7 +106,7 @@ pub fn sparse(comm: &Comm) {
     assert_eq!(comm.sparse_exchange::<[f64; 3]>(vec![]), vec![]);
 }
 
-pub fn neighbours(comm: &Comm) {
+pub(crate) fn neighbours(comm: &Comm) {
     let (rank, size) = (comm.rank(), comm.size());
     let mut ring = vec![(rank + 1) % size, (rank + size - 1) % size, rank];
     ring.sort_unstable();
@@ -160,19 +160,19 @@ pub fn neighbours(comm: &Comm) {
     assert_eq!(NeighbourExchange::new(comm, lopsided, 3).is_valid(), size == 1);
 }
 
-pub fn panic_in_a_step(comm: &Comm) {
+pub(crate) fn panic_in_a_step(comm: &Comm) {
     comm.begin_step(17);
     panic_on_last(comm);
 }
 
 /// On all ranks, on two threads each.
-pub fn panic_everywhere(_: &Comm) {
+pub(crate) fn panic_everywhere(_: &Comm) {
     let threads = [(); 2].map(|()| std::thread::spawn(|| panic!("deliberate")));
     threads.into_iter().for_each(|thread| drop(thread.join()));
     std::thread::sleep(Duration::from_secs(20));
 }
 
-pub fn panic_on_last(comm: &Comm) {
+pub(crate) fn panic_on_last(comm: &Comm) {
     if comm.rank() == comm.size() - 1 {
         panic!("deliberate");
     }

@@ -6,13 +6,13 @@ use partition::{Brick, Comm, CutAt, Forest, MAX_LEVEL, Mark, Octant};
 
 /// All leaves of a tree.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Oracle<const D: usize> {
+pub(crate) struct Oracle<const D: usize> {
     pub brick: Brick<D>,
     pub leaves: BTreeSet<Octant<D>>,
 }
 
 impl<const D: usize> Oracle<D> {
-    pub fn uniform(brick: Brick<D>, level: u8) -> Self {
+    pub(crate) fn uniform(brick: Brick<D>, level: u8) -> Self {
         let mut leaves: BTreeSet<Octant<D>> = (0..brick.root_count())
             .map(|mut i| {
                 let coord = std::array::from_fn(|a| {
@@ -30,7 +30,7 @@ impl<const D: usize> Oracle<D> {
         Oracle { brick, leaves }
     }
 
-    pub fn adapt(&mut self, mark: impl Fn(&Octant<D>) -> Mark) {
+    pub(crate) fn adapt(&mut self, mark: impl Fn(&Octant<D>) -> Mark) {
         let mut result = BTreeSet::new();
         for leaf in &self.leaves {
             let coarsens = |l: &Octant<D>| self.leaves.contains(l) && mark(l) == Mark::Coarsen;
@@ -47,14 +47,14 @@ impl<const D: usize> Oracle<D> {
         self.leaves = result;
     }
 
-    pub fn refine_where(&mut self, wanted: impl Fn(&Octant<D>) -> bool) {
+    pub(crate) fn refine_where(&mut self, wanted: impl Fn(&Octant<D>) -> bool) {
         while let Some(leaf) = self.leaves.iter().find(|l| l.level < MAX_LEVEL && wanted(l)).copied() {
             self.split(&leaf);
         }
     }
 
     /// Splits each leaf that touches one more than a level finer, until there is none.
-    pub fn balance(&mut self) {
+    pub(crate) fn balance(&mut self) {
         loop {
             let too_coarse: Vec<_> = self.leaves.iter().filter(|&leaf| !self.fits(leaf)).copied().collect();
             if too_coarse.is_empty() {
@@ -64,7 +64,7 @@ impl<const D: usize> Oracle<D> {
         }
     }
 
-    pub fn is_balanced(&self) -> bool {
+    pub(crate) fn is_balanced(&self) -> bool {
         self.leaves.iter().all(|leaf| self.fits(leaf))
     }
 
@@ -79,7 +79,7 @@ impl<const D: usize> Oracle<D> {
 
     /// Number of leaves of each rank for these weights: each cut is nearest to its ideal place, between families
     /// runs of siblings are whole.
-    pub fn shares(&self, ranks: usize, at: CutAt, weight: impl Fn(&Octant<D>) -> u64) -> Vec<usize> {
+    pub(crate) fn shares(&self, ranks: usize, at: CutAt, weight: impl Fn(&Octant<D>) -> u64) -> Vec<usize> {
         let leaves: Vec<_> = self.leaves.iter().copied().collect();
         let mut weights: Vec<u64> = leaves.iter().map(weight).collect();
         if weights.iter().all(|&w| w == 0) {
@@ -111,12 +111,12 @@ impl<const D: usize> Oracle<D> {
     }
 }
 
-pub fn children<const D: usize>(octant: &Octant<D>) -> Vec<Octant<D>> {
+pub(crate) fn children<const D: usize>(octant: &Octant<D>) -> Vec<Octant<D>> {
     (0..Octant::<D>::CHILDREN).map(|i| octant.child(i)).collect()
 }
 
 /// Collective. Leaves of each rank, everywhere. What the library itself never does.
-pub fn all_leaves<const D: usize>(comm: &Comm, forest: &Forest<D>) -> Vec<Vec<Octant<D>>> {
+pub(crate) fn all_leaves<const D: usize>(comm: &Comm, forest: &Forest<D>) -> Vec<Vec<Octant<D>>> {
     let bytes: Vec<u8> = forest.leaves().iter().flat_map(|leaf| leaf.code().to_ne_bytes()).collect();
     let gathered = comm.gather_bytes(&bytes);
     (0..comm.size())
@@ -130,7 +130,7 @@ pub fn all_leaves<const D: usize>(comm: &Comm, forest: &Forest<D>) -> Vec<Vec<Oc
 }
 
 /// Collective. Checks that the forest is valid and has the leaves of the oracle.
-pub fn assert_same<const D: usize>(comm: &Comm, forest: &Forest<D>, oracle: &Oracle<D>, what: &str) {
+pub(crate) fn assert_same<const D: usize>(comm: &Comm, forest: &Forest<D>, oracle: &Oracle<D>, what: &str) {
     if let Err(error) = forest.is_valid(comm) {
         panic!("after {what}: {error}");
     }

@@ -24,7 +24,7 @@ fn random_region<const D: usize>(random: &mut Random, brick: &Brick<D>) -> Regio
     region
 }
 
-pub fn random_queries<const D: usize>(comm: &Comm) {
+pub(crate) fn random_queries<const D: usize>(comm: &Comm) {
     for seed in 0..6 {
         let mut random = Random::new(1000 + seed);
         let brick = random_brick::<D>(&mut random);

@@ -7,7 +7,7 @@ use crate::oracle::{Oracle, all_leaves, assert_same};
 use crate::random::{Random, hash};
 
 /// A small brick with random numbers of roots; one of a single root now and then.
-pub fn random_brick<const D: usize>(random: &mut Random) -> Brick<D> {
+pub(crate) fn random_brick<const D: usize>(random: &mut Random) -> Brick<D> {
     let most = if random.one_in(4) { 1 } else { 3 };
     Brick { roots: std::array::from_fn(|_| 1 + random.below(most) as u32) }
 }
@@ -37,7 +37,7 @@ fn payload<const D: usize>(leaf: &Octant<D>) -> Vec<[u16; 3]> {
     (0..leaf.code() % 4).map(|i| [i as u16, leaf.code() as u16, (leaf.code() >> 16) as u16]).collect()
 }
 
-pub fn random_trees<const D: usize>(comm: &Comm) {
+pub(crate) fn random_trees<const D: usize>(comm: &Comm) {
     for seed in 0..if D == 2 { 12 } else { 6 } {
         let mut random = Random::new(seed);
         // The first tree begins as one leaf, so that most ranks are empty for a while.
@@ -178,7 +178,7 @@ fn share_out_at<const D: usize>(
 }
 
 /// Uniform trees of bricks of many shapes are cut as `partition` cuts them.
-pub fn uniform(comm: &Comm) {
+pub(crate) fn uniform(comm: &Comm) {
     for roots in [[1, 1], [3, 1], [5, 7], [64, 1], [9, 64]] {
         for level in 0..3 {
             let brick = Brick { roots };
@@ -198,7 +198,7 @@ pub fn uniform(comm: &Comm) {
 }
 
 /// The same tree given in segments cut anywhere, families torn, is cut the same afterwards.
-pub fn given_leaves(comm: &Comm) {
+pub(crate) fn given_leaves(comm: &Comm) {
     for seed in 0..12 {
         let mut random = Random::new(100 + seed);
         let brick = random_brick::<2>(&mut random);
@@ -233,7 +233,7 @@ pub fn given_leaves(comm: &Comm) {
 }
 
 /// Leaves that are no tree are refused with the same words on all ranks.
-pub fn bad_leaves(comm: &Comm) {
+pub(crate) fn bad_leaves(comm: &Comm) {
     let brick = Brick { roots: [2, 1] };
     let good: Vec<_> = Oracle::uniform(brick, 2).leaves.into_iter().collect();
     let last = comm.rank() == comm.size() - 1;

@@ -21,7 +21,7 @@ pub(super) struct Group {
 
 impl Group {
     /// Children of a family are given by number, which is not their order in the chunk once they have moved.
-    pub fn new(mut members: Vec<u32>, id: u64, is_family: bool) -> Self {
+    pub(super) fn new(mut members: Vec<u32>, id: u64, is_family: bool) -> Self {
         if let Some(first) = (0..members.len()).min_by_key(|&i| members[i]) {
             // The merged particle takes the place of the first in the chunk.
             members[..=first].rotate_right(1);

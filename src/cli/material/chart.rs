@@ -18,7 +18,7 @@ const PANELS: [Panel; 3] = [
 ///
 /// # Errors
 /// The file cannot be written, or the numbers cannot be drawn; why.
-pub fn draw(table: &Table, path: &Path) -> Result<(), String> {
+pub(super) fn draw(table: &Table, path: &Path) -> Result<(), String> {
     let mut text = String::new();
     panels(table, &mut text).map_err(|error| error.to_string())?;
     std::fs::write(path, text).map_err(|error| error.to_string())

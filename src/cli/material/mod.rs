@@ -148,7 +148,7 @@ enum MaterialError {
 ///
 /// # Errors
 /// Model or path cannot be used, or standard output cannot be written.
-pub fn execute(args: &Arguments) -> Result<(), Failure> {
+pub(super) fn execute(args: &Arguments) -> Result<(), Failure> {
     drive(args, &mut std::io::stdout().lock()).map_err(|error| match error {
         MaterialError::Write(error) => error.into(),
         other => Failure::Usage(other.to_string()),

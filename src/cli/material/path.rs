@@ -9,7 +9,7 @@ use crate::material::driver::control::{COMPONENTS, Prescribed, Target};
 
 /// What a file prescribes.
 #[derive(Debug)]
-pub enum Drive {
+pub(super) enum Drive {
     /// Total deformations.
     Deformation(Vec<Deformation>),
     /// Strains and stresses, with the time at the end of each row.
@@ -18,7 +18,7 @@ pub enum Drive {
 
 /// A row of prescribed strains and stresses.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub(super) struct Row {
     /// Time since the start, s.
     pub time: f64,
     /// What holds then.
@@ -27,7 +27,7 @@ pub struct Row {
 
 /// A total deformation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Deformation {
+pub(super) enum Deformation {
     /// Logarithmic strains along the axes.
     Strain([f64; 3]),
     /// Deformation gradient.
@@ -35,7 +35,7 @@ pub enum Deformation {
 }
 
 impl Deformation {
-    pub fn gradient(&self) -> Matrix {
+    pub(super) fn gradient(&self) -> Matrix {
         match *self {
             Self::Gradient(f) => f,
             Self::Strain(strain) => std::array::from_fn(|i| {
@@ -46,7 +46,7 @@ impl Deformation {
 
     /// Between this (`share` 0) and `target` (`share` 1): linear in strains if both are strains, else
     /// in the deformation gradient.
-    pub fn towards(&self, target: &Self, share: f64) -> Self {
+    pub(super) fn towards(&self, target: &Self, share: f64) -> Self {
         let between = |a: f64, b: f64| if share == 1.0 { b } else { (b - a).mul_add(share, a) };
         if let (Self::Strain(a), Self::Strain(b)) = (self, target) {
             return Self::Strain(std::array::from_fn(|k| between(a[k], b[k])));
@@ -112,7 +112,7 @@ impl JsonRow {
 }
 
 /// Reads a path from CSV or JSON.
-pub fn read_path(path: &Path) -> Result<Drive, MaterialError> {
+pub(super) fn read_path(path: &Path) -> Result<Drive, MaterialError> {
     let text = read(path)?;
     let failed = |row: usize, reason: String| MaterialError::Row { path: path.to_path_buf(), row, reason };
     if text.trim_start().starts_with(['[', '{']) {

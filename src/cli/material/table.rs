@@ -6,7 +6,7 @@ use crate::material::driver::{Matrix, Point, determinant, logarithmic_strain};
 
 /// A state to be noted.
 #[derive(Debug)]
-pub struct Stage<'a> {
+pub(super) struct Stage<'a> {
     /// Time, s.
     pub time: f64,
     /// Deformation gradient.
@@ -17,7 +17,7 @@ pub struct Stage<'a> {
 
 /// What a picture shows of a state.
 #[derive(Clone, Copy, Debug)]
-pub struct Invariants {
+pub(super) struct Invariants {
     /// Strain of volume `tr ε` and of shear `√(2/3) |dev ε|`.
     pub strain: [f64; 2],
     /// Cauchy pressure and `q = √(3/2) |dev σ|`, Pa.
@@ -26,7 +26,7 @@ pub struct Invariants {
 
 /// All states.
 #[derive(Debug)]
-pub struct Table {
+pub(super) struct Table {
     names: Vec<String>,
     histories: usize,
     rows: Vec<Vec<f64>>,
@@ -36,7 +36,7 @@ pub struct Table {
 
 impl Table {
     /// No states yet, of a material with these history variables.
-    pub fn new(histories: &[&str]) -> Self {
+    pub(super) fn new(histories: &[&str]) -> Self {
         let mut names = Vec::new();
         let tensor = |name: &'static str| COMPONENTS.iter().map(move |c| format!("{name}_{c}"));
         names.extend(tensor("tau").chain(tensor("b")));
@@ -48,7 +48,7 @@ impl Table {
     }
 
     /// Notes a state.
-    pub fn push(&mut self, stage: &Stage) {
+    pub(super) fn push(&mut self, stage: &Stage) {
         let Stage { time, gradient, point } = stage;
         let volume = determinant(gradient);
         let strain = logarithmic_strain(gradient);
@@ -71,7 +71,7 @@ impl Table {
     ///
     /// # Errors
     /// `out` takes no more.
-    pub fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
+    pub(super) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         writeln!(out, "row,{}", self.names.join(","))?;
         for (i, row) in self.rows.iter().enumerate() {
             write!(out, "{i}")?;

@@ -23,7 +23,7 @@ pub enum Trial {
 }
 
 /// Rows of a test: the confinement, and `rows` more to the end of the range.
-pub fn rows(test: Trial, args: &Arguments) -> Result<Vec<Row>, MaterialError> {
+pub(super) fn rows(test: Trial, args: &Arguments) -> Result<Vec<Row>, MaterialError> {
     let fail = |option, value, range| Err(MaterialError::Option { option, value, range });
     if !(args.pressure >= 0.0 && args.pressure.is_finite()) {
         return fail("pressure", args.pressure, "at least 0 (Pa)");

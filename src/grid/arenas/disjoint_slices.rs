@@ -10,12 +10,12 @@ pub(in crate::grid) struct DisjointSlices<'a, T> {
 
 impl<'a, T> DisjointSlices<'a, T> {
     /// Of a slice whose first element has the index `first`.
-    pub fn new(slice: &'a mut [T], first: usize) -> Self {
+    pub(crate) fn new(slice: &'a mut [T], first: usize) -> Self {
         Self { rest: slice, first }
     }
 
     /// The elements with these indices, which begin behind those of the last piece.
-    pub fn cut(&mut self, range: Range<usize>) -> &'a mut [T] {
+    pub(crate) fn cut(&mut self, range: Range<usize>) -> &'a mut [T] {
         let (_, rest) = std::mem::take(&mut self.rest).split_at_mut(range.start - self.first);
         let (piece, rest) = rest.split_at_mut(range.len());
         (self.rest, self.first) = (rest, range.end);

@@ -50,7 +50,7 @@ pub(in crate::grid) struct Tables<'a, const D: usize> {
 
 impl<'a, const D: usize> Tables<'a, D> {
     /// `second` holds the second moments of all blocks, by row of their first moments.
-    pub fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
+    pub(crate) fn new(blocks: &'a [Block<D>], second: Vec<f64>) -> Self {
         let mut known: FxHashMap<Vec<u64>, u32> = FxHashMap::default();
         let kinds = blocks.iter().map(|block| {
             let own = &second[block.first_moment as usize..][..rows_of::<D>(block.with_moments)];
@@ -65,7 +65,7 @@ impl<'a, const D: usize> Tables<'a, D> {
     }
 
     /// Number of the table for the nodes around a bin.
-    pub fn number(&mut self, around: &[u32; 27]) -> u32 {
+    pub(crate) fn number(&mut self, around: &[u32; 27]) -> u32 {
         let kinds = around.map(|block| self.kinds.get(block as usize).copied().unwrap_or(NO_BLOCK));
         if let Some(&number) = self.of_kinds.get(&kinds) {
             return number;
@@ -102,7 +102,7 @@ impl<'a, const D: usize> Tables<'a, D> {
     }
 
     /// The tables by number.
-    pub fn finish(self) -> Vec<ArenaConstraints<D>> {
+    pub(crate) fn finish(self) -> Vec<ArenaConstraints<D>> {
         self.tables
     }
 }

@@ -49,7 +49,7 @@ pub(super) struct BlockSum<'a, const D: usize> {
 
 impl<'a, const D: usize> BlockSum<'a, D> {
     /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and from other ranks.
-    pub fn find(
+    pub(super) fn find(
         sources: Sources<'a, D>,
         scratch: &'a mut Irregular<D>,
         block: usize,
@@ -118,12 +118,12 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     }
 
     /// Whether nothing reaches the block.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.occupied == 0 && self.mixed == 0
     }
 
     /// Nodes that own bins touch.
-    pub fn own_nodes(&self) -> u64 {
+    pub(super) fn own_nodes(&self) -> u64 {
         let outer = self.scratch.outer.iter().fold(0, |all, term| all | term.touched);
         bits(u64::from(self.occupied)).fold(outer, |all, position| all | self.touched_at(position as usize))
     }
@@ -138,7 +138,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     }
 
     /// Writes the sums of momentum and mass at all nodes of the regions in `wanted`.
-    pub fn sum_rows(&mut self, wanted: u32, to: &mut [Row]) {
+    pub(super) fn sum_rows(&mut self, wanted: u32, to: &mut [Row]) {
         let to = &mut to[..block_nodes(D)];
         self.all_planes::<false>(wanted & !self.mixed, to);
         let left = if self.mixed == 0 { 0 } else { self.all_planes::<true>(wanted & self.mixed, to) };
@@ -245,7 +245,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
     }
 
     /// Writes the sums of first moments at those of `nodes` that have any. `to` has all moments of the block.
-    pub fn sum_moments(&mut self, nodes: u64, to: &mut [Row]) {
+    pub(super) fn sum_moments(&mut self, nodes: u64, to: &mut [Row]) {
         let nodes = nodes & self.plan.blocks[self.block].with_moments;
         if nodes == 0 {
             return;
@@ -313,7 +313,7 @@ impl<'a, const D: usize> BlockSum<'a, D> {
 impl<const D: usize> Sources<'_, D> {
     /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the processor to
     /// foresee them.
-    pub fn read_ahead(&self, block: usize) {
+    pub(super) fn read_ahead(&self, block: usize) {
         for (position, &bin) in self.plan.bins_by_block.inner::<D>(block).iter().enumerate() {
             if bin == NO_BIN {
                 continue;

@@ -203,7 +203,7 @@ impl<const D: usize> ArenaExchange<D> {
 
 impl SentPiece {
     /// What reaches the block of the piece from the bins that it asks for.
-    pub fn find<'a, const D: usize>(
+    pub(super) fn find<'a, const D: usize>(
         &self,
         own: Sources<'a, D>,
         scratch: &'a mut Irregular<D>,

@@ -73,7 +73,7 @@ impl<const D: usize> BlockSum<'_, D> {
 
     /// Finds the places of all that reaches a region beside whole arenas; false if it does not fit the pattern.
     #[inline(never)]
-    pub fn place(&mut self, region: usize) -> bool {
+    pub(super) fn place(&mut self, region: usize) -> bool {
         let (here, nodes) = (self.regions.positions[region], self.regions.nodes[region]);
         let mut placed = std::mem::take(&mut self.scratch.placed);
         placed.clear();
@@ -99,7 +99,7 @@ impl<const D: usize> BlockSum<'_, D> {
     }
 
     /// Copies rows of other ranks to their places.
-    pub fn copy_pieces(&mut self, region: usize) {
+    pub(super) fn copy_pieces(&mut self, region: usize) {
         let nodes = self.regions.nodes[region];
         let Some(received) = self.received else { return };
         let Irregular { placed, pieces, .. } = &mut *self.scratch;
@@ -117,7 +117,7 @@ impl<const D: usize> BlockSum<'_, D> {
     }
 
     /// The sums of a region, along a list of all that reaches it.
-    pub fn fold_rows(&mut self, region: usize, to: &mut [Row]) {
+    pub(super) fn fold_rows(&mut self, region: usize, to: &mut [Row]) {
         self.list_terms(region);
         let nodes = self.regions.nodes[region];
         let mut stack = std::mem::take(&mut self.scratch.rows);
@@ -133,7 +133,7 @@ impl<const D: usize> BlockSum<'_, D> {
     }
 
     /// The moments at nodes of a region, along a list of all that reaches it. `to` has all of the block.
-    pub fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Row]) {
+    pub(super) fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Row]) {
         self.list_terms(region);
         let mut stack = std::mem::take(&mut self.scratch.moments);
         for bit in bits(nodes) {
@@ -200,7 +200,7 @@ impl<const D: usize> BlockSum<'_, D> {
     }
 
     /// First moments that something adds to a node.
-    pub fn moments(&self, origin: Origin, bit: u32) -> Option<Moments<D>> {
+    pub(super) fn moments(&self, origin: Origin, bit: u32) -> Option<Moments<D>> {
         match origin {
             Origin::Bin { bin, position } => {
                 let moments = self.arenas.get(bin)?.moments?;

@@ -9,7 +9,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::lines::create_new;
 
 /// An image.
-pub struct Canvas {
+pub(super) struct Canvas {
     pub width: usize,
     pub height: usize,
     pixels: Vec<u8>,
@@ -17,12 +17,12 @@ pub struct Canvas {
 
 impl Canvas {
     /// A canvas of one colour.
-    pub fn new(width: usize, height: usize, colour: Rgb) -> Self {
+    pub(super) fn new(width: usize, height: usize, colour: Rgb) -> Self {
         Self { width, height, pixels: colour.repeat(width * height) }
     }
 
     /// Colours a pixel; outside nothing happens.
-    pub fn set(&mut self, x: i64, y: i64, colour: Rgb) {
+    pub(super) fn set(&mut self, x: i64, y: i64, colour: Rgb) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
             self.pixels[at..at + 3].copy_from_slice(&colour);
@@ -31,20 +31,20 @@ impl Canvas {
 
     /// Colour of a pixel.
     #[cfg(test)]
-    pub fn pixel(&self, x: usize, y: usize) -> Rgb {
+    pub(super) fn pixel(&self, x: usize, y: usize) -> Rgb {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
     }
 
     /// Fills a rectangle.
-    pub fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
+    pub(super) fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
         for row in y..y + height {
             (x..x + width).for_each(|column| self.set(column, row, colour));
         }
     }
 
     /// Writes a text with its upper left corner at `(x, y)`; dots are squares of `size` pixels.
-    pub fn text(&mut self, x: i64, y: i64, size: i64, text: &str, colour: Rgb) {
+    pub(super) fn text(&mut self, x: i64, y: i64, size: i64, text: &str, colour: Rgb) {
         for (place, character) in text.chars().enumerate() {
             let left = x + place as i64 * size * (font::WIDTH as i64 + 1);
             for (row, bits) in font::glyph(character).into_iter().enumerate() {
@@ -56,12 +56,12 @@ impl Canvas {
     }
 
     /// Pixels that a text is wide.
-    pub fn text_width(size: i64, text: &str) -> i64 {
+    pub(super) fn text_width(size: i64, text: &str) -> i64 {
         text.chars().count() as i64 * size * (font::WIDTH as i64 + 1)
     }
 
     /// Not collective. Writes the image as PNG, under a temporary name first.
-    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+    pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
         let part = path.with_added_extension("part");
         let save = || -> std::io::Result<()> {
             // In memory first, as a buffered writer hides the error of its last piece.

@@ -1,7 +1,7 @@
 //! Colours of values.
 
 /// Red, green, blue.
-pub type Rgb = [u8; 3];
+pub(super) type Rgb = [u8; 3];
 
 /// Dark violet over green to yellow: even steps of lightness, readable in grey and by the colour-blind.
 const SEQUENCE: [Rgb; 6] =
@@ -20,7 +20,7 @@ const CLASSES: [Rgb; 8] = [
 ];
 
 /// Colour of a value between 0 and 1.
-pub fn sequential(value: f64) -> Rgb {
+pub(super) fn sequential(value: f64) -> Rgb {
     let place = value.clamp(0.0, 1.0) * (SEQUENCE.len() - 1) as f64;
     let low = (place as usize).min(SEQUENCE.len() - 2);
     let part = place - low as f64;
@@ -31,11 +31,11 @@ pub fn sequential(value: f64) -> Rgb {
 }
 
 /// Colour of a whole number.
-pub fn class(number: usize) -> Rgb {
+pub(super) fn class(number: usize) -> Rgb {
     CLASSES[number % CLASSES.len()]
 }
 
 /// A colour made lighter or darker.
-pub fn scaled(colour: Rgb, factor: f64) -> Rgb {
+pub(super) fn scaled(colour: Rgb, factor: f64) -> Rgb {
     colour.map(|channel| (f64::from(channel) * factor).clamp(0.0, 255.0) as u8)
 }

@@ -2,12 +2,12 @@
 //! scales need it.
 
 /// Columns of a glyph.
-pub const WIDTH: usize = 5;
+pub(super) const WIDTH: usize = 5;
 /// Rows of a glyph; lower-case tails use the last two.
-pub const HEIGHT: usize = 9;
+pub(super) const HEIGHT: usize = 9;
 
 /// Rows of the glyph of a character from the top, the leftmost dot in bit 4. Unknown characters give a box.
-pub fn glyph(character: char) -> [u8; HEIGHT] {
+pub(super) fn glyph(character: char) -> [u8; HEIGHT] {
     let rows: [u8; 7] = match character {
         ' ' => [0; 7],
         '0' => [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e],

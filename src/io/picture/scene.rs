@@ -7,7 +7,7 @@ use super::colour::{Rgb, scaled};
 
 /// A particle to be drawn.
 #[derive(Clone, Copy)]
-pub struct Splat {
+pub(super) struct Splat {
     pub position: [f64; 3],
     pub radius: f64,
     /// Between 0 and 1.
@@ -16,7 +16,7 @@ pub struct Splat {
 
 /// Lower and upper corner of a box.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub(super) struct Bounds {
     pub low: [f64; 3],
     pub high: [f64; 3],
 }
@@ -29,13 +29,13 @@ impl Bounds {
     }
 
     /// Longest edge.
-    pub fn extent(&self) -> f64 {
+    pub(super) fn extent(&self) -> f64 {
         (0..3).fold(0.0, |most: f64, axis| most.max(self.high[axis] - self.low[axis]))
     }
 }
 
 /// An orthographic camera that fits a box into an image.
-pub struct Camera {
+pub(super) struct Camera {
     right: [f64; 3],
     up: [f64; 3],
     toward: [f64; 3],
@@ -54,7 +54,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl Camera {
     /// Looks along z from above (`flat`), or obliquely down on the x-y plane with z upwards, at `bounds`,
     /// which fill the given part of the image.
-    pub fn new(flat: bool, bounds: &Bounds, x: Range<f64>, y: Range<f64>) -> Self {
+    pub(super) fn new(flat: bool, bounds: &Bounds, x: Range<f64>, y: Range<f64>) -> Self {
         let (right, up, toward) = if flat {
             ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
         } else {
@@ -85,7 +85,7 @@ impl Camera {
     }
 
     /// Column, row and depth (towards the viewer, m) of a point.
-    pub fn project(&self, point: [f64; 3]) -> [f64; 3] {
+    pub(super) fn project(&self, point: [f64; 3]) -> [f64; 3] {
         [
             self.origin[0] + self.scale * (dot(self.right, point) - self.centre[0]),
             self.origin[1] - self.scale * (dot(self.up, point) - self.centre[1]),
@@ -113,7 +113,7 @@ enum Seen {
 
 /// Depth and value per pixel in one number: the larger one is nearer, so the images of several ranks are
 /// combined by an exact maximum, whatever their order.
-pub struct Raster {
+pub(super) struct Raster {
     pub width: usize,
     pub height: usize,
     pub pixels: Vec<u64>,
@@ -121,7 +121,7 @@ pub struct Raster {
 
 impl Raster {
     /// An empty image.
-    pub fn new(width: usize, height: usize) -> Self {
+    pub(super) fn new(width: usize, height: usize) -> Self {
         Self { width, height, pixels: vec![0; width * height] }
     }
 
@@ -137,7 +137,7 @@ impl Raster {
     }
 
     /// Draws a particle as a ball.
-    pub fn splat(&mut self, camera: &Camera, splat: &Splat) {
+    pub(super) fn splat(&mut self, camera: &Camera, splat: &Splat) {
         let [column, row, depth] = camera.project(splat.position);
         let radius = (splat.radius * camera.scale).max(0.75);
         let shown = 2 << 16 | (splat.value.clamp(0.0, 1.0) * f64::from(u16::MAX)) as u64;
@@ -155,7 +155,7 @@ impl Raster {
     }
 
     /// Draws the floor at the lower side of `bounds` with lines every `spacing` metres.
-    pub fn ground(&mut self, camera: &Camera, bounds: &Bounds, spacing: f64) {
+    pub(super) fn ground(&mut self, camera: &Camera, bounds: &Bounds, spacing: f64) {
         for row in 0..self.height as i64 {
             for column in 0..self.width as i64 {
                 let (point, depth) = camera.on_plane(column as f64 + 0.5, row as f64 + 0.5, bounds.low[2]);
@@ -180,7 +180,13 @@ impl Raster {
 
     /// Paints the image; `colour` turns values between 0 and 1 into colours. With `light`, surfaces are
     /// shaded by their slope and darkened behind nearer ones.
-    pub fn paint(&self, camera: &Camera, canvas: &mut Canvas, light: bool, colour: impl Fn(f64) -> Rgb) {
+    pub(super) fn paint(
+        &self,
+        camera: &Camera,
+        canvas: &mut Canvas,
+        light: bool,
+        colour: impl Fn(f64) -> Rgb,
+    ) {
         let pixels_per_unit =
             camera.scale * (camera.depths.end - camera.depths.start) / f64::from(u32::MAX - 1);
         // Depth in pixels.

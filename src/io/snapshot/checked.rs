@@ -21,19 +21,19 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Collective. Places `count` rows behind those of the lower ranks.
-    pub fn place(comm: &Comm, count: u64) -> Self {
+    pub(super) fn place(comm: &Comm, count: u64) -> Self {
         let mut total = [count];
         comm.sum_u64(&mut total);
         Self { offset: comm.exclusive_sum_u64(count), count, total: total[0] }
     }
 
     /// As many rows per row; for example the corners of each leaf.
-    pub fn times(self, n: u64) -> Self {
+    pub(super) fn times(self, n: u64) -> Self {
         Self { offset: self.offset * n, count: self.count * n, total: self.total * n }
     }
 
     /// One more row at the end, on the last rank with rows (the first rank if none has).
-    pub fn and_one(self, comm: &Comm) -> Self {
+    pub(super) fn and_one(self, comm: &Comm) -> Self {
         let last = comm.rank() + 1 == comm.size();
         Self { count: self.count + u64::from(last), total: self.total + 1, ..self }
     }
@@ -71,12 +71,12 @@ pub(super) struct Recorded<'a> {
 
 impl<'a> Recorded<'a> {
     /// Starts to collect.
-    pub fn new(comm: &'a Comm, file: &'a Writer) -> Self {
+    pub(super) fn new(comm: &'a Comm, file: &'a Writer) -> Self {
         Self { comm, file, names: Vec::new(), parts: Vec::new(), links: Vec::new() }
     }
 
     /// Collective. Writes this rank's rows of a new data set.
-    pub fn write<T: Element>(
+    pub(super) fn write<T: Element>(
         &mut self,
         dataset: &str,
         rows: Rows,
@@ -90,13 +90,13 @@ impl<'a> Recorded<'a> {
     }
 
     /// Collective. Gives a data set a second name.
-    pub fn link(&mut self, dataset: &str, new: &str) -> Result<(), FileError> {
+    pub(super) fn link(&mut self, dataset: &str, new: &str) -> Result<(), FileError> {
         self.links.push((dataset.to_owned(), new.to_owned()));
         self.file.hard_link(dataset, new)
     }
 
     /// Collective. The checksums of all data sets, under all their names.
-    pub fn checksums(self) -> Vec<(String, u32)> {
+    pub(super) fn checksums(self) -> Vec<(String, u32)> {
         let crcs = combine(Some(self.comm), &self.parts);
         let mut sums: Vec<(String, u32)> = self.names.into_iter().zip(crcs).collect();
         for (dataset, new) in self.links {
@@ -117,7 +117,7 @@ pub(in crate::io) struct Checked<'a> {
 
 impl<'a> Checked<'a> {
     /// For a file that is opened on all ranks of `comm`, or alone.
-    pub fn new(comm: Option<&'a Comm>, file: &'a Reader, header: &'a Header) -> Self {
+    pub(crate) fn new(comm: Option<&'a Comm>, file: &'a Reader, header: &'a Header) -> Self {
         Self { comm, file, header, sums: Vec::new() }
     }
 
@@ -151,7 +151,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Not collective, for a file opened alone. Reads a whole data set of as many rows as the header says.
-    pub fn read_all<T: Element>(
+    pub(crate) fn read_all<T: Element>(
         &mut self,
         dataset: &str,
         rows: u64,
@@ -161,7 +161,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Names and checksums of the data sets read, in their order.
-    pub fn into_sums(self) -> Vec<(String, u32)> {
+    pub(crate) fn into_sums(self) -> Vec<(String, u32)> {
         self.sums
     }
 }

@@ -112,7 +112,7 @@ pub(crate) enum Values {
 
 impl Values {
     /// Real numbers in single precision; integers stay as they are.
-    pub fn into_single(self) -> Self {
+    pub(crate) fn into_single(self) -> Self {
         match self {
             Self::Real(values, components) => {
                 Self::Single(values.into_iter().map(|v| v as f32).collect(), components)

@@ -27,7 +27,7 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Components as [`Writer::write_slab`] counts them: 0 for a plain list.
-    pub fn components(&self) -> usize {
+    pub(super) fn components(&self) -> usize {
         if self.count == 1 { 0 } else { self.count }
     }
 }

@@ -18,12 +18,12 @@ pub(in crate::job) struct Checks<'t> {
 
 impl Checks<'_> {
     /// Whether there are so many faults that it is no use to look for more.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.faults.len() > MOST
     }
 
     /// Notes a fault of the value at `path`.
-    pub fn fault(&mut self, path: &Path, message: String) {
+    pub(crate) fn fault(&mut self, path: &Path, message: String) {
         if self.is_full() {
             return;
         }
@@ -32,7 +32,12 @@ impl Checks<'_> {
     }
 
     /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
-    pub fn column_name<'a>(&mut self, name: &str, mut before: impl Iterator<Item = &'a str>, path: &Path) {
+    pub(crate) fn column_name<'a>(
+        &mut self,
+        name: &str,
+        mut before: impl Iterator<Item = &'a str>,
+        path: &Path,
+    ) {
         let allowed = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(allowed) {
             let name = excerpt(name, QUOTED);
@@ -44,7 +49,7 @@ impl Checks<'_> {
     }
 
     /// The components of a vector of the job's dimension.
-    pub fn vector<const D: usize>(&mut self, vector: &Vector, path: &Path) -> Option<[f64; D]> {
+    pub(crate) fn vector<const D: usize>(&mut self, vector: &Vector, path: &Path) -> Option<[f64; D]> {
         let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();
         if array.is_none() {
             self.fault(path, format!("found {} components; expected {D} in a {D}D job", vector.0.len()));
@@ -61,7 +66,7 @@ pub(in crate::job) struct Space<const D: usize> {
 
 impl<const D: usize> Space<D> {
     /// A point in the file's coordinates, in words.
-    pub fn words(&self, x: &[f64; D]) -> String {
+    pub(crate) fn words(&self, x: &[f64; D]) -> String {
         let components: Vec<String> = (0..D).map(|a| number(x[a] + self.origin[a], 7)).collect();
         format!("[{}]", components.join(", "))
     }

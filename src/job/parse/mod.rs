@@ -1,5 +1,5 @@
 //! From text to a tree that knows where everything stands, checked against the schema; faults with their places.
-pub mod error;
+pub(super) mod error;
 pub(super) mod settings;
 pub(super) mod source;
 pub(super) mod structure;

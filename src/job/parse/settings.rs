@@ -281,7 +281,7 @@ impl Edited {
     }
 
     /// Where a byte stands in the text as the user has written it; for what is new, where that is put.
-    pub fn original(&self, byte: usize) -> usize {
+    pub(crate) fn original(&self, byte: usize) -> usize {
         self.edits.iter().rev().fold(byte, |byte, edit| {
             if byte < edit.start {
                 byte
@@ -294,7 +294,7 @@ impl Edited {
     }
 
     /// A fault of the changed text as one of the file or of the setting that it is about.
-    pub fn attribute(&self, fault: Fault) -> Fault {
+    pub(crate) fn attribute(&self, fault: Fault) -> Fault {
         let is_about = |path: &str| {
             let rest = fault.key.strip_prefix(path);
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))

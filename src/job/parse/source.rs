@@ -42,13 +42,13 @@ enum Step {
 pub(in crate::job) struct Path(Vec<Step>);
 
 impl Path {
-    pub fn key(&self, key: impl Into<Cow<'static, str>>) -> Self {
+    pub(crate) fn key(&self, key: impl Into<Cow<'static, str>>) -> Self {
         let mut steps = self.0.clone();
         steps.push(Step::Key(key.into()));
         Self(steps)
     }
 
-    pub fn index(&self, index: usize) -> Self {
+    pub(crate) fn index(&self, index: usize) -> Self {
         let mut steps = self.0.clone();
         steps.push(Step::Index(index));
         Self(steps)
@@ -70,7 +70,7 @@ impl std::fmt::Display for Path {
 
 impl Node {
     /// Parses the text of a file; the error has the place and the parser's words.
-    pub fn parse(text: &str) -> Result<Self, (Range<usize>, String)> {
+    pub(crate) fn parse(text: &str) -> Result<Self, (Range<usize>, String)> {
         let table = DeTable::parse(text).map_err(|error| {
             let end = text.len();
             (error.span().unwrap_or(end..end), error.message().to_owned())
@@ -80,7 +80,7 @@ impl Node {
     }
 
     /// The value under a key, for tables.
-    pub fn get(&self, key: &str) -> Option<&Self> {
+    pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         match &self.value {
             Value::Table(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
             _ => None,
@@ -88,7 +88,7 @@ impl Node {
     }
 
     /// Where the value at `path` stands, or the innermost value around it that is there.
-    pub fn locate(&self, path: &Path) -> Range<usize> {
+    pub(crate) fn locate(&self, path: &Path) -> Range<usize> {
         let mut node = self;
         for step in &path.0 {
             let inner = match (step, &node.value) {
@@ -105,7 +105,7 @@ impl Node {
     }
 
     /// The value as a person would name it in "found …".
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let mut words = String::new();
         let written = match &self.value {
             Value::Text(text) => write!(words, "the text \"{}\"", excerpt(text, QUOTED)),

@@ -6,7 +6,7 @@ use crate::simd::{Vector, VectorMask};
 
 /// Strength as a function of plastic strain, its rate and temperature.
 #[derive(Clone, Debug)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// Strength of the undeformed material, Pa.
     initial: f64,
     kind: Kind,
@@ -64,7 +64,7 @@ struct JohnsonCook {
 
 /// What strength depends on besides the plastic strain: the increment in which it comes, and the temperature.
 #[derive(Clone, Copy, Debug)]
-pub struct Flow<V> {
+pub(crate) struct Flow<V> {
     /// Increment of the plastic strain in this step.
     pub increment: V,
     /// Temperature at the end of the step, K, and its derivative by the increment.
@@ -73,7 +73,7 @@ pub struct Flow<V> {
 
 impl Curve {
     /// From the parameters, the strength of the undeformed material, Pa, and its density, kg/m³.
-    pub fn new(hardening: &Hardening, initial: f64, density: f64) -> Self {
+    pub(crate) fn new(hardening: &Hardening, initial: f64, density: f64) -> Self {
         let mut own_length = None;
         let kind = match hardening {
             Hardening::Modulus(modulus) => Kind::Linear { modulus: *modulus },
@@ -126,17 +126,17 @@ impl Curve {
     }
 
     /// The same law with half the strength.
-    pub fn halved(self) -> Self {
+    pub(crate) fn halved(self) -> Self {
         Self { factor: 0.5 * self.factor, ..self }
     }
 
     /// Strength of the undeformed material, Pa.
-    pub fn initial(&self) -> f64 {
+    pub(crate) fn initial(&self) -> f64 {
         self.initial * self.factor
     }
 
     /// The modulus where strength is linear for good.
-    pub fn linear(&self) -> Option<f64> {
+    pub(crate) fn linear(&self) -> Option<f64> {
         match self.kind {
             Kind::Linear { modulus } => Some(modulus * self.factor),
             _ => None,
@@ -144,13 +144,13 @@ impl Curve {
     }
 
     /// Whether it depends on the size of cells.
-    pub fn softens(&self) -> bool {
+    pub(crate) fn softens(&self) -> bool {
         self.length.is_some()
     }
 
     /// Names of the history variables of a frictional model: plastic shear strain, plastic volume, and temperature or, with
     /// `books_apart`, the volume that has opened.
-    pub fn frictional_history(&self, books_apart: bool) -> &'static [&'static str] {
+    pub(crate) fn frictional_history(&self, books_apart: bool) -> &'static [&'static str] {
         match (self.temperature(), books_apart) {
             (Some(_), _) => &["plastic_shear_strain", "plastic_volume", "temperature"],
             (None, true) => &["plastic_shear_strain", "plastic_volume", "volume_gain"],
@@ -159,14 +159,14 @@ impl Curve {
     }
 
     /// History variables of an undeformed particle: its temperature.
-    pub fn initial_history(&self) -> [f64; HISTORIES] {
+    pub(crate) fn initial_history(&self) -> [f64; HISTORIES] {
         let mut history = [0.0; HISTORIES];
         history[OWN] = self.temperature().unwrap_or(0.0);
         history
     }
 
     /// Temperature of the undeformed material, K, for laws with one.
-    pub fn temperature(&self) -> Option<f64> {
+    pub(crate) fn temperature(&self) -> Option<f64> {
         match &self.kind {
             Kind::JohnsonCook(law) => Some(law.temperature),
             _ => None,
@@ -174,7 +174,7 @@ impl Curve {
     }
 
     /// Temperature gained per plastic work, K/(J/m³).
-    pub fn heat(&self) -> f64 {
+    pub(crate) fn heat(&self) -> f64 {
         match &self.kind {
             Kind::JohnsonCook(law) => law.heat,
             _ => 0.0,
@@ -183,7 +183,7 @@ impl Curve {
 
     /// Strength at a plastic strain, which includes the increment, and its derivative by the increment, Pa.
     #[inline(always)]
-    pub fn strength<V: Vector>(&self, strain: V, flow: &Flow<V>, step: &Step) -> [V; 2] {
+    pub(crate) fn strength<V: Vector>(&self, strain: V, flow: &Flow<V>, step: &Step) -> [V; 2] {
         let [value, slope] = self.whole_strength(strain, flow, step);
         [value * self.factor, slope * self.factor]
     }
@@ -243,7 +243,7 @@ impl Curve {
     /// Part of the way from the strength of the undeformed material to the residual one that is still to go, 1 to 0: what
     /// other parameters that soften with this strength follow. 1 for laws that do not soften.
     #[inline(always)]
-    pub fn progress<V: Vector>(&self, strain: V, step: &Step) -> V {
+    pub(crate) fn progress<V: Vector>(&self, strain: V, step: &Step) -> V {
         let one = V::splat(1.0);
         match &self.kind {
             Kind::LinearSoftening { strain: whole, .. } => {

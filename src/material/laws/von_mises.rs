@@ -69,13 +69,13 @@ pub(super) struct Overstress {
 
 impl Overstress {
     /// What there is, if anything: η, Pa s^h, and h.
-    pub fn new(viscosity: f64, exponent: f64) -> Option<Self> {
+    pub(super) fn new(viscosity: f64, exponent: f64) -> Option<Self> {
         (viscosity > 0.0).then_some(Self { viscosity, exponent })
     }
 
     /// In a step of `dt` (s) with a plastic increment of this norm, above 0, and its derivative by the increment, Pa.
     #[inline(always)]
-    pub fn of<V: Vector>(self, increment: V, dt: f64) -> [V; 2] {
+    pub(super) fn of<V: Vector>(self, increment: V, dt: f64) -> [V; 2] {
         let rate = increment * (1.0 / dt);
         let value = match self.exponent {
             1.0 => rate,

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::{OutOfRange, Parameters};
 
 /// The first parameter that is outside the range that its type states.
-pub fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
+pub(crate) fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
     // Made once: a job may have thousands of materials.
     static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Parameters).to_value());
     // What is not finite has no form in JSON, and comes as null.

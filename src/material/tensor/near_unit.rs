@@ -45,7 +45,7 @@ pub(super) struct TraceFree<V> {
 impl<V: Vector> TraceFree<V> {
     /// A third of the trace of b, and Y where `b = tr(b)/3 (I + Y)`.
     #[inline(always)]
-    pub fn beside_unit(b: &Symmetric<V>) -> (V, Self) {
+    pub(super) fn beside_unit(b: &Symmetric<V>) -> (V, Self) {
         let mean = (b[0] + b[1] + b[2]) * (1.0 / 3.0);
         let scale = V::splat(1.0) / mean;
         let mut tensor = each(*b, |component| component * scale);
@@ -57,7 +57,7 @@ impl<V: Vector> TraceFree<V> {
 
     /// From its components.
     #[inline(always)]
-    pub fn new(tensor: Symmetric<V>) -> Self {
+    pub(super) fn new(tensor: Symmetric<V>) -> Self {
         let [xx, yy, zz, xy, xz, yz] = tensor;
         let square = [
             xx.mul_add(xx, xy.mul_add(xy, xz * xz)),
@@ -72,13 +72,13 @@ impl<V: Vector> TraceFree<V> {
 
     /// Where the series hold.
     #[inline(always)]
-    pub fn is_small(&self) -> V::Mask {
+    pub(super) fn is_small(&self) -> V::Mask {
         self.q.le(V::splat(0.5 * LIMIT * LIMIT))
     }
 
     /// `ln(I + Y)`: its trace and its deviator.
     #[inline(always)]
-    pub fn ln_of_one_plus(&self) -> (V, Symmetric<V>) {
+    pub(super) fn ln_of_one_plus(&self) -> (V, Symmetric<V>) {
         let [unit, first, second] = self.series(&LN);
         // Neither Y nor what is added to the diagonal has a trace.
         let two_thirds = self.q * (2.0 / 3.0);
@@ -92,7 +92,7 @@ impl<V: Vector> TraceFree<V> {
 
     /// `exp Y`.
     #[inline(always)]
-    pub fn exp(&self) -> Symmetric<V> {
+    pub(super) fn exp(&self) -> Symmetric<V> {
         let [unit, first, second] = self.series(&EXP);
         let mut sum = self.tensor;
         for c in 0..6 {

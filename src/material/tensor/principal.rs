@@ -7,7 +7,7 @@ use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, VectorMask, each};
 
 /// A deviator taken apart. It is `norm` times a tensor of unit norm.
-pub struct Principal<V> {
+pub(crate) struct Principal<V> {
     /// Frobenius norm of the deviator.
     norm: V,
     /// The eigenvalue that stands alone, of the tensor of unit norm.
@@ -23,7 +23,7 @@ pub struct Principal<V> {
 impl<V: Vector> Principal<V> {
     /// Takes a deviator of known Frobenius norm apart.
     #[inline(always)]
-    pub fn of(deviator: &Symmetric<V>, norm: V) -> Self {
+    pub(crate) fn of(deviator: &Symmetric<V>, norm: V) -> Self {
         let one = V::splat(1.0);
         let scale = one / norm.max(V::splat(f64::MIN_POSITIVE));
         let unit = each(*deviator, |component| component * scale);
@@ -68,7 +68,7 @@ impl<V: Vector> Principal<V> {
 
     /// Eigenvalues of the deviator, greatest first.
     #[inline(always)]
-    pub fn sorted(&self) -> [V; 3] {
+    pub(crate) fn sorted(&self) -> [V; 3] {
         let zero = V::splat(0.0);
         let lone = self.lone * self.norm;
         let (middle, half) = (lone * -0.5, self.half * self.norm);
@@ -79,7 +79,7 @@ impl<V: Vector> Principal<V> {
 
     /// The tensor with the same directions and these eigenvalues, in the order of [`Principal::sorted`].
     #[inline(always)]
-    pub fn compose(&self, sorted: &[V; 3]) -> Symmetric<V> {
+    pub(crate) fn compose(&self, sorted: &[V; 3]) -> Symmetric<V> {
         let zero = V::splat(0.0);
         let first = zero.lt(self.lone);
         let lone = first.select(sorted[0], sorted[2]);

@@ -10,7 +10,7 @@ use crate::simd::math::{exp, ln};
 use crate::simd::{Lanes, Mask, Vector, VectorMask, each};
 
 /// The logarithmic strain `½ ln b` of a trial tensor.
-pub struct Strain<V = Lanes> {
+pub(crate) struct Strain<V = Lanes> {
     /// Trace.
     pub trace: V,
     /// Deviator.
@@ -32,7 +32,7 @@ struct Far {
 impl<V: Vector> Strain<V> {
     /// Strain of a tensor.
     #[inline(always)]
-    pub fn of(b: &Symmetric<V>, plane: bool) -> Self {
+    pub(crate) fn of(b: &Symmetric<V>, plane: bool) -> Self {
         let (mean, beside) = TraceFree::beside_unit(b);
         let near = beside.is_small() & V::splat(0.0).lt(mean);
         let (trace, deviator) = beside.ln_of_one_plus();
@@ -62,7 +62,7 @@ impl<V: Vector> Strain<V> {
     /// the trial one elsewhere: elastic tensor, stress, wave speed. Lanes in `unstrained` get exactly the unit tensor, and
     /// lanes that have not changed keep the bits of the trial tensor.
     #[inline(always)]
-    pub fn finish(
+    pub(crate) fn finish(
         &self,
         solid: &Hencky,
         state: &mut State<V>,
@@ -77,7 +77,7 @@ impl<V: Vector> Strain<V> {
 
     /// Writes the elastic tensor of the final state as [`Strain::finish`] does; returns trace and deviator of its strain.
     #[inline(always)]
-    pub fn rewrite(
+    pub(crate) fn rewrite(
         &self,
         state: &mut State<V>,
         [trace, kept]: [V; 2],
@@ -102,7 +102,7 @@ impl<V: Vector> Strain<V> {
 
 /// `exp(2 ε)` of a strain with this trace and this deviator.
 #[inline(always)]
-pub fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: bool) -> Symmetric<V> {
+pub(crate) fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: bool) -> Symmetric<V> {
     let twice = TraceFree::new(each(*deviator, |component| component + component));
     let near = twice.is_small();
     let volumetric = exp(trace * (2.0 / 3.0));
@@ -140,7 +140,7 @@ fn far_tensor_of(tensor: &mut Symmetric, lanes: Mask, trace: Lanes, deviator: &S
 /// Writes the final state of a return that changes principal strains one by one: this trace and this deviator where
 /// `changed`, the trial ones elsewhere. Lanes that have not changed keep the bits of the trial tensor.
 #[inline(always)]
-pub fn finish<V: Vector>(
+pub(crate) fn finish<V: Vector>(
     trial: &Strain<V>,
     solid: &Hencky,
     state: &mut State<V>,

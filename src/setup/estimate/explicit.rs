@@ -5,7 +5,7 @@ use partition::Octant;
 use rustc_hash::FxHashSet;
 
 /// Not collective. All leaves of the tree that the job asks for, along the curve.
-pub fn leaves<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
+pub(crate) fn leaves<const D: usize>(problem: &Problem<D>) -> Vec<Octant<D>> {
     // The octants that are split, by level; everything else follows from them.
     let mut split = vec![FxHashSet::default(); usize::from(problem.finest_level()) + 1];
     let mut pending = roots(problem);

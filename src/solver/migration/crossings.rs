@@ -35,7 +35,7 @@ pub(super) enum Crossing {
 
 impl<const D: usize> FaceRules<D> {
     /// Those of a run.
-    pub fn new(physics: &Physics<D>) -> Self {
+    pub(crate) fn new(physics: &Physics<D>) -> Self {
         let outflow = physics.faces.map(|sides| sides.map(|face| face == FaceCondition::Outflow));
         Self { leaving: physics.leaving, outflow, origin: physics.origin }
     }
@@ -80,7 +80,7 @@ pub(in crate::solver) struct Crossed {
 
 impl Crossed {
     /// Whether there are any.
-    pub fn is_any(&self) -> bool {
+    pub(crate) fn is_any(&self) -> bool {
         self.put_back > 0 || !self.deleted.is_empty() || !self.left.is_empty()
     }
 }

@@ -52,12 +52,12 @@ pub(in crate::solver) struct Departed {
 
 impl Departed {
     /// Whether there is anything to tell.
-    pub fn is_any(&self) -> bool {
+    pub(crate) fn is_any(&self) -> bool {
         !self.records.is_empty() || self.crossed.is_any() || self.error.is_some() || self.splits.is_some()
     }
 
     /// Takes particles, ascending, out of a chunk.
-    pub fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
+    pub(crate) fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
         let mut departed = Self::default();
         if leavers.is_empty() {
             return departed;

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
-pub const fn record_words<const D: usize>() -> usize {
+pub(super) const fn record_words<const D: usize>() -> usize {
     Layout::<D>::REALS + 3
 }
 
 /// Appends the record of particle `p`.
-pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
+pub(super) fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
     records.push(way);
     records.extend(chunk.tile_of(p).iter().map(|line| line[p % TILE].to_bits()));
     records.extend([chunk.ids()[p], chunk.tags()[p]]);
@@ -17,7 +17,7 @@ pub fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chu
 
 /// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given. Chunks know
 /// their greatest half width afterwards.
-pub fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
+pub(super) fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
     // Sorted by counting, so that chunks can take theirs at the same time.
     let mut start = vec![0u32; chunks.len() + 1];
     for &(chunk, _) in arrivals {

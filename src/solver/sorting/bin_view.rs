@@ -24,7 +24,7 @@ pub(in crate::solver) struct BinView<'a, const D: usize> {
 
 impl<'a, const D: usize> BinView<'a, D> {
     /// A bin of a plan, whose leaf has `lists` and so many particles.
-    pub fn new(
+    pub(crate) fn new(
         plan: &'a GridPlan<D>,
         lists: Option<&'a LeafBins<D>>,
         number: usize,
@@ -52,7 +52,7 @@ impl<'a, const D: usize> BinView<'a, D> {
     }
 
     /// The bins of an own leaf that have members.
-    pub fn of_leaf(
+    pub(crate) fn of_leaf(
         plan: &'a GridPlan<D>,
         lists: Option<&'a LeafBins<D>>,
         leaf: usize,

@@ -157,13 +157,13 @@ pub(in crate::solver) struct OfLeaf<'a, const D: usize> {
 
 impl<const D: usize> OfLeaf<'_, D> {
     /// As [`BinLists::of_leaf`].
-    pub fn lists(&self) -> Option<&LeafBins<D>> {
+    pub(crate) fn lists(&self) -> Option<&LeafBins<D>> {
         self.bins.as_deref().filter(|_| self.sorted)
     }
 
     /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are gone: what it looks
     /// at is still in the cache.
-    pub fn presort(
+    pub(crate) fn presort(
         self,
         plan: &GridPlan<D>,
         leaf: usize,

@@ -24,7 +24,7 @@ impl<const D: usize> Physics<D> {
 
 impl<const D: usize> Widths<'_, D> {
     /// The greatest half width among boxes that may become wider than `cell`, m; 0 if none may.
-    pub fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
+    pub(crate) fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let limit = Lanes::splat(0.5 * cell);
         let mut wide = Vec::new();
         list_lanes(0..chunk.len(), &mut wide, |first| (!self.bounds(chunk, first).le(limit)).bits());

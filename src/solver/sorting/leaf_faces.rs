@@ -25,7 +25,7 @@ pub(in crate::solver) struct NearLeaf<const D: usize> {
 
 impl<const D: usize> NearLeaf<D> {
     /// How far beyond its faces boxes count as touching them, m.
-    pub fn slack(&self) -> [f64; D] {
+    pub(crate) fn slack(&self) -> [f64; D] {
         self.upper.map(|x| 16.0 * f64::EPSILON * x)
     }
 }
@@ -66,7 +66,13 @@ pub(super) struct LeafFaces<const D: usize> {
 impl<const D: usize> LeafFaces<D> {
     /// The sides of `leaf`, which is the octant `here` with cells of edge `cell` and has the given bins; `near` are the
     /// finer leaves around.
-    pub fn new(leaf: NearLeaf<D>, here: Octant<D>, cell: f64, near: &[NearLeaf<D>], bins: &[Bin<D>]) -> Self {
+    pub(super) fn new(
+        leaf: NearLeaf<D>,
+        here: Octant<D>,
+        cell: f64,
+        near: &[NearLeaf<D>],
+        bins: &[Bin<D>],
+    ) -> Self {
         // Finest level in each direction, among the leaves that touch this one. A box at most a cell wide reaches
         // half a cell beyond, less than the depth of a leaf one level finer.
         let mut towards = [Side::Own; 27];
@@ -116,7 +122,7 @@ impl<const D: usize> LeafFaces<D> {
     /// Lanes whose boxes may scatter elsewhere than on the leaf's own level, given bounds on their half widths.
     /// `position` gives coordinates along an axis.
     #[inline(always)]
-    pub fn undecided(&self, half: Lanes, position: impl Fn(usize) -> Lanes) -> u32 {
+    pub(super) fn undecided(&self, half: Lanes, position: impl Fn(usize) -> Lanes) -> u32 {
         let mut lanes = 0;
         for axis in 0..D {
             let faces = self.decisive >> (2 * axis) & 0b11;
@@ -135,7 +141,7 @@ impl<const D: usize> LeafFaces<D> {
     }
 
     /// Faces that a box crosses, or touches up to round-off: bit `2 axis` for the lower and `2 axis + 1` for the upper one.
-    pub fn faces(&self, centre: &[f64; D], half: &[f64; D]) -> usize {
+    pub(super) fn faces(&self, centre: &[f64; D], half: &[f64; D]) -> usize {
         (0..D).fold(0, |faces, axis| {
             let above_lower = self.lower[axis] <= centre[axis] - half[axis] - self.slack[axis];
             let below_upper = centre[axis] + half[axis] + self.slack[axis] <= self.upper[axis];
@@ -146,7 +152,7 @@ impl<const D: usize> LeafFaces<D> {
     /// Bins, counted within the leaf, of the boxes of a batch that are whole and on the leaf's own level or one finer: half widths
     /// are held against these limits of both levels.
     #[inline(always)]
-    pub fn bins(
+    pub(super) fn bins(
         &self,
         centre: &[Lanes; D],
         half: &[Lanes; D],
@@ -185,7 +191,7 @@ impl<const D: usize> LeafFaces<D> {
     }
 
     /// Where a box scatters that crosses some faces.
-    pub fn side(&self, faces: usize) -> Side {
+    pub(super) fn side(&self, faces: usize) -> Side {
         self.sides[faces]
     }
 }

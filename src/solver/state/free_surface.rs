@@ -29,7 +29,7 @@ pub(in crate::solver) struct Surroundings {
 
 impl Surroundings {
     /// Not collective. Finds everything anew if the tree or the partition has changed; the plan is that of the forest.
-    pub fn update<const D: usize>(&mut self, forest: &Forest<D>, plan: &GridPlan<D>) {
+    pub(crate) fn update<const D: usize>(&mut self, forest: &Forest<D>, plan: &GridPlan<D>) {
         if self.revision == Some(forest.revision()) {
             return;
         }
@@ -48,12 +48,12 @@ impl Surroundings {
     }
 
     /// Own leaves that touch an own leaf, itself included.
-    pub fn touching(&self, leaf: usize) -> &[u32] {
+    pub(crate) fn touching(&self, leaf: usize) -> &[u32] {
         &self.touching[self.start[leaf] as usize..self.start[leaf + 1] as usize]
     }
 
     /// Collective. Whether each own leaf touches one without particles.
-    pub fn beside_empty<const D: usize>(
+    pub(crate) fn beside_empty<const D: usize>(
         &self,
         forest: &Forest<D>,
         comm: &Comm,
@@ -77,7 +77,7 @@ impl Surroundings {
 
     /// Whether any real node in the arena of a leaf's own bin is free of material. Only nodes on the leaf and on leaves
     /// of its level count: the lattice goes on over finer leaves, but what is there has its mass on finer nodes.
-    pub fn is_exposed<const D: usize>(
+    pub(crate) fn is_exposed<const D: usize>(
         &self,
         leaf: usize,
         plan: &GridPlan<D>,
@@ -192,7 +192,7 @@ impl MassRange {
     }
 
     /// Of all real nodes of each block.
-    pub fn of_blocks<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<Self> {
+    pub(crate) fn of_blocks<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<Self> {
         let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
         blocks.map(|(number, block)| Self::of::<D>(fields, number as u32, block.real_nodes())).collect()
     }

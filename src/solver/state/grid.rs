@@ -172,7 +172,7 @@ pub(in crate::solver) struct Increments {
 
 impl Increments {
     /// Heap bytes held.
-    pub fn heap_bytes(&self) -> usize {
+    pub(crate) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.base) + size_of_val(&*self.rows)
     }
 }

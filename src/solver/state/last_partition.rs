@@ -17,12 +17,12 @@ pub(in crate::solver) struct LastPartition {
 
 impl LastPartition {
     /// The partition with which a run starts or goes on, made since `start`.
-    pub fn at_start(start: Duration) -> Self {
+    pub(crate) fn at_start(start: Duration) -> Self {
         Self { is_guess: true, ..Self::since(start) }
     }
 
     /// One made since `start`.
-    pub fn since(start: Duration) -> Self {
+    pub(crate) fn since(start: Duration) -> Self {
         let now = thread_time();
         Self { price: (now - start).as_secs_f64(), lost: 0.0, looked: now, is_guess: false }
     }

@@ -67,18 +67,18 @@ pub(in crate::solver) struct LeafTimes {
 
 impl LeafTimes {
     /// Not collective. Forgets what was measured.
-    pub fn reset(&mut self, leaves: usize) {
+    pub(crate) fn reset(&mut self, leaves: usize) {
         self.nanoseconds = std::iter::repeat_with(AtomicU64::default).take(leaves).collect();
         self.steps = 0..0;
     }
 
     /// Not collective. The step is over.
-    pub fn end_step(&mut self) {
+    pub(crate) fn end_step(&mut self) {
         self.is_step = false;
     }
 
     /// Runs work on the particles of a leaf, on any thread.
-    pub fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
+    pub(crate) fn time<R>(&self, leaf: usize, work: impl FnOnce() -> R) -> R {
         if !self.is_step || !is_measured(leaf, self.steps.end) {
             return work();
         }
@@ -89,7 +89,7 @@ impl LeafTimes {
     }
 
     /// In how many of the steps time was taken of a leaf.
-    pub fn measurements(&self, leaf: usize) -> u64 {
+    pub(crate) fn measurements(&self, leaf: usize) -> u64 {
         let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
         before(self.steps.end) - before(self.steps.start)
     }

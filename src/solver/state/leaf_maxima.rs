@@ -53,7 +53,7 @@ pub(in crate::solver) struct Watch {
 
 impl Watch {
     /// What a job wants to know after a step of that number (the first is 1).
-    pub fn after_step<const D: usize>(adaptivity: &Adaptivity<D>, step: u64) -> Self {
+    pub(crate) fn after_step<const D: usize>(adaptivity: &Adaptivity<D>, step: u64) -> Self {
         let has = |wanted: fn(&Kind<D>) -> bool| adaptivity.criteria.iter().any(|c| wanted(&c.kind));
         // Files show the rate whenever they are written.
         let rate = has(|kind| matches!(kind, Kind::PlasticStrainRate));
@@ -66,14 +66,14 @@ impl Watch {
     }
 
     /// To be called before the leaf's particles advance.
-    pub fn before<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
+    pub(crate) fn before<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.rate {
             maxima.plastic_rate = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum();
         }
     }
 
     /// To be called after the leaf's particles have advanced by `dt` (s).
-    pub fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, maxima: &mut LeafMaxima<D>) {
+    pub(crate) fn after<const D: usize>(self, chunk: &Chunk<D>, dt: f64, maxima: &mut LeafMaxima<D>) {
         if self.rate {
             let gain = chunk.column(Layout::<D>::PLASTIC_STRAIN).sum() - maxima.plastic_rate;
             maxima.plastic_rate = gain / (dt * chunk.len().max(1) as f64);
