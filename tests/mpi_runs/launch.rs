@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use agimp::io::hdf5_file::Reader;
+use agimp::io::snapshot::Header;
+
 use super::mpirun;
 
 /// After this a run counts as hanging.
@@ -198,8 +201,8 @@ pub(crate) fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
 }
 
-/// What a run to the end leaves, but for times measured. Files with a state, which hold the text of the job too, stand
-/// there with their digests; of checkpoints the last counts.
+/// What a run to the end leaves, but for times measured and the text of the job. Files with a state stand there with their digests,
+/// other outputs with the checksums of all their data sets but that text; of checkpoints the last counts.
 pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
     let results = directory.join("out").join(name);
     let mut files = contents(&results);
@@ -212,10 +215,21 @@ pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>>
             continue;
         }
         let digest = agimp(&results).args(["digest", "--parts", &file]).output().expect("agimp starts");
-        let contents = if digest.status.success() { digest.stdout } else { contents };
+        let contents = match digest.status.success() {
+            true => digest.stdout,
+            false => sums(&results.join(&file)).unwrap_or(contents),
+        };
         kept.insert(if is_last { "the last checkpoint".into() } else { file }, contents);
     }
     kept
+}
+
+/// The checksums of an output that holds the text of its job, without that of the text.
+fn sums(path: &Path) -> Option<Vec<u8>> {
+    let header = Header::read(&Reader::open_alone(path).ok()?).ok()?;
+    header.checksum("state/job")?;
+    let sums: Vec<_> = header.checksums.iter().filter(|(set, _)| set != "state/job").collect();
+    Some(format!("{:08x} {sums:?}", header.state_checksum()).into_bytes())
 }
 
 /// What has to be the same however a run was carried out.
