@@ -4,11 +4,11 @@ use super::*;
 /// Four doubles.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(super) struct F64x4([f64; 4]);
+pub struct F64x4([f64; 4]);
 
 /// Four truth values.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mask4([bool; 4]);
+pub struct Mask4([bool; 4]);
 
 impl F64x4 {
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
@@ -19,89 +19,89 @@ impl F64x4 {
     }
     /// All lanes equal to `value`.
     #[inline(always)]
-    pub(super) fn splat(value: f64) -> Self {
+    pub fn splat(value: f64) -> Self {
         Self([value; 4])
     }
     /// From an array.
     #[inline(always)]
-    pub(super) fn new(values: [f64; 4]) -> Self {
+    pub fn new(values: [f64; 4]) -> Self {
         Self(values)
     }
     /// To an array.
     #[inline(always)]
-    pub(super) fn to_array(self) -> [f64; 4] {
+    pub fn to_array(self) -> [f64; 4] {
         self.0
     }
     /// `self * a + b`, rounded once.
     #[inline(always)]
-    pub(super) fn mul_add(self, a: Self, b: Self) -> Self {
+    pub fn mul_add(self, a: Self, b: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i].mul_add(a.0[i], b.0[i])))
     }
     /// `b - self * a`, rounded once.
     #[inline(always)]
-    pub(super) fn neg_mul_add(self, a: Self, b: Self) -> Self {
+    pub fn neg_mul_add(self, a: Self, b: Self) -> Self {
         Self(std::array::from_fn(|i| (-self.0[i]).mul_add(a.0[i], b.0[i])))
     }
     /// Square root.
     #[inline(always)]
-    pub(super) fn sqrt(self) -> Self {
+    pub fn sqrt(self) -> Self {
         Self(self.0.map(f64::sqrt))
     }
     /// Absolute value.
     #[inline(always)]
-    pub(super) fn abs(self) -> Self {
+    pub fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
     }
     /// Largest integer not above.
     #[inline(always)]
-    pub(super) fn floor(self) -> Self {
+    pub fn floor(self) -> Self {
         Self(self.0.map(f64::floor))
     }
     /// Nearest integer, ties to even.
     #[inline(always)]
-    pub(super) fn round(self) -> Self {
+    pub fn round(self) -> Self {
         Self(self.0.map(f64::round_ties_even))
     }
     /// The smaller; `other` if they are equal or either is NaN.
     #[inline(always)]
-    pub(super) fn min(self, other: Self) -> Self {
+    pub fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
     }
     /// The larger; `other` if they are equal or either is NaN.
     #[inline(always)]
-    pub(super) fn max(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
     /// `self` with the sign of `sign`.
     #[inline(always)]
-    pub(super) fn copysign(self, sign: Self) -> Self {
+    pub fn copysign(self, sign: Self) -> Self {
         self.zip(sign, f64::copysign)
     }
     /// `self < other`.
     #[inline(always)]
-    pub(super) fn lt(self, other: Self) -> Mask4 {
+    pub fn lt(self, other: Self) -> Mask4 {
         self.compare(other, |a, b| a < b)
     }
     /// `self <= other`.
     #[inline(always)]
-    pub(super) fn le(self, other: Self) -> Mask4 {
+    pub fn le(self, other: Self) -> Mask4 {
         self.compare(other, |a, b| a <= b)
     }
     /// Exponent `k` and significand in `[1, 2)` of positive normal numbers: `self = m · 2^k`.
     #[inline(always)]
-    pub(super) fn split(self) -> (Self, Self) {
+    pub fn split(self) -> (Self, Self) {
         let k = self.0.map(|x| f64::from_bits((x.to_bits() >> 52) | TWO_52_BITS) - EXPONENT_MAGIC);
         let m = self.0.map(|x| f64::from_bits((x.to_bits() & FRACTION_BITS) | ONE_BITS));
         (Self(k), Self(m))
     }
     /// `2^self` of integers in `-1022..=1023`.
     #[inline(always)]
-    pub(super) fn power_of_two(self) -> Self {
+    pub fn power_of_two(self) -> Self {
         Self(self.0.map(|k| f64::from_bits((k + EXPONENT_MAGIC).to_bits() << 52)))
     }
     /// Rows become columns.
     #[inline(always)]
-    pub(super) fn transpose(rows: [Self; 4]) -> [Self; 4] {
+    pub fn transpose(rows: [Self; 4]) -> [Self; 4] {
         std::array::from_fn(|i| Self(std::array::from_fn(|j| rows[j].0[i])))
     }
 }
@@ -109,17 +109,17 @@ impl F64x4 {
 impl Mask4 {
     /// `a` where true, `b` where false.
     #[inline(always)]
-    pub(super) fn select(self, a: F64x4, b: F64x4) -> F64x4 {
+    pub fn select(self, a: F64x4, b: F64x4) -> F64x4 {
         F64x4(std::array::from_fn(|i| if self.0[i] { a.0[i] } else { b.0[i] }))
     }
     /// Bit `i` is lane `i`.
     #[inline(always)]
-    pub(super) fn bits(self) -> u32 {
+    pub fn bits(self) -> u32 {
         (0..4).fold(0, |bits, i| bits | u32::from(self.0[i]) << i)
     }
     /// Lane `i` is bit `i`.
     #[inline(always)]
-    pub(super) fn from_bits(bits: u32) -> Self {
+    pub fn from_bits(bits: u32) -> Self {
         Self(std::array::from_fn(|i| bits >> i & 1 == 1))
     }
 }
