@@ -18,7 +18,7 @@ def test_table_has_units_and_names(plane: agimp.Results) -> None:
     units = table.attrs["units"]
     assert list(table.columns[:2]) == ["x", "y"]
     assert {"velocity_x", "velocity_y"} < set(table.columns) and "velocity_z" not in table.columns
-    assert units["x"] == "m" and units["pressure"] == "Pa" and units["density"] == "kg/m3" and units["id"] == ""
+    assert units["x"] == "m" and units["pressure"] == "Pa" and units["density"] == "kg/m³" and units["id"] == ""
     assert set(units) == set(table.columns) == set(table.attrs["descriptions"])
     assert table["material"].cat.categories.tolist() == ["rubber", "sand"] == list(out.materials)
     # The base lies lower at the start and fills twice the area of the other: 0.12 x 0.04 and 0.06 x 0.06 m².

@@ -27,7 +27,7 @@ KNOWN: dict[str, Field] = {
     "von_mises": Field("Pa", "von Mises equivalent of the Cauchy stress"),
     "stress": Field("Pa", "Cauchy stress"),
     "mass": Field("kg", "mass; per metre of thickness in plane strain"),
-    "density": Field("kg/m3", "density"),
+    "density": Field("kg/m³", "density"),
     "volume_ratio": Field("", "volume over reference volume, det F"),
     "half_width": Field("m", "half of the undeformed edge of the particle's box"),
     "plastic_work": Field("J/m3", "plastic work done so far, per reference volume"),
