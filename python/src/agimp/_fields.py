@@ -30,7 +30,7 @@ KNOWN: dict[str, Field] = {
     "density": Field("kg/m³", "density"),
     "volume_ratio": Field("", "volume over reference volume, det F"),
     "half_width": Field("m", "half of the undeformed edge of the particle's box"),
-    "plastic_work": Field("J/m3", "plastic work done so far, per reference volume"),
+    "plastic_work": Field("J/m³", "plastic work done so far, per reference volume"),
     "level": Field("", "level of the leaf"),
     "particles": Field("", "particles in the leaf"),
     "edge": Field("m", "edge of the leaf"),
