@@ -1,5 +1,8 @@
 //! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is counted; material
 //! lets go of faces that pull; states that no material can have end the run.
+#[path = "common/history.rs"]
+#[allow(dead_code, reason = "shared with other tests, which use all of it")]
+mod history;
 #[path = "mpi_runs/launch.rs"]
 #[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
 mod launch;
@@ -7,13 +10,14 @@ mod launch;
 mod mpirun;
 #[path = "common/relaunch.rs"]
 mod relaunch;
-
-use std::path::Path;
+#[path = "common/restart.rs"]
+mod restart;
 
 use agimp::job::{Problem, parse};
 use agimp::particle::chunk::Layout;
 use agimp::setup;
 use agimp::solver::{Requests, Solver};
+use history::History;
 use launch::{Outcome, run, succeed};
 use partition::comm::Comm;
 use relaunch::{ran_if_launched, relaunch};
@@ -84,19 +88,6 @@ fn text(end: f64, velocity: &str, rest: &str) -> String {
     )
 }
 
-/// Columns of a history by name, row by row.
-fn history(directory: &Path) -> impl Fn(&str) -> Vec<f64> {
-    let text = std::fs::read_to_string(launch::file(directory, "body", ".history.csv")).expect("history");
-    move |name| {
-        let mut lines = text.lines();
-        let mut names = lines.next().expect("header").split(',');
-        let column = names.position(|cell| cell.split(' ').next() == Some(name)).expect("a column");
-        lines
-            .map(|row| row.split(',').nth(column).and_then(|cell| cell.parse().ok()).expect("number"))
-            .collect()
-    }
-}
-
 /// A block that flies out of the domain through a face of outflow: it keeps its velocity and stays without stress, what is inside and
 /// what has left make up the whole at every time, and nothing is left in the end. The same on any ranks and across a
 /// restart, which goes on counting.
@@ -113,7 +104,8 @@ fn a_body_leaves_through_an_outflow() {
         assert!(told.contains("64 left through outflow faces (64 kg)"), "{told}");
         let telemetry = std::fs::read_to_string(launch::file(directory.path(), "body", ".telemetry.jsonl"));
         assert!(!telemetry.expect("telemetry").contains("null"), "a number is none");
-        let column = history(directory.path());
+        let history = History::read(directory.path(), "body");
+        let column = |name| history.column(name);
         let (mass, left_mass) = (column("mass"), column("left_mass"));
         let (inside, left) = (column("particles"), column("left"));
         let momenta = [column("momentum_x"), column("momentum_y")];
@@ -132,15 +124,9 @@ fn a_body_leaves_through_an_outflow() {
             None => reference = Some(result),
         }
         if ranks == 2 {
-            let files = launch::contents(&directory.path().join("out").join("body"));
-            let mut checkpoints: Vec<_> =
-                files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
-            checkpoints.sort();
-            // Some particles have left by then.
-            let from = format!("out/body/{}", checkpoints[1]);
-            succeed(&mut run(directory.path(), 3, 1, &path, &["--quiet", "--restart", &from]));
-            let result = Outcome::read(directory.path(), "body");
-            reference.as_ref().expect("a run").assert_same(&result, &format!("restart from {from}"));
+            // Some particles have left by the second checkpoint.
+            let reference = reference.as_ref().expect("a run");
+            restart::assert_restart_gives(reference, directory.path(), &path, "body");
         }
     }
 }
@@ -156,8 +142,8 @@ fn a_block_does_not_hang_from_the_ceiling() {
         std::fs::write(&path, job.replace("dimension = 2", "dimension = 2\ngravity = [0, -10]"))
             .expect("job");
         succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-        let column = history(directory.path());
-        let last = |name: &str| *column(name).last().expect("a row");
+        let history = History::read(directory.path(), "body");
+        let last = |name| history.last(name);
         last("momentum_y") / (last("mass") * -10.0 * last("time"))
     };
     assert!((fall("") - 1.0).abs() < 1e-9, "{}", fall(""));
@@ -174,7 +160,7 @@ fn other_faces_keep_their_policy() {
     let path = directory.path().join("body.toml");
     std::fs::write(&path, text(0.2, "[4.0, 4.0]", rest)).expect("job");
     succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    let column = history(directory.path());
-    let last = |name: &str| *column(name).last().expect("a row");
+    let history = History::read(directory.path(), "body");
+    let last = |name| history.last(name);
     assert_eq!((last("left"), last("deleted"), last("deleted_mass")), (64.0, 0.0, 0.0));
 }

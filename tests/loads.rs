@@ -8,6 +8,8 @@ mod history;
 mod launch;
 #[path = "common/mpirun.rs"]
 mod mpirun;
+#[path = "common/restart.rs"]
+mod restart;
 
 use history::History;
 use launch::{Outcome, agimp, run, succeed};
@@ -131,14 +133,8 @@ fn same_results_on_any_ranks_and_across_restart() {
             None => reference = Some(result),
         }
         if ranks == 2 {
-            let files = launch::contents(&directory.path().join("out").join("body"));
-            let mut checkpoints: Vec<_> =
-                files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
-            checkpoints.sort();
-            let from = format!("out/body/{}", checkpoints[1]);
-            succeed(&mut run(directory.path(), 3, 1, &path, &["--quiet", "--restart", &from]));
-            let result = Outcome::read(directory.path(), "body");
-            reference.as_ref().expect("a run").assert_same(&result, &format!("restart from {from}"));
+            let reference = reference.as_ref().expect("a run");
+            restart::assert_restart_gives(reference, directory.path(), &path, "body");
         }
     }
 }

@@ -13,10 +13,23 @@ pub fn schema() -> Value {
 mod tests {
     use super::*;
 
+    /// Calls `look` with each part of a JSON value and its path.
+    fn walk(value: &Value, path: &str, look: &mut impl FnMut(&Value, &str)) {
+        look(value, path);
+        match value {
+            Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), look)),
+            Value::Array(list) => {
+                list.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), look));
+            }
+            _ => {}
+        }
+    }
+
     /// Every key that a user can write is explained.
     #[test]
     fn every_property_has_a_description() {
-        fn walk(value: &Value, path: &str, missing: &mut Vec<String>) {
+        let mut missing = Vec::new();
+        walk(&schema(), "", &mut |value, path| {
             if let Some(properties) = value.get("properties").and_then(Value::as_object) {
                 for (key, property) in properties {
                     if property.get("const").is_none() && property.get("description").is_none() {
@@ -24,23 +37,15 @@ mod tests {
                     }
                 }
             }
-            match value {
-                Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), missing)),
-                Value::Array(list) => {
-                    list.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), missing));
-                }
-                _ => {}
-            }
-        }
-        let mut missing = Vec::new();
-        walk(&schema(), "", &mut missing);
+        });
         assert!(missing.is_empty(), "{missing:?}");
     }
 
     /// Every number of the file has a lower and an upper limit, so that none is finite and yet impossible.
     #[test]
     fn numbers_have_limits() {
-        fn walk(value: &Value, path: &str, missing: &mut Vec<String>) {
+        let mut missing = Vec::new();
+        walk(&schema(), "", &mut |value, path| {
             let is_number = |kind: &Value| kind == "number" || kind == "integer";
             let kinds = match &value["type"] {
                 Value::Array(kinds) => kinds.iter().any(is_number),
@@ -51,16 +56,7 @@ mod tests {
             if kinds && !(lower && has(["maximum", "exclusiveMaximum"])) {
                 missing.push(path.to_owned());
             }
-            match value {
-                Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), missing)),
-                Value::Array(list) => {
-                    list.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), missing));
-                }
-                _ => {}
-            }
-        }
-        let mut missing = Vec::new();
-        walk(&schema(), "", &mut missing);
+        });
         assert!(missing.is_empty(), "{missing:#?}");
     }
 
