@@ -10,19 +10,21 @@ pub fn is_launched() -> bool {
         .any(|name| std::env::var_os(name).is_some())
 }
 
-/// Tells the library what this program needs of it, as far as the user has not chosen.
-///
-/// # Safety
-///
-/// Nothing reads the environment meanwhile; see [`std::env::set_var`].
-pub(super) unsafe fn prepare() {
+/// Not collective. Gives the library the settings that this program needs, as far as the user has not chosen. A process that has
+/// threads already is left as it is: one of them may read the environment meanwhile.
+pub(super) fn prepare() {
     let version = mpi::environment::library_version().unwrap_or_default();
     for &(name, value) in settings(&version) {
-        if std::env::var_os(name).is_none() {
-            // SAFETY: the caller's promise.
+        if std::env::var_os(name).is_none() && has_one_thread() {
+            // SAFETY: this is the only thread, so nothing reads or writes the environment meanwhile.
             unsafe { std::env::set_var(name, value) };
         }
     }
+}
+
+/// Whether this thread is the only one of the process. Where the system does not say, it is taken to have others.
+fn has_one_thread() -> bool {
+    std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1)
 }
 
 /// Settings for the library that calls itself `version`.
@@ -38,7 +40,17 @@ fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
 
 #[cfg(test)]
 mod tests {
-    use super::settings;
+    use super::{has_one_thread, settings};
+
+    /// A process with threads does not get its environment changed. A test is a thread beside that of its harness.
+    #[test]
+    fn threads_are_noticed() {
+        std::thread::scope(|scope| {
+            let other = scope.spawn(std::thread::park);
+            assert!(!has_one_thread());
+            other.thread().unpark();
+        });
+    }
 
     /// Yielding for all versions of Open MPI; nothing for other libraries.
     #[test]

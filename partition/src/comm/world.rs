@@ -57,11 +57,9 @@ impl World {
     /// prints `agimp: rank R, step S: <message> (<file>:<line>)` and ends all ranks; with one rank it
     /// prints the same line and unwinds as usual. See [`Comm::begin_step`] for the step.
     ///
-    /// To be called before the program starts threads, since it may set an environment variable.
+    /// To be called before the program starts threads: waiting ranks give their cores away only then.
     pub fn init() -> Result<World, CommError> {
-        // SAFETY: nothing reads the environment meanwhile: by the contract of this function the program has no other
-        // threads yet (a test harness has, but they wait), and MPI starts its own later.
-        unsafe { environment::prepare() };
+        environment::prepare();
         let (universe, threading) =
             mpi::initialize_with_threading(Threading::Funneled).ok_or(CommError::AlreadyStarted)?;
         if threading < Threading::Funneled {
