@@ -48,6 +48,7 @@ fn rounding_takes_no_particle_out_of_the_domain() {
         chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-3;
         let error = solver.step(1e3, Requests::default()).expect_err("a particle has left").to_string();
         assert!(error.contains("left the domain at (9.99") && error.contains(", 20."), "{error}");
+        assert!(error.contains("1 mm beyond `x_min`"), "{error}");
     });
     if !is_test {
         relaunch("rounding_takes_no_particle_out_of_the_domain", 1, 60);

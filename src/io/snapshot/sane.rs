@@ -8,6 +8,7 @@ use super::header::Header;
 use super::state::columns;
 use crate::grid::leaf_geometry::position_key;
 use crate::particle::chunk::{TILE, Tag};
+use crate::text::{number, place};
 
 /// Numbers of the job that tags of particles refer to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +61,9 @@ pub(super) fn finite_field<const D: usize>(
 
 fn unstable(name: &str, id: u64, value: f64, position: &[f64]) -> String {
     format!(
-        "not written: {name} of particle {id} is {value:?}, at {position:?} m (relative to the domain's lower corner); \
-         the run has become unstable"
+        "not written: {name} of particle {id} is {}, at {} from the domain's lower corner; the run has become unstable",
+        number(value, 4),
+        place(position)
     )
 }
 
@@ -80,9 +82,9 @@ pub(super) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), Stri
         Some(at) => {
             let expected = if positive { "a positive number" } else { "a finite number" };
             Err(format!(
-                "{name} of the particle in row {} is {:?}; expected {expected}, at most {most:e} in size",
+                "{name} of the particle in row {} is {}; expected {expected}, at most {most:e} in size",
                 at / width,
-                values[at]
+                number(values[at], 4)
             ))
         }
     }
@@ -106,8 +108,10 @@ pub(super) fn positions<const D: usize>(
             let key = position_key(position, roots, header.root_edge);
             if !(inside && (octant.key()..octant.key_end()).contains(&key)) {
                 return Err(format!(
-                    "the particle in row {row}, at {position:?} m, is not in its leaf of level {} at {:?}",
-                    octant.level, octant.coord
+                    "the particle in row {row}, at {}, is not in its leaf of level {} at {:?}",
+                    place(&position),
+                    octant.level,
+                    octant.coord
                 ));
             }
         }

@@ -67,6 +67,15 @@ impl<const D: usize> FaceRules<D> {
     }
 }
 
+/// The face of the domain `[0, extent)` that a position is farthest beyond, by its name in the job, and how far, m.
+pub(super) fn farthest_beyond<const D: usize>(position: &[f64; D], extent: &[f64; D]) -> (&'static str, f64) {
+    const FACES: [[&str; 2]; 3] = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]];
+    let sides = (0..D).flat_map(|axis| {
+        [(FACES[axis][0], -position[axis]), (FACES[axis][1], position[axis] - extent[axis])]
+    });
+    sides.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(("", 0.0))
+}
+
 /// Particles of one leaf that crossed a face of the domain in one step.
 #[derive(Debug, Default)]
 pub(in crate::solver) struct Crossed {
@@ -167,6 +176,12 @@ mod tests {
             assert_eq!(of([1.1, -0.1]), Some(Crossing::Left));
         }
         assert_eq!(rules(Leaving::Error).in_job(&[0.5, 1.0]), [10.5, 21.0]);
+    }
+
+    #[test]
+    fn the_farthest_face_is_named() {
+        assert_eq!(farthest_beyond(&[0.5, 2.25], &[1.0, 2.0]), ("y_max", 0.25));
+        assert_eq!(farthest_beyond(&[-0.5, 2.25], &[1.0, 2.0]), ("x_min", 0.5));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
-use super::crossings::{Crossed, Crossing, FaceRules};
+use super::crossings::{Crossed, Crossing, FaceRules, farthest_beyond};
 use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
@@ -194,8 +194,9 @@ impl<const D: usize> Borders<D> {
             Some(Crossing::Deleted) => return Ok(Destination::Deleted),
             Some(Crossing::Left) => return Ok(Destination::Left),
             Some(Crossing::Refused) => {
+                let (face, beyond) = farthest_beyond(&position, &extent);
                 let position = self.rules.in_job(&position);
-                return Err(MigrateError::Left { id: chunk.ids()[p], position });
+                return Err(MigrateError::Left { id: chunk.ids()[p], position, face, beyond });
             }
             Some(Crossing::PutBack) => {
                 *put_back += 1;

@@ -12,7 +12,7 @@ use super::records::{append_all, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::grid::{GridPlan, KnownTree};
 use crate::particle::chunk::Chunk;
-use crate::text::{number, place};
+use crate::text::{number, place, quantity};
 
 const TAG: u16 = 12;
 
@@ -21,15 +21,20 @@ const TAG: u16 = 12;
 pub enum MigrateError {
     /// A particle has left the domain and the job does not allow it.
     #[error(
-        "particle {id} left the domain at {}; `boundaries.leaving` says what to do with such particles, and faces \
-         of kind `outflow` let them go",
-        place(position)
+        "particle {id} left the domain at {}, {} beyond `{face}`; `boundaries.leaving` says what to do with such particles, \
+         and faces of kind `outflow` let them go",
+        place(position),
+        quantity(*beyond, "m")
     )]
     Left {
         /// Identifier of the particle.
         id: u64,
         /// Position in the coordinates of the job, m.
         position: Vec<f64>,
+        /// The face that it is farthest beyond.
+        face: &'static str,
+        /// How far, m.
+        beyond: f64,
     },
     /// The state of a particle is not one that material can have.
     #[error(
