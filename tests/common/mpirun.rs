@@ -25,6 +25,12 @@ pub(crate) fn command(ranks: usize, seconds: u32) -> Command {
     command
 }
 
+/// Whether `mpirun` is that of MPICH.
+pub(crate) fn is_mpich() -> bool {
+    let output = Command::new("mpirun").arg("--version").output().expect("mpirun");
+    text(&output).contains("HYDRA")
+}
+
 /// Runs a command of [`command`] to its end. One at a time in this process: more would only compete for the same cores.
 pub(crate) fn finish(command: &mut Command) -> Output {
     static ONE_LAUNCH: Mutex<()> = Mutex::new(());

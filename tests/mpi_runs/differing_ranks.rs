@@ -4,7 +4,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::in_turn;
-use crate::launch::{Outcome, Running, job, mpirun, run, succeed, text};
+use crate::launch::{Outcome, Running, by_rank, job, mpirun, run, succeed, text};
 
 /// A run that waits for ever would take longer.
 const SOON: Duration = Duration::from_secs(60);
@@ -79,12 +79,14 @@ fn ranks_need_the_same_command() {
         (vec!["run", &a], vec!["run", &b]),
         (vec!["run", &a], vec!["run", &a, "--restart", "latest"]),
         (vec!["run", &a, "--restart", "latest"], vec!["run", &a]),
+        (vec!["run", &a, "--set", "time.cfl=0.3"], vec!["run", &a, "--set", "time.cfl=0.2"]),
+        (vec!["run", &a], vec!["run", &a, "--set", "time.cfl=0.2"]),
         (vec!["run", &a], vec!["check", &a]),
         (vec!["run", &a], vec!["run", "missing.toml"]),
     ];
+    let started = |words: &[&str]| format!("exec {agimp} {}", words.join(" "));
     for (first, second) in cases {
-        let mut command = mpirun(home.path(), 1);
-        command.arg(agimp).args(&first).args([":", "-n", "1", agimp]).args(&second);
+        let mut command = by_rank(home.path(), [&started(&first), &started(&second)]);
         let output = Running::start(&mut command).finish_within(SOON);
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
@@ -98,8 +100,6 @@ fn ranks_need_the_same_command() {
         assert!(!home.path().join("out").exists());
     }
     // Threads are each rank's own affair.
-    let mut command = mpirun(home.path(), 1);
-    command.arg(agimp).args(["run", &a, "--threads", "1"]);
-    command.args([":", "-n", "1", agimp]).args(["run", &a, "--threads", "2"]);
-    succeed(&mut command);
+    let threads = ["1", "2"].map(|threads| started(&["run", &a, "--threads", threads]));
+    succeed(&mut by_rank(home.path(), [&threads[0], &threads[1]]));
 }

@@ -41,6 +41,15 @@ pub(crate) fn mpirun(directory: &Path, ranks: usize) -> Command {
     command
 }
 
+/// A command of the shell for rank 0 and one for rank 1. One command of `mpirun`: several, of which each fails, make that of
+/// Open MPI 5.0.7 crash.
+pub(crate) fn by_rank(directory: &Path, [first, second]: [&str; 2]) -> Command {
+    let mut command = mpirun(directory, 2);
+    let script = r#"if [ "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}" = 0 ]; then eval "$0"; else eval "$1"; fi"#;
+    command.args(["bash", "-c", script, first, second]);
+    command
+}
+
 /// `agimp run JOB --threads THREADS ARGUMENTS…` on that many ranks; one rank is started without `mpirun`.
 pub(crate) fn run(directory: &Path, ranks: usize, threads: usize, job: &Path, arguments: &[&str]) -> Command {
     let mut command = if ranks == 1 {
@@ -83,7 +92,18 @@ impl Running {
         if is_rank(&launcher) {
             vec![launcher]
         } else {
-            children(launcher).into_iter().filter(is_rank).collect()
+            // Ranks are children of `mpirun`, or of a helper that it has started.
+            let mut processes = children(launcher);
+            let mut ranks = Vec::new();
+            while let Some(process) = processes.pop() {
+                if is_rank(&process) {
+                    ranks.push(process);
+                } else {
+                    processes.extend(children(process));
+                }
+            }
+            ranks.sort_unstable();
+            ranks
         }
     }
 
