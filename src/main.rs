@@ -2,6 +2,7 @@
 use agimp::cli::{Arguments, execute, unusable};
 use agimp::run::stop::StopRequest;
 use clap::Parser as _;
+use partition::comm::is_launched;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -10,8 +11,11 @@ fn main() -> ExitCode {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();
-    // Without it such a write ends the program, which says nothing.
-    let _ = agimp::io::cause::tell_size_limits();
+    // Without it such a write ends the program, which says nothing. Ranks do so once MPI has started: until then the limit may be
+    // what keeps `mpirun` from starting it, and they would wait for ever.
+    if !is_launched() {
+        let _ = agimp::io::cause::tell_size_limits();
+    }
     agimp::io::hdf5_file::prepare();
     let done = Arguments::try_parse().map_err(unusable).and_then(|arguments| execute(arguments.command));
     match done {

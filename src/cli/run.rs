@@ -9,6 +9,7 @@ use super::Failure;
 use super::shared::message::{together, warn_of};
 use super::shared::ranks;
 use super::shared::settings::Changes;
+use crate::io::cause::tell_size_limits;
 use crate::job::problem::AnyProblem;
 use crate::job::{Problem, Settings};
 use crate::run::stop::StopRequest;
@@ -62,6 +63,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let settings = arguments.changes.settings()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
+    tell_size_limits()?;
     ranks::same_command(comm, &arguments.words(&settings))?;
     let problem = ranks::load(comm, &arguments.job, &settings)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;

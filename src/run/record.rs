@@ -12,6 +12,7 @@ use crate::job::Problem;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
+use crate::text::quantity;
 
 /// Writes history, telemetry and messages of a run. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder {
@@ -83,10 +84,11 @@ impl Recorder {
             since_traffic: solver.traffic(),
         };
         for Gap { after, before } in gaps.into_iter().flatten() {
-            let from = after.map_or_else(|| "the start".into(), |time| format!("t = {time} s"));
-            let to = before.unwrap_or(time);
+            let from =
+                after.map_or_else(|| "the start".into(), |time| format!("t = {}", quantity(time, "s")));
+            let to = quantity(before.unwrap_or(time), "s");
             recorder.warning(&format!(
-                "{}: rows are missing from {from} to t = {to} s; the file was damaged, cut or moved",
+                "{}: rows are missing from {from} to t = {to}; the file was damaged, cut or moved",
                 rows.display()
             ));
         }

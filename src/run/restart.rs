@@ -13,7 +13,7 @@ use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
-use crate::io::snapshot::{self, Header, Scalars};
+use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
 use crate::particle::Chunk;
 use crate::setup;
@@ -22,6 +22,7 @@ use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::ExactBooks;
 use crate::solver::state::cost::leaf_weight;
 use crate::solver::{Clock, Solver};
+use crate::text::{quantity, written};
 
 /// Where a run goes on from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -209,6 +210,10 @@ pub fn solver<const D: usize>(
         match restored(comm, problem, &path) {
             Ok((solver, scalars)) => {
                 check_end(problem, &path, solver.clock)?;
+                let beside = compare::verify_beside_state(comm, &path);
+                if let (Err(damage), 0) = (beside, comm.rank()) {
+                    warn(&format!("{}; the state is whole, and the run goes on from it", damage.message));
+                }
                 return Ok((solver, scalars));
             }
             Err(reason) => refusal = reason,
@@ -226,9 +231,11 @@ fn check_end<const D: usize>(problem: &Problem<D>, path: &Path, clock: Clock) ->
         return Ok(());
     }
     Err(RunError::Refused(format!(
-        "{}: the file is of t = {time} s (step {step}), which lies behind the end of the run; found time.end = {end}; \
-         expected a later end, or an earlier file",
-        path.display()
+        "{}: the file is of t = {} (step {step}), which lies behind the end of the run; found time.end = {}; expected a \
+         later end, or an earlier file",
+        path.display(),
+        quantity(time, "s"),
+        written(end)
     )))
 }
 

@@ -2,6 +2,8 @@
 //! goes on from what is whole, and says what it has passed over.
 use std::path::Path;
 
+use agimp::text::quantity;
+
 use crate::in_turn;
 use crate::launch::{Outcome, Running, agimp, file, job, run, signal, succeed, text};
 
@@ -45,15 +47,18 @@ fn tables_are_mended_and_gaps_told() {
     let there = rows(&written).len();
     assert!((10..expected.len()).contains(&there), "{there} rows");
     let start_of = |line: usize| rows(&written)[..line].iter().map(|line| line.len() + 1).sum::<usize>();
-    let time_of = |line: usize| expected[line].split(',').nth(1).expect("time").to_owned();
+    let time_of = |line: usize| {
+        let cell = expected[line].split(',').nth(1).and_then(|cell| cell.parse().ok());
+        format!("t = {}", quantity(cell.expect("time"), "s"))
+    };
     let restart = "the start".to_owned();
     let garbage = [&written[..start_of(8)], b"24,0.0\xff\xfe\0\0\0\0"].concat();
     let cases: [Case; 6] = [
         ("gone", None, 1, Some(restart.clone())),
         ("empty", Some(b""), 1, Some(restart)),
-        ("cut after rows", Some(&written[..start_of(6)]), 6, Some(format!("t = {} s", time_of(5)))),
-        ("cut in a row", Some(&written[..start_of(8) + 9]), 8, Some(format!("t = {} s", time_of(7)))),
-        ("garbage behind", Some(&garbage), 8, Some(format!("t = {} s", time_of(7)))),
+        ("cut after rows", Some(&written[..start_of(6)]), 6, Some(time_of(5))),
+        ("cut in a row", Some(&written[..start_of(8) + 9]), 8, Some(time_of(7))),
+        ("garbage behind", Some(&garbage), 8, Some(time_of(7))),
         ("whole, and more", Some(&[&written[..], b"999,1.0"].concat()), there, None),
     ];
     for (what, left, lines, told) in cases {
@@ -102,12 +107,15 @@ fn a_damaged_state_is_passed_over() {
     stopped(home.path(), 45);
     let newest = newest_checkpoint(home.path());
     let bytes = std::fs::read(home.path().join(&newest)).expect("checkpoint");
-    let flipped = flipped(home.path(), &bytes);
+    let beside = flipped(home.path(), &bytes, "VTKHDF");
+    let flipped = flipped(home.path(), &bytes, "state/particles");
     let cut = bytes[..bytes.len() / 2].to_vec();
     for (ranks, damaged, reason) in [
         (1, &flipped, "wrong checksum of state/"),
         (2, &flipped, "wrong checksum of state/"),
         (2, &cut, "cut short"),
+        (1, &beside, "the state is whole, and the run goes on from it"),
+        (3, &beside, "wrong checksum of VTKHDF/"),
     ] {
         let parts = tempfile::tempdir().expect("temporary directory");
         copy(home.path(), parts.path());
@@ -143,15 +151,15 @@ fn newest_checkpoint(directory: &Path) -> String {
     results.join(newest).to_string_lossy().into_owned()
 }
 
-/// The file with one bit changed in a data set of the particles.
-fn flipped(directory: &Path, whole: &[u8]) -> Vec<u8> {
+/// The file with one bit changed in a data set of a group.
+fn flipped(directory: &Path, whole: &[u8], group: &str) -> Vec<u8> {
     let probe = directory.join("probe.hdf");
     for part in 1..32 {
         let mut bytes = whole.to_vec();
         bytes[whole.len() * part / 32] ^= 0x10;
         std::fs::write(&probe, &bytes).expect("written");
-        let output = agimp(directory).args(["digest", "probe.hdf"]).output().expect("agimp starts");
-        if text(&output).contains("wrong checksum of state/particles") {
+        let output = agimp(directory).args(["info", "--verify", "probe.hdf"]).output().expect("agimp starts");
+        if text(&output).contains(&format!("wrong checksum of {group}/")) {
             return bytes;
         }
     }

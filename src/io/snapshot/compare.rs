@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::checked::{Checked, verify_all};
+use partition::comm::{Comm, Disagreement};
+
+use super::checked::{self, Checked};
 use super::header::Header;
 use super::sane::{self, Limits};
 use super::state::{check_tree, columns, octants, path};
@@ -21,7 +23,16 @@ pub struct Digest {
 pub fn verify(path: &Path) -> Result<usize, FileError> {
     let file = Reader::open_alone(path)?;
     let header = Header::read(&file)?;
-    verify_all(&file, &header)
+    checked::verify(&file, &header, |_, _| true)
+}
+
+/// Collective. Compares the checksums of the data sets that [`super::read`] does not read, each on one rank. An error is the
+/// same on all ranks.
+pub fn verify_beside_state(comm: &Comm, path: &Path) -> Result<(), Disagreement> {
+    let mine = |number: usize, name: &str| !name.starts_with("state/") && number % comm.size() == comm.rank();
+    let verified =
+        Reader::open_alone(path).and_then(|file| checked::verify(&file, &Header::read(&file)?, mine));
+    comm.agree(verified).map(|_| ())
 }
 
 /// Not collective. Level and particles of each leaf, where the file holds the tree.
