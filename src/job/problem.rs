@@ -9,7 +9,9 @@ use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
 pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
+use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
+use crate::quantity::Quantity;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
 
@@ -128,6 +130,11 @@ impl<const D: usize> Problem<D> {
         Aabb::new(octant.coord.map(|c| f64::from(c) * edge), octant.coord.map(|c| f64::from(c + 1) * edge))
     }
 
+    /// A point in the coordinates of the job, m, with z = 0 in plane strain: where quantities are taken.
+    pub fn place(&self, x: &[f64; D]) -> [f64; 3] {
+        std::array::from_fn(|a| if a < D { self.origin[a] + x[a] } else { 0.0 })
+    }
+
     /// The finest level that the job asks for.
     pub fn finest_level(&self) -> u8 {
         self.tree.regions.iter().map(|region| region.level).fold(self.tree.base_level, u8::max)
@@ -183,14 +190,50 @@ pub struct Body<const D: usize> {
     pub place: (usize, usize),
     /// Index into [`Problem::materials`].
     pub material: usize,
-    /// Velocity of the body's centre, m/s.
-    pub velocity: [f64; D],
+    /// Velocity without that of rotation, m/s; it may depend on the place.
+    pub velocity: [Quantity; D],
     /// Angular velocity about the body's centre, rad/s; only the third component in plane strain.
     pub angular_velocity: [f64; 3],
     /// The point that the angular velocity turns about: the centre of the bounding box, m.
     pub centre: [f64; D],
     /// Particles per cell along each axis; not necessarily a whole number.
     pub particles_per_cell: f64,
+    /// Stress at the start, if it does not begin without.
+    pub stress: Option<InitialStress>,
+}
+
+/// Stress of a body at the start.
+#[derive(Clone, Debug)]
+pub struct InitialStress {
+    /// Line and column of its table in the job file, both from 1; for messages.
+    pub place: (usize, usize),
+    /// What it is.
+    pub kind: StressKind,
+    /// Consolidation, in place of that of the material.
+    pub consolidation: Option<Consolidation>,
+}
+
+/// What the stress of a body is at the start. Levels are in the coordinates of the job, along the axis of gravity.
+#[derive(Clone, Debug)]
+pub enum StressKind {
+    /// The weight above, Pa, with this ratio of horizontal to vertical stress, under a surface (found: `None`) with a pressure on it.
+    Weight {
+        /// Horizontal over vertical stress.
+        ratio: Quantity,
+        /// Level of the surface, m.
+        surface: Option<Quantity>,
+        /// Pressure on the surface, Pa.
+        surcharge: Quantity,
+    },
+    /// Vertical and horizontal pressures, Pa, over the depth under a surface, m.
+    Depth {
+        /// Rows of depth and pressures, depths increasing.
+        rows: Vec<[f64; 3]>,
+        /// Level of depth 0, m.
+        surface: Option<Quantity>,
+    },
+    /// Components `xx, yy, zz, xy, xz, yz`, Pa, tension positive.
+    Components(Box<[Quantity; 6]>),
 }
 
 /// End and time step.

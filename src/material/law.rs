@@ -1,5 +1,6 @@
 //! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the trait
 //! that the solver calls ([`Material`]).
+use super::initial::Consolidation;
 use super::tensor::eigen::Symmetric;
 use super::{HISTORIES, PLASTIC_STRAIN};
 use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
@@ -118,6 +119,21 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     fn softens(&self) -> bool {
         false
     }
+
+    /// See [`Material::strain_under`]. Without it, no body of this law can start under stress.
+    fn strain_under(
+        &self,
+        _stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        None
+    }
+
+    /// See [`Material::consolidates`].
+    fn consolidates(&self) -> bool {
+        false
+    }
 }
 
 /// A constitutive model with its parameters, called once for each batch of particles.
@@ -144,6 +160,19 @@ pub trait Material: std::fmt::Debug + Send + Sync {
 
     /// Whether it asks for the size of cells ([`Step::size`]).
     fn softens(&self) -> bool;
+
+    /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None` where there are none. The
+    /// volume is that of these strains and of the plastic volume in `history`, which holds the initial values; a law that is
+    /// consolidated changes them to what is asked for.
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]>;
+
+    /// Whether it has a preconsolidation pressure that a job may give.
+    fn consolidates(&self) -> bool;
 
     /// True for models that flow: they have history, do plastic work, and their stretch since the
     /// start is unbounded.
@@ -179,6 +208,19 @@ impl<L: Law> Material for L {
 
     fn softens(&self) -> bool {
         Law::softens(self)
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        Law::strain_under(self, stress, consolidation, history)
+    }
+
+    fn consolidates(&self) -> bool {
+        Law::consolidates(self)
     }
 }
 

@@ -6,6 +6,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `law.rs` | state, step, and the traits of a model |
+//! | `initial.rs` | states under a given stress |
 //! | `laws/` | the models, one file each, and the list of them |
 //! | `parameters/` | what models share of their parameters: elastic constants, checks, reading them from text |
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
@@ -18,6 +19,7 @@ use crate::simd::{LANES, Mask, VectorMask};
 mod coulomb;
 pub mod driver;
 mod hardening;
+pub mod initial;
 mod law;
 pub mod laws;
 pub mod parameters;

@@ -5,6 +5,7 @@ use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
+use self::initial_stress::put_under_stress;
 use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
@@ -14,6 +15,7 @@ use crate::solver::state::cost::leaf_cost;
 use crate::solver::{Clock, Physics, Solver, StepControl};
 
 pub mod estimate;
+pub mod initial_stress;
 pub mod seed;
 pub mod warnings;
 
@@ -106,6 +108,10 @@ fn seeded<const D: usize>(
             }
         }
     }
+    let stressed = forest.leaves().par_iter().zip(&mut chunks);
+    let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
+    let stressed: Result<(), SeedError> = stressed.collect();
+    comm.agree(stressed)?;
     Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 

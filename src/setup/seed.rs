@@ -5,7 +5,9 @@
 //! own points, on whichever rank it is, and no point is made twice.
 use crate::geometry::{Aabb, Side};
 use crate::job::problem::{Body, Problem};
+use crate::material::initial::NoState;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::quantity::Quantity;
 use partition::Octant;
 
 /// A particle cannot be made.
@@ -38,6 +40,22 @@ pub enum SeedError {
         /// The body.
         body: String,
     },
+    /// A body cannot have the stress that the job gives it.
+    #[error(
+        "{place}: found a stress at {} that the body \"{body}\" cannot have: {reason}; expected a stress inside the yield surface: \
+         another k0, more cohesion, or a higher preconsolidation pressure",
+        crate::text::place(point)
+    )]
+    Stress {
+        /// File, line, column and key of the stress.
+        place: String,
+        /// The body.
+        body: String,
+        /// The point in the coordinates of the job file, m.
+        point: Vec<f64>,
+        /// Why.
+        reason: NoState,
+    },
 }
 
 /// Not collective. True when a body may have points in the leaf: never false for a leaf that
@@ -64,17 +82,18 @@ pub fn fill_leaf<const D: usize>(
         let volume: f64 = [spacing; D].iter().product();
         let mass = problem.materials[body.material].density * volume;
         let tag = Tag { material: body.material as u16, body: index as u16, level: octant.level };
-        let affine = velocity_gradient::<D>(body.angular_velocity);
+        let spin = velocity_gradient::<D>(body.angular_velocity);
         chunk.reserve_exact(chunk.len() + points.len());
         for x in points {
             let p = chunk.push_zeroed(0, tag);
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
             for i in 0..D {
-                let turning: f64 = (0..D).map(|j| affine[i][j] * (x[j] - body.centre[j])).sum();
+                let turning: f64 = (0..D).map(|j| spin[i][j] * (x[j] - body.centre[j])).sum();
                 set(Layout::<D>::POSITION + i, x[i]);
-                set(Layout::<D>::VELOCITY + i, body.velocity[i] + turning);
+                set(Layout::<D>::VELOCITY + i, body.velocity[i].at(&problem.place(x), 0.0) + turning);
                 for j in 0..D {
-                    set(Layout::<D>::AFFINE + D * i + j, affine[i][j]);
+                    let slope = slope(problem, &body.velocity[i], x, j, spacing);
+                    set(Layout::<D>::AFFINE + D * i + j, spin[i][j] + slope);
                 }
             }
             // The identity: xx, yy and zz come first in either dimension.
@@ -144,6 +163,51 @@ fn place<const D: usize>(problem: &Problem<D>, body: usize) -> String {
 /// Distance of lattice points of a body in leaves of a level, m.
 fn spacing<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
     problem.cell_edge(level) / body.particles_per_cell
+}
+
+/// Mean slope of a field along an axis over a box of this edge, by the values on its faces.
+fn slope<const D: usize>(
+    problem: &Problem<D>,
+    field: &Quantity,
+    x: &[f64; D],
+    axis: usize,
+    edge: f64,
+) -> f64 {
+    if !field.depends_on_place() {
+        return 0.0;
+    }
+    let [mut low, mut high] = [*x; 2];
+    low[axis] -= 0.5 * edge;
+    high[axis] += 0.5 * edge;
+    (field.at(&problem.place(&high), 0.0) - field.at(&problem.place(&low), 0.0)) / edge
+}
+
+/// Greatest speed of a body at the start without its rotation, m/s, at points of a raster.
+pub fn greatest_speed<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> f64 {
+    let speed = |x: &[f64; D]| {
+        let velocity = body.velocity.each_ref().map(|component| component.at(&problem.place(x), 0.0));
+        velocity.iter().map(|v| v * v).sum::<f64>().sqrt()
+    };
+    if !body.velocity.iter().any(Quantity::depends_on_place) {
+        return speed(&[0.0; D]);
+    }
+    raster(problem, body).map(|x| speed(&x)).fold(0.0, f64::max)
+}
+
+/// Nine points along each axis of the body's bounding box that lie in the body.
+pub fn raster<'a, const D: usize>(
+    problem: &Problem<D>,
+    body: &'a Body<D>,
+) -> impl Iterator<Item = [f64; D]> + 'a {
+    let bounds = body.shape.bounds().intersection(&Aabb::new([0.0; D], problem.size()));
+    (0..9_usize.pow(D as u32)).filter_map(move |mut index| {
+        let x = std::array::from_fn(|a| {
+            let share = ((index % 9) as f64 + 0.5) / 9.0;
+            index /= 9;
+            bounds.lower[a] + share * (bounds.upper[a] - bounds.lower[a])
+        });
+        body.shape.contains(&x).then_some(x)
+    })
 }
 
 /// Gradient of the velocity of a rotation: `C r = ω × r`.

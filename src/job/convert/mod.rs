@@ -9,6 +9,7 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
+//! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
@@ -22,6 +23,7 @@ use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::{Aabb, Shape};
 use crate::load::Gravity;
 use crate::material::parameters::OutOfRange;
+use crate::quantity::Quantity;
 use crate::text::{excerpt, nearest, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
@@ -33,6 +35,10 @@ mod loads;
 mod overlap;
 pub(super) mod settings;
 mod shapes;
+mod stress;
+
+/// Greatest component of a velocity, m/s: less than light.
+const FASTEST: f64 = 1e8;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
@@ -319,8 +325,8 @@ fn body<const D: usize>(
         checks.fault(&path.key("material"), message);
     }
     let velocity = match &body.velocity {
-        Some(velocity) => checks.vector(velocity, &path.key("velocity")),
-        None => Some([0.0; D]),
+        Some(velocity) => stress::fields(checks, velocity, &path.key("velocity"), FASTEST),
+        None => Some(std::array::from_fn(|_| Quantity::default())),
     };
     let angular_velocity = match (&body.angular_velocity, D) {
         (None, _) => Some([0.0; 3]),
@@ -370,5 +376,12 @@ fn body<const D: usize>(
         velocity: velocity?,
         angular_velocity: angular_velocity?,
         particles_per_cell: body.particles_per_cell,
+        stress: match &body.stress {
+            Some(written) => {
+                let here = path.key("stress");
+                Some(stress::stress::<D>(checks, written, file, &file.materials[material?], &here)?)
+            }
+            None => None,
+        },
     })
 }

@@ -3,11 +3,12 @@
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
 pub use super::colliders::Collider;
+use super::common::yes;
 pub use super::common::{AxisName, Spin, Vector};
-use super::common::{velocity, yes};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 use super::shape::Shape;
+pub use super::stress::Stress;
 use crate::material::parameters::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -219,14 +220,18 @@ pub struct Body {
     #[serde(default = "two")]
     #[schemars(range(min = 0.5, max = 8.0))]
     pub particles_per_cell: f64,
-    /// Velocity, m/s; at rest by default.
+    /// Components of the velocity, m/s, as many as the job has dimensions; each a number or an expression in x, y, z. At rest by
+    /// default.
     #[serde(default)]
-    #[schemars(transform = velocity)]
-    pub velocity: Option<Vector>,
+    #[schemars(length(min = 2, max = 3))]
+    pub velocity: Option<Vec<Quantity>>,
     /// Angular velocity about the centre of the body's bounding box, rad/s: three components in 3D, one
     /// number in 2D (about z, counter-clockwise).
     #[serde(default)]
     pub angular_velocity: Option<Spin>,
+    /// Stress at the start; none by default. With it, `density` is that of the body as it stands, under its stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<Stress>,
 }
 
 fn two() -> f64 {

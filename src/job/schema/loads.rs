@@ -17,6 +17,12 @@ pub enum Quantity {
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
 }
 
+impl Default for Quantity {
+    fn default() -> Self {
+        Self::Number(0.0)
+    }
+}
+
 /// A load: what acts on the material beside gravity, contact and the faces of the domain. It acts on nodes inside its shape.
 /// Its mean force (N) since the row before and its work (J) since the start are columns of `history.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

@@ -16,6 +16,7 @@ use super::Model;
 use super::hencky::Hencky;
 use super::von_mises::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
+use crate::material::initial::Consolidation;
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
 use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
@@ -219,6 +220,15 @@ impl Law for DruckerPrager {
     fn softens(&self) -> bool {
         self.cohesive.as_ref().is_some_and(|own| own.cohesion.softens())
     }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        self.dry.strain_under(stress, consolidation, history)
+    }
 }
 
 impl Law for Dry {
@@ -272,6 +282,15 @@ impl Law for Dry {
 
     fn history_names(&self) -> &'static [&'static str] {
         &["plastic_shear_strain", "volume_gain"]
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        self.solid.strain_under(stress, consolidation, history)
     }
 }
 

@@ -2,8 +2,9 @@
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::Model;
 use crate::material::eigen::{decompose, greatest_bound};
+use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::{Elastic, Lame};
-use crate::material::{Law, State, Step};
+use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::{Vector, each};
 
 /// Fixed corotated solid.
@@ -23,6 +24,22 @@ impl Model for FixedCorotated {
     fn examples() -> &'static [&'static str] {
         &["model = 'fixed_corotated', young = 1e6, poisson = 0.3"]
     }
+}
+
+/// Principal logarithmic strains of this elasticity under principal Cauchy stresses, Pa.
+///
+/// `s² - s = (J σ - λ (J - 1) J) / 2μ` along each direction, and J is the product of the stretches s.
+pub(super) fn strain_of_stretches(lame: &Lame, stress: [f64; 3]) -> Option<[f64; 3]> {
+    let stretches = |volume: f64| {
+        stress.map(|s| {
+            let part = volume * (s - lame.lambda * (volume - 1.0)) / (2.0 * lame.mu);
+            0.5 + (0.25 + part).max(0.0).sqrt()
+        })
+    };
+    let volume = increasing_root(|volume| volume - stretches(volume).iter().product::<f64>(), [0.2, 3.0])?;
+    // A stretch of a half and less is on the other branch.
+    let stretch = stretches(volume);
+    stretch.iter().all(|&s| s > 0.5).then(|| stretch.map(libm::log))
 }
 
 impl Law for FixedCorotated {
@@ -58,5 +75,14 @@ impl Law for FixedCorotated {
 
     fn wave_speed(&self) -> f64 {
         (self.lame.pressure_wave() / self.density).sqrt()
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        strain_of_stretches(&self.lame, stress)
     }
 }

@@ -2,9 +2,10 @@
 //! `ε = ½ ln b`. Also the elastic part of the plastic models.
 use super::Model;
 use crate::material::eigen::greatest_bound;
+use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::{Elastic, Lame};
 use crate::material::tensor::strain::Strain;
-use crate::material::{Law, State, Step, Symmetric};
+use crate::material::{HISTORIES, Law, State, Step, Symmetric};
 use crate::simd::{Vector, each};
 
 /// Hencky solid.
@@ -82,5 +83,21 @@ impl Law for Hencky {
 
     fn wave_speed(&self) -> f64 {
         (self.lame.pressure_wave() / self.density).sqrt()
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        // 3K θ = exp(θ) tr σ, then dev ε = exp(θ) dev σ / 2μ; in tension up to tr σ = 3K / e.
+        let Lame { lambda, mu } = self.lame;
+        let three_bulk = 3.0 * lambda + 2.0 * mu;
+        let trace = stress.iter().sum::<f64>();
+        let range = if trace > 0.0 { [0.0, 1.0] } else { [trace.min(0.0) / three_bulk, 0.0] };
+        let volume_log = increasing_root(|log| three_bulk * log - libm::exp(log) * trace, range)?;
+        let volume = libm::exp(volume_log);
+        Some(stress.map(|s| volume * (s - trace / 3.0) / (2.0 * mu) + volume_log / 3.0))
     }
 }

@@ -2,8 +2,9 @@
 //! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
 use super::Model;
 use crate::material::eigen::{determinant, greatest_bound};
+use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::{Elastic, Lame};
-use crate::material::{Law, State, Step};
+use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
 use crate::simd::math::ln;
 
@@ -62,5 +63,23 @@ impl Law for NeoHookean {
 
     fn wave_speed(&self) -> f64 {
         (self.lame.pressure_wave() / self.density).sqrt()
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        // b = 1 + (J σ - λ ln J) / μ along each direction, and J² is their product.
+        let Lame { lambda, mu } = self.lame;
+        let squares = |log: f64| stress.map(|s| 1.0 + (libm::exp(log) * s - lambda * log) / mu);
+        let excess = |log: f64| {
+            // Where a stretch is not positive, J is too great.
+            let logs = squares(log).map(|b| if b > 0.0 { libm::log(b) } else { f64::NEG_INFINITY });
+            log - 0.5 * logs.iter().sum::<f64>()
+        };
+        let log = increasing_root(|log| excess(log).min(1e9), [-3.0, 1.0])?;
+        Some(squares(log).map(|b| 0.5 * libm::log(b)))
     }
 }

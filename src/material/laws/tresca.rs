@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Model;
 use super::mohr_coulomb::MohrCoulomb;
 use crate::material::hardening::{Curve, Hardening};
+use crate::material::initial::Consolidation;
 use crate::material::parameters::OutOfRange;
 use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
@@ -87,5 +88,14 @@ impl Law for Tresca {
 
     fn softens(&self) -> bool {
         Law::softens(&self.0)
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        self.0.strain_under(stress, consolidation, history)
     }
 }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::Model;
 use super::hencky::Hencky;
 use crate::material::hardening::{Curve, Flow, Hardening};
+use crate::material::initial::Consolidation;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
@@ -167,6 +168,15 @@ impl Law for VonMises {
 
     fn softens(&self) -> bool {
         self.curve.softens()
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        self.solid.strain_under(stress, consolidation, history)
     }
 }
 

@@ -148,6 +148,8 @@ impl Estimate {
 /// Two bodies share a lattice point, or the steps cannot be counted.
 pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, EstimateError> {
     let (time_step, steps) = steps(problem)?;
+    let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
+    super::initial_stress::probe(problem, &materials)?;
     let Tally { particles, levels, is_cut } = count::count(problem)?;
     let outputs =
         problem.output.every.map_or(2, |every| (problem.time.end / every - 1e-9).floor() as u64 + 2);
@@ -198,7 +200,7 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
         .map(|body| {
             let bounds = body.shape.bounds();
             let reach = if bounds.half_diagonal().is_finite() { bounds.half_diagonal() } else { 0.0 };
-            norm(&body.velocity) + norm(&body.angular_velocity) * reach
+            super::seed::greatest_speed(problem, body) + norm(&body.angular_velocity) * reach
         })
         .fold(0.0, f64::max);
     let extent = problem.size();

@@ -1,6 +1,7 @@
 //! Choice of the time step.
 use rayon::prelude::*;
 
+use crate::material::{self, HISTORIES, State, Step};
 use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};
 use crate::solver::physics::Physics;
@@ -47,18 +48,42 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Physics<D> {
-    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest.
+    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest, or under the stress that they
+    /// have.
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
         let mut fastest: f64 = 0.0;
         let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS);
         for (tile, tags) in tiles.zip(chunk.tags().chunks(TILE)) {
             let velocity = tile[Layout::<D>::VELOCITY..].iter().take(D).map(Lanes::load);
             let squares = velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum));
-            for (&tag, speed) in tags.iter().zip(squares.sqrt().to_array()) {
+            let speeds = squares.sqrt().to_array();
+            for (&tag, speed) in tags.iter().zip(speeds) {
                 let material = &self.materials[usize::from(Tag::unpack(tag).material)];
                 fastest = fastest.max(material.wave_speed() + speed);
             }
+            let stresses = &tile[Layout::<D>::STRESS..][..Layout::<D>::SYMMETRIC];
+            if stresses.iter().any(|line| line[..tags.len()].iter().any(|&stress| stress != 0.0)) {
+                let waves = self.waves_under_stress(tile, tags);
+                for (wave, speed) in waves.to_array().into_iter().zip(speeds).take(tags.len()) {
+                    fastest = fastest.max(wave + speed);
+                }
+            }
         }
         fastest
+    }
+
+    /// Wave speeds of the particles of a tile in their present state, m/s.
+    fn waves_under_stress(&self, tile: &[[f64; TILE]], tags: &[u64]) -> Lanes {
+        let mut state = State::new([Lanes::splat(0.0); 6]);
+        for c in 0..Layout::<D>::SYMMETRIC {
+            state.elastic[c] = Lanes::load(&tile[Layout::<D>::LEFT_CAUCHY_GREEN + c]);
+        }
+        for h in 0..HISTORIES {
+            state.history[h] = Lanes::load(&tile[Layout::<D>::HISTORY + h]);
+        }
+        let last = tags.len() - 1;
+        let index = std::array::from_fn(|lane| Tag::unpack(tags[lane.min(last)]).material);
+        material::update(&self.materials, &index, &mut state, &Step::rest(D == 2));
+        state.wave_speed
     }
 }

@@ -10,10 +10,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::eigen::greatest_bound;
+use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;
-use crate::material::{Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask, each};
 
@@ -208,5 +209,40 @@ impl Law for CamClay {
 
     fn history_names(&self) -> &'static [&'static str] {
         &["plastic_strain", "plastic_volume"]
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        // With the volume exp(θ + g) of elastic and plastic volume strain, p exp(θ + g) = p_r exp(-θ / κ) and
+        // p_c exp(θ + g) = p_c0 exp(-g / (λ - κ)): linear in the logarithms.
+        let pressure = -stress.iter().sum::<f64>() / 3.0;
+        if pressure.is_nan() || pressure <= 0.0 {
+            return None;
+        }
+        let elastic = self.swelling * (self.pressure_log - libm::log(pressure));
+        let (mut gain, mut volume_log) = (0.0, elastic / (1.0 + self.swelling));
+        if let Some(consolidation) = consolidation {
+            let square: f64 = stress.iter().map(|s| (s + pressure) * (s + pressure)).sum();
+            let on_surface = pressure + 1.5 * square / (self.slope * self.slope * pressure);
+            let consolidated = match consolidation {
+                Consolidation::Ratio(ratio) => ratio * on_surface,
+                Consolidation::Pressure(pressure) => pressure,
+            };
+            let plastic = self.plastic * (self.preconsolidation_log - libm::log(consolidated));
+            // θ + κ (θ + g) = elastic, g + (λ - κ) (θ + g) = plastic.
+            let sum = (elastic + plastic) / (1.0 + self.swelling + self.plastic);
+            (volume_log, gain) = (elastic - self.swelling * sum, plastic - self.plastic * sum);
+            history[PLASTIC_VOLUME] = gain;
+        }
+        let volume = libm::exp(volume_log + gain);
+        Some(stress.map(|s| volume * (s + pressure) / (2.0 * self.shear) + volume_log / 3.0))
+    }
+
+    fn consolidates(&self) -> bool {
+        true
     }
 }

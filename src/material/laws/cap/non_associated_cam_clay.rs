@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::eigen::{determinant, greatest_bound};
+use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::laws::Model;
 use crate::material::parameters::Lame;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
@@ -202,5 +203,25 @@ impl Law for NonAssociatedCamClay {
         let mut history = [0.0; HISTORIES];
         history[CONSOLIDATION] = self.parameters.consolidation;
         history
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        // κ/2 (J² - 1) = J σ_m; dev b = J^(5/3) dev σ / μ, and the mean m of b makes the product of m + dev b J².
+        let mean = stress.iter().sum::<f64>() / 3.0;
+        // The form without a difference of two large numbers.
+        let root = (mean * mean + self.kappa * self.kappa).sqrt();
+        let volume = if mean > 0.0 { (mean + root) / self.kappa } else { self.kappa / (root - mean) };
+        let size = libm::pow(volume, 5.0 / 3.0) / self.mu;
+        let deviator = stress.map(|s| (s - mean) * size);
+        let least = deviator.iter().fold(0.0_f64, |least, d| least.max(-d));
+        let isotropic = libm::pow(volume, 2.0 / 3.0);
+        let excess = |mean: f64| deviator.iter().map(|d| mean + d).product::<f64>() - volume * volume;
+        let mean = increasing_root(excess, [least, least + 2.0 * isotropic])?;
+        Some(deviator.map(|d| 0.5 * libm::log(mean + d)))
     }
 }

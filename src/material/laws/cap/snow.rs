@@ -4,9 +4,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::eigen::{decompose, greatest_bound};
+use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
+use crate::material::laws::fixed_corotated::strain_of_stretches;
 use crate::material::parameters::Lame;
-use crate::material::{Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
+use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask, each};
 
@@ -148,5 +150,15 @@ impl Law for Snow {
 
     fn history_names(&self) -> &'static [&'static str] {
         &["plastic_strain", "plastic_volume"]
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        let stiffening = libm::exp((1.0 - libm::exp(history[PLASTIC_VOLUME])) * self.exponent);
+        strain_of_stretches(&self.lame, stress.map(|s| s / stiffening))
     }
 }

@@ -6,9 +6,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::tensor::strain::Strain;
-use crate::material::{Law, PLASTIC_STRAIN, State, Step, eigen};
+use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, State, Step, eigen};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask, each};
 
@@ -119,5 +120,20 @@ impl Law for Fluid {
 
     fn history_names(&self) -> &'static [&'static str] {
         &["shear_strain"]
+    }
+
+    fn strain_under(
+        &self,
+        stress: [f64; 3],
+        _consolidation: Option<Consolidation>,
+        _history: &mut [f64; HISTORIES],
+    ) -> Option<[f64; 3]> {
+        // p = K/γ (J^-γ - 1), the same along all directions.
+        let [pressure, ..] = stress.map(|s| -s);
+        if stress.iter().any(|s| (s + pressure).abs() > 1e-12 * pressure.abs()) {
+            return None;
+        }
+        let Parameters { bulk_modulus, gamma, .. } = self.parameters;
+        Some([-libm::log1p(gamma * pressure / bulk_modulus) / (3.0 * gamma); 3])
     }
 }

@@ -1,0 +1,78 @@
+//! Stress at the start of a body, as it is written in a job file.
+use super::loads::Quantity;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Stress of a body at the start. The elastic state is the one to which the material answers with this stress; a stress at which
+/// it yields is refused. Vertical is the axis of `gravity` at the start.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Stress {
+    /// Overconsolidation ratio: preconsolidation pressure over that of the yield surface through the stress; 1 is normally
+    /// consolidated. For models with `preconsolidation_pressure`, in place of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1.0, max = 1e6))]
+    pub ocr: Option<f64>,
+    /// Preconsolidation pressure, Pa, in place of that of the material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
+    pub preconsolidation: Option<f64>,
+    /// What the stress is.
+    #[serde(flatten)]
+    pub kind: StressKind,
+}
+
+/// What the stress of a body is.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum StressKind {
+    /// Vertical stress from the weight above, horizontal stresses in proportion to it.
+    Geostatic {
+        /// Horizontal over vertical stress, K0; a number or an expression in x, y, z.
+        k0: Quantity,
+        /// Level of the surface, m, along the vertical axis: a number or an expression in the horizontal coordinates. By default
+        /// it is found: all bodies above count, with their densities.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        surface: Option<Quantity>,
+        /// Pressure on the surface, Pa; 0 by default.
+        #[serde(default)]
+        surcharge: Quantity,
+    },
+    /// The weight above as a pressure, the same in all directions.
+    Hydrostatic {
+        /// Level of the surface, m, as for `geostatic`; found by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        surface: Option<Quantity>,
+        /// Pressure on the surface, Pa; 0 by default.
+        #[serde(default)]
+        surcharge: Quantity,
+    },
+    /// A table over depth, linear between its rows and constant outside.
+    Depth {
+        /// Rows [depth (m), vertical pressure (Pa), horizontal pressure (Pa)] with increasing depths; compression is positive.
+        table: Vec<[f64; 3]>,
+        /// Level of depth 0, m, as for `geostatic`; by default that of the uppermost body.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        surface: Option<Quantity>,
+    },
+    /// Components of the Cauchy stress, Pa, tension positive: numbers or expressions in x, y, z; 0 by default.
+    Components {
+        /// Normal stress along x.
+        #[serde(default)]
+        xx: Quantity,
+        /// Normal stress along y.
+        #[serde(default)]
+        yy: Quantity,
+        /// Normal stress along z.
+        #[serde(default)]
+        zz: Quantity,
+        /// Shear stress in the plane of x and y.
+        #[serde(default)]
+        xy: Quantity,
+        /// Shear stress in the plane of x and z; 3D only.
+        #[serde(default)]
+        xz: Quantity,
+        /// Shear stress in the plane of y and z; 3D only.
+        #[serde(default)]
+        yz: Quantity,
+    },
+}

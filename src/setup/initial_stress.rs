@@ -1,0 +1,301 @@
+//! Stress of bodies at the start.
+//!
+//! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along the vertical, this is its
+//! mean over each box, and the sums at the nodes are those of the exact integrals: level ground is at rest to round-off.
+use partition::Octant;
+
+use super::seed::{SeedError, raster};
+use crate::job::problem::{Body, InitialStress, Problem, StressKind};
+use crate::material::initial::{NoState, Stressed, under_stress};
+use crate::material::{HISTORIES, Material};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and the volume that they have is the one
+/// under stress: the reference volume is smaller or larger by what the stress does to it.
+///
+/// # Errors
+/// A material cannot have the stress.
+pub fn put_under_stress<const D: usize>(
+    problem: &Problem<D>,
+    materials: &[Box<dyn Material>],
+    octant: &Octant<D>,
+    chunk: &mut Chunk<D>,
+) -> Result<(), SeedError> {
+    let mut columns = Columns::default();
+    let interval = 0.25 * problem.cell_edge(octant.level);
+    for p in 0..chunk.len() {
+        let Tag { body: index, material, .. } = Tag::unpack(chunk.tags()[p]);
+        let body = &problem.bodies[usize::from(index)];
+        let Some(initial) = &body.stress else { continue };
+        let x = chunk.position(p);
+        let material = &*materials[usize::from(material)];
+        let stressed = at(problem, body, initial, material, &x, interval, &mut columns)
+            .map_err(|reason| fault(problem, usize::from(index), initial, &x, reason))?;
+        let symmetric = |tensor: &[f64; 6]| tensor[..Layout::<D>::SYMMETRIC].to_vec();
+        chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &symmetric(&stressed.elastic));
+        chunk.write(Layout::<D>::STRESS, p, &symmetric(&stressed.stress));
+        chunk.write(Layout::<D>::HISTORY, p, &stressed.history[..HISTORIES]);
+        let [half] = chunk.read::<1>(Layout::<D>::HALF, p);
+        let reference = half * libm::pow(stressed.volume_ratio, -1.0 / D as f64);
+        chunk.write(Layout::<D>::HALF, p, &[reference]);
+    }
+    Ok(())
+}
+
+/// Not collective. Looks for stress that a material cannot have at some points of each body, before any particle is made.
+///
+/// # Errors
+/// The first such point.
+pub fn probe<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>]) -> Result<(), SeedError> {
+    let interval = 0.25 * problem.cell_edge(problem.finest_level());
+    for (index, body) in problem.bodies.iter().enumerate() {
+        let Some(initial) = &body.stress else { continue };
+        for x in raster(problem, body) {
+            let material = &*materials[body.material];
+            at(problem, body, initial, material, &x, interval, &mut Columns::default())
+                .map_err(|reason| fault(problem, index, initial, &x, reason))?;
+        }
+    }
+    Ok(())
+}
+
+fn fault<const D: usize>(
+    problem: &Problem<D>,
+    index: usize,
+    initial: &InitialStress,
+    x: &[f64; D],
+    reason: NoState,
+) -> SeedError {
+    let (line, column) = initial.place;
+    SeedError::Stress {
+        place: format!("{}:{line}:{column}: bodies[{index}].stress", problem.path.display()),
+        body: problem.bodies[index].name.clone(),
+        point: problem.place(x)[..D].to_vec(),
+        reason,
+    }
+}
+
+/// State of a particle of a body at a point.
+fn at<const D: usize>(
+    problem: &Problem<D>,
+    body: &Body<D>,
+    initial: &InitialStress,
+    material: &dyn Material,
+    x: &[f64; D],
+    interval: f64,
+    columns: &mut Columns<D>,
+) -> Result<Stressed, NoState> {
+    let place = problem.place(x);
+    let gravity = problem.gravity.at(0.0);
+    let up = Up::new(&gravity);
+    let pressures = match &initial.kind {
+        StressKind::Components(components) => {
+            let stress = components.each_ref().map(|component| component.at(&place, 0.0));
+            return under_stress(material, &stress, initial.consolidation, D == 2);
+        }
+        StressKind::Weight { ratio, surface, surcharge } => {
+            let weight = gravity[up.axis].abs()
+                * match surface {
+                    Some(surface) => {
+                        let depth = (surface.at(&place, 0.0) - place[up.axis]) * up.sign;
+                        problem.materials[body.material].density * depth.max(0.0)
+                    }
+                    None => columns.at(problem, up, x, interval).mass_above(x[up.axis] * up.sign),
+                };
+            let vertical = weight + surcharge.at(&place, 0.0);
+            [vertical, vertical * ratio.at(&place, 0.0)]
+        }
+        StressKind::Depth { rows, surface } => {
+            let depth = match surface {
+                Some(surface) => (surface.at(&place, 0.0) - place[up.axis]) * up.sign,
+                None => columns.at(problem, up, x, interval).top() - x[up.axis] * up.sign,
+            };
+            interpolate(rows, depth)
+        }
+    };
+    let mut stress = [-pressures[1], -pressures[1], -pressures[1], 0.0, 0.0, 0.0];
+    stress[up.axis] = -pressures[0];
+    under_stress(material, &stress, initial.consolidation, D == 2)
+}
+
+/// Values of a table over depth, constant outside.
+fn interpolate(rows: &[[f64; 3]], depth: f64) -> [f64; 2] {
+    let after = rows.iter().position(|row| row[0] > depth).unwrap_or(rows.len());
+    let [low, high] = [after.saturating_sub(1), after.min(rows.len() - 1)].map(|row| rows[row]);
+    let share = if high[0] > low[0] { ((depth - low[0]) / (high[0] - low[0])).max(0.0) } else { 0.0 };
+    [1, 2].map(|value| share.mul_add(high[value] - low[value], low[value]))
+}
+
+/// Which way is up.
+#[derive(Clone, Copy)]
+struct Up {
+    axis: usize,
+    /// 1 along the axis, -1 against it.
+    sign: f64,
+}
+
+impl Up {
+    /// Against gravity, which lies along an axis.
+    fn new<const D: usize>(gravity: &[f64; D]) -> Self {
+        let axis = (0..D).max_by(|&a, &b| gravity[a].abs().total_cmp(&gravity[b].abs())).unwrap_or(0);
+        Self { axis, sign: if gravity[axis] > 0.0 { -1.0 } else { 1.0 } }
+    }
+}
+
+/// What stands on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density, kg/m³.
+#[derive(Clone, Debug, Default)]
+struct Standing(Vec<[f64; 3]>);
+
+impl Standing {
+    /// Mass per area above a height, kg/m².
+    fn mass_above(&self, height: f64) -> f64 {
+        self.0.iter().map(|[low, high, density]| density * (high - low.max(height)).max(0.0)).sum()
+    }
+
+    /// Height of the uppermost surface.
+    fn top(&self) -> f64 {
+        self.0.iter().map(|piece| piece[1]).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// Vertical lines of a leaf that have been followed: those of its lattice.
+struct Columns<const D: usize>(Vec<([f64; D], Standing)>);
+
+impl<const D: usize> Default for Columns<D> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<const D: usize> Columns<D> {
+    /// What stands on the vertical line through a point. Layers thinner than `interval` (m) may be missed.
+    fn at(&mut self, problem: &Problem<D>, up: Up, x: &[f64; D], interval: f64) -> &Standing {
+        let mut foot = *x;
+        foot[up.axis] = 0.0;
+        let found = self.0.iter().position(|(other, _)| *other == foot).unwrap_or_else(|| {
+            self.0.push((foot, standing(problem, up, &foot, interval)));
+            self.0.len() - 1
+        });
+        &self.0[found].1
+    }
+}
+
+fn standing<const D: usize>(problem: &Problem<D>, up: Up, foot: &[f64; D], interval: f64) -> Standing {
+    let mut pieces = Vec::new();
+    let extent = problem.size()[up.axis];
+    for body in &problem.bodies {
+        let bounds = body.shape.bounds();
+        let (low, high) = (bounds.lower[up.axis].max(0.0), bounds.upper[up.axis].min(extent));
+        let point = |height: f64| {
+            let mut x = *foot;
+            x[up.axis] = height;
+            x
+        };
+        let density = problem.materials[body.material].density;
+        let mut push = |from: f64, to: f64| {
+            let [a, b] = [from * up.sign, to * up.sign];
+            pieces.push([a.min(b), a.max(b), density]);
+        };
+        // As far as the distance to the surface each time, and no less than the interval.
+        let (mut height, mut inside_from) = (low, None);
+        let mut was_inside = body.shape.contains(&point(low));
+        if was_inside {
+            inside_from = Some(low);
+        }
+        while height < high {
+            let next = (height + body.shape.distance(&point(height)).abs().max(interval)).min(high);
+            let is_inside = next < high && body.shape.contains(&point(next));
+            if is_inside != was_inside {
+                let crossing =
+                    crossing(height, next, |height| body.shape.contains(&point(height)) == was_inside);
+                match inside_from.take() {
+                    Some(from) => push(from, crossing),
+                    None => inside_from = Some(crossing),
+                }
+                was_inside = is_inside;
+            }
+            height = next;
+        }
+        if let Some(from) = inside_from {
+            push(from, high);
+        }
+    }
+    Standing(pieces)
+}
+
+/// Where a property that holds at `low` and not at `high` ends.
+fn crossing(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return high;
+        }
+        if holds(middle) { low = middle } else { high = middle }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{AnyProblem, parse};
+
+    /// A slope on a layer: columns through a corner, a hole and the layer.
+    #[test]
+    fn weight_above_counts_every_body_and_no_hole() {
+        let text = r#"
+version = 1
+dimension = 2
+gravity = [0, -10]
+domain = { min = [1, -2], size = [4, 4], root_edge = 1 }
+time = { end = 1 }
+[[materials]]
+name = "light"
+density = 1000
+model = "hencky"
+young = 1e8
+poisson = 0.3
+[[materials]]
+name = "heavy"
+density = 2000
+model = "hencky"
+young = 1e8
+poisson = 0.3
+[[bodies]]
+name = "slope"
+material = "light"
+shape = { kind = "difference", from = { kind = "polygon", points = [[1, -1], [5, -1], [5, 1], [3, 1]] }, remove = [{ kind = "box", min = [4, -0.5], max = [5, 0.25] }] }
+[[bodies]]
+name = "layer"
+material = "heavy"
+shape = { kind = "box", min = [1, -2], max = [5, -1] }
+"#;
+        let any = parse(text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let problem: Problem<2> = match any {
+            AnyProblem::Two(problem) => problem,
+            AnyProblem::Three(_) => panic!("a 2D job"),
+        };
+        let up = Up::new(&problem.gravity.at(0.0));
+        for (x, height, expected) in [
+            (1.0, 0.0, 2000.0 + 1000.0),
+            (1.0, 0.5, 1000.0 + 1000.0),
+            (1.5, 1.25, 1000.0 * (1.0 + 0.5 - 0.25)),
+            (3.5, 1.0, 1000.0 * 1.25),
+            (3.5, 1.25, 1000.0 * 1.25),
+            (3.5, 2.75, 250.0),
+        ] {
+            let found = standing(&problem, up, &[x, 0.0], 0.1).mass_above(height);
+            assert!((found / expected - 1.0).abs() < 1e-14, "{x}, {height}: {found} for {expected}");
+        }
+        assert_eq!(standing(&problem, up, &[1.5, 0.0], 0.1).top(), 2.5);
+    }
+
+    #[test]
+    fn tables_over_depth_are_linear_and_constant_outside() {
+        let rows = [[1.0, 10.0, 5.0], [3.0, 30.0, 6.0]];
+        for (depth, expected) in
+            [(0.0, [10.0, 5.0]), (1.0, [10.0, 5.0]), (2.0, [20.0, 5.5]), (7.0, [30.0, 6.0])]
+        {
+            assert_eq!(interpolate(&rows, depth), expected, "{depth}");
+        }
+    }
+}
