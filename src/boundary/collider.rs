@@ -3,46 +3,10 @@
 //! On a real node inside a collider (signed distance at most 0) the condition holds for the velocity relative to the
 //! collider's surface there, with the gradient of the signed distance as normal. The momentum that this takes from
 //! the material is what the material gives to the collider: its force and torque.
+use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, length};
 use crate::geometry::{Aabb, Shape};
-use crate::text::{number, quantity};
-
-/// What a collider does to material that it touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Contact {
-    /// The material moves with the collider.
-    Sticky,
-    /// No motion through the surface, free motion along it.
-    Slip,
-    /// No motion into the collider, free motion away from it; Coulomb friction while it is pressed.
-    Separating {
-        /// Coefficient of friction, tan of the friction angle; 0 is frictionless.
-        friction: f64,
-    },
-}
-
-impl Contact {
-    /// Applies the condition to a velocity relative to the surface (m/s), with the outward unit normal.
-    ///
-    /// Friction takes away at most the tangential velocity that the normal impulse allows:
-    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step).
-    pub fn apply<const D: usize>(self, velocity: &mut [f64; D], outward: &[f64; D]) {
-        let normal = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(outward[a], sum));
-        let tangential: [f64; D] = std::array::from_fn(|a| (-normal).mul_add(outward[a], velocity[a]));
-        match self {
-            Self::Sticky => *velocity = [0.0; D],
-            Self::Slip => *velocity = tangential,
-            Self::Separating { friction } => {
-                if normal >= 0.0 {
-                    return;
-                }
-                let (speed, lost) = (length(&tangential), -friction * normal);
-                let kept = if speed > lost { 1.0 - lost / speed } else { 0.0 };
-                *velocity = tangential.map(|v| v * kept);
-            }
-        }
-    }
-}
+use crate::text::quantity;
 
 /// A collider as the job describes it; it does not change in a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -201,13 +165,7 @@ impl<const D: usize> Collider<D> {
 impl<const D: usize> std::fmt::Display for Collider<D> {
     /// Contact and motion in words.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.contact {
-            Contact::Sticky => write!(f, "sticky, ")?,
-            Contact::Slip => write!(f, "slip, ")?,
-            Contact::Separating { friction } => {
-                write!(f, "separating with friction {}, ", number(friction, 4))?
-            }
-        }
+        write!(f, "{}, ", self.contact)?;
         let both = |speed: f64, spin: f64| format!("{}, {}", quantity(speed, "m/s"), quantity(spin, "rad/s"));
         let speeds = |rate: &Rate<D>| both(length(&rate.velocity), rate.spin);
         match &self.motion {
@@ -282,22 +240,5 @@ mod tests {
         let hit = collider.advanced(&state, &state.rate, &[0.0; 2], [time, 0.0], [4.0, 0.0], [0.0, 0.0, 1.0]);
         assert_eq!(hit.rate.velocity, [state.rate.velocity[0] + 2.0, state.rate.velocity[1]]);
         assert_eq!(hit.rate.spin, 2.0);
-    }
-
-    #[test]
-    fn friction_is_limited_by_the_normal_impulse() {
-        let contact = Contact::Separating { friction: 0.5 };
-        let mut v = [3.0, -2.0];
-        contact.apply(&mut v, &[0.0, 1.0]);
-        assert_eq!(v, [2.0, 0.0]);
-        let mut v = [0.5, -2.0];
-        contact.apply(&mut v, &[0.0, 1.0]);
-        assert_eq!(v, [0.0, 0.0]);
-        let mut v = [0.5, 2.0];
-        contact.apply(&mut v, &[0.0, 1.0]);
-        assert_eq!(v, [0.5, 2.0]);
-        let mut v = [0.5, 2.0];
-        Contact::Slip.apply(&mut v, &[0.0, 1.0]);
-        assert_eq!(v, [0.5, 0.0]);
     }
 }

@@ -1,10 +1,10 @@
 //! Boundary conditions on the velocities of real nodes, and what becomes of particles that leave.
 pub mod collider;
-pub mod face;
+pub mod contact;
 pub mod motion;
 
-pub use collider::{Collider, ColliderState, Contact};
-pub use face::FaceCondition;
+pub use collider::{Collider, ColliderState};
+pub use contact::Contact;
 
 /// What happens to particles that leave the domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

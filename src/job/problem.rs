@@ -4,7 +4,7 @@
 //! [`Problem::origin`]. All quantities are in SI units.
 use crate::adaptivity::{Adaptivity, least_level};
 use crate::boundary::Collider;
-pub use crate::boundary::{FaceCondition, Leaving as LeavingPolicy};
+pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
 pub use crate::kernel::{BoxPolicy, Transfer};
@@ -83,7 +83,7 @@ pub struct Problem<const D: usize> {
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and the upper face of the domain along each axis.
-    pub faces: [[FaceCondition; 2]; D],
+    pub faces: [[Contact; 2]; D],
     /// Which of them the job names; the others have the default.
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.

@@ -1,6 +1,6 @@
 //! What is allowed in a job and likely not meant.
 use crate::adaptivity::Kind;
-use crate::boundary::{Collider, FaceCondition};
+use crate::boundary::Collider;
 use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;
 use crate::material::laws::drucker_prager::FrictionMatch;
@@ -39,14 +39,7 @@ fn faces<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             ["min", "max"].into_iter().enumerate().filter(|(side, _)| !problem.named_faces[a][*side])
         {
             unnamed.push(format!("{}_{end}", ["x", "y", "z"][a]));
-            conditions.push(match problem.faces[a][side] {
-                FaceCondition::Sticky => "sticky",
-                FaceCondition::Slip => "slip",
-                FaceCondition::Separating { .. } => "separating",
-                FaceCondition::Symmetric => "symmetric",
-                #[allow(unreachable_patterns)]
-                _ => "that of the default",
-            });
+            conditions.push(problem.faces[a][side].name());
         }
     }
     if let Some(condition) = conditions.first() {

@@ -1,6 +1,6 @@
 //! What is solved.
 use crate::adaptivity::Adaptivity;
-use crate::boundary::{Collider, FaceCondition, Leaving};
+use crate::boundary::{Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::Material;
@@ -20,7 +20,7 @@ pub struct Physics<const D: usize> {
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
-    pub faces: [[FaceCondition; 2]; D],
+    pub faces: [[Contact; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
     /// Dynamic refinement; `None`: tree and particles keep their sizes.

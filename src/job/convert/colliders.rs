@@ -53,7 +53,7 @@ fn collider<const D: usize>(
     };
     let (motion, axis) = motion?;
     let contact = match written.contact {
-        None => Contact::Separating { friction: 0.0 },
+        None => Contact::default(),
         Some(WrittenContact::Sticky {}) => Contact::Sticky,
         Some(WrittenContact::Slip {}) => Contact::Slip,
         Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },

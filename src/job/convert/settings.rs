@@ -13,7 +13,7 @@ pub(in crate::job) fn faces<const D: usize>(
     checks: &mut Checks,
     boundaries: &file::Boundaries,
     path: &Path,
-) -> Option<[[FaceCondition; 2]; D]> {
+) -> Option<[[Contact; 2]; D]> {
     let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
     if D == 2 {
         for (key, face) in [("z_min", z_min), ("z_max", z_max)] {
@@ -25,12 +25,12 @@ pub(in crate::job) fn faces<const D: usize>(
         }
     }
     let condition = |face: &Option<file::Face>| match face {
-        None => FaceCondition::default(),
-        Some(file::Face::Slip {}) => FaceCondition::Slip,
-        Some(file::Face::Sticky {}) => FaceCondition::Sticky,
-        Some(file::Face::Separating { friction }) => FaceCondition::Separating { friction: *friction },
-        Some(file::Face::Symmetric {}) => FaceCondition::Symmetric,
-        Some(file::Face::Outflow {}) => FaceCondition::Outflow,
+        None => Contact::default(),
+        Some(file::Face::Slip {}) => Contact::Slip,
+        Some(file::Face::Sticky {}) => Contact::Sticky,
+        Some(file::Face::Separating { friction }) => Contact::Separating { friction: *friction },
+        Some(file::Face::Symmetric {}) => Contact::Symmetric,
+        Some(file::Face::Outflow {}) => Contact::Outflow,
     };
     let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
     Some(std::array::from_fn(|a| all[a].map(condition)))

@@ -5,7 +5,7 @@
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
-use crate::boundary::{FaceCondition, Leaving};
+use crate::boundary::{Contact, Leaving};
 use crate::grid::constraints::constraint::node_coord;
 use crate::grid::leaf_geometry::position_key;
 use crate::grid::mask::{bits, block_nodes};
@@ -94,7 +94,7 @@ impl<const D: usize> GivenBoxes<D> {
             materials: vec![material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)],
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
-            faces: [[FaceCondition::Slip; 2]; D],
+            faces: [[Contact::Slip; 2]; D],
             colliders: Vec::new(),
             adaptivity: None,
             leaving: Leaving::default(),

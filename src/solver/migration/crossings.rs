@@ -1,7 +1,7 @@
 //! Particles that cross the faces of the domain: what becomes of them, and what is booked of that.
 use partition::comm::Comm;
 
-use crate::boundary::{FaceCondition, Leaving};
+use crate::boundary::{Contact, Leaving};
 use crate::exact_sum::ExactSum;
 use crate::solver::physics::Physics;
 use crate::text::{count, quantity};
@@ -36,7 +36,7 @@ pub(super) enum Crossing {
 impl<const D: usize> FaceRules<D> {
     /// Those of a run.
     pub(crate) fn new(physics: &Physics<D>) -> Self {
-        let outflow = physics.faces.map(|sides| sides.map(|face| face == FaceCondition::Outflow));
+        let outflow = physics.faces.map(|sides| sides.map(|face| face == Contact::Outflow));
         Self { leaving: physics.leaving, outflow, origin: physics.origin }
     }
 

@@ -1,7 +1,7 @@
 //! Velocities of nodes: forces, conditions on domain faces, and interpolation from real to constrained nodes.
 use rayon::prelude::*;
 
-use crate::boundary::FaceCondition;
+use crate::boundary::Contact;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
@@ -73,7 +73,7 @@ pub fn update_velocity<const D: usize>(
 pub fn apply_faces<const D: usize>(
     fields: &mut NodeFields<D>,
     plan: &GridPlan<D>,
-    faces: &[[FaceCondition; 2]; D],
+    faces: &[[Contact; 2]; D],
 ) {
     for &(node, on) in
         plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)])
@@ -83,7 +83,8 @@ pub fn apply_faces<const D: usize>(
         for axis in 0..D {
             for (side, inward) in [1.0, -1.0].into_iter().enumerate() {
                 if on >> (2 * axis + side) & 1 == 1 {
-                    faces[axis][side].apply(&mut velocity, axis, inward);
+                    let normal = std::array::from_fn(|a| if a == axis { inward } else { 0.0 });
+                    faces[axis][side].apply(&mut velocity, &normal);
                 }
             }
         }
