@@ -1,6 +1,7 @@
 //! Particles on their way between leaves: one record of 64-bit words each.
 use rayon::prelude::*;
 
+use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
@@ -18,24 +19,11 @@ pub(super) fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chun
 /// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given. Chunks know
 /// their greatest half width afterwards.
 pub(super) fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
-    // Sorted by counting, so that chunks can take theirs at the same time.
-    let mut start = vec![0u32; chunks.len() + 1];
-    for &(chunk, _) in arrivals {
-        start[chunk as usize + 1] += 1;
-    }
-    for chunk in 0..chunks.len() {
-        start[chunk + 1] += start[chunk];
-    }
-    let mut next = start.clone();
-    let mut order = vec![0u32; arrivals.len()];
-    for (number, &(chunk, _)) in arrivals.iter().enumerate() {
-        order[next[chunk as usize] as usize] = number as u32;
-        next[chunk as usize] += 1;
-    }
-    let ranges = start.par_windows(2);
-    chunks.par_iter_mut().zip(ranges).with_min_len(32).for_each(|(chunk, range)| {
-        for &number in &order[range[0] as usize..range[1] as usize] {
-            if let [_, columns @ .., id, tag] = arrivals[number as usize].1 {
+    // Sorted, so that chunks can take theirs at the same time.
+    let by_chunk = Csr::new(chunks.len(), arrivals.iter().copied());
+    chunks.par_iter_mut().enumerate().with_min_len(32).for_each(|(number, chunk)| {
+        for record in by_chunk.of(number) {
+            if let [_, columns @ .., id, tag] = record {
                 chunk.push_words(columns, *id, *tag);
             }
         }
