@@ -1,5 +1,5 @@
 //! Rows of `history.csv`.
-use crate::adaptivity::resample::ledger::BooksTotal;
+use crate::adaptivity::resample::ledger::LedgerTotals;
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
@@ -47,7 +47,7 @@ pub fn columns<const D: usize>(
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
     if is_adaptive {
-        columns.extend(BOOKS.map(|(name, unit)| (name.to_owned(), unit)));
+        columns.extend(LEDGER.map(|(name, unit)| (name.to_owned(), unit)));
     }
     for load in loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
@@ -70,13 +70,19 @@ pub fn columns<const D: usize>(
 }
 
 /// Columns of runs with dynamic refinement: sums since the start.
-const BOOKS: [(&str, &str); 5] =
+const LEDGER: [(&str, &str); 5] =
     [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
 
 /// The values of a row that are of splits and merges.
-pub fn book_values(books: &BooksTotal) -> [f64; BOOKS.len()] {
+pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {
     let count = |n: u64| n as f64;
-    [count(books.splits), count(books.merges), count(books.removed), books.split_energy, books.merge_energy]
+    [
+        count(ledger.splits),
+        count(ledger.merges),
+        count(ledger.removed),
+        ledger.split_energy,
+        ledger.merge_energy,
+    ]
 }
 
 const AXES: [&str; 3] = ["_x", "_y", "_z"];

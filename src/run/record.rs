@@ -190,12 +190,12 @@ impl Recorder {
         let reactions = solver.reactions();
         let loads = solver.load_totals();
         let crossings = solver.crossings.gather(comm);
-        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
+        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
         let mut written = Ok(());
         if let Some(history) = &mut self.history {
             let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
-            if let Some(books) = &books {
-                values.extend(history::book_values(books));
+            if let Some(ledger) = &ledger {
+                values.extend(history::ledger_values(ledger));
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
@@ -212,7 +212,7 @@ impl Recorder {
 
     /// Collective. Speed, traffic and memory since the last record.
     fn record<const D: usize>(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
-        let books = solver.physics.adaptivity.as_ref().map(|_| solver.books.total(comm));
+        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
         let phases: Vec<(&'static str, f64)> =
             Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
         let traffic = solver.traffic();
@@ -236,14 +236,14 @@ impl Recorder {
                 possible_imbalance: solver.possible_imbalance().0,
                 partitions: solver.partitions,
                 mass_error,
-                resampled: books.map(|books| Resampled {
+                resampled: ledger.map(|ledger| Resampled {
                     regrids: solver.regrids,
-                    splits: books.splits,
-                    refused: books.refused,
-                    merges: books.merges,
-                    merged_away: books.removed,
-                    split_energy: books.split_energy,
-                    merge_energy: books.merge_energy,
+                    splits: ledger.splits,
+                    refused: ledger.refused,
+                    merges: ledger.merges,
+                    merged_away: ledger.removed,
+                    split_energy: ledger.split_energy,
+                    merge_energy: ledger.merge_energy,
                 }),
             },
         );

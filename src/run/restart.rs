@@ -72,9 +72,9 @@ pub fn scalars<const D: usize>(
     write_exact_books("collider", &solver.contacts.books, comm, &mut reals, &mut exact);
     write_exact_books("load", &solver.load_books, comm, &mut reals, &mut exact);
     if solver.physics.adaptivity.is_some() {
-        let ([splits, _, merges, removed], mut energies) = solver.books.gather(comm);
-        let numbers = [splits, merges, removed, solver.books.next_root];
-        counts.extend(BOOKS.iter().map(|name| String::from(*name)).zip(numbers));
+        let ([splits, _, merges, removed], mut energies) = solver.ledger.gather(comm);
+        let numbers = [splits, merges, removed, solver.ledger.next_root];
+        counts.extend(LEDGER.iter().map(|name| String::from(*name)).zip(numbers));
         exact.extend(
             ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())),
         );
@@ -129,23 +129,23 @@ fn restore_exact_books<const N: usize>(
 }
 
 /// Names of the counters of splits and merges.
-const BOOKS: [&str; 4] = ["splits", "merges", "particles_merged_away", "next_root"];
+const LEDGER: [&str; 4] = ["splits", "merges", "particles_merged_away", "next_root"];
 /// Names of the energies booked by splits and merges.
 const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
 
-/// Takes over the books of splits and merges; the sums are on rank 0. `None` if the file lacks one.
-fn restore_books<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+/// Takes over the ledger of splits and merges; the sums are on rank 0. `None` if the file lacks one.
+fn restore_ledger<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     if solver.physics.adaptivity.is_none() {
         return Some(());
     }
     let energy = |name: &str| ExactSum::from_words(scalars.exact(name)?);
     let (split_energy, merge_energy) = (energy(ENERGIES[0])?, energy(ENERGIES[1])?);
-    let [splits, merges, removed, next_root] = BOOKS.map(|name| scalars.count(name));
-    let books = &mut solver.books;
-    books.next_root = next_root?;
+    let [splits, merges, removed, next_root] = LEDGER.map(|name| scalars.count(name));
+    let ledger = &mut solver.ledger;
+    ledger.next_root = next_root?;
     if rank == 0 {
-        (books.splits, books.merges, books.removed) = (splits?, merges?, removed?);
-        (books.split_energy, books.merge_energy) = (split_energy, merge_energy);
+        (ledger.splits, ledger.merges, ledger.removed) = (splits?, merges?, removed?);
+        (ledger.split_energy, ledger.merge_energy) = (split_energy, merge_energy);
     }
     Some(())
 }
@@ -275,10 +275,10 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of a collider is missing"))?;
     restore_exact_books("load", &mut solver.load_books, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
-    restore_books(comm.rank(), &mut solver, &header.scalars)
-        .ok_or_else(|| refused("the books of splits and merges are missing"))?;
+    restore_ledger(comm.rank(), &mut solver, &header.scalars)
+        .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
-        .ok_or_else(|| refused("the books of particles that left the domain are missing"))?;
+        .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
     Ok((solver, header.scalars))
 }
 
@@ -288,7 +288,7 @@ const MOST: u64 = 1 << 53;
 /// What no run can have counted is refused, whatever the checksum of the header says.
 fn check_counts<const D: usize>(scalars: &Scalars) -> Result<(), String> {
     for (name, count) in &scalars.counts {
-        let most = if name == BOOKS[3] { ids::roots(D) } else { MOST };
+        let most = if name == LEDGER[3] { ids::roots(D) } else { MOST };
         if *count > most {
             return Err(format!("the header says {name} = {count}; no run counts further than {most}"));
         }

@@ -30,7 +30,7 @@ use partition::comm::{Comm, Disagreement, Traffic};
 
 use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
-use crate::adaptivity::resample::ledger::Books;
+use crate::adaptivity::resample::ledger::Ledger;
 use crate::particle::Chunk;
 use crate::solver::state::bookings::{Contacts, ExactBooks};
 use crate::solver::state::cost::Costs;
@@ -66,7 +66,7 @@ impl<const D: usize> Solver<D> {
             phases: Phases::default(),
             grid,
             crossings: Crossings::default(),
-            books: Books::default(),
+            ledger: Ledger::default(),
             regrids: 0,
             parts: RegridTimers::default(),
             regrid_cache: RegridCache::default(),
@@ -79,7 +79,7 @@ impl<const D: usize> Solver<D> {
             weighed: None,
         };
         solver.leaf_data.reset(solver.chunks.len());
-        solver.books.next_root = solver.first_free_root();
+        solver.ledger.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
         solver.provide_reach(reach);
         if clock == Clock::default() {

@@ -228,7 +228,7 @@ where
     let regrids = solver.regrids;
     advance(&mut solver, 100);
     assert_eq!(solver.regrids, regrids, "leaves flicker");
-    let total = solver.books.total(comm);
+    let total = solver.ledger.total(comm);
     assert_eq!((total.splits, total.merges), (0, 0), "{total:?}");
 }
 

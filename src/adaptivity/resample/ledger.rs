@@ -1,4 +1,4 @@
-//! Books about splits and merges.
+//! The ledger of splits and merges.
 use partition::comm::Comm;
 
 use crate::adaptivity::resample::cell_fit::Splits;
@@ -6,7 +6,7 @@ use crate::exact_sum::ExactSum;
 
 /// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
 #[derive(Clone, Debug, Default)]
-pub struct Books {
+pub struct Ledger {
     /// Particles that were split.
     pub splits: u64,
     /// Particles that could not be split: their identifiers have no room for another generation.
@@ -23,24 +23,24 @@ pub struct Books {
     pub next_root: u64,
 }
 
-/// The books of all ranks together.
+/// The ledgers of all ranks together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BooksTotal {
-    /// See [`Books::splits`].
+pub struct LedgerTotals {
+    /// See [`Ledger::splits`].
     pub splits: u64,
-    /// See [`Books::refused`].
+    /// See [`Ledger::refused`].
     pub refused: u64,
-    /// See [`Books::merges`].
+    /// See [`Ledger::merges`].
     pub merges: u64,
-    /// See [`Books::removed`].
+    /// See [`Ledger::removed`].
     pub removed: u64,
-    /// See [`Books::split_energy`].
+    /// See [`Ledger::split_energy`].
     pub split_energy: f64,
-    /// See [`Books::merge_energy`].
+    /// See [`Ledger::merge_energy`].
     pub merge_energy: f64,
 }
 
-impl Books {
+impl Ledger {
     /// Collective. Counts of all ranks and the words of the two energies, as a checkpoint needs them.
     pub fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
         let mut counts = [self.splits, self.refused, self.merges, self.removed];
@@ -51,14 +51,14 @@ impl Books {
     }
 
     /// Collective. Totals of all ranks; energies are exact before they are rounded once.
-    pub fn total(&self, comm: &Comm) -> BooksTotal {
+    pub fn total(&self, comm: &Comm) -> LedgerTotals {
         let ([splits, refused, merges, removed], [split_energy, merge_energy]) = self.gather(comm);
         let (split_energy, merge_energy) = (split_energy.to_f64(), merge_energy.to_f64());
-        BooksTotal { splits, refused, merges, removed, split_energy, merge_energy }
+        LedgerTotals { splits, refused, merges, removed, split_energy, merge_energy }
     }
 
-    /// Books what was split in one leaf.
-    pub fn book_split(&mut self, done: &Splits) {
+    /// Enters what was split in one leaf.
+    pub fn enter_splits(&mut self, done: &Splits) {
         self.splits += done.split;
         self.refused += done.refused;
         done.energies.iter().for_each(|&energy| self.split_energy.add(energy));

@@ -184,7 +184,7 @@ pub fn particle_totals<const D: usize>(
     time: f64,
 ) -> ParticleTotals {
     let gravity = physics.gravity.at(time);
-    let of_leaves: Vec<[Doubled; SUMS]> =
+    let of_leaves: Vec<[DoubleDouble; SUMS]> =
         chunks.par_iter().with_min_len(4).map(|chunk| leaf_totals(physics, &gravity, chunk)).collect();
     let mut sums = vec![ExactSum::new(); SUMS];
     for leaf in &of_leaves {
@@ -210,12 +210,12 @@ const SUMS: usize = 8;
 
 /// A sum of twice the usual precision: the rounding errors of `high` add up in `low` (Knuth's two-sum).
 #[derive(Clone, Copy, Debug, Default)]
-struct Doubled {
+struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
-impl Doubled {
+impl DoubleDouble {
     fn add(&mut self, other: Self) {
         let sum = self.high + other.high;
         let part = sum - self.high;
@@ -232,14 +232,14 @@ impl Doubled {
     }
 }
 
-/// [`Doubled`] for each lane.
+/// [`DoubleDouble`] for each lane.
 #[derive(Clone, Copy)]
-struct DoubledLanes {
+struct DoubleDoubleLanes {
     high: Lanes,
     low: Lanes,
 }
 
-impl DoubledLanes {
+impl DoubleDoubleLanes {
     fn new() -> Self {
         Self { high: Lanes::splat(0.0), low: Lanes::splat(0.0) }
     }
@@ -252,10 +252,10 @@ impl DoubledLanes {
     }
 
     /// All lanes together.
-    fn total(self) -> Doubled {
+    fn total(self) -> DoubleDouble {
         let (high, low) = (self.high.to_array(), self.low.to_array());
-        let lanes = high.into_iter().zip(low).map(|(high, low)| Doubled { high, low });
-        lanes.fold(Doubled::default(), |mut total, lane| {
+        let lanes = high.into_iter().zip(low).map(|(high, low)| DoubleDouble { high, low });
+        lanes.fold(DoubleDouble::default(), |mut total, lane| {
             total.add(lane);
             total
         })
@@ -263,9 +263,9 @@ impl DoubledLanes {
 }
 
 /// Mass of the particles of one leaf, added up as by [`leaf_totals`].
-fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> Doubled {
+fn leaf_mass<const D: usize>(chunk: &Chunk<D>) -> DoubleDouble {
     let (lines, rest) = chunk.column(Layout::<D>::MASS).lines();
-    let mut sum = DoubledLanes::new();
+    let mut sum = DoubleDoubleLanes::new();
     lines.for_each(|line| sum.add(Lanes::load(line)));
     let rest = std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0));
     sum.add(Lanes::new(rest));
@@ -277,8 +277,8 @@ fn leaf_totals<const D: usize>(
     physics: &Physics<D>,
     gravity: &[f64; D],
     chunk: &Chunk<D>,
-) -> [Doubled; SUMS] {
-    let mut sums = [DoubledLanes::new(); SUMS];
+) -> [DoubleDouble; SUMS] {
+    let mut sums = [DoubleDoubleLanes::new(); SUMS];
     for first in (0..chunk.len()).step_by(LANES) {
         let members = Mask::from_bits((1 << LANES.min(chunk.len() - first)) - 1);
         let load = |column: usize| members.select(Lanes::new(chunk.values(column, first)), Lanes::splat(0.0));
@@ -298,7 +298,7 @@ fn leaf_totals<const D: usize>(
         sums[6].add(-mass * height);
         sums[7].add(volume * load(Layout::<D>::WORK));
     }
-    sums.map(DoubledLanes::total)
+    sums.map(DoubleDoubleLanes::total)
 }
 
 /// Elastic energy of the particles from `first` on per reference volume, J/m³.

@@ -1,4 +1,4 @@
-//! Splitting and merging of particles in a run, and the books about it.
+//! Splitting and merging of particles in a run, and its ledger.
 use partition::Octant;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
@@ -65,10 +65,10 @@ impl<const D: usize> Solver<D> {
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
         });
         let done: Vec<Option<Splits>> = done.collect();
-        let books = &mut self.books;
+        let ledger = &mut self.ledger;
         // A refusal is told again at each regrid, so the count is that of now.
-        books.refused = 0;
-        done.iter().flatten().for_each(|done| books.book_split(done));
+        ledger.refused = 0;
+        done.iter().flatten().for_each(|done| ledger.enter_splits(done));
         done.iter().map(|done| done.as_ref().is_some_and(Splits::is_any)).collect()
     }
 
@@ -104,9 +104,9 @@ impl<const D: usize> Solver<D> {
             .collect();
         let mut reports = Vec::with_capacity(done.len());
         for (merged, energies) in done {
-            self.books.merges += merged.merged;
-            self.books.removed += merged.removed;
-            energies.iter().for_each(|&energy| self.books.merge_energy.add(energy));
+            self.ledger.merges += merged.merged;
+            self.ledger.removed += merged.removed;
+            energies.iter().for_each(|&energy| self.ledger.merge_energy.add(energy));
             reports.push(merged);
         }
         reports
@@ -119,15 +119,15 @@ impl<const D: usize> Solver<D> {
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
         let mut total = [strangers];
         self.comm.sum_u64(&mut total);
-        if total[0] > 0 && self.books.next_root + total[0] <= ids::roots(D) {
-            let mut root = self.books.next_root + self.comm.exclusive_sum_u64(strangers);
+        if total[0] > 0 && self.ledger.next_root + total[0] <= ids::roots(D) {
+            let mut root = self.ledger.next_root + self.comm.exclusive_sum_u64(strangers);
             for (chunk, report) in self.chunks.iter_mut().zip(&reports) {
                 for &p in &report.unnamed {
                     chunk.ids_mut()[p as usize] = root;
                     root += 1;
                 }
             }
-            self.books.next_root += total[0];
+            self.ledger.next_root += total[0];
         }
         reports
     }
@@ -171,8 +171,8 @@ impl<const D: usize> Solver<D> {
         next[0]
     }
 
-    /// Books of splits on the way to other leaves.
+    /// Enters splits on the way to other leaves.
     pub(in crate::solver) fn book_entries(&mut self, splits: &[Splits]) {
-        splits.iter().for_each(|done| self.books.book_split(done));
+        splits.iter().for_each(|done| self.ledger.enter_splits(done));
     }
 }

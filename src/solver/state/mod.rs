@@ -15,7 +15,7 @@ use self::grid::Grid;
 use super::migration::crossings::Crossings;
 use super::migration::migrate::{MigrateError, Moved};
 use super::sorting::bins::BinMissing;
-use crate::adaptivity::resample::ledger::Books;
+use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::solver::physics::Physics;
@@ -116,7 +116,7 @@ pub struct Solver<const D: usize> {
     /// Particles that crossed the faces of the domain so far.
     pub crossings: Crossings,
     /// Splits and merges of particles so far.
-    pub books: Books,
+    pub ledger: Ledger,
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
     /// Where the time of regrids went since the start of this process.
