@@ -1,5 +1,5 @@
-//! The example of `docs/extending.md`, followed word by word on a copy of the sources: the new material is in the schema, a
-//! job with it is checked, and its tests pass with those of the other models.
+//! The examples of `docs/extending.md`, followed word by word on a copy of the sources: the new material and the new criterion are in
+//! the schema, a job with them is checked, and the tests of the material pass with those of the other models.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -43,20 +43,26 @@ fn extended(root: &Path) -> tempfile::TempDir {
     ] {
         copy(&root.join(part), &directory.path().join(part));
     }
-    let law = directory.path().join("src/material/laws/gel.rs");
-    std::fs::write(law, block("<!-- file: src/material/laws/gel.rs -->")).expect("law");
-    let list = directory.path().join("src/material/laws/mod.rs");
-    let text = std::fs::read_to_string(&list).expect("list");
-    let end = text.rfind('}').expect("the end of the list");
-    let line = block("<!-- line: src/material/laws/mod.rs: materials! { -->");
-    let text = format!("{}{line}{}", &text[..end], &text[end..]);
-    std::fs::write(&list, text.replacen("pub mod hencky;", "pub mod gel;\npub mod hencky;", 1))
-        .expect("list");
+    let root = directory.path();
+    add(root, "src/material/laws", "gel", "pub mod hencky;", "materials!");
+    add(root, "src/adaptivity/criteria", "speed", "pub mod stretch;", "criteria!");
     directory
 }
 
+/// Adds the file of an example to a folder, its module ahead of another one, and its line to the end of the list.
+fn add(root: &Path, folder: &str, name: &str, next: &str, list: &str) {
+    let file = format!("{folder}/{name}.rs");
+    std::fs::write(root.join(&file), block(&format!("<!-- file: {file} -->"))).expect("file");
+    let path = root.join(folder).join("mod.rs");
+    let text = std::fs::read_to_string(&path).expect("list");
+    let end = text.rfind('}').expect("the end of the list");
+    let line = block(&format!("<!-- line: {folder}/mod.rs: {list} {{ -->"));
+    let text = format!("{}{line}{}", &text[..end], &text[end..]);
+    std::fs::write(&path, text.replacen(next, &format!("pub mod {name};\n{next}"), 1)).expect("list");
+}
+
 #[test]
-fn a_material_is_one_file_and_one_line() {
+fn materials_and_criteria_are_one_file_and_one_line() {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let copy = extended(&root);
     let cargo = |arguments: &[&str]| {
@@ -78,6 +84,7 @@ fn a_material_is_one_file_and_one_line() {
     };
     let schema = cargo(&["run", "--quiet", "--bin", "agimp", "--", "schema"]);
     assert!(schema.contains("\"gel\"") && schema.contains("Bulk modulus, Pa; above 0."), "{schema}");
+    assert!(schema.contains("\"speed\"") && schema.contains("Where a particle is fast."), "{schema}");
 
     let job = std::fs::read_to_string(root.join("jobs/elastic_cubes.toml")).expect("job");
     let (head, rest) = job.split_once("[[materials]]").expect("materials");
@@ -86,9 +93,14 @@ fn a_material_is_one_file_and_one_line() {
         rest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"')).expect("a name");
     let material = block("<!-- job -->").replace("jelly", name);
     let path = copy.path().join("jelly.toml");
-    std::fs::write(&path, format!("{head}{material}\n[[{tail}")).expect("job");
+    let criterion = block("<!-- criterion -->");
+    std::fs::write(&path, format!("{head}{material}\n[[{tail}\n{criterion}")).expect("job");
     let checked = cargo(&["run", "--quiet", "--bin", "agimp", "--", "check", &path.to_string_lossy()]);
     assert!(checked.contains("particles"), "{checked}");
+    // The cubes move at 2 m/s, so their leaves are of that level at the start.
+    assert!(checked.contains("speed from 1 m/s on, until below 500 mm/s"), "{checked}");
+    let filled: Vec<&str> = checked.lines().filter(|line| line.trim_start().starts_with("3 ")).collect();
+    assert!(checked.contains("at the start, with the criteria") && !filled.is_empty(), "{checked}");
 
     let tests = cargo(&["test", "--quiet", "--lib", "material::"]);
     assert!(tests.contains("test result: ok"), "{tests}");

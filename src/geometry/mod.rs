@@ -9,6 +9,7 @@ mod gradient;
 mod primitives;
 mod rotation;
 mod shape;
+pub mod written;
 
 pub use classify::Side;
 pub use common_point::common_point;

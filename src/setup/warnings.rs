@@ -1,5 +1,4 @@
 //! What is allowed in a job and likely not meant.
-use crate::adaptivity::Kind;
 use crate::boundary::Collider;
 use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;
@@ -113,9 +112,8 @@ fn level_at<const D: usize>(problem: &Problem<D>, index: usize, collider: &Colli
     let regions =
         regions.filter(|region| region.shape.classify(&bounds) == Side::Inside).map(|region| region.level);
     let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
-    let criteria = criteria
-        .filter(|criterion| matches!(criterion.kind, Kind::Collider(other) if other == index))
-        .map(|criterion| criterion.level);
+    let criteria =
+        criteria.filter(|criterion| criterion.collider() == Some(index)).map(|criterion| criterion.level);
     regions.chain(criteria).fold(problem.tree.base_level, u8::max)
 }
 

@@ -1,8 +1,7 @@
 //! The size and the cost of a job in words.
 use std::io::Write;
 
-use crate::adaptivity::{Adaptivity, Criterion, Kind};
-use crate::boundary::motion::Motion;
+use crate::adaptivity::Adaptivity;
 use crate::job::Problem;
 use crate::load::{Kind as LoadKind, Load};
 use crate::quantity::Quantity;
@@ -75,7 +74,7 @@ pub(in crate::cli) fn write<const D: usize>(
         )?;
     }
     if let Some(adaptivity) = &problem.adaptivity {
-        write_refinement(out, problem, adaptivity, is_refined)?;
+        write_refinement(out, adaptivity, is_refined)?;
     }
     let about = if estimate.is_cut { "more than" } else { "about" };
     writeln!(
@@ -112,7 +111,6 @@ pub(in crate::cli) fn write<const D: usize>(
 /// Criteria in words, and what they mean for the numbers above and below.
 fn write_refinement<const D: usize>(
     out: &mut impl Write,
-    problem: &Problem<D>,
     adaptivity: &Adaptivity<D>,
     is_refined: bool,
 ) -> std::io::Result<()> {
@@ -123,7 +121,7 @@ fn write_refinement<const D: usize>(
         adaptivity.every, adaptivity.buffer
     )?;
     for criterion in &adaptivity.criteria {
-        writeln!(out, "  level {:5}        {}", criterion.level, words(problem, criterion))?;
+        writeln!(out, "  level {:5}        {}", criterion.level, criterion.describe())?;
     }
     writeln!(
         out,
@@ -131,31 +129,6 @@ fn write_refinement<const D: usize>(
         if is_refined { "at the start, with the criteria" } else { "of the job's tree, before the criteria" }
     )?;
     writeln!(out, "  that criteria want.")
-}
-
-/// A criterion in words.
-fn words<const D: usize>(problem: &Problem<D>, criterion: &Criterion<D>) -> String {
-    let (refine, coarsen) = (criterion.refine, criterion.coarsen);
-    let amount = |value: f64, unit: &str| quantity(value, unit);
-    let near = |what: &str| {
-        format!("within {} of {what}, until {} from it", amount(refine, "m"), amount(coarsen, "m"))
-    };
-    let above = |what: &str, unit: &str| {
-        format!("{what} from {} on, until below {}", amount(refine, unit), amount(coarsen, unit))
-    };
-    match &criterion.kind {
-        Kind::Region { motion: Motion::Fixed, .. } => near("a region"),
-        Kind::Region { .. } => near("a region that moves"),
-        Kind::Collider(index) => near(&format!("collider {}", problem.colliders[*index].name)),
-        Kind::FreeSurface => "at free surfaces".into(),
-        Kind::VelocityGradient => above("velocity gradient", "1/s"),
-        Kind::PlasticStrain => above("plastic strain", ""),
-        Kind::PlasticStrainRate => above("plastic strain rate", "1/s"),
-        Kind::Stretch => above("stretch of particles", ""),
-        Kind::Material(index) => {
-            format!("where there is {}", excerpt(&problem.materials[usize::from(*index)].name, NAME))
-        }
-    }
 }
 
 fn plural(ranks: u32) -> String {

@@ -1,12 +1,14 @@
 //! Dynamic refinement of the job file to that of the solver.
 use super::checks::{Checks, Space};
+use crate::adaptivity::criteria::region::Way;
+use crate::adaptivity::criteria::{Job, Keys, Parameters};
 use crate::adaptivity::resample::Limits;
-use crate::adaptivity::{Adaptivity, Criterion, Kind};
+use crate::adaptivity::{Adaptivity, Criterion, Thresholds};
 use crate::boundary::motion::{Knot, Motion};
+use crate::geometry::{Shape, written};
 use crate::job::parse::error::{QUOTED, names as listed};
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, BoxPolicy, TreeSetup};
-use crate::job::schema::adaptivity::{Criterion as Written, Way};
 use crate::job::schema::job_file::JobFile;
 use crate::text::{excerpt, written as number};
 
@@ -76,48 +78,17 @@ pub(in crate::job) fn adaptivity<const D: usize>(
 
 fn criterion<const D: usize>(
     checks: &mut Checks,
-    written: &Written,
+    written: &Parameters,
     context: &Context<D>,
     path: &Path,
 ) -> Option<Criterion<D>> {
-    let file = context.file;
-    let (kind, level, refine, coarsen) = match written {
-        Written::Region { level, shape, distance, coarsen, motion } => {
-            let shape = checks.shape(shape, context.space, &path.key("shape"));
-            let motion = ways(checks, motion, &path.key("motion"));
-            let coarsen = coarsen.unwrap_or(1.5 * distance);
-            (Kind::Region { shape: shape?, motion: motion? }, *level, *distance, coarsen)
-        }
-        Written::Collider { level, collider, distance, coarsen } => {
-            let names = || file.colliders.iter().map(|collider| collider.name.as_str());
-            let index = named(checks, collider, names, "collider", &path.key("collider"))?;
-            (Kind::Collider(index), *level, *distance, coarsen.unwrap_or(1.5 * distance))
-        }
-        Written::FreeSurface { level } => (Kind::FreeSurface, *level, 1.0, 1.0),
-        Written::VelocityGradient { level, refine, coarsen } => {
-            (Kind::VelocityGradient, *level, *refine, coarsen.unwrap_or(0.5 * refine))
-        }
-        Written::PlasticStrain { level, refine, coarsen } => {
-            (Kind::PlasticStrain, *level, *refine, coarsen.unwrap_or(0.5 * refine))
-        }
-        Written::PlasticStrainRate { level, refine, coarsen } => {
-            (Kind::PlasticStrainRate, *level, *refine, coarsen.unwrap_or(0.5 * refine))
-        }
-        Written::Stretch { level, refine, coarsen } => {
-            (Kind::Stretch, *level, *refine, coarsen.unwrap_or(0.5 + 0.5 * refine))
-        }
-        Written::Material { level, material } => {
-            let names = || file.materials.iter().map(|material| material.name.as_str());
-            let index = named(checks, material, names, "material", &path.key("material"))?;
-            (Kind::Material(index as u16), *level, 1.0, 1.0)
-        }
-    };
-    let base = context.tree.base_level;
+    let criterion = written.criterion(&mut Rest { checks: &mut *checks, context, path })?;
+    let (level, base) = (criterion.level, context.tree.base_level);
     if level <= base {
         let message = format!("found {level}; expected a level deeper than tree.base_level = {base}");
         checks.fault(&path.key("level"), message);
     }
-    let is_distance = matches!(kind, Kind::Region { .. } | Kind::Collider(_));
+    let Thresholds { refine, coarsen, is_distance } = criterion.thresholds;
     let key = if is_distance { "distance" } else { "refine" };
     if is_distance && coarsen < refine || !is_distance && coarsen > refine {
         let side = if is_distance { "least" } else { "most" };
@@ -130,7 +101,34 @@ fn criterion<const D: usize>(
             ),
         );
     }
-    Some(Criterion { kind, level, refine, coarsen })
+    Some(criterion)
+}
+
+/// The rest of the job for the criterion at `path`.
+struct Rest<'a, 'c, 't, const D: usize> {
+    checks: &'a mut Checks<'t>,
+    context: &'a Context<'c, D>,
+    path: &'a Path,
+}
+
+impl<const D: usize> Job<D> for Rest<'_, '_, '_, D> {
+    fn shape(&mut self, shape: &written::Shape, key: &'static str) -> Option<Shape<D>> {
+        self.checks.shape(shape, self.context.space, &self.path.key(key))
+    }
+
+    fn motion(&mut self, rows: &[Way], key: &'static str) -> Option<Motion<D>> {
+        ways(self.checks, rows, &self.path.key(key))
+    }
+
+    fn collider(&mut self, name: &str, key: &'static str) -> Option<usize> {
+        let names = || self.context.file.colliders.iter().map(|collider| collider.name.as_str());
+        named(self.checks, name, names, "collider", &self.path.key(key))
+    }
+
+    fn material(&mut self, name: &str, key: &'static str) -> Option<usize> {
+        let names = || self.context.file.materials.iter().map(|material| material.name.as_str());
+        named(self.checks, name, names, "material", &self.path.key(key))
+    }
 }
 
 /// Index of a name among others.

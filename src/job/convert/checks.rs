@@ -1,7 +1,7 @@
 //! What all conversions need: faults with their places, and the domain.
+use crate::geometry::written::Vector;
 use crate::job::parse::error::{Fault, MOST, QUOTED};
 use crate::job::parse::source::{Node, Path};
-use crate::job::schema::common::Vector;
 use crate::text::{excerpt, number};
 
 /// Collects faults; knows where the keys of the file stand.

@@ -3,9 +3,10 @@ use super::checks::{Checks, Space};
 use crate::boundary::motion::{Free, Knot, Motion, Rate};
 use crate::boundary::{Collider, Contact};
 use crate::geometry::Aabb;
+use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{Contact as WrittenContact, Motion as Written, Row};
-use crate::job::schema::common::{AxisName, Spin, Vector};
+use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file as file;
 use crate::text::written;
 

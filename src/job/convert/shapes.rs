@@ -1,9 +1,8 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
 use super::checks::{Checks, Space};
+use crate::geometry::written::{Shape as Written, Vector};
 use crate::geometry::{Aabb, Frustum, Placement, Shape, rotation};
 use crate::job::parse::source::Path;
-use crate::job::schema::common::Vector;
-use crate::job::schema::shape::Shape as Written;
 use crate::text::written;
 
 impl Checks<'_> {

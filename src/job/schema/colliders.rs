@@ -1,6 +1,6 @@
 //! Colliders as they are written in a job file.
-use super::common::{AxisName, Spin, Vector, velocity};
-use super::shape::Shape;
+use super::common::{AxisName, Spin, velocity};
+use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

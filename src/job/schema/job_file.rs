@@ -4,11 +4,12 @@
 pub use super::adaptivity::Adaptivity;
 pub use super::colliders::Collider;
 use super::common::yes;
-pub use super::common::{AxisName, Spin, Vector};
+pub use super::common::{AxisName, Spin};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
-use super::shape::Shape;
 pub use super::stress::Stress;
+use crate::geometry::written::Shape;
+pub use crate::geometry::written::Vector;
 use crate::material::parameters::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
 //! Loads and quantities as they are written in a job file.
-use super::shape::Shape;
+use crate::geometry::written::Shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

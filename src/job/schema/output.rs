@@ -1,5 +1,6 @@
 //! What a job writes, as its file has it: outputs, checkpoints, history, telemetry, report.
-use super::common::{AxisName, Vector, yes};
+use super::common::{AxisName, yes};
+use crate::geometry::written::Vector;
 use crate::job::problem::{CollapseLaw, Field};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -5,12 +5,11 @@ use partition::comm::Disagreement;
 use partition::{Forest, MAX_LEVEL, Mark, Octant, Region, correspondence};
 use rayon::prelude::*;
 
-use crate::adaptivity::{Adaptivity, Value};
+use crate::adaptivity::{Adaptivity, LeafMaxima, Value};
 use crate::geometry::Aabb;
 use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::particle::Chunk;
 use crate::solver::migration::migrate::{MigrateError, Moved};
-use crate::solver::state::leaf_maxima::{LeafMaxima, Watch};
 use crate::solver::state::phases::Phase;
 use crate::solver::state::regrid_cache::{SettledTree, Wish};
 use crate::solver::state::regrid_timers::Part;
@@ -46,7 +45,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Notes the state as it is now; rates stay.
     pub(in crate::solver) fn survey_now(&mut self) {
         let Some(adaptivity) = &self.physics.adaptivity else { return };
-        let watch = Watch::after_step(adaptivity, 0);
+        let watch = adaptivity.watch(0);
         self.leaf_data.maxima.resize(self.chunks.len(), LeafMaxima::default());
         self.leaf_data
             .maxima

@@ -2,9 +2,9 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::adaptivity::LeafMaxima;
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
-use crate::solver::state::leaf_maxima::LeafMaxima;
 use crate::solver::state::phases::thread_time;
 
 /// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the

@@ -4,8 +4,8 @@
 //! |---|---|
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
-//! | [`leaf_data`], `leaf_maxima` | what is noted of each leaf; bounds on its particles |
-//! | `regrid_cache`, `free_surface` | what regrids remember |
+//! | [`leaf_data`] | what is noted of each leaf |
+//! | `regrid_cache` | what regrids remember |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
 //! | [`phases`], [`regrid_timers`] | timers |
 use partition::Forest;
@@ -29,11 +29,9 @@ use crate::solver::state::regrid_timers::RegridTimers;
 
 pub mod bookings;
 pub mod cost;
-pub(super) mod free_surface;
 pub mod grid;
 pub(super) mod last_partition;
 pub mod leaf_data;
-pub(super) mod leaf_maxima;
 pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;

@@ -1,5 +1,5 @@
 //! What regrids remember from one time to the next.
-use crate::solver::state::free_surface::Surroundings;
+use crate::adaptivity::surroundings::Surroundings;
 use partition::Mark;
 
 /// What a leaf wants for itself and the leaves around.

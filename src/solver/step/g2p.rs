@@ -4,6 +4,7 @@
 use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
+use crate::adaptivity::{LeafMaxima, Watch};
 use crate::grid::arenas::Arenas;
 use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
@@ -19,7 +20,6 @@ use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
 use crate::solver::state::leaf_data::LeafData;
-use crate::solver::state::leaf_maxima::{LeafMaxima, Watch};
 use crate::solver::state::phases::Phase;
 
 /// Memory that a thread reuses from leaf to leaf.
@@ -83,7 +83,7 @@ impl<const D: usize> Solver<D> {
         let adaptivity = self.physics.adaptivity.as_ref();
         let resampling = Resampling::new(adaptivity, &scheme, self.grid.plan.extent());
         let widths = self.physics.widths(&self.grid.plan);
-        let watch = adaptivity.map(|adaptivity| Watch::after_step(adaptivity, self.clock.step + 1));
+        let watch = adaptivity.map(|adaptivity| adaptivity.watch(self.clock.step + 1));
         self.leaf_data.begin_gather(&self.chunks);
         let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
         let sweep = Sweep {

@@ -1,7 +1,27 @@
-//! Shapes as they are written in a job file.
-use super::common::Vector;
+//! Vectors and shapes as they are written in a job file.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Components along x, y (and z in 3D): as many as the job has dimensions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline, transform = two_or_three)]
+pub struct Vector(pub Vec<f64>);
+
+fn two_or_three(schema: &mut schemars::Schema) {
+    schema.insert("minItems".into(), 2.into());
+    schema.insert("maxItems".into(), 3.into());
+    // Metres across a solar system; squares and sums stay finite.
+    bound_items(schema, 1e12);
+}
+
+/// Bounds the magnitude of each component.
+pub(crate) fn bound_items(schema: &mut schemars::Schema, limit: f64) {
+    if let Some(items) = schema.get_mut("items").and_then(serde_json::Value::as_object_mut) {
+        items.insert("minimum".into(), (-limit).into());
+        items.insert("maximum".into(), limit.into());
+    }
+}
 
 /// A region of space.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

@@ -1,15 +1,14 @@
 //! What the solver notes of each leaf's particles right after G2P, while they are in the cache: what refinement
 //! criteria and splitting will ask for. Looking at them again later would cost more than all the rest of a regrid that
 //! changes nothing.
-use crate::adaptivity::resample::merge_backoff::Levels;
-use crate::adaptivity::{Adaptivity, Kind};
+use super::resample::merge_backoff::Levels;
 use crate::kernel::domain;
 use crate::particle::chunk::{Chunk, Layout};
 
 /// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts for the
 /// leaf that it comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::solver) struct LeafMaxima<const D: usize> {
+pub(crate) struct LeafMaxima<const D: usize> {
     /// Least and greatest velocity along each axis, 0 among them, m/s. Nodes would not do: those with next to no mass
     /// may be very fast.
     pub velocity: [[f64; D]; 2],
@@ -40,31 +39,18 @@ impl<const D: usize> Default for LeafMaxima<D> {
 
 /// What to note.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::solver) struct Watch {
+pub(crate) struct Watch {
     /// Velocities and tags.
-    velocity: bool,
+    pub velocity: bool,
     /// Greatest plastic strain.
-    strain: bool,
+    pub strain: bool,
     /// Widths of boxes.
-    width: bool,
+    pub width: bool,
     /// Rate of the plastic strain.
-    rate: bool,
+    pub rate: bool,
 }
 
 impl Watch {
-    /// What a job wants to know after a step of that number (the first is 1).
-    pub(crate) fn after_step<const D: usize>(adaptivity: &Adaptivity<D>, step: u64) -> Self {
-        let has = |wanted: fn(&Kind<D>) -> bool| adaptivity.criteria.iter().any(|c| wanted(&c.kind));
-        // Files show the rate whenever they are written.
-        let rate = has(|kind| matches!(kind, Kind::PlasticStrainRate));
-        if !step.is_multiple_of(adaptivity.every) {
-            return Self { rate, ..Self::default() };
-        }
-        let strain = has(|kind| matches!(kind, Kind::PlasticStrain));
-        let width = adaptivity.split_stretch.is_some() || has(|kind| matches!(kind, Kind::Stretch));
-        Self { velocity: true, strain, width, rate }
-    }
-
     /// To be called before the leaf's particles advance.
     pub(crate) fn before<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.rate {
@@ -82,7 +68,7 @@ impl Watch {
     }
 
     /// What follows from the state alone.
-    pub(in crate::solver) fn look<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
+    pub(crate) fn look<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.velocity {
             let ranges: [[f64; 2]; D] =
                 std::array::from_fn(|axis| chunk.column(Layout::<D>::VELOCITY + axis).range());

@@ -15,7 +15,7 @@ const NEXT_TO_NOTHING: f64 = 0.1;
 
 /// The surroundings of each own leaf, for one tree and partition.
 #[derive(Clone, Debug, Default)]
-pub(in crate::solver) struct Surroundings {
+pub(crate) struct Surroundings {
     /// Revision of the forest that this is for.
     revision: Option<u64>,
     /// Own leaves that touch leaf i: `touching[start[i]..start[i + 1]]`.
@@ -162,7 +162,7 @@ impl Around {
 
 /// Least and greatest mass of some nodes, kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::solver) struct MassRange {
+pub(crate) struct MassRange {
     least: f64,
     greatest: f64,
 }
