@@ -68,7 +68,7 @@ impl<const D: usize> Solver<D> {
             crossings: Crossings::default(),
             ledger: Ledger::default(),
             regrids: 0,
-            parts: RegridTimers::default(),
+            regrid_timers: RegridTimers::default(),
             regrid_cache: RegridCache::default(),
             sent_before: Traffic::default(),
             surface_bytes: 0,

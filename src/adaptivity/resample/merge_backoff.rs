@@ -86,7 +86,7 @@ fn interval(tag: u64) -> u32 {
     1 << (count_of(tag) / DOUBLING)
 }
 
-/// Whether a particle has been tried so often that it waits no longer for siblings who are not there.
+/// Whether a particle has been tried so often that it stops waiting for siblings that are not there.
 pub fn has_given_up(tag: u64) -> bool {
     tag & MET == 0 && (GIVEN_UP..PARKED).contains(&count_of(tag))
 }

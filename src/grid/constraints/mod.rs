@@ -2,9 +2,9 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`constraint`] | parents of a node from its place |
-//! | [`parents`] | the same as tables by parity of a block |
+//! | [`parents`] | parents of a node from its place |
+//! | [`parent_table`] | the same as tables by parity of a block |
 //! | [`moments`] | first moments of the nodes of a block |
-pub mod constraint;
 pub mod moments;
+pub mod parent_table;
 pub mod parents;

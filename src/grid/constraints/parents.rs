@@ -1,138 +1,47 @@
-//! Parents of the nodes of fine blocks, in one table for all blocks.
+//! Constraints between the nodes of two levels.
 //!
-//! Where the parents of a node lie follows from its place in its block and the parity of the block's coordinates.
-use std::sync::LazyLock;
+//! A constrained node of level `l` takes the multilinear interpolation of the level `l-1` nodes around it
+//! (Gao et al. 2017, section 4.2): along an axis where its coordinate is even it coincides with the parent
+//! `x/2`; where it is odd the parents `(x ± 1)/2` take part with one half each. Restriction is the
+//! transpose. Parents may be constrained themselves; chains over several levels follow by recursion.
+use crate::grid::mask::{bit_of_node, node_of_bit};
 
-use super::constraint::{block_and_bit, node_coord, parents_of};
-use crate::grid::mask::{block_nodes, moved_along, offset, offset_index};
-
-/// A parent of a node of a fine block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ParentNode {
-    /// The parent's block: bit `k` tells whether it is the upper one along axis `k` of those that hold parents.
-    pub corner: u8,
-    /// The parent in its block.
-    pub bit: u8,
-    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see [`weight_of`].
-    pub offset: u8,
+/// One parent of a constrained node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parent<const D: usize> {
+    /// Coordinate of the parent on the lattice of its level.
+    pub node: [u32; D],
+    /// Interpolation weight, `0.5^|offset|_1`.
+    pub weight: f64,
+    /// Parent minus constrained node, in cells of the finer level; each in {-1, 0, 1}.
+    pub offset: [i32; D],
 }
 
-/// Parents of the nodes of fine blocks, by parity of the blocks' coordinates.
-pub struct ParentTable {
-    parents: Vec<ParentNode>,
-    /// First parent of each node, by parity.
-    start: Vec<u16>,
-    /// Nodes that have a parent in the block at each corner, by parity.
-    having: Vec<[u64; 8]>,
-}
-
-/// By offset of a fine block from the coarse one (both along an axis, the coarse coordinate doubled) and node of the coarse
-/// one: its children, a bit each, along the axis.
-const CHILDREN: [[u8; 4]; 3] = relatives(false);
-/// The same by node of the fine block: its parents.
-const PARENTS: [[u8; 4]; 3] = relatives(true);
-
-/// Where a node of the one block has relatives in the other: nodes of a fine block at most a fine cell from one of a coarse
-/// block have it as parent.
-const fn relatives(is_upwards: bool) -> [[u8; 4]; 3] {
-    let mut relatives = [[0; 4]; 3];
-    let mut entry = 0;
-    while entry < 3 * 16 {
-        let (place, fine, coarse) = (entry / 16, entry / 4 % 4, entry % 4);
-        let way = 2 * coarse as i32 - (4 * (place as i32 - 1) + fine as i32);
-        if -1 <= way && way <= 1 {
-            let (from, to) = if is_upwards { (fine, coarse) } else { (coarse, fine) };
-            relatives[place][from] |= 1 << to;
-        }
-        entry += 1;
-    }
-    relatives
-}
-
-/// Relatives of the nodes in `mask` in the other block, axis by axis.
-#[inline(always)]
-fn related<const D: usize>(along: &[[u8; 4]; 3], place: usize, mask: u64) -> u64 {
-    let place = offset::<D>(place);
-    (0..D).fold(mask, |mask, axis| {
-        let sets = along[(place[axis] + 1) as usize];
-        (0..4).fold(0, |all, k| all | moved_along(mask, axis, k, sets[k]))
+/// Parents of the constrained node at lattice coordinate `node`, in lexicographic order, last axis slowest.
+pub fn parents_of<const D: usize>(node: [u32; D]) -> impl Iterator<Item = Parent<D>> {
+    let odd: u32 = (0..D).filter(|&axis| node[axis] & 1 == 1).map(|axis| 1 << axis).sum();
+    let count = odd.count_ones();
+    let weight = 0.5f64.powi(count as i32);
+    (0..1u32 << D).filter(move |corner| corner & !odd == 0).map(move |corner| {
+        let offset = std::array::from_fn(|axis| match (odd >> axis & 1, corner >> axis & 1) {
+            (0, _) => 0,
+            (_, 0) => -1,
+            _ => 1,
+        });
+        let parent = std::array::from_fn(|axis| node[axis].wrapping_add_signed(offset[axis]) / 2);
+        Parent { node: parent, weight, offset }
     })
 }
 
-static TWO: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<2>);
-static THREE: LazyLock<ParentTable> = LazyLock::new(ParentTable::new::<3>);
-
-impl ParentTable {
-    /// The table for `D` dimensions.
-    pub fn of<const D: usize>() -> &'static Self {
-        if D == 2 { &TWO } else { &THREE }
-    }
-
-    fn new<const D: usize>() -> Self {
-        let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
-        for parity in 0..1u32 << D {
-            let mut corners = [0; 8];
-            // Any block of this parity that is not at the lower faces shows the pattern.
-            let block: [u32; D] = std::array::from_fn(|axis| 2 + (parity >> axis & 1));
-            for bit in 0..block_nodes(D) as u32 {
-                start.push(parents.len() as u16);
-                for parent in parents_of::<D>(node_coord(block, bit)) {
-                    let (coarse, parent_bit) = block_and_bit(parent.node);
-                    let corner = (0..D).fold(0, |corner, axis| corner | (coarse[axis] - 1) << axis);
-                    corners[corner as usize] |= 1 << bit;
-                    let offset = offset_index(parent.offset) as u8;
-                    debug_assert_eq!(parent.weight, weight_of(parent.offset));
-                    parents.push(ParentNode { corner: corner as u8, bit: parent_bit as u8, offset });
-                }
-            }
-            having.push(corners);
-        }
-        start.push(parents.len() as u16);
-        Self { parents, start, having }
-    }
-
-    /// Parents of node `bit` of a block of some parity, in lexicographic order.
-    #[inline(always)]
-    pub fn of_node<const D: usize>(&self, parity: usize, bit: u32) -> &[ParentNode] {
-        let node = parity * block_nodes(D) + bit as usize;
-        &self.parents[usize::from(self.start[node])..usize::from(self.start[node + 1])]
-    }
-
-    /// Nodes of blocks of some parity that have a parent in the block at a corner.
-    pub fn having(&self, parity: usize, corner: u8) -> u64 {
-        self.having[parity][usize::from(corner)]
-    }
+/// Lattice coordinate of node `bit` of the block at `coord`.
+pub fn node_coord<const D: usize>(coord: [u32; D], bit: u32) -> [u32; D] {
+    let local = node_of_bit::<D>(bit);
+    std::array::from_fn(|axis| 4 * coord[axis] + local[axis])
 }
 
-/// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate of the
-/// coarse block to the fine one.
-pub fn children<const D: usize>(place: usize, mask: u64) -> u64 {
-    related::<D>(&CHILDREN, place, mask)
-}
-
-/// Nodes of the coarse block that are parents of `mask` in the fine block at a place, as in [`children`].
-pub fn parents<const D: usize>(place: usize, mask: u64) -> u64 {
-    related::<D>(&PARENTS, place, mask)
-}
-
-/// Parity of coordinates, a bit for each axis.
-pub fn parity<const D: usize>(coord: [u32; D]) -> usize {
-    (0..D).fold(0, |parity, axis| parity | (coord[axis] as usize & 1) << axis)
-}
-
-/// Coordinate of the coarser block at a corner of a fine one: `corner` has a bit for each axis.
-pub fn coarser_at<const D: usize>(coord: [u32; D], corner: u8) -> [u32; D] {
-    std::array::from_fn(|axis| coord[axis] / 2 + u32::from(corner >> axis & 1))
-}
-
-/// Offset number from twice the coordinate of a coarser block to a fine block that has parents in it.
-pub fn place_beside<const D: usize>(fine: [u32; D], coarse: [u32; D]) -> usize {
-    offset_index::<D>(std::array::from_fn(|axis| fine[axis] as i32 - 2 * coarse[axis] as i32))
-}
-
-/// Weight of a parent at an offset from the constrained node: one half for each axis along which they differ.
-pub fn weight_of<const D: usize>(offset: [i32; D]) -> f64 {
-    offset.iter().filter(|along| **along != 0).fold(1.0, |weight, _| 0.5 * weight)
+/// Block of a node and its bit there.
+pub fn block_and_bit<const D: usize>(node: [u32; D]) -> ([u32; D], u32) {
+    (node.map(|x| x / 4), bit_of_node::<D>(node.map(|x| x % 4)))
 }
 
 #[cfg(test)]
@@ -140,54 +49,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_has_the_parents_of_every_node() {
-        let table = ParentTable::of::<3>();
-        for coord in [[2, 4, 6], [3, 4, 6], [3, 5, 7], [8, 9, 1]] {
-            for bit in 0..64 {
-                let found: Vec<_> = table
-                    .of_node::<3>(parity(coord), bit)
-                    .iter()
-                    .map(|parent| {
-                        let block = coarser_at(coord, parent.corner);
-                        assert_eq!(table.having(parity(coord), parent.corner) >> bit & 1, 1);
-                        (node_coord(block, parent.bit.into()), offset::<3>(parent.offset.into()))
-                    })
-                    .collect();
-                let expected: Vec<_> =
-                    parents_of(node_coord(coord, bit)).map(|parent| (parent.node, parent.offset)).collect();
-                assert_eq!(found, expected);
+    fn weights_of_parents_sum_to_one_and_reproduce_the_node() {
+        for node in [[4u32, 6, 8], [5, 6, 8], [5, 7, 8], [5, 7, 9]] {
+            let parents: Vec<_> = parents_of::<3>(node).collect();
+            assert_eq!(parents.iter().map(|p| p.weight).sum::<f64>(), 1.0);
+            for axis in 0..3 {
+                let x: f64 = parents.iter().map(|p| p.weight * 2.0 * f64::from(p.node[axis])).sum();
+                assert_eq!(x, f64::from(node[axis]));
+                for p in &parents {
+                    assert_eq!(2 * p.node[axis] as i32 - node[axis] as i32, p.offset[axis]);
+                }
             }
         }
-        // Blocks with even coordinates have all parents in one block.
-        assert_eq!((1..8).map(|corner| table.having(0, corner)).max(), Some(0));
-    }
-
-    #[test]
-    fn children_are_the_nodes_that_name_the_block_as_parent() {
-        let table = ParentTable::of::<3>();
-        for place in 0..27 {
-            for mask in [1, 1 << 63, 0x8421_1248_8421_1248, 0xf0f0_0000_1234_5678, u64::MAX] {
-                let coord: [u32; 3] = offset::<3>(place).map(|o| (4 + o) as u32);
-                let is_parent = |parent: &&ParentNode| {
-                    coarser_at(coord, parent.corner) == [2; 3] && mask >> parent.bit & 1 == 1
-                };
-                let named = (0..64)
-                    .filter(|&bit| table.of_node::<3>(parity(coord), bit).iter().any(|p| is_parent(&p)));
-                assert_eq!(children::<3>(place, mask), named.fold(0, |all, bit| all | 1 << bit));
-                let of_mask = (0..64).filter(|bit| mask >> bit & 1 == 1).flat_map(|bit| {
-                    table
-                        .of_node::<3>(parity(coord), bit)
-                        .iter()
-                        .filter(|p| coarser_at(coord, p.corner) == [2; 3])
-                });
-                assert_eq!(parents::<3>(place, mask), of_mask.fold(0, |all, parent| all | 1 << parent.bit));
-            }
-        }
-        let number = |offset: [i32; 2]| offset_index(offset);
-        assert_eq!(children::<2>(number([0, 0]), 1), 0b0000_0000_0011_0011);
-        assert_eq!(children::<2>(number([-1, -1]), 1), 1 << 15);
-        assert_eq!(children::<2>(number([1, 1]), 1), 0);
-        assert_eq!(parents::<2>(number([0, 0]), 0b11), 0b11);
-        assert_eq!(parents::<2>(number([-1, -1]), 1 << 15), 1);
     }
 }

@@ -261,7 +261,7 @@ impl<'a, const D: usize> SourceSearch<'a, D> {
     }
 
     /// Asks for the leaves of the octant that may reach the bin, and for the leaf at its lower corner, which
-    /// tells whether the octant is a leaf. The rest of a large octant is left alone.
+    /// shows whether the octant is a leaf. The rest of a large octant is left alone.
     fn ask(&mut self, octant: &Octant<D>) {
         let lo = octant.lower();
         self.missing.push(Region { lo, hi: lo.map(|x| x + 1) });

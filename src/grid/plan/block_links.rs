@@ -1,12 +1,12 @@
 //! Which blocks hold the parents of constrained nodes: over these sums are restricted and values prolonged.
 //!
-//! Where the parents of a node lie is in a table for all blocks (`parents.rs`); a plan lists pairs of blocks only.
+//! Where the parents of a node lie is in a table for all blocks (`parent_table.rs`); a plan lists pairs of blocks only.
 use rustc_hash::FxHashMap;
 
 use super::needed_nodes::constrained_nodes;
 use super::{Block, GridPlan, NO_BLOCK};
 use crate::grid::constraints::moments::{first_row, rows_of};
-use crate::grid::constraints::parents::{
+use crate::grid::constraints::parent_table::{
     ParentTable, children, coarser_at, parents, parity, place_beside, weight_of,
 };
 use crate::grid::mask::{bits, offset};

@@ -227,7 +227,7 @@ impl<const D: usize> KnownTree<D> {
         self.graded && self.reach <= 1
     }
 
-    /// Leaves that boxes of a leaf can reach lie within so many of the leaf's edges from it.
+    /// Distance in edges of a leaf within which all leaves lie that its boxes can reach.
     pub fn reach_in_leaves(&self) -> u32 {
         self.reach.div_ceil(BLOCK as u32).max(1)
     }

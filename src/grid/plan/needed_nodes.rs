@@ -13,7 +13,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::bin_reach::{SourceSearch, bin_container, interior, own_bins};
 use super::ghost_layer::{Cover, KnownTree};
-use crate::grid::constraints::parents::{ParentTable, children, coarser_at, parents, parity, place_beside};
+use crate::grid::constraints::parent_table::{
+    ParentTable, children, coarser_at, parents, parity, place_beside,
+};
 use crate::grid::mask::{
     arena_overlap, box_offsets, lower_face, offset, offset_count, opposite, product, shifted,
 };

@@ -5,7 +5,7 @@ use super::node_fields::NodeFields;
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::disjoint_slices::DisjointSlices;
 use crate::grid::constraints::moments::{self, Moments};
-use crate::grid::constraints::parents::{ParentNode, ParentTable, parity, weight_of};
+use crate::grid::constraints::parent_table::{ParentNode, ParentTable, parity, weight_of};
 use crate::grid::mask::{bits, block_nodes, offset};
 use crate::grid::plan::block_links::{Child, FineBlock};
 use crate::grid::plan::{Block, GridPlan, NO_BLOCK};

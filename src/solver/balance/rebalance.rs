@@ -115,19 +115,19 @@ impl<const D: usize> Solver<D> {
 
     fn move_leaves(&mut self, cuts: Cuts) -> bool {
         let (wall, start) = (Instant::now(), thread_time());
-        self.parts.begin();
+        self.regrid_timers.begin();
         let shipment = self.forest.partition_at(&self.comm, cuts);
         if shipment.changed() {
             let chunks = std::mem::take(&mut self.chunks);
             self.chunks = shipment.move_items(&self.comm, chunks, Chunk::append_to, Chunk::from_bytes);
         }
-        self.parts.end(Part::Partition);
+        self.regrid_timers.end(Part::Partition);
         // The tree may have changed before, even if no leaf moves now.
         if self.grid.plan.revision != self.forest.revision() {
             self.leaf_data.reset(self.chunks.len());
             self.rebuild_grid(self.agreed_reach());
         }
-        self.parts.end(Part::Grid);
+        self.regrid_timers.end(Part::Grid);
         self.partitioned = LastPartition::since(start);
         self.partitions += u64::from(shipment.changed());
         self.phases.book(Phase::Regrid, wall.elapsed());

@@ -6,7 +6,7 @@ use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 
 use crate::boundary::{Contact, Leaving};
-use crate::grid::constraints::constraint::node_coord;
+use crate::grid::constraints::parents::node_coord;
 use crate::grid::leaf_geometry::position_key;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{BoxPolicy, Transfer};

@@ -51,7 +51,7 @@ pub(in crate::solver) struct Departed {
 }
 
 impl Departed {
-    /// Whether there is anything to tell.
+    /// Whether anything departed or failed.
     pub(crate) fn is_any(&self) -> bool {
         !self.records.is_empty() || self.crossed.is_any() || self.error.is_some() || self.splits.is_some()
     }

@@ -43,7 +43,7 @@ impl<const D: usize> Solver<D> {
         }
         let before: Vec<usize> = self.chunks.iter().map(Chunk::len).collect();
         let gathered = self.gather_in_leaves(&apart);
-        // Where somebody came; numbers tell unless as many went.
+        // Where particles came. Counts alone do not show it where as many went.
         let came: Vec<bool> = (self.chunks.iter().zip(&before).zip(&apart))
             .map(|((chunk, &before), apart)| chunk.len() != before || !apart.is_empty())
             .collect();

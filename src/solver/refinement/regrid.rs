@@ -67,7 +67,7 @@ impl<const D: usize> Solver<D> {
             _ => return Ok(false),
         };
         let (start, phases) = (Instant::now(), self.phases);
-        self.parts.begin();
+        self.regrid_timers.begin();
         if self.leaf_data.maxima.len() != self.chunks.len() {
             self.survey_now();
         }
@@ -76,7 +76,7 @@ impl<const D: usize> Solver<D> {
         let mut looks = self.look_at_levels();
         let mut split_in = self.split_particles(&looks, levels_before.as_deref());
         let is_split = split_in.contains(&true);
-        self.parts.end(Part::Split);
+        self.regrid_timers.end(Part::Split);
         if is_new && self.rebalance() {
             // Children may have come with leaves of other ranks.
             split_in = vec![true; self.chunks.len()];
@@ -91,7 +91,7 @@ impl<const D: usize> Solver<D> {
         let [is_other, is_due] = flags.map(|flag| flag > 0);
         let reports = if is_due { self.merge_particles(&looks) } else { Vec::new() };
         let mut merged = is_due && self.comm.any(reports.iter().any(|report| report.merged > 0));
-        self.parts.end(Part::Merge);
+        self.regrid_timers.end(Part::Merge);
         if is_other || merged {
             // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of merged ones
             // do not, but for rounding.
@@ -103,11 +103,11 @@ impl<const D: usize> Solver<D> {
             };
             self.comm.agree(moved)?;
         }
-        self.parts.end(Part::Migrate);
+        self.regrid_timers.end(Part::Migrate);
         if is_due {
             merged |= self.reunite_families(&looks)?;
             self.count_tries(&looks, &reports);
-            self.parts.end(Part::Merge);
+            self.regrid_timers.end(Part::Merge);
         }
         if is_other {
             // Merged particles are no faster than the fastest of those that they stand for.
@@ -122,7 +122,7 @@ impl<const D: usize> Solver<D> {
             self.comm.max_u64(&mut reach);
             self.provide_reach(reach[0] as u32);
         }
-        self.parts.end(Part::Migrate);
+        self.regrid_timers.end(Part::Migrate);
         // One phase for all of it.
         self.phases = phases;
         self.phases.book(Phase::Regrid, start.elapsed());
@@ -156,11 +156,11 @@ impl<const D: usize> Solver<D> {
     /// `steps`.
     fn change_tree(&mut self, steps: u64) -> Option<Vec<u8>> {
         let wishes = self.wishes(steps);
-        self.parts.end(Part::Criteria);
+        self.regrid_timers.end(Part::Criteria);
         let revision = self.forest.revision();
         let settled = self.regrid_cache.settled.as_ref().filter(|settled| settled.revision == revision);
         if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
-            self.parts.end(Part::Tree);
+            self.regrid_timers.end(Part::Tree);
             return None;
         }
         let adaptivity = self.physics.adaptivity.as_ref()?;
@@ -173,11 +173,11 @@ impl<const D: usize> Solver<D> {
         let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
         let Some(followed) = followed else {
             self.regrid_cache.settled = Some(SettledTree { revision, wishes, marks });
-            self.parts.end(Part::Tree);
+            self.regrid_timers.end(Part::Tree);
             return None;
         };
         let old = std::mem::replace(&mut self.forest, followed);
-        self.parts.end(Part::Tree);
+        self.regrid_timers.end(Part::Tree);
         Some(self.move_to_leaves(old.leaves()))
     }
 

@@ -2,7 +2,7 @@
 //!
 //! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
 //! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
-//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are held against the finer
+//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are compared with the finer
 //! leaves around.
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
@@ -37,10 +37,10 @@ pub struct LeafBins<const D: usize> {
     /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
     around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
-    pub(super) sides: Option<LeafFaces<D>>,
+    pub(super) faces: Option<LeafFaces<D>>,
     /// Particles that are not whole in the leaf's own bin, with their bin; they ascend.
     outside_own_bin: Vec<(u32, u32)>,
-    /// What is sorted already: so many of the first particles, as long as the chunk has the revision.
+    /// How many of the first particles are sorted already, as long as the chunk has the revision.
     presorted: Option<(Revision, usize)>,
 }
 
@@ -81,8 +81,8 @@ impl<const D: usize> LeafBins<D> {
         let leaf = known - tree.first_own();
         let bins = &plan.bins[plan.leaf_bins(leaf)];
         let (own, cell) = (near_leaf(tree, known, plan.root_edge), plan.cell(here.level));
-        let sides = Some(LeafFaces::new(own, here, cell, &finer, bins));
-        Some(Box::new(Self { finer, around, sides, ..Self::beside_others(plan, leaf) }))
+        let faces = Some(LeafFaces::new(own, here, cell, &finer, bins));
+        Some(Box::new(Self { finer, around, faces, ..Self::beside_others(plan, leaf) }))
     }
 
     /// Of an own leaf beside leaves of its level and coarser ones.
@@ -92,7 +92,7 @@ impl<const D: usize> LeafBins<D> {
 
     /// Whether leaves around are finer.
     pub(super) fn is_beside_finer(&self) -> bool {
-        self.sides.is_some()
+        self.faces.is_some()
     }
 
     /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
@@ -175,7 +175,7 @@ impl<const D: usize> LeafBins<D> {
         let touches_all_nodes = chunk.len() >= touches_all_nodes(D);
         let own_cell = plan.cell(own.level);
         let given = !widths.are_known_to_kernels();
-        let sides = if given { None } else { self.sides.take() };
+        let faces = if given { None } else { self.faces.take() };
         // Of most boxes it is known without their half widths that they are whole and stay inside.
         let limit = Lanes::splat(narrow_limit(own_cell));
         scratch.undecided.clear();
@@ -184,8 +184,8 @@ impl<const D: usize> LeafBins<D> {
                 return !0;
             }
             let half = widths.bounds(chunk, first);
-            let elsewhere = sides.as_ref().map_or(0, |sides| {
-                sides.undecided(half, |axis| values(chunk, Layout::<D>::POSITION + axis, first))
+            let elsewhere = faces.as_ref().map_or(0, |faces| {
+                faces.undecided(half, |axis| values(chunk, Layout::<D>::POSITION + axis, first))
             });
             let lanes = elsewhere | (!half.le(limit)).bits();
             if lanes != 0 {
@@ -198,13 +198,13 @@ impl<const D: usize> LeafBins<D> {
         for particles in scratch.undecided.chunks(LANES) {
             let half = widths.of_batch(chunk, particles, own_cell);
             let centre = positions_of(chunk, particles);
-            let known = sides.as_ref().map(|sides| sides.bins(&centre, &half, limits));
+            let known = faces.as_ref().map(|faces| faces.bins(&centre, &half, limits));
             let (half, centre) = (half.map(Lanes::to_array), centre.map(Lanes::to_array));
             for (lane, &p) in particles.iter().enumerate() {
                 let (centre, half) = (centre.map(|x| x[lane]), half.map(|half| half[lane]));
                 let bin = match known.and_then(|known| known[lane]) {
                     Some(bin) => Ok(bin),
-                    None => self.sort_one(plan, leaf, own, sides.as_ref(), p, centre, half, given),
+                    None => self.sort_one(plan, leaf, own, faces.as_ref(), p, centre, half, given),
                 };
                 let bin = bin.unwrap_or_else(|()| {
                     sorted = sorted.and(Err(BinMissing { id: chunk.ids()[p as usize] }));
@@ -220,8 +220,8 @@ impl<const D: usize> LeafBins<D> {
                 }
             }
         }
-        if sides.is_some() {
-            self.sides = sides;
+        if faces.is_some() {
+            self.faces = faces;
         }
         sorted
     }
@@ -239,21 +239,21 @@ impl<const D: usize> LeafBins<D> {
         self.members[0].whole.extend(next..particles);
     }
 
-    /// Finds the bin of one box that [`LeafFaces::bins`] does not tell, or cuts it.
+    /// Finds the bin of one box that [`LeafFaces::bins`] leaves open, or cuts it.
     fn sort_one(
         &mut self,
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
-        sides: Option<&LeafFaces<D>>,
+        faces: Option<&LeafFaces<D>>,
         particle: u32,
         centre: [f64; D],
         half: [f64; D],
         given: bool,
     ) -> Result<u32, ()> {
         // What lies across the faces is known as far as boxes up to a cell wide can reach.
-        let sides = sides.filter(|_| is_narrow(half, plan.cell(own.level)));
-        let level = self.finest_level(own, sides, centre, half);
+        let faces = faces.filter(|_| is_narrow(half, plan.cell(own.level)));
+        let level = self.finest_level(own, faces, centre, half);
         if !given && is_narrow(half, plan.cell(level)) {
             // The first bin of a leaf is its own block's.
             let bin = if level == own.level { Some(0) } else { self.bin(plan, leaf, level, centre) };
@@ -269,7 +269,7 @@ impl<const D: usize> LeafBins<D> {
         };
         let (fraction, spread) = (1.0, [0.0; D]);
         let whole = SubBox { particle, slot, centre, half, softening, fraction, spread };
-        self.cut_box(plan, leaf, own, sides, whole)?;
+        self.cut_box(plan, leaf, own, faces, whole)?;
         Ok(CUT)
     }
 
@@ -279,10 +279,10 @@ impl<const D: usize> LeafBins<D> {
         plan: &GridPlan<D>,
         leaf: usize,
         own: &NearLeaf<D>,
-        sides: Option<&LeafFaces<D>>,
+        faces: Option<&LeafFaces<D>>,
         part: SubBox<D>,
     ) -> Result<(), ()> {
-        let level = self.finest_level(own, sides, part.centre, part.half);
+        let level = self.finest_level(own, faces, part.centre, part.half);
         let cell = plan.cell(level);
         let wide: [bool; D] = std::array::from_fn(|axis| !is_narrow([part.half[axis]], cell));
         let count = wide.iter().filter(|&&wide| wide).count();
@@ -300,22 +300,22 @@ impl<const D: usize> LeafBins<D> {
                 (true, _) => part.centre[axis] + half[axis],
             });
             let fraction = part.fraction / f64::from(1u32 << count);
-            self.cut_box(plan, leaf, own, sides, SubBox { centre, half, fraction, ..part })?;
+            self.cut_box(plan, leaf, own, faces, SubBox { centre, half, fraction, ..part })?;
         }
         Ok(())
     }
 
     /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
-    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves. `sides` are those
+    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves. `faces` are those
     /// of the leaf, for boxes at most a cell wide.
     fn finest_level(
         &self,
         own: &NearLeaf<D>,
-        sides: Option<&LeafFaces<D>>,
+        faces: Option<&LeafFaces<D>>,
         centre: [f64; D],
         half: [f64; D],
     ) -> u8 {
-        match sides.map(|sides| sides.side(sides.faces(&centre, &half))) {
+        match faces.map(|faces| faces.side(faces.faces(&centre, &half))) {
             Some(Side::Own) => return own.level,
             Some(Side::Finer) => return own.level + 1,
             Some(Side::Other) | None => {}

@@ -1,4 +1,4 @@
-//! What lies across the faces of a leaf beside finer ones, so that boxes need not be held against every leaf around.
+//! What lies across the faces of a leaf beside finer ones, so that boxes need not be compared with every leaf around.
 //!
 //! Along each axis a box stays within its leaf, or crosses the lower or the upper face, or both: at most `4^D` cases,
 //! each with its answer in a table.
@@ -150,7 +150,7 @@ impl<const D: usize> LeafFaces<D> {
     }
 
     /// Bins, counted within the leaf, of the boxes of a batch that are whole and on the leaf's own level or one finer: half widths
-    /// are held against these limits of both levels.
+    /// are compared with these limits of both levels.
     #[inline(always)]
     pub(super) fn bins(
         &self,

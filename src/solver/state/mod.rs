@@ -118,7 +118,7 @@ pub struct Solver<const D: usize> {
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
     /// Where the time of regrids went since the start of this process.
-    pub parts: RegridTimers,
+    pub regrid_timers: RegridTimers,
     /// What regrids remember; nothing that a bit depends on.
     pub(super) regrid_cache: RegridCache<D>,
     /// What grids of earlier trees and partitions have sent.
