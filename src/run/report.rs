@@ -21,10 +21,19 @@ pub struct Collapse {
     pub edge: f64,
     /// Height of the deposit at the centre, m.
     pub height: f64,
-    /// Run-out radius by the fit, m; `None` where no law holds.
-    pub law_edge: Option<f64>,
-    /// Final height by the fit, m; `None` where no law holds.
-    pub law_height: Option<f64>,
+    /// What the published laws give.
+    pub laws: [Published; 2],
+}
+
+/// A deposit by a published law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Published {
+    /// Its authors.
+    pub authors: &'static str,
+    /// Run-out radius, m; `None` where the law does not say.
+    pub edge: Option<f64>,
+    /// Final height, m; `None` where the law does not say.
+    pub height: Option<f64>,
 }
 
 /// Collective. Evaluates the deposit that the particles, of `total_mass` kg on all ranks, form.
@@ -73,7 +82,6 @@ pub fn evaluate<const D: usize>(
     });
     let edge = covered.iter().position(|&c| c == 0).unwrap_or(bins);
     let aspect = height / radius;
-    let (law_edge, law_height) = fits(law, aspect, radius, height);
     // The centre is a tenth of the initial radius, where a bin alone may be empty.
     let centre = (0.1 * BINS_PER_RADIUS).ceil() as usize;
     Collapse {
@@ -81,20 +89,19 @@ pub fn evaluate<const D: usize>(
         front: (front.unwrap_or(0) as f64 + 1.0) * width,
         edge: edge as f64 * width,
         height: top[..centre].iter().copied().fold(0.0, f64::max),
-        law_edge,
-        law_height,
+        laws: [lube(law, aspect, radius), lajeunesse(law, aspect, radius)],
     }
 }
 
-/// Run-out and final height by Lube et al.: J. Fluid Mech. 508 (2004) for cylinders, Phys. Rev. E 72
-/// (2005) for columns between walls. The run-out laws count from the initial edge.
-fn fits(law: CollapseLaw, a: f64, radius: f64, height: f64) -> (Option<f64>, Option<f64>) {
-    let (runout, top) = match law {
+/// Lube et al.: J. Fluid Mech. 508 (2004) for cylinders, Phys. Rev. E 72 (2005) for columns between walls. `a` is the aspect ratio.
+/// The run-out laws count from the initial edge.
+fn lube(law: CollapseLaw, a: f64, radius: f64) -> Published {
+    let (runout, height) = match law {
         CollapseLaw::Axisymmetric => (
             Some(if a < 1.7 { 1.24 * a } else { 1.6 * a.sqrt() }),
             match a {
-                _ if a < 1.0 => Some(height),
-                _ if a > 1.7 => Some(0.88 * radius * a.powf(1.0 / 6.0)),
+                _ if a < 1.0 => Some(a),
+                _ if a > 1.7 => Some(0.88 * a.powf(1.0 / 6.0)),
                 _ => None,
             },
         ),
@@ -104,42 +111,83 @@ fn fits(law: CollapseLaw, a: f64, radius: f64, height: f64) -> (Option<f64>, Opt
                 _ if a > 2.8 => Some(1.9 * a.powf(2.0 / 3.0)),
                 _ => None,
             },
-            Some(if a < 1.15 { height } else { radius * a.powf(0.4) }),
+            Some(if a < 1.15 { a } else { a.powf(0.4) }),
         ),
     };
-    (runout.map(|runout| radius * (1.0 + runout)), top)
+    let edge = runout.map(|runout| radius * (1.0 + runout));
+    Published { authors: "Lube et al.", edge, height: height.map(|height| radius * height) }
+}
+
+/// Lajeunesse et al.: Phys. Fluids 16 (2004) for cylinders, 17 (2005) for columns between walls. `a` is the aspect ratio. Their
+/// heights; where the top has fallen, the run-out of the cone or wedge of that height and of the initial volume.
+fn lajeunesse(law: CollapseLaw, a: f64, radius: f64) -> Published {
+    let (limit, fallen) = match law {
+        CollapseLaw::Axisymmetric => (0.74, 0.74),
+        CollapseLaw::Planar => (0.7, a.cbrt()),
+    };
+    let (edge, height) = match (law, a > limit) {
+        (_, false) => (None, a),
+        (CollapseLaw::Axisymmetric, true) => (Some((3.0 * a / fallen).sqrt()), fallen),
+        (CollapseLaw::Planar, true) => (Some(2.0 * a / fallen), fallen),
+    };
+    Published {
+        authors: "Lajeunesse et al.",
+        edge: edge.map(|edge| radius * edge),
+        height: Some(radius * height),
+    }
 }
 
 impl std::fmt::Display for Collapse {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let published = |value: Option<f64>| {
-            value.map_or_else(
-                || "no published fit".into(),
-                |value| format!("published fit {}", quantity(value, "m")),
-            )
+        let published = |value: fn(&Published) -> Option<f64>| {
+            let of = |law: &Published| Some(format!("{} {}", law.authors, quantity(value(law)?, "m")));
+            let laws: Vec<String> = self.laws.iter().filter_map(of).collect();
+            if laws.is_empty() { "no published law".to_owned() } else { laws.join(", ") }
         };
         writeln!(f, "column collapse, aspect ratio {}", number(self.aspect, 4))?;
         writeln!(
             f,
             "  run-out radius  {} (98 % of the mass)   {}",
             quantity(self.front, "m"),
-            published(self.law_edge)
+            published(|law| law.edge)
         )?;
         writeln!(f, "  outer edge      {} (connected deposit)", quantity(self.edge, "m"))?;
-        write!(f, "  final height    {}   {}", quantity(self.height, "m"), published(self.law_height))
+        write!(f, "  final height    {}   {}", quantity(self.height, "m"), published(|law| law.height))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use approx::assert_relative_eq;
+
     use super::*;
 
     #[test]
-    fn published_fits() {
-        let (edge, height) = fits(CollapseLaw::Axisymmetric, 0.9, 0.097, 0.0873);
-        approx::assert_relative_eq!(edge.unwrap(), 0.097 * (1.0 + 1.24 * 0.9));
-        assert_eq!(height, Some(0.0873));
-        assert_eq!(fits(CollapseLaw::Planar, 2.0, 1.0, 2.0).0, None);
-        approx::assert_relative_eq!(fits(CollapseLaw::Planar, 8.0, 1.0, 8.0).0.unwrap(), 1.0 + 1.9 * 4.0);
+    fn published_laws() {
+        let Published { edge, height, .. } = lube(CollapseLaw::Axisymmetric, 0.9, 0.097);
+        assert_relative_eq!(edge.unwrap(), 0.097 * (1.0 + 1.24 * 0.9));
+        assert_relative_eq!(height.unwrap(), 0.0873);
+        assert_eq!(lube(CollapseLaw::Planar, 2.0, 1.0).edge, None);
+        assert_relative_eq!(lube(CollapseLaw::Planar, 8.0, 1.0).edge.unwrap(), 1.0 + 1.9 * 4.0);
+        // The cone has the volume of the cylinder, the wedge the area of the column.
+        let cone = lajeunesse(CollapseLaw::Axisymmetric, 0.9, 0.097);
+        let (edge, height) = (cone.edge.unwrap(), cone.height.unwrap());
+        assert_relative_eq!(edge * edge * height / 3.0, 0.097 * 0.097 * 0.0873, max_relative = 1e-12);
+        assert_relative_eq!(height, 0.07178);
+        let wedge = lajeunesse(CollapseLaw::Planar, 8.0, 0.5);
+        assert_relative_eq!(
+            wedge.edge.unwrap() * wedge.height.unwrap() / 2.0,
+            0.5 * 4.0,
+            max_relative = 1e-12
+        );
+        assert_eq!(lajeunesse(CollapseLaw::Planar, 0.5, 1.0).edge, None);
+    }
+
+    #[test]
+    fn both_laws_are_shown() {
+        let laws = [lube(CollapseLaw::Planar, 2.0, 1.0), lajeunesse(CollapseLaw::Planar, 2.0, 1.0)];
+        let shown = Collapse { aspect: 2.0, front: 3.0, edge: 3.1, height: 1.3, laws }.to_string();
+        assert!(shown.contains("3 m (98 % of the mass)   Lajeunesse et al. 3.175 m\n"), "{shown}");
+        assert!(shown.contains("1.3 m   Lube et al. 1.32 m, Lajeunesse et al. 1.26 m"), "{shown}");
     }
 }
