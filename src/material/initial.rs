@@ -105,7 +105,7 @@ fn norm(tensor: &[f64; 6]) -> f64 {
     (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)).sqrt()
 }
 
-/// Principal values of a stress, and principal directions in the columns of a matrix.
+/// Principal values of a stress, and principal directions in the rows of a matrix.
 fn principal(stress: &[f64; 6], plane: bool) -> ([f64; 3], [[f64; 3]; 3]) {
     let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     if stress[3..] == [0.0; 3] {
@@ -125,7 +125,7 @@ fn principal(stress: &[f64; 6], plane: bool) -> ([f64; 3], [[f64; 3]; 3]) {
 /// The symmetric tensor with these principal values.
 fn compose(value: &[f64; 3], vector: &[[f64; 3]; 3]) -> [f64; 6] {
     [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-        .map(|(i, j)| (0..3).map(|k| vector[i][k] * value[k] * vector[j][k]).sum())
+        .map(|(i, j)| (0..3).map(|k| vector[k][i] * value[k] * vector[k][j]).sum())
 }
 
 /// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last two points, halves
