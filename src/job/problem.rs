@@ -12,6 +12,7 @@ use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
 use crate::quantity::Quantity;
+use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
 
@@ -88,6 +89,8 @@ pub struct Problem<const D: usize> {
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
+    /// Equilibrium at which the run ends, if it asks for one.
+    pub equilibrium: Option<Equilibrium>,
     /// What happens to particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.

@@ -8,6 +8,7 @@ use crate::load::Load;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{LoadTotals, Reaction};
+use crate::solver::state::relaxation::Relaxation;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
     Column { name, unit }
@@ -37,17 +38,21 @@ const COLUMNS: [Column<'static>; 20] = [
     column("left_mass", "kg"),
 ];
 
-/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
+/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; on the way to equilibrium those of it; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
 /// its place follow the others.
 pub fn columns<const D: usize>(
     loads: &[Load<D>],
     colliders: &[Collider<D>],
     is_adaptive: bool,
+    relaxes: bool,
 ) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
     if is_adaptive {
         columns.extend(LEDGER.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    if relaxes {
+        columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));
     }
     for load in loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
@@ -72,6 +77,15 @@ pub fn columns<const D: usize>(
 /// Columns of runs with dynamic refinement: sums since the start.
 const LEDGER: [(&str, &str); 5] =
     [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
+
+/// Columns of runs on the way to equilibrium.
+const RELAXATION: [(&str, &str); 3] =
+    [("peak_speed", "m/s"), ("unbalanced_acceleration", "m/s^2"), ("stops", "")];
+
+/// The values of a row that are of the way to equilibrium.
+pub fn relaxation_values(relaxation: &Relaxation) -> [f64; RELAXATION.len()] {
+    [relaxation.speed, relaxation.acceleration, relaxation.stops as f64]
+}
 
 /// The values of a row that are of splits and merges.
 pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {

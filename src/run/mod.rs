@@ -25,7 +25,7 @@ use crate::io::snapshot::{Outputs, PointField, Scalars, View};
 use crate::job::Problem;
 use crate::setup;
 use crate::solver::state::phases::Phase;
-use crate::solver::{Clock, Requests, Solver};
+use crate::solver::{Clock, Requests, Solver, StepReport};
 
 /// How a run is started.
 #[derive(Clone, Debug)]
@@ -257,26 +257,52 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to meet the
     /// end, so that a run to a later end takes the same steps.
     fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
-        while self.solver.clock.time < self.problem.time.end {
+        let mut settled = self.is_settled();
+        while self.solver.clock.time < self.problem.time.end && !settled {
             let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
-            let granted = self.step(requests)?;
+            let report = self.step(requests)?;
+            let granted = report.granted;
+            settled = report.settled;
             self.solver.regrid().map_err(|source| self.step_error(source))?;
             self.write_due(granted.checkpoint)?;
             if granted.stop {
                 let checkpoint = self.checkpoint()?;
                 return Ok(Outcome::Stopped { checkpoint });
             }
-            if self.solver.clock.time < self.problem.time.end {
+            if self.solver.clock.time < self.problem.time.end && !settled {
                 self.solver.balance_if_due();
             }
         }
         Ok(Outcome::Finished(Box::new(self.finish()?)))
     }
 
-    fn step(&mut self, requests: Requests) -> Result<Requests, RunError> {
+    /// Not collective. Whether the equilibrium is reached that the job asks for.
+    fn is_settled(&self) -> bool {
+        let solver = &self.solver;
+        solver.physics.equilibrium.is_some_and(|asked| solver.relaxation.is_settled(&asked))
+    }
+
+    /// Not collective. Says how the way to equilibrium has ended.
+    fn tell_equilibrium(&mut self) {
+        if self.problem.equilibrium.is_none() {
+            return;
+        }
+        let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
+        let found = format!(
+            "{} peaks, the last with {:.2e} m/s, unbalanced {:.2e} m/s^2 (root mean squares)",
+            way.stops, way.speed, way.acceleration
+        );
+        if self.is_settled() {
+            self.recorder.message(&format!("equilibrium at t = {time} s (step {step}): {found}"));
+        } else {
+            self.recorder.warning(&format!("no equilibrium until the end, t = {time} s: {found}"));
+        }
+    }
+
+    fn step(&mut self, requests: Requests) -> Result<StepReport, RunError> {
         let clock = self.solver.clock;
         let report = self.solver.step(f64::INFINITY, requests);
-        Ok(report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })?.granted)
+        report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })
     }
 
     fn step_error(&self, source: Disagreement) -> RunError {
@@ -313,6 +339,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let row = self.recorder.last_row() != Some(step);
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
         self.recorder.finish(self.comm, &self.solver);
+        self.tell_equilibrium();
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;

@@ -54,6 +54,7 @@ impl Recorder {
             &solver.physics.loads,
             &solver.physics.colliders,
             solver.physics.adaptivity.is_some(),
+            solver.physics.equilibrium.is_some(),
         );
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), kept) {
@@ -196,6 +197,9 @@ impl Recorder {
             let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
             if let Some(ledger) = &ledger {
                 values.extend(history::ledger_values(ledger));
+            }
+            if solver.physics.equilibrium.is_some() {
+                values.extend(history::relaxation_values(&solver.relaxation));
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);

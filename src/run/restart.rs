@@ -21,6 +21,7 @@ use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::ExactBooks;
 use crate::solver::state::cost::leaf_weight;
+use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 use crate::solver::{Clock, Solver};
 use crate::text::{quantity, written};
 
@@ -71,6 +72,12 @@ pub fn scalars<const D: usize>(
         .collect();
     write_exact_books("collider", &solver.contacts.books, comm, &mut reals, &mut exact);
     write_exact_books("load", &solver.load_books, comm, &mut reals, &mut exact);
+    if solver.physics.equilibrium.is_some() {
+        let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.relaxation;
+        reals.extend(RELAXATION.iter().map(|name| String::from(*name)).zip([kinetic, speed, acceleration]));
+        let phase = PHASES.iter().position(|other| *other == phase).unwrap_or_default();
+        counts.extend([(STOPS.into(), stops), (PHASE.into(), phase as u64)]);
+    }
     if solver.physics.adaptivity.is_some() {
         let ([splits, _, merges, removed], mut energies) = solver.ledger.gather(comm);
         let numbers = [splits, merges, removed, solver.ledger.next_root];
@@ -125,6 +132,27 @@ fn restore_exact_books<const N: usize>(
             *sum = read;
         }
     }
+    Some(())
+}
+
+/// Names of the numbers of the way to equilibrium.
+const RELAXATION: [&str; 3] = ["relaxation_kinetic_energy", "relaxation_speed", "relaxation_acceleration"];
+/// Name of the counter of the times that velocities were set to 0.
+const STOPS: &str = "relaxation_stops";
+/// Name of the counter that holds the number of the phase in [`PHASES`].
+const PHASE: &str = "relaxation_phase";
+/// Phases by number.
+const PHASES: [RelaxPhase; 3] = [RelaxPhase::Falling, RelaxPhase::Stopped, RelaxPhase::FromRest];
+
+/// Takes over the way to equilibrium. `None` if the file lacks a number.
+fn restore_relaxation<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
+    if solver.physics.equilibrium.is_none() {
+        return Some(());
+    }
+    let [kinetic, speed, acceleration] = RELAXATION.map(|name| scalars.real(name));
+    let phase = *PHASES.get(usize::try_from(scalars.count(PHASE)?).ok()?)?;
+    let (kinetic, speed, acceleration, stops) = (kinetic?, speed?, acceleration?, scalars.count(STOPS)?);
+    solver.relaxation = Relaxation { kinetic, speed, acceleration, stops, phase };
     Some(())
 }
 
@@ -275,6 +303,7 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of a collider is missing"))?;
     restore_exact_books("load", &mut solver.load_books, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
+    restore_relaxation(&mut solver, scalars).ok_or_else(|| refused("the way to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
     restore_crossings(comm.rank(), &mut solver, &header.scalars)

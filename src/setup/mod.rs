@@ -32,6 +32,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         colliders: problem.colliders.clone(),
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
+        equilibrium: problem.equilibrium,
         transfer: problem.transfer,
         boxes: problem.boxes,
         control: StepControl {

@@ -22,7 +22,7 @@ pub mod sorting;
 pub mod state;
 pub mod step;
 
-pub use physics::{Physics, StepControl};
+pub use physics::{Equilibrium, Physics, StepControl};
 pub use state::{Clock, Requests, Solver, StepError, StepReport};
 
 use partition::Forest;
@@ -40,6 +40,7 @@ use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::{Phase, Phases, thread_time};
 use crate::solver::state::regrid_cache::RegridCache;
 use crate::solver::state::regrid_timers::RegridTimers;
+use crate::solver::state::relaxation::Relaxation;
 
 impl<const D: usize> Solver<D> {
     /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state read
@@ -59,6 +60,8 @@ impl<const D: usize> Solver<D> {
             leaf_data: LeafData::default(),
             contacts: Contacts::new(&physics, clock.time),
             load_books: ExactBooks::new(physics.loads.len(), clock.time),
+            relaxation: Relaxation::default(),
+            motion: Default::default(),
             physics,
             forest,
             chunks,
@@ -103,10 +106,11 @@ impl<const D: usize> Solver<D> {
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();
         let advanced = self.advance(to, dt);
+        let settled = self.relax(dt);
         self.weigh_nodes();
         self.leaf_data.times.end_step();
         (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
-        self.close_step(advanced, requests)
+        self.close_step(advanced, requests).map(|report| StepReport { settled, ..report })
     }
 
     /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s. `docs/time-step.md` goes through it.
@@ -161,6 +165,6 @@ impl<const D: usize> Solver<D> {
         self.clock.bound = bound;
         self.provide_reach(-reach as u32);
         let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
-        Ok(StepReport { moved, granted })
+        Ok(StepReport { moved, granted, settled: false })
     }
 }

@@ -29,10 +29,21 @@ pub struct Physics<const D: usize> {
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
+    /// Equilibrium at which the run ends, and to which kinetic damping leads; `None`: neither.
+    pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
     /// Choice of the time step.
     pub control: StepControl,
+}
+
+/// What a run asks of an equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Equilibrium {
+    /// Greatest root mean square of the velocities at a peak of the kinetic energy, m/s.
+    pub speed: f64,
+    /// Greatest root mean square of the unbalanced force per mass, m/s².
+    pub acceleration: f64,
 }
 
 /// Limits on the time step.

@@ -119,6 +119,10 @@ fn problem<const D: usize>(
             file::Leaving::Delete => LeavingPolicy::Delete,
             file::Leaving::Clamp => LeavingPolicy::Clamp,
         },
+        equilibrium: file
+            .equilibrium
+            .as_ref()
+            .map(|asked| crate::solver::Equilibrium { speed: asked.speed, acceleration: asked.acceleration }),
         time: TimeSetup {
             end: file.time.end,
             cfl: file.time.cfl,

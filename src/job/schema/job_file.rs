@@ -61,6 +61,9 @@ pub struct JobFile {
     pub colliders: Vec<Collider>,
     /// End of the run and time step.
     pub time: Time,
+    /// The way to equilibrium; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equilibrium: Option<Equilibrium>,
     /// Choices of the method.
     #[serde(default)]
     pub numerics: Numerics,
@@ -266,6 +269,20 @@ fn default_cfl() -> f64 {
 
 fn default_growth() -> f64 {
     1.1
+}
+
+/// The way to equilibrium, by kinetic damping: whenever the kinetic energy has passed a peak, all velocities are set to 0. The run ends at
+/// rest, once both bounds hold, or at `time.end`. Columns of `history.csv` show the last peak, the last unbalanced force, and how often
+/// velocities were set to 0.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Equilibrium {
+    /// Bound on the root mean square of the velocities at a peak of the kinetic energy, m/s; 1e-6 of the wave speed is small.
+    #[schemars(range(max = 1e8), extend("exclusiveMinimum" = 0.0))]
+    pub speed: f64,
+    /// Bound on the root mean square of the unbalanced force per mass, m/s²; 1e-4 of gravity is small.
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+    pub acceleration: f64,
 }
 
 /// Choices of the method.

@@ -88,6 +88,7 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn new(comm: &Comm, forest: Forest<D>, root_edge: f64) -> Self {
         let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
         let physics = Physics {
+            equilibrium: None,
             origin: [0.0; D],
             root_edge,
             graded: forest.is_balanced(comm),

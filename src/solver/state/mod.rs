@@ -7,6 +7,7 @@
 //! | [`leaf_data`] | what is noted of each leaf |
 //! | `regrid_cache` | what regrids remember |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
+//! | [`relaxation`] | the way to equilibrium |
 //! | [`phases`], [`regrid_timers`] | timers |
 use partition::Forest;
 use partition::comm::{Comm, Traffic};
@@ -26,6 +27,7 @@ use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phases;
 use crate::solver::state::regrid_cache::RegridCache;
 use crate::solver::state::regrid_timers::RegridTimers;
+use crate::solver::state::relaxation::Relaxation;
 
 pub mod bookings;
 pub mod cost;
@@ -35,6 +37,7 @@ pub mod leaf_data;
 pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
+pub mod relaxation;
 
 /// Why a step failed on this rank.
 #[derive(Debug, thiserror::Error)]
@@ -73,6 +76,8 @@ pub struct StepReport {
     pub moved: Moved,
     /// What any rank asked for.
     pub granted: Requests,
+    /// Whether the equilibrium is reached that the job asks for.
+    pub settled: bool,
 }
 
 /// What a rank wants all ranks to do after a step.
@@ -106,6 +111,10 @@ pub struct Solver<const D: usize> {
     pub contacts: Contacts<D>,
     /// What is booked of the loads.
     pub load_books: ExactBooks<LOAD_SUMS>,
+    /// The way to equilibrium.
+    pub relaxation: Relaxation,
+    /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.
+    pub(super) motion: [ExactSum; 2],
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,

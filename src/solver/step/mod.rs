@@ -9,6 +9,7 @@
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders |
+//! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
 pub mod colliders;
 pub mod exchange;
@@ -17,4 +18,5 @@ pub mod g2p;
 pub mod loads;
 pub mod node_update;
 pub mod p2g;
+pub mod relax;
 pub mod time_step;

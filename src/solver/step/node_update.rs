@@ -28,6 +28,7 @@ impl<const D: usize> Solver<D> {
         let (grid, faces) = (&mut self.grid, &self.physics.faces);
         self.phases.time(Phase::Nodes, || apply_faces(&mut grid.fields, &grid.plan, faces));
         self.book_loads(&pushes);
+        self.note_motion();
         impulses
     }
 

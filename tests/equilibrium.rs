@@ -1,0 +1,102 @@
+//! Equilibrium through the whole program: kinetic damping leads a column to its closed form and a slope to rest, the run ends there and
+//! says so, with the same bits on any ranks and across restarts.
+#[path = "common/history.rs"]
+#[allow(dead_code, reason = "each test uses its part")]
+mod history;
+#[path = "mpi_runs/launch.rs"]
+#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
+mod launch;
+#[path = "common/mpirun.rs"]
+mod mpirun;
+#[path = "common/restart.rs"]
+mod restart;
+
+use history::History;
+use launch::{Outcome, run, succeed};
+
+/// A job with a body of 1800 kg/m³ in a box of 4 m by 2 m with slip faces at its sides.
+fn text(model: &str, shape: &str, rest: &str) -> String {
+    format!(
+        "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [4, 2]\nroot_edge = 1\n\
+         [boundaries]\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_min.kind = 'sticky'\ny_max.kind = 'separating'\n\
+         [[materials]]\nname = 'soil'\ndensity = 1800\n{model}\n\
+         [[bodies]]\nname = 'ground'\nmaterial = 'soil'\nshape = {shape}\n\
+         [history]\nevery_steps = 20\n{rest}\n"
+    )
+}
+
+const SLOPE: &str = "{ kind = 'polygon', points = [[0, 0], [4, 0], [4, 0.5], [2.5, 0.5], [1, 1.25], [0, 1.25]] }\n\
+                     stress = { kind = 'geostatic', k0 = 0.5 }";
+const SOIL: &str = "model = 'mohr_coulomb'\nyoung = 2e7\npoisson = 0.3\nfriction_angle = 35\ncohesion = 3e3";
+
+/// A column put under its weight at once comes to rest under the stress of the closed form: its elastic energy is
+/// (ρ g)² H³ / 6 M per area, with M = λ + 2μ.
+#[test]
+fn a_column_comes_to_rest_under_its_weight() {
+    let job = text(
+        "model = 'hencky'\nyoung = 2e7\npoisson = 0.25",
+        "{ kind = 'box', min = [0, 0], max = [4, 1.125] }",
+        "[time]\nend = 5\n[output]\npicture = false\n[equilibrium]\nspeed = 1e-5\nacceleration = 1e-2",
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("column.toml");
+    std::fs::write(&path, job).expect("job");
+    let output = run(directory.path(), 1, 1, &path, &[]).output().expect("starts");
+    let words =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(output.status.success() && words.contains("equilibrium at t = "), "{words}");
+    let history = History::read(directory.path(), "column");
+    let stops = history.last("stops");
+    println!("{stops} stops, {} s", history.last("time"));
+    assert!(stops >= 2.0 && history.last("time") < 3.0, "{stops} stops until {} s", history.last("time"));
+    assert!(history.last("peak_speed") <= 1e-5 && history.last("unbalanced_acceleration") <= 1e-2);
+    let modulus = 2e7 * 0.75 / (1.25 * 0.5);
+    let exact = 4.0 * (1800.0 * 9.81_f64).powi(2) * 1.125_f64.powi(3) / (6.0 * modulus);
+    let found = history.last("elastic_energy");
+    println!("elastic energy {found} J, exact {exact} J");
+    assert!((found / exact - 1.0).abs() < 0.02, "{found} for {exact}");
+}
+
+/// A slope under the stress of level ground relaxes to below 1e-6 of the wave speed, 120 m/s, on any ranks and across restarts with the
+/// same bits; without the bounds met until the end, the run says that.
+#[test]
+fn a_slope_relaxes_with_the_same_bits_on_any_ranks_and_across_restart() {
+    let rest = "[time]\nend = 3\n[checkpoint]\nevery_steps = 20\nkeep = 99\n[equilibrium]\nspeed = 1e-4\nacceleration = 0.01\n\
+                [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [1, 0], max = [2.5, 2] }";
+    let job = text(SOIL, SLOPE, rest);
+    let mut reference: Option<Outcome> = None;
+    for ranks in [1, 2, 3] {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("slope.toml");
+        std::fs::write(&path, &job).expect("job");
+        succeed(&mut run(directory.path(), ranks, 1, &path, &["--quiet"]));
+        let result = Outcome::read(directory.path(), "slope");
+        match &reference {
+            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
+            None => {
+                let history = History::read(directory.path(), "slope");
+                let (speed, time) = (history.last("peak_speed"), history.last("time"));
+                println!("{speed} m/s after {time} s and {} stops", history.last("stops"));
+                assert!(speed <= 1.2e-4 && time < 3.0 && history.last("stops") > 1.0, "{speed} {time}");
+                reference = Some(result);
+            }
+        }
+        if ranks == 2 {
+            let reference = reference.as_ref().expect("a run");
+            restart::assert_restart_gives(reference, directory.path(), &path, "slope");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_is_not_settled_at_its_end_says_so() {
+    let rest =
+        "[time]\nend = 0.01\n[output]\npicture = false\n[equilibrium]\nspeed = 1e-9\nacceleration = 1e-6";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("slope.toml");
+    std::fs::write(&path, text(SOIL, SLOPE, rest)).expect("job");
+    let output = run(directory.path(), 2, 1, &path, &[]).output().expect("starts");
+    let words =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(output.status.success() && words.contains("no equilibrium until the end"), "{words}");
+}
