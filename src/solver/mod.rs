@@ -88,7 +88,7 @@ impl<const D: usize> Solver<D> {
         if clock == Clock::default() {
             // A box without a bin stops the first step, which says so.
             let _ = solver.moments_from_affine();
-            solver.leaf_data.signal = solver.signals_at_rest();
+            solver.leaf_data.signal = solver.signals_under_stress();
             solver.clock.bound = comm.min_f64(solver.local_bound());
         }
         solver

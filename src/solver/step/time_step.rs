@@ -47,31 +47,43 @@ impl<const D: usize> Solver<D> {
         particles.min(self.collider_bound())
     }
 
-    /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, from the materials at rest.
+    /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, m/s, from the materials at rest: quick, for
+    /// each change of the tree.
     pub(in crate::solver) fn signals_at_rest(&self) -> Vec<f64> {
         let physics = &self.physics;
         self.chunks.par_iter().with_min_len(64).map(|chunk| physics.signal_at_rest(chunk)).collect()
     }
+
+    /// Not collective. The same with the wave speeds under the stress that the particles have, where these are greater: for the
+    /// first step of bodies that begin under stress.
+    pub(in crate::solver) fn signals_under_stress(&self) -> Vec<f64> {
+        let physics = &self.physics;
+        let signal = |chunk| physics.signal_at_rest(chunk).max(physics.signal_under_stress(chunk));
+        self.chunks.par_iter().with_min_len(64).map(signal).collect()
+    }
 }
 
 impl<const D: usize> Physics<D> {
-    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest, or under the stress that they
-    /// have.
+    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest.
     fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
         let mut fastest: f64 = 0.0;
-        let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS);
-        for (tile, tags) in tiles.zip(chunk.tags().chunks(TILE)) {
-            let velocity = tile[Layout::<D>::VELOCITY..].iter().take(D).map(Lanes::load);
-            let squares = velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum));
-            let speeds = squares.sqrt().to_array();
-            for (&tag, speed) in tags.iter().zip(speeds) {
+        for (tile, tags) in tiles_of(chunk) {
+            for (&tag, speed) in tags.iter().zip(speeds::<D>(tile)) {
                 let material = &self.materials[usize::from(Tag::unpack(tag).material)];
                 fastest = fastest.max(material.wave_speed() + speed);
             }
+        }
+        fastest
+    }
+
+    /// Greatest `c + |v|` of those of a leaf's particles, eight at a time, that are under stress, m/s.
+    fn signal_under_stress(&self, chunk: &Chunk<D>) -> f64 {
+        let mut fastest: f64 = 0.0;
+        for (tile, tags) in tiles_of(chunk) {
             let stresses = &tile[Layout::<D>::STRESS..][..Layout::<D>::SYMMETRIC];
             if stresses.iter().any(|line| line[..tags.len()].iter().any(|&stress| stress != 0.0)) {
-                let waves = self.waves_under_stress(tile, tags);
-                for (wave, speed) in waves.to_array().into_iter().zip(speeds).take(tags.len()) {
+                let waves = self.waves_under_stress(tile, tags).to_array();
+                for (wave, speed) in waves.into_iter().zip(speeds::<D>(tile)).take(tags.len()) {
                     fastest = fastest.max(wave + speed);
                 }
             }
@@ -93,4 +105,15 @@ impl<const D: usize> Physics<D> {
         material::update(&self.materials, &index, &mut state, &Step::rest(D == 2));
         state.wave_speed
     }
+}
+
+/// The tiles of a chunk with the tags of their particles.
+fn tiles_of<const D: usize>(chunk: &Chunk<D>) -> impl Iterator<Item = (&[[f64; TILE]], &[u64])> {
+    chunk.tiles().chunks_exact(Layout::<D>::REALS).zip(chunk.tags().chunks(TILE))
+}
+
+/// Speeds of the particles of a tile, m/s.
+fn speeds<const D: usize>(tile: &[[f64; TILE]]) -> [f64; TILE] {
+    let velocity = tile[Layout::<D>::VELOCITY..].iter().take(D).map(Lanes::load);
+    velocity.fold(Lanes::splat(0.0), |sum, v| v.mul_add(v, sum)).sqrt().to_array()
 }
