@@ -49,6 +49,7 @@ pub enum StressKind {
     /// A table over depth, linear between its rows and constant outside.
     Depth {
         /// Rows [depth (m), vertical pressure (Pa), horizontal pressure (Pa)] with increasing depths; compression is positive.
+        #[schemars(transform = limited)]
         table: Vec<[f64; 3]>,
         /// Level of depth 0, m, as for `geostatic`; by default that of the uppermost body.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -75,4 +76,12 @@ pub enum StressKind {
         #[serde(default)]
         yz: Quantity,
     },
+}
+
+/// Limits of the numbers of a table over depth.
+fn limited(schema: &mut schemars::Schema) {
+    if let Some(number) = schema.pointer_mut("/items/items").and_then(|number| number.as_object_mut()) {
+        number.insert("minimum".into(), (-1e13).into());
+        number.insert("maximum".into(), 1e13.into());
+    }
 }
