@@ -106,8 +106,9 @@ fn scatter<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
         let scheme = setting.scheme();
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
-            let (all, place) = (Select::All, Place::default());
-            p2g::scatter(&mut scratch, chunk, all, &setting.frame, &scheme, DT, &mut arena, None, place);
+            let (frame, scheme, scratch, arena) = (&setting.frame, &scheme, &mut scratch, &mut arena[..]);
+            p2g::Scatter { scratch, chunk, frame, scheme, dt: DT, arena, moments: None }
+                .whole_boxes(Select::All, Place::default());
         }
         arena[100 % arena_nodes(D)]
     });
@@ -122,18 +123,10 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
-            let (all, frame, place) = (Select::All, &setting.frame, Place::default());
-            greatest.max(g2p::gather(
-                &mut scratch,
-                chunk,
-                all,
-                frame,
-                &scheme,
-                DT,
-                &fields,
-                &mut leavers,
-                place,
-            ))
+            let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
+            let (scratch, leavers) = (&mut scratch, &mut leavers);
+            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers };
+            greatest.max(bin.whole_boxes(Select::All, Place::default()))
         })
     });
 }
@@ -164,17 +157,9 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
         for chunk in setting.chunks.iter().cycle().take(blocks::<3>()) {
             arena.fill(Row::default());
             let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut [] });
-            p2g::scatter(
-                &mut scratch,
-                chunk,
-                Select::List(&list),
-                &setting.frame,
-                &scheme,
-                DT,
-                &mut arena,
-                moments,
-                Place::default(),
-            );
+            let (frame, scheme, scratch, arena) = (&setting.frame, &scheme, &mut scratch, &mut arena[..]);
+            p2g::Scatter { scratch, chunk, frame, scheme, dt: DT, arena, moments }
+                .whole_boxes(Select::List(&list), Place::default());
         }
         arena[100]
     });
@@ -192,17 +177,10 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
         let moments = jump.then_some(g2p::Moments { nodes: &nodes, first: &[] });
         let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
-            greatest.max(g2p::gather(
-                &mut scratch,
-                chunk,
-                Select::List(&list),
-                &setting.frame,
-                &scheme,
-                DT,
-                &fields,
-                &mut leavers,
-                Place::default(),
-            ))
+            let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
+            let (scratch, leavers) = (&mut scratch, &mut leavers);
+            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers };
+            greatest.max(bin.whole_boxes(Select::List(&list), Place::default()))
         })
     });
 }

@@ -33,51 +33,59 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// Gathers for the selected particles and advances them by `dt`. Returns the greatest sum of wave
-/// speed and particle speed, m/s, for the time step; infinite if the state of any particle is not finite or its det b is not
-/// above zero. `leavers` notes those that leave its box; `next` is the place of the chunk that will be read after this one.
-pub fn gather<const D: usize>(
-    scratch: &mut Scratch<D>,
-    chunk: &mut Chunk<D>,
-    select: Select,
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    fields: &Fields,
-    leavers: &mut Leavers<D>,
-    next: Place,
-) -> f64 {
-    widest(Gather { scratch, chunk, select, frame, scheme, dt, fields, leavers, next })
+/// What gathering for the particles of a bin and advancing them needs.
+pub struct Gather<'a, const D: usize> {
+    /// Memory of the thread.
+    pub scratch: &'a mut Scratch<D>,
+    /// Particles of the leaf.
+    pub chunk: &'a mut Chunk<D>,
+    /// The block.
+    pub frame: &'a Frame<D>,
+    /// What holds for all particles.
+    pub scheme: &'a Scheme<'a>,
+    /// Length of the step, s.
+    pub dt: f64,
+    /// Velocities of the nodes.
+    pub fields: &'a Fields<'a>,
+    /// Notes the particles that leave its box.
+    pub leavers: &'a mut Leavers<D>,
 }
 
-/// [`gather`] with its arguments.
-struct Gather<'a, const D: usize> {
-    scratch: &'a mut Scratch<D>,
-    chunk: &'a mut Chunk<D>,
+impl<const D: usize> Gather<'_, D> {
+    /// Gathers for the selected particles and advances them. Returns the greatest sum of wave speed and particle speed, m/s, for
+    /// the time step; infinite if the state of any particle is not finite or its det b is not above zero. `next` is the place of
+    /// the chunk that will be read after this one.
+    pub fn whole_boxes(self, select: Select, next: Place) -> f64 {
+        widest(WholeBoxes { bin: self, select, next })
+    }
+}
+
+/// The kernel of [`Gather::whole_boxes`].
+struct WholeBoxes<'a, const D: usize> {
+    bin: Gather<'a, D>,
     select: Select<'a>,
-    frame: &'a Frame<D>,
-    scheme: &'a Scheme<'a>,
-    dt: f64,
-    fields: &'a Fields<'a>,
-    leavers: &'a mut Leavers<D>,
     next: Place,
 }
 
-impl<const D: usize> Kernel for Gather<'_, D> {
+impl<const D: usize> Kernel for WholeBoxes<'_, D> {
     type Output = f64;
 
     #[inline(always)]
     fn run<V: Vector>(self) -> f64 {
         // Two copies of the loop, so that bins away from walls do not ask at every particle.
-        if self.frame.is_at_wall() { self.run_all::<V, true>() } else { self.run_all::<V, false>() }
+        if self.bin.frame.is_at_wall() {
+            self.advance_all::<V, true>()
+        } else {
+            self.advance_all::<V, false>()
+        }
     }
 }
 
-impl<const D: usize> Gather<'_, D> {
+impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
-    fn run_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
-        let Self { scratch, chunk, select, frame, scheme, dt, fields, leavers, next } = self;
-        let batches = Batches::new(select, chunk, next);
+    fn advance_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
+        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers } = self.bin;
+        let batches = Batches::new(self.select, chunk, self.next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
         let (cell, extent) = (frame.cell, &frame.extent);
         let Scratch { weights, nodes, sums, spare } = scratch;
@@ -136,7 +144,8 @@ pub fn gather_sub_boxes<const D: usize>(
 }
 
 /// Advances the particles of a list by `dt` with what they gathered, in a domain `[0, extent]`. `cell` is the least edge of the cells that their
-/// boxes overlap, m. Returns as [`gather`].
+/// boxes overlap, m. Returns as
+/// [`Gather::whole_boxes`].
 pub fn advance_gathered<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,

@@ -43,132 +43,117 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// Adds the selected particles to the arena of their block: rows (momentum, mass), and with `moments` also what
-/// constrained nodes need: first moments, or other factors (see [`super::hanging`]).
-///
-/// `dt` is the step that turns internal forces into impulses; each particle's box must lie within
-/// the arena, which holds when its centre lies in the block. `next` is the place of the chunk that will be read after
-/// this one.
-pub fn scatter<const D: usize>(
-    scratch: &mut Scratch<D>,
-    chunk: &Chunk<D>,
-    select: Select,
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    arena: &mut [Row],
-    moments: Option<MomentSums>,
-    next: Place,
-) {
-    widest(Scatter { scratch, chunk, select, frame, scheme, dt, arena, moments, next });
+/// What scattering a bin of particles into the arena of its block needs.
+pub struct Scatter<'a, const D: usize> {
+    /// Memory of the thread.
+    pub scratch: &'a mut Scratch<D>,
+    /// Particles of the leaf.
+    pub chunk: &'a Chunk<D>,
+    /// The block.
+    pub frame: &'a Frame<D>,
+    /// What holds for all particles.
+    pub scheme: &'a Scheme<'a>,
+    /// The step that turns internal forces into impulses, s.
+    pub dt: f64,
+    /// Rows (momentum, mass) of the nodes.
+    pub arena: &'a mut [Row],
+    /// What constrained nodes need, where there are any: first moments, or other factors (see [`super::hanging`]).
+    pub moments: Option<MomentSums<'a>>,
 }
 
-/// [`scatter`] with its arguments.
-struct Scatter<'a, const D: usize> {
-    scratch: &'a mut Scratch<D>,
-    chunk: &'a Chunk<D>,
+impl<const D: usize> Scatter<'_, D> {
+    /// Adds the selected particles. Each particle's box must lie within the arena, which holds when its centre lies in the
+    /// block. `next` is the place of the chunk that will be read after this one.
+    pub fn whole_boxes(&mut self, select: Select, next: Place) {
+        let Self { scratch, chunk, frame, scheme, dt, arena, moments } = self;
+        // By value, so that the kernel holds each of them in a register.
+        let moments = moments.as_mut().map(|MomentSums { nodes, sums }| MomentSums { nodes, sums });
+        let bin = Scatter { scratch, chunk, frame, scheme, dt: *dt, arena, moments };
+        widest(WholeBoxes { bin, select, next });
+    }
+
+    /// Adds parts of boxes; the affine term is relative to the particle.
+    pub fn sub_boxes(&mut self, parts: &[SubBox<D>]) {
+        let Self { scratch, chunk, frame, scheme, dt, arena, moments } = self;
+        let Scratch { prepared, nodes, spare } = &mut **scratch;
+        for parts in parts.chunks(LANES) {
+            let batch = Batch::from_indices(parts, |part| part.particle);
+            let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+            prepared.fill_parts(frame, &batch.positions(tile), parts);
+            let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
+            prepared.load::<Lanes>(tile, &batch, *dt, scheme.transfer, &spread);
+            prepared.share(parts);
+            prepared.add::<Lanes>(&batch, arena);
+            if let Some(moments) = moments {
+                let hanging = &moments.nodes.hanging;
+                prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
+                let touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
+                prepared.add_moments(nodes, touched, moments);
+            }
+        }
+    }
+}
+
+/// The kernel of [`Scatter::whole_boxes`].
+struct WholeBoxes<'a, const D: usize> {
+    bin: Scatter<'a, D>,
     select: Select<'a>,
-    frame: &'a Frame<D>,
-    scheme: &'a Scheme<'a>,
-    dt: f64,
-    arena: &'a mut [Row],
-    moments: Option<MomentSums<'a>>,
     next: Place,
 }
 
-impl<const D: usize> Kernel for Scatter<'_, D> {
+impl<const D: usize> Kernel for WholeBoxes<'_, D> {
     type Output = ();
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { scratch, chunk, select, frame, scheme, dt, arena, moments, next } = self;
         // Copies of the loop, so that bins away from walls and bins without constrained nodes do not ask at every particle.
-        match moments {
-            None if !frame.is_at_wall() => {
-                scatter_all::<V, D, false>(scratch, chunk, select, frame, scheme, dt, arena, None, next);
-            }
-            None => scatter_all::<V, D, true>(scratch, chunk, select, frame, scheme, dt, arena, None, next),
-            moments => {
-                scatter_all::<V, D, true>(scratch, chunk, select, frame, scheme, dt, arena, moments, next);
-            }
+        match (self.bin.frame.is_at_wall(), self.bin.moments.is_some()) {
+            (false, false) => self.add_all::<V, false, false>(),
+            (true, false) => self.add_all::<V, true, false>(),
+            (_, true) => self.add_all::<V, true, true>(),
         }
     }
 }
 
-/// Adds parts of boxes to the arena of their block; the affine term is relative to the particle.
-pub fn scatter_sub_boxes<const D: usize>(
-    scratch: &mut Scratch<D>,
-    chunk: &Chunk<D>,
-    parts: &[SubBox<D>],
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    arena: &mut [Row],
-    mut moments: Option<MomentSums>,
-) {
-    let Scratch { prepared, nodes, spare } = scratch;
-    for parts in parts.chunks(LANES) {
-        let batch = Batch::from_indices(parts, |part| part.particle);
-        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
-        prepared.fill_parts(frame, &batch.positions(tile), parts);
-        let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
-        prepared.load::<Lanes>(tile, &batch, dt, scheme.transfer, &spread);
-        prepared.share(parts);
-        prepared.add::<Lanes>(&batch, arena);
-        if let Some(moments) = &mut moments {
-            let hanging = &moments.nodes.hanging;
-            prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
-            let touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
-            prepared.add_moments(nodes, touched, moments);
-        }
-    }
-}
-
-#[inline(always)]
-fn scatter_all<V: Vector, const D: usize, const AT_WALL: bool>(
-    scratch: &mut Scratch<D>,
-    chunk: &Chunk<D>,
-    select: Select,
-    frame: &Frame<D>,
-    scheme: &Scheme,
-    dt: f64,
-    arena: &mut [Row],
-    mut moments: Option<MomentSums>,
-    next: Place,
-) {
-    let (tags, cell) = (chunk.tags(), frame.cell);
-    let Scratch { prepared, nodes, spare } = scratch;
-    let mut batches = Batches::new(select, chunk, next);
-    while let Some(batch) = batches.next() {
-        batches.look_up_pages();
-        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
-        let position: [V; D] = batch.positions(tile);
-        let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
-        let half = match AT_WALL {
-            true => domain::cut_at_walls(&whole, &position, cell, &frame.extent),
-            false => domain::away_from_walls(&whole, cell),
-        };
-        prepared.weights.fill(frame, &position, &position, &half);
-        if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
-            prepared.weights.soften(&factors);
-        }
-        let mut spread = prepared.weights.spread;
-        let (mut touched, mut hanging) = (0, 0);
-        if let Some(moments) = &moments {
-            hanging = moments.nodes.hanging.touched(&prepared.weights, &batch);
-            if hanging != 0 {
-                moments.nodes.hanging.add_spread(&prepared.weights, hanging, cell, &mut spread);
+impl<const D: usize> WholeBoxes<'_, D> {
+    #[inline(always)]
+    fn add_all<V: Vector, const AT_WALL: bool, const HAS_MOMENTS: bool>(self) {
+        let Scatter { scratch, chunk, frame, scheme, dt, arena, moments } = self.bin;
+        let mut moments = if HAS_MOMENTS { moments } else { None };
+        let (tags, cell) = (chunk.tags(), frame.cell);
+        let Scratch { prepared, nodes, spare } = scratch;
+        let mut batches = Batches::new(self.select, chunk, self.next);
+        while let Some(batch) = batches.next() {
+            batches.look_up_pages();
+            let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+            let position: [V; D] = batch.positions(tile);
+            let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
+            let half = match AT_WALL {
+                true => domain::cut_at_walls(&whole, &position, cell, &frame.extent),
+                false => domain::away_from_walls(&whole, cell),
+            };
+            prepared.weights.fill(frame, &position, &position, &half);
+            if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
+                prepared.weights.soften(&factors);
             }
-            touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
-            if touched != 0 {
-                moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
+            let mut spread = prepared.weights.spread;
+            let (mut touched, mut hanging) = (0, 0);
+            if let Some(moments) = &moments {
+                hanging = moments.nodes.hanging.touched(&prepared.weights, &batch);
+                if hanging != 0 {
+                    moments.nodes.hanging.add_spread(&prepared.weights, hanging, cell, &mut spread);
+                }
+                touched = moments.nodes.prepare(&prepared.weights, nodes, &batch);
+                if touched != 0 {
+                    moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
+                }
             }
-        }
-        prepared.load::<V>(tile, &batch, dt, scheme.transfer, &spread);
-        prepared.add::<V>(&batch, arena);
-        if let Some(moments) = &mut moments {
-            prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
-            prepared.add_moments(nodes, touched, moments);
+            prepared.load::<V>(tile, &batch, dt, scheme.transfer, &spread);
+            prepared.add::<V>(&batch, arena);
+            if let Some(moments) = &mut moments {
+                prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
+                prepared.add_moments(nodes, touched, moments);
+            }
         }
     }
 }

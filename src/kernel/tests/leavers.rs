@@ -13,17 +13,17 @@ fn leavers_are_found<const D: usize>() {
     for select in [Select::All, Select::List(&odd), Select::List(&[7, 20]), Select::List(&[])] {
         let (mut chunk, mut leavers) = (start.clone(), Leavers::default());
         leavers.begin(&bounds);
-        g2p::gather(
-            &mut Default::default(),
-            &mut chunk,
-            select,
-            &frame,
-            &scheme,
-            DT,
-            &fields,
-            &mut leavers,
-            Place::default(),
-        );
+        let (scratch, frame, scheme) = (&mut Default::default(), &frame, &scheme);
+        let bin = g2p::Gather {
+            scratch,
+            chunk: &mut chunk,
+            frame,
+            scheme,
+            dt: DT,
+            fields: &fields,
+            leavers: &mut leavers,
+        };
+        bin.whole_boxes(select, Place::default());
         let moved: Vec<u32> = match select {
             Select::All => (0..53).collect(),
             Select::List(list) => list.to_vec(),

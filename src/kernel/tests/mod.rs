@@ -12,7 +12,7 @@ mod beside_coarser;
 mod leavers;
 mod parts;
 
-/// As [`super::g2p::gather`], for particles that may go anywhere.
+/// As [`super::g2p::Gather::whole_boxes`], for particles that may go anywhere.
 fn gather<const D: usize>(
     chunk: &mut Chunk<D>,
     select: Select,
@@ -22,20 +22,11 @@ fn gather<const D: usize>(
     fields: &Fields,
     next: Place,
 ) -> f64 {
-    g2p::gather(
-        &mut Default::default(),
-        chunk,
-        select,
-        frame,
-        scheme,
-        dt,
-        fields,
-        &mut Leavers::default(),
-        next,
-    )
+    let (scratch, leavers) = (&mut Default::default(), &mut Leavers::default());
+    g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers }.whole_boxes(select, next)
 }
 
-/// As [`super::p2g::scatter`], with memory of its own.
+/// As [`super::p2g::Scatter::whole_boxes`], with memory of its own.
 fn scatter<const D: usize>(
     chunk: &Chunk<D>,
     select: Select,
@@ -46,7 +37,8 @@ fn scatter<const D: usize>(
     moments: Option<MomentSums>,
     next: Place,
 ) {
-    p2g::scatter(&mut Default::default(), chunk, select, frame, scheme, dt, arena, moments, next);
+    let scratch = &mut Default::default();
+    p2g::Scatter { scratch, chunk, frame, scheme, dt, arena, moments }.whole_boxes(select, next);
 }
 
 /// A small deterministic generator of numbers in [0, 1).

@@ -46,7 +46,17 @@ fn parts_equal_the_whole<const D: usize>() {
             assert!((sum[k] - part.spread[k]).abs() < 1e-13 * part.spread[k]);
         }
     }
-    p2g::scatter_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &scheme, DT, &mut other, None);
+    let (scratch, arena_of_parts) = (&mut Default::default(), &mut other[..]);
+    let mut bin = p2g::Scatter {
+        scratch,
+        chunk: &parted,
+        frame: &frame,
+        scheme: &scheme,
+        dt: DT,
+        arena: arena_of_parts,
+        moments: None,
+    };
+    bin.sub_boxes(&parts);
     for (a, b) in arena.iter().zip(&other) {
         for i in 0..4 {
             assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
@@ -314,10 +324,14 @@ fn bits_do_not_depend_on_earlier_bins() {
         let mut run = |chunk: &mut Chunk<3>, velocity: &[Row]| {
             let (mut arena, mut leavers) = (vec![Row::default(); arena_nodes(3)], Leavers::default());
             let place = Place::default();
-            p2g::scatter(&mut to_nodes, chunk, Select::All, &frame, &scheme, DT, &mut arena, None, place);
-            let fields = Fields { velocity, increment: None, moments: None };
-            let all = Select::All;
-            g2p::gather(&mut to_particles, chunk, all, &frame, &scheme, DT, &fields, &mut leavers, place);
+            let (frame, scheme, dt) = (&frame, &scheme, DT);
+            let (scratch, rows) = (&mut to_nodes, &mut arena[..]);
+            p2g::Scatter { scratch, chunk, frame, scheme, dt, arena: rows, moments: None }
+                .whole_boxes(Select::All, place);
+            let fields = &Fields { velocity, increment: None, moments: None };
+            let (scratch, leavers) = (&mut to_particles, &mut leavers);
+            g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers }
+                .whole_boxes(Select::All, place);
             arena
         };
         if used {

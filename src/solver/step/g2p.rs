@@ -213,7 +213,8 @@ impl<const D: usize> Sweep<'_, D> {
         let Some(whole) = bin.whole else { return 0.0 };
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
-        g2p::gather(kernel, chunk, whole, frame, scheme, dt, &nodes, leavers, next)
+        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields: &nodes, leavers }
+            .whole_boxes(whole, next)
     }
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].

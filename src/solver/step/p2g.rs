@@ -86,13 +86,12 @@ fn scatter<const D: usize>(
     arena.clear(&bin.window);
     let chunk = &chunks[bin.leaf];
     let ArenaMut { rows, moments: sums, .. } = arena;
+    let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums });
+    let mut kernel = p2g::Scatter { scratch, chunk, frame: &bin.frame, scheme, dt, arena: rows, moments };
     if let Some(whole) = bin.whole {
-        let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums: &mut *sums });
-        let next = chunks.get(bin.leaf + 1).map_or(Place::default(), Chunk::place);
-        p2g::scatter(scratch, chunk, whole, &bin.frame, scheme, dt, rows, moments, next);
+        kernel.whole_boxes(whole, chunks.get(bin.leaf + 1).map_or(Place::default(), Chunk::place));
     }
     if !bin.parts.is_empty() {
-        let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums });
-        p2g::scatter_sub_boxes(scratch, chunk, bin.parts, &bin.frame, scheme, dt, rows, moments);
+        kernel.sub_boxes(bin.parts);
     }
 }
