@@ -239,7 +239,12 @@ impl<const D: usize> Counter<'_, D> {
         let depth = last - octant.level;
         let (lo, hi) = self.within(octant, depth);
         self.work += price;
-        if region.shape.classify(&self.cell(last, lo, hi)) == Side::Outside {
+        // Shapes that are classified by distance reach cells by the balls around them, which stick out of the box.
+        let beyond = match is_exact(&region.shape) {
+            true => 0.0,
+            false => 0.51 * ((D as f64).sqrt() - 1.0) * problem.leaf_edge(last),
+        };
+        if region.shape.classify(&grown(&self.cell(last, lo, hi), beyond)) == Side::Outside {
             return false;
         }
         if is_exact(&region.shape) {
