@@ -1,6 +1,7 @@
 //! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the trait
 //! that the solver calls ([`Material`]).
 use super::initial::Consolidation;
+use super::laws::hencky::Hencky;
 use super::tensor::eigen::Symmetric;
 use super::{HISTORIES, PLASTIC_STRAIN};
 use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
@@ -120,14 +121,19 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         false
     }
 
-    /// See [`Material::strain_under`]. Without it, no body of this law can start under stress.
+    /// The elastic part of the law, where it is that of Hencky.
+    fn solid(&self) -> Option<&Hencky> {
+        None
+    }
+
+    /// See [`Material::strain_under`]. By default that of [`Law::solid`]; without either, no body of this law can start under stress.
     fn strain_under(
         &self,
-        _stress: [f64; 3],
-        _consolidation: Option<Consolidation>,
-        _history: &mut [f64; HISTORIES],
+        stress: [f64; 3],
+        consolidation: Option<Consolidation>,
+        history: &mut [f64; HISTORIES],
     ) -> Option<[f64; 3]> {
-        None
+        Law::strain_under(self.solid()?, stress, consolidation, history)
     }
 
     /// See [`Material::consolidates`].

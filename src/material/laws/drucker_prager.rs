@@ -16,7 +16,6 @@ use super::Model;
 use super::hencky::Hencky;
 use super::von_mises::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
-use crate::material::initial::Consolidation;
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
 use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
@@ -221,13 +220,8 @@ impl Law for DruckerPrager {
         self.cohesive.as_ref().is_some_and(|own| own.cohesion.softens())
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.dry.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        Some(&self.dry.solid)
     }
 }
 
@@ -284,13 +278,8 @@ impl Law for Dry {
         &["plastic_shear_strain", "volume_gain"]
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.solid.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        Some(&self.solid)
     }
 }
 

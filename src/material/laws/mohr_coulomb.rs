@@ -13,7 +13,6 @@ use super::Model;
 use super::hencky::Hencky;
 use crate::material::coulomb::{Pyramid, Returned};
 use crate::material::hardening::{Curve, Flow, Hardening};
-use crate::material::initial::Consolidation;
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::principal::Principal;
 use crate::material::tensor::strain::{Strain, finish};
@@ -365,13 +364,8 @@ impl Law for MohrCoulomb {
         self.cohesion.softens()
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.solid.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        Some(&self.solid)
     }
 }
 

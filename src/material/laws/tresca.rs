@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
+use super::hencky::Hencky;
 use super::mohr_coulomb::MohrCoulomb;
 use crate::material::hardening::{Curve, Hardening};
-use crate::material::initial::Consolidation;
 use crate::material::parameters::OutOfRange;
 use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
@@ -90,12 +90,7 @@ impl Law for Tresca {
         Law::softens(&self.0)
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.0.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        self.0.solid()
     }
 }

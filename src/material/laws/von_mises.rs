@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use super::Model;
 use super::hencky::Hencky;
 use crate::material::hardening::{Curve, Flow, Hardening};
-use crate::material::initial::Consolidation;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
@@ -170,13 +169,8 @@ impl Law for VonMises {
         self.curve.softens()
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.solid.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        Some(&self.solid)
     }
 }
 

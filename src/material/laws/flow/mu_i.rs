@@ -9,12 +9,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::laws::hencky::Hencky;
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
+use crate::material::{Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Vector, VectorMask};
 
 /// Hencky elasticity with μ(I) friction.
@@ -140,12 +139,7 @@ impl Law for MuI {
         &["plastic_shear_strain", "volume_gain"]
     }
 
-    fn strain_under(
-        &self,
-        stress: [f64; 3],
-        consolidation: Option<Consolidation>,
-        history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        self.solid.strain_under(stress, consolidation, history)
+    fn solid(&self) -> Option<&Hencky> {
+        Some(&self.solid)
     }
 }
