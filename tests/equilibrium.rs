@@ -12,7 +12,7 @@ mod mpirun;
 mod restart;
 
 use history::History;
-use launch::{Outcome, run, succeed};
+use launch::run;
 
 /// A job with a body of 1800 kg/m³ in a box of 4 m by 2 m with slip faces at its sides.
 fn text(model: &str, shape: &str, rest: &str) -> String {
@@ -64,28 +64,12 @@ fn a_slope_relaxes_with_the_same_bits_on_any_ranks_and_across_restart() {
     let rest = "[time]\nend = 3\n[checkpoint]\nevery_steps = 20\nkeep = 99\n[equilibrium]\nspeed = 1e-4\nacceleration = 0.01\n\
                 [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [1, 0], max = [2.5, 2] }";
     let job = text(SOIL, SLOPE, rest);
-    let mut reference: Option<Outcome> = None;
-    for ranks in [1, 2, 3] {
-        let directory = tempfile::tempdir().expect("temporary directory");
-        let path = directory.path().join("slope.toml");
-        std::fs::write(&path, &job).expect("job");
-        succeed(&mut run(directory.path(), ranks, 1, &path, &["--quiet"]));
-        let result = Outcome::read(directory.path(), "slope");
-        match &reference {
-            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
-            None => {
-                let history = History::read(directory.path(), "slope");
-                let (speed, time) = (history.last("peak_speed"), history.last("time"));
-                println!("{speed} m/s after {time} s and {} stops", history.last("stops"));
-                assert!(speed <= 1.2e-4 && time < 3.0 && history.last("stops") > 1.0, "{speed} {time}");
-                reference = Some(result);
-            }
-        }
-        if ranks == 2 {
-            let reference = reference.as_ref().expect("a run");
-            restart::assert_restart_gives(reference, directory.path(), &path, "slope");
-        }
-    }
+    restart::assert_same_on_any_ranks(&job, "slope", |directory, _| {
+        let history = History::read(directory, "slope");
+        let (speed, time) = (history.last("peak_speed"), history.last("time"));
+        println!("{speed} m/s after {time} s and {} stops", history.last("stops"));
+        assert!(speed <= 1.2e-4 && time < 3.0 && history.last("stops") > 1.0, "{speed} {time}");
+    });
 }
 
 #[test]

@@ -12,7 +12,7 @@ mod mpirun;
 mod restart;
 
 use history::History;
-use launch::{Outcome, agimp, run, succeed};
+use launch::{agimp, run, succeed};
 
 /// Sand of 1800 kg/m³; P waves at 120 m/s.
 const SAND: &str =
@@ -191,22 +191,7 @@ fn same_results_on_any_ranks_and_across_restart() {
         0.05,
         &rest,
     );
-    let mut reference: Option<Outcome> = None;
-    for ranks in [1, 2, 3] {
-        let directory = tempfile::tempdir().expect("temporary directory");
-        let path = directory.path().join("ground.toml");
-        std::fs::write(&path, text.replace("picture = false", "")).expect("job");
-        succeed(&mut run(directory.path(), ranks, 1, &path, &["--quiet"]));
-        let result = Outcome::read(directory.path(), "ground");
-        match &reference {
-            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
-            None => reference = Some(result),
-        }
-        if ranks == 2 {
-            let reference = reference.as_ref().expect("a run");
-            restart::assert_restart_gives(reference, directory.path(), &path, "ground");
-        }
-    }
+    restart::assert_same_on_any_ranks(&text.replace("picture = false", ""), "ground", |_, _| ());
 }
 
 /// What is wrong with a stress is said with its key, and what would be right.
