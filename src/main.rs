@@ -11,8 +11,8 @@ fn main() -> ExitCode {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();
-    // Without it such a write ends the program, which says nothing. Ranks do so once MPI has started: until then the limit may be
-    // what keeps `mpirun` from starting it, and they would wait for ever.
+    // Without it such a write ends the program, which says nothing. `agimp run` does so on ranks once MPI has started: until then the
+    // limit may be what keeps `mpirun` from starting it, and they would wait for ever.
     if !is_launched() {
         let _ = agimp::io::cause::tell_size_limits();
     }

@@ -3,7 +3,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::path::PathBuf;
 
-use partition::comm::{Comm, World};
+use partition::comm::{Comm, World, is_launched};
 
 use super::Failure;
 use super::shared::message::{together, warn_of};
@@ -63,7 +63,9 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let settings = arguments.changes.settings()?;
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();
-    tell_size_limits()?;
+    if is_launched() {
+        tell_size_limits()?;
+    }
     ranks::same_command(comm, &arguments.words(&settings))?;
     let problem = ranks::load(comm, &arguments.job, &settings)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;

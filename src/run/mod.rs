@@ -26,6 +26,7 @@ use crate::job::Problem;
 use crate::setup;
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Requests, Solver, StepReport};
+use crate::text::quantity;
 
 /// How a run is started.
 #[derive(Clone, Debug)]
@@ -288,14 +289,11 @@ impl<'a, const D: usize> Run<'a, D> {
             return;
         }
         let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
-        let found = format!(
-            "{} peaks, the last with {:.2e} m/s, unbalanced {:.2e} m/s^2 (root mean squares)",
-            way.stops, way.speed, way.acceleration
-        );
+        let time = quantity(time, "s");
         if self.is_settled() {
-            self.recorder.message(&format!("equilibrium at t = {time} s (step {step}): {found}"));
+            self.recorder.message(&format!("equilibrium at t = {time} (step {step}): {way}"));
         } else {
-            self.recorder.warning(&format!("no equilibrium until the end, t = {time} s: {found}"));
+            self.recorder.warning(&format!("no equilibrium until the end, t = {time}: {way}"));
         }
     }
 

@@ -21,6 +21,9 @@ pub fn put_under_stress<const D: usize>(
     octant: &Octant<D>,
     chunk: &mut Chunk<D>,
 ) -> Result<(), SeedError> {
+    if problem.bodies.iter().all(|body| body.stress.is_none()) {
+        return Ok(());
+    }
     let mut columns = Columns::default();
     let interval = 0.25 * problem.cell_edge(octant.level);
     for p in 0..chunk.len() {

@@ -19,6 +19,7 @@ use self::settings::{digest, faces, named_faces, numerics, output, report};
 use super::parse::error::{Fault, QUOTED, names as listed};
 use super::parse::source::{Node, Path};
 use super::problem::*;
+use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::{Aabb, Shape};
 use crate::load::Gravity;
@@ -36,9 +37,6 @@ mod overlap;
 pub(super) mod settings;
 mod shapes;
 mod stress;
-
-/// Greatest component of a velocity, m/s: less than light.
-const FASTEST: f64 = 1e8;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;

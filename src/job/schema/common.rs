@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Greatest component of a velocity, m/s or rad/s: less than light.
-const FASTEST: f64 = 1e8;
+pub(in crate::job) const FASTEST: f64 = 1e8;
 
 /// For vectors that are velocities.
 pub(super) fn velocity(schema: &mut schemars::Schema) {

@@ -1,5 +1,6 @@
 //! Stress at the start of a body, as it is written in a job file.
 use super::loads::Quantity;
+use crate::geometry::written::bound_items;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -80,8 +81,7 @@ pub enum StressKind {
 
 /// Limits of the numbers of a table over depth.
 fn limited(schema: &mut schemars::Schema) {
-    if let Some(number) = schema.pointer_mut("/items/items").and_then(|number| number.as_object_mut()) {
-        number.insert("minimum".into(), (-1e13).into());
-        number.insert("maximum".into(), 1e13.into());
+    if let Some(row) = schema.get_mut("items").and_then(|row| row.try_into().ok()) {
+        bound_items(row, 1e13);
     }
 }

@@ -1,5 +1,6 @@
 //! Where a run is on its way to equilibrium.
 use crate::solver::physics::Equilibrium;
+use crate::text::quantity;
 
 /// Where a run is on its way to equilibrium; the same on all ranks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,6 +57,16 @@ impl Relaxation {
         self.phase == RelaxPhase::FromRest
             && self.speed <= asked.speed
             && self.acceleration <= asked.acceleration
+    }
+}
+
+/// For the end of a run.
+impl std::fmt::Display for Relaxation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { speed, acceleration, stops, .. } = *self;
+        let [speed, acceleration] =
+            [(speed, "m/s"), (acceleration, "m/s²")].map(|(v, unit)| quantity(v, unit));
+        write!(f, "{stops} peaks, the last with {speed}, unbalanced {acceleration} (root mean squares)")
     }
 }
 
