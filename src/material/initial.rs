@@ -6,6 +6,7 @@
 use super::eigen::{Symmetric, decompose};
 use super::{HISTORIES, Material, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Lanes, Vector};
+use crate::text::quantity;
 
 /// How strongly matter that yields under pressure was loaded once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,8 +38,11 @@ pub enum NoState {
     Unreachable,
     /// It yields.
     #[error(
-        "the material yields under it, at a shear stress of {:.4e} Pa and a pressure of {:.4e} Pa for {:.4e} and {:.4e} Pa asked for",
-        found[0], found[1], asked[0], asked[1]
+        "the material yields under it, at a shear stress of {} and a pressure of {} for {} and {} asked for",
+        quantity(found[0], "Pa"),
+        quantity(found[1], "Pa"),
+        quantity(asked[0], "Pa"),
+        quantity(asked[1], "Pa")
     )]
     Yields {
         /// Shear stress `√(3/2) |dev σ|` and pressure after yield, Pa.

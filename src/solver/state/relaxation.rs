@@ -66,7 +66,10 @@ impl std::fmt::Display for Relaxation {
         let Self { speed, acceleration, stops, .. } = *self;
         let [speed, acceleration] =
             [(speed, "m/s"), (acceleration, "m/s²")].map(|(v, unit)| quantity(v, unit));
-        write!(f, "{stops} peaks, the last with {speed}, unbalanced {acceleration} (root mean squares)")
+        write!(
+            f,
+            "peaks passed: {stops}, the last with {speed}; unbalanced {acceleration} (root mean squares)"
+        )
     }
 }
 
