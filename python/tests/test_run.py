@@ -74,6 +74,8 @@ def test_failure_of_a_run_has_its_reason(needs_program: str, tmp_path: Path) -> 
 def test_an_interrupt_stops_with_a_checkpoint_from_which_a_run_goes_on(
     plane: agimp.Results, needs_program: str, tmp_path: Path, ranks: int
 ) -> None:
+    # What a shell has put into the background ignores it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     job = agimp.job(PLANE, name="plane").set("time.end", 5.0)
     history = tmp_path / "out" / "plane" / "plane.history.csv"
 
