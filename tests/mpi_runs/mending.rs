@@ -108,6 +108,10 @@ fn a_damaged_state_is_passed_over() {
     let newest = newest_checkpoint(home.path());
     let bytes = std::fs::read(home.path().join(&newest)).expect("checkpoint");
     let beside = flipped(home.path(), &bytes, "VTKHDF");
+    let mut other_text = bytes.clone();
+    let title = b"Small column collapse";
+    let text_at = bytes.windows(title.len()).position(|part| part == title).expect("text of the job");
+    other_text[text_at] ^= 0x01;
     let flipped = flipped(home.path(), &bytes, "state/particles");
     let cut = bytes[..bytes.len() / 2].to_vec();
     for (ranks, damaged, reason) in [
@@ -116,6 +120,7 @@ fn a_damaged_state_is_passed_over() {
         (2, &cut, "cut short"),
         (1, &beside, "the state is whole, and the run goes on from it"),
         (3, &beside, "wrong checksum of VTKHDF/"),
+        (2, &other_text, "wrong checksum of state/job"),
     ] {
         let parts = tempfile::tempdir().expect("temporary directory");
         copy(home.path(), parts.path());

@@ -7,7 +7,7 @@ use partition::comm::{Comm, Disagreement};
 use super::checked::{self, Checked};
 use super::header::Header;
 use super::sane::{self, Limits};
-use super::state::{check_tree, columns, octants, path};
+use super::state::{self, check_tree, columns, octants, path};
 use crate::io::hdf5_file::{Element, FileError, Reader};
 
 /// What identifies the state in a file, whatever the ranks that wrote it.
@@ -29,7 +29,8 @@ pub fn verify(path: &Path) -> Result<usize, FileError> {
 /// Collective. Compares the checksums of the data sets that [`super::read`] does not read, each on one rank. An error is the
 /// same on all ranks.
 pub fn verify_beside_state(comm: &Comm, path: &Path) -> Result<(), Disagreement> {
-    let mine = |number: usize, name: &str| !name.starts_with("state/") && number % comm.size() == comm.rank();
+    let is_read = |name: &str| name.starts_with("state/") && name != state::JOB;
+    let mine = |number: usize, name: &str| !is_read(name) && number % comm.size() == comm.rank();
     let verified =
         Reader::open_alone(path).and_then(|file| checked::verify(&file, &Header::read(&file)?, mine));
     comm.agree(verified).map(|_| ())
