@@ -198,7 +198,7 @@ where
             return Err(format!("step {step}: {} of {} particles are left", totals.count, start.count));
         }
         if let Some(plate) = solver.reactions().first() {
-            let elapsed = solver.clock.time - solver.contacts.books.since;
+            let elapsed = solver.clock.time - solver.contacts.sums.since;
             // The plate moves against the force on it.
             work -= solver.contacts.states[0].rate.velocity[1] * plate.force[1] * elapsed;
             solver.forget_reactions();

@@ -1,7 +1,7 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
 use super::Row;
 use super::batch::{Batch, lanes_in};
-use super::constrained::ConstrainedNodes;
+use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, dot, pencils};
 use crate::simd::{F64x4, LANES, Vector};

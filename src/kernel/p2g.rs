@@ -15,7 +15,7 @@
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
 use super::batch::{Batch, Batches, Tile, lanes_in};
-use super::constrained::ConstrainedNodes;
+use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, add_products};
 use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};

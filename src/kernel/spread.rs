@@ -4,7 +4,7 @@
 //! depends on where the box lies in its cells. S_j are the second moments that constrained nodes inherit from their
 //! parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
 use super::batch::{Batch, Batches, Tile};
-use super::constrained::ConstrainedNodes;
+use super::constrained_nodes::ConstrainedNodes;
 use super::weights::{NodeWeights, Weights};
 use super::{Frame, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};

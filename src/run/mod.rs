@@ -1,115 +1,29 @@
 //! A whole run: from a checked job to its last file.
 mod claim;
+mod files;
 pub mod history;
+mod outcome;
 pub mod record;
 pub mod report;
 pub mod restart;
 pub mod schedule;
 pub mod stop;
 
-use std::path::PathBuf;
-use std::time::Instant;
-
 use partition::comm::{Comm, Disagreement};
 
 use self::claim::Claim;
+use self::files::Names;
+pub use self::outcome::{Options, Outcome, RunError, Summary};
 use self::record::Recorder;
-use self::report::Collapse;
 use self::restart::From;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
-use crate::io::hdf5_file::FileError;
 use crate::io::history::Kept;
-use crate::io::picture;
-use crate::io::snapshot::{Outputs, PointField, Scalars, View};
+use crate::io::snapshot::Outputs;
 use crate::job::Problem;
 use crate::setup;
-use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Requests, Solver, StepReport};
 use crate::text::quantity;
-
-/// How a run is started.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// File to go on from; a new run without it.
-    pub restart: Option<From>,
-    /// Whether a new run may replace the results of another job, or checkpoints.
-    pub overwrite: bool,
-    /// Whether this process shows the progress of the run.
-    pub speaks: bool,
-    /// Threads of this rank.
-    pub threads: usize,
-}
-
-/// How a run ended.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
-    /// At its end time.
-    Finished(Box<Summary>),
-    /// On request, after writing this checkpoint.
-    Stopped {
-        /// The checkpoint.
-        checkpoint: PathBuf,
-    },
-}
-
-/// What a finished run leaves.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Summary {
-    /// Index of the output files, for ParaView.
-    pub series: PathBuf,
-    /// Picture of the last state, or why there is none; `Ok(None)` if the job wants none.
-    pub picture: Result<Option<PathBuf>, String>,
-    /// Evaluation that the job asks for.
-    pub collapse: Option<Collapse>,
-}
-
-/// Why a run could not be started or finished; the same on all ranks.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The bodies of the job cannot be filled with particles.
-    #[error("{0}")]
-    Seed(Disagreement),
-    /// Some rank failed.
-    #[error(transparent)]
-    Rank(#[from] Disagreement),
-    /// A step failed.
-    #[error("step {step}, time {}: {source}", crate::text::quantity_to(*time, "s", 7))]
-    Step {
-        /// Number of the step.
-        step: u64,
-        /// Time at its start, s.
-        time: f64,
-        /// Rank and reason.
-        source: Disagreement,
-    },
-    /// Something failed after a step, while files were written.
-    #[error("step {step}, time {}: {source}", crate::text::quantity_to(*time, "s", 7))]
-    After {
-        /// Number of steps done.
-        step: u64,
-        /// Time, s.
-        time: f64,
-        /// What failed.
-        source: Box<RunError>,
-    },
-    /// A file could not be read or written.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// What the run was asked for cannot be done, and nothing has been written.
-    #[error("{0}")]
-    Refused(String),
-}
-
-impl RunError {
-    /// The same with step and time, if it does not name them yet.
-    fn after(self, clock: Clock) -> Self {
-        match self {
-            Self::Step { .. } | Self::After { .. } => self,
-            other => Self::After { step: clock.step, time: clock.time, source: Box::new(other) },
-        }
-    }
-}
 
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///
@@ -131,23 +45,6 @@ pub fn run<const D: usize>(
     let outcome = outcome?;
     settled?;
     Ok(outcome)
-}
-
-/// Names that files carry, in the order of the numbers in tags.
-struct Names {
-    materials: Vec<String>,
-    bodies: Vec<String>,
-    histories: Vec<String>,
-}
-
-impl Names {
-    fn of<const D: usize>(problem: &Problem<D>, solver: &Solver<D>) -> Self {
-        Self {
-            materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
-            bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
-            histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
-        }
-    }
 }
 
 /// A run under way.
@@ -345,114 +242,9 @@ impl<'a, const D: usize> Run<'a, D> {
         });
         Ok(Summary { series: self.outputs.series().to_owned(), picture, collapse })
     }
-
-    /// Collective. Draws the last state. All results are on disk by now, so a failure is only a message.
-    fn picture(&self) -> Result<Option<PathBuf>, String> {
-        let problem = self.problem;
-        if !problem.output.picture {
-            return Ok(None);
-        }
-        let plastic = self.solver.physics.materials.iter().any(|material| material.is_plastic());
-        let usual = if plastic { PointField::PlasticStrain } else { PointField::Speed };
-        let field = problem.output.picture_field.unwrap_or(usual);
-        let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
-        let path = problem.output.directory.join(format!("{}.png", problem.name));
-        let scalars = Scalars::default();
-        let view = view(problem, &self.solver, &self.names, &scalars);
-        picture::draw(self.comm, &view, field, &picture::Settings::new(title), &path)
-            .map_err(|error| error.to_string())?;
-        Ok(Some(path))
-    }
-
-    /// Collective. Writes the next output. One that `is_due` by its time keeps its number; any other is written because the
-    /// run ends here, and the next output of a run that goes on takes its place.
-    fn write_output(&mut self, is_due: bool) -> Result<(), RunError> {
-        let start = Instant::now();
-        let step = Some(self.solver.clock.step);
-        let next = self.outputs.next() + u64::from(is_due);
-        let scalars = self.scalars(next, step);
-        let fields = self.leaf_fields();
-        let view = view(self.problem, &self.solver, &self.names, &scalars);
-        let view = View { leaf_fields: &fields, ..view };
-        self.comm.agree(self.recorder.sync())?;
-        self.outputs.write(self.comm, &view)?;
-        if !is_due {
-            self.outputs.give_back_number();
-        }
-        self.output_step = step;
-        self.solver.phases.book(Phase::Output, start.elapsed());
-        Ok(())
-    }
-
-    /// Collective. What a state holds beside particles and tree.
-    fn scalars(&self, next_output: u64, output_step: Option<u64>) -> Scalars {
-        let mut scalars = restart::scalars(self.comm, &self.solver, next_output, output_step);
-        scalars.counts.extend(self.recorder.last_row().map(|step| (restart::ROW_STEP.into(), step)));
-        scalars
-    }
-
-    /// Collective. Fields of leaves for the file of the tree.
-    fn leaf_fields(&mut self) -> Vec<(String, Vec<f64>)> {
-        let refinement = self.solver.refinement();
-        refinement.map_or_else(Vec::new, |refinement| {
-            vec![
-                ("refinement_indicator".into(), refinement.urgency),
-                ("wanted_level".into(), refinement.wanted),
-            ]
-        })
-    }
-
-    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it implies are
-    /// on disk before.
-    fn settle(&mut self, wait: bool) -> Result<(), RunError> {
-        if self.outputs.is_pending() && (wait || self.outputs.is_on_disk(self.comm)) {
-            let synced = self.comm.agree(self.recorder.sync());
-            // The checkpoint counts for more than rows: without them a run can still go on from it.
-            self.outputs.settle(self.comm)?;
-            synced?;
-        }
-        Ok(())
-    }
-
-    fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
-        let start = Instant::now();
-        self.settle(true)?;
-        let scalars = self.scalars(self.outputs.next(), self.output_step);
-        let view = view(self.problem, &self.solver, &self.names, &scalars);
-        let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
-        self.schedule.checkpoint_written(self.solver.clock.time);
-        self.solver.phases.book(Phase::Output, start.elapsed());
-        Ok(path)
-    }
 }
 
 /// Cores that this process may use; `mpirun` binds it to some of them.
 fn available_cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// The state of a run as files show it.
-fn view<'a, const D: usize>(
-    problem: &'a Problem<D>,
-    solver: &'a Solver<D>,
-    names: &'a Names,
-    scalars: &'a Scalars,
-) -> View<'a, D> {
-    View {
-        leaves: solver.forest.leaves(),
-        chunks: &solver.chunks,
-        leaf_fields: &[],
-        origin: problem.origin,
-        root_edge: problem.root_edge,
-        brick: problem.brick,
-        materials: &names.materials,
-        bodies: &names.bodies,
-        histories: &names.histories,
-        job_digest: problem.digest,
-        job_text: &problem.text,
-        step: solver.clock.step,
-        time: solver.clock.time,
-        dt: solver.clock.dt,
-        scalars,
-    }
 }

@@ -210,7 +210,7 @@ impl Recorder {
         }
         // Where the row of this step has been written already, there is nothing to forget.
         solver.forget_reactions();
-        solver.load_books.forget(3, clock.time);
+        solver.load_sums.forget(3, clock.time);
         written
     }
 

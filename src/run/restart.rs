@@ -19,7 +19,7 @@ use crate::particle::Chunk;
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
-use crate::solver::state::bookings::ExactBooks;
+use crate::solver::state::bookings::ExactSums;
 use crate::solver::state::cost::leaf_weight;
 use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 use crate::solver::{Clock, Solver};
@@ -70,8 +70,8 @@ pub fn scalars<const D: usize>(
         .zip(&mut crossings.masses)
         .map(|(name, sum)| ((*name).into(), sum.words().to_vec()))
         .collect();
-    write_exact_books("collider", &solver.contacts.books, comm, &mut reals, &mut exact);
-    write_exact_books("load", &solver.load_books, comm, &mut reals, &mut exact);
+    write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
+    write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
     if solver.physics.equilibrium.is_some() {
         let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.relaxation;
         reals.extend(RELAXATION.iter().map(|name| String::from(*name)).zip([kinetic, speed, acceleration]));
@@ -98,35 +98,35 @@ pub fn scalars<const D: usize>(
 }
 
 /// Collective. Appends the exact sums of some kind of thing: those of all ranks, counted through all things.
-fn write_exact_books<const N: usize>(
+fn write_exact_sums<const N: usize>(
     kind: &str,
-    books: &ExactBooks<N>,
+    sums: &ExactSums<N>,
     comm: &Comm,
     reals: &mut Vec<(String, f64)>,
     exact: &mut Vec<(String, Vec<i64>)>,
 ) {
-    if books.sums.is_empty() {
+    if sums.of.is_empty() {
         return;
     }
-    reals.push((format!("{kind}_sums_since"), books.since));
-    let mut sums = books.exact_totals(comm);
+    reals.push((format!("{kind}_sums_since"), sums.since));
+    let mut totals = sums.exact_totals(comm);
     exact.extend(
-        sums.iter_mut().enumerate().map(|(i, sum)| (format!("{kind}_sum_{i}"), sum.words().to_vec())),
+        totals.iter_mut().enumerate().map(|(i, sum)| (format!("{kind}_sum_{i}"), sum.words().to_vec())),
     );
 }
 
 /// Takes over the exact sums of some kind of thing, which are on rank 0. `None` if the file lacks one.
-fn restore_exact_books<const N: usize>(
+fn restore_exact_sums<const N: usize>(
     kind: &str,
-    books: &mut ExactBooks<N>,
+    sums: &mut ExactSums<N>,
     rank: usize,
     scalars: &Scalars,
 ) -> Option<()> {
-    if books.sums.is_empty() {
+    if sums.of.is_empty() {
         return Some(());
     }
-    books.since = scalars.real(&format!("{kind}_sums_since"))?;
-    for (number, sum) in books.sums.iter_mut().flatten().enumerate() {
+    sums.since = scalars.real(&format!("{kind}_sums_since"))?;
+    for (number, sum) in sums.of.iter_mut().flatten().enumerate() {
         let read = ExactSum::from_words(scalars.exact(&format!("{kind}_sum_{number}"))?)?;
         if rank == 0 {
             *sum = read;
@@ -299,9 +299,9 @@ fn restored<const D: usize>(
     // Every rank has read the same header.
     let (rank, scalars) = (comm.rank(), &header.scalars);
     restore_colliders(&mut solver, scalars)
-        .and_then(|()| restore_exact_books("collider", &mut solver.contacts.books, rank, scalars))
+        .and_then(|()| restore_exact_sums("collider", &mut solver.contacts.sums, rank, scalars))
         .ok_or_else(|| refused("the state of a collider is missing"))?;
-    restore_exact_books("load", &mut solver.load_books, rank, scalars)
+    restore_exact_sums("load", &mut solver.load_sums, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
     restore_relaxation(&mut solver, scalars).ok_or_else(|| refused("the way to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)

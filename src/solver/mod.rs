@@ -32,7 +32,7 @@ use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::particle::Chunk;
-use crate::solver::state::bookings::{Contacts, ExactBooks};
+use crate::solver::state::bookings::{Contacts, ExactSums};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
 use crate::solver::state::last_partition::LastPartition;
@@ -59,7 +59,7 @@ impl<const D: usize> Solver<D> {
             comm: comm.clone(),
             leaf_data: LeafData::default(),
             contacts: Contacts::new(&physics, clock.time),
-            load_books: ExactBooks::new(physics.loads.len(), clock.time),
+            load_sums: ExactSums::new(physics.loads.len(), clock.time),
             relaxation: Relaxation::default(),
             motion: Default::default(),
             physics,

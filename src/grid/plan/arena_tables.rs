@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 use super::{Block, NO_BLOCK, arena_index};
 use crate::grid::constraints::moments::{self, Moments, first_row, rows_of};
 use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
-use crate::kernel::constrained::{ConstrainedNodes, MomentNode};
+use crate::kernel::constrained_nodes::{ConstrainedNodes, MomentNode};
 use crate::kernel::hanging::HangingNodes;
 use crate::kernel::{Row, arena_nodes};
 

@@ -25,7 +25,7 @@ use super::constraints::moments::rows_of;
 use super::constraints::parents::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use crate::csr::Csr;
-use crate::kernel::constrained::ConstrainedNodes;
+use crate::kernel::constrained_nodes::ConstrainedNodes;
 use crate::kernel::{ARENA_EDGE, Frame};
 
 pub mod arena_tables;

@@ -1,5 +1,5 @@
 //! Scatter and gather together, against a plain scalar definition.
-use super::constrained::{ConstrainedNodes, MomentNode};
+use super::constrained_nodes::{ConstrainedNodes, MomentNode};
 use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
 use super::leavers::Leavers;

@@ -1,7 +1,7 @@
 //! One bin with its members, as the kernels take them.
 use super::leaf_bins::LeafBins;
 use crate::grid::{GridPlan, Window};
-use crate::kernel::constrained::ConstrainedNodes;
+use crate::kernel::constrained_nodes::ConstrainedNodes;
 use crate::kernel::{Frame, Select, SubBox};
 
 /// A bin and its members in this step.

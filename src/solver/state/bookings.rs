@@ -19,17 +19,17 @@ pub struct Reaction {
 
 /// Exact sums of some things on this rank, `N` for each, of which some go over the time since a row of the history.
 #[derive(Clone, Debug, Default)]
-pub struct ExactBooks<const N: usize> {
+pub struct ExactSums<const N: usize> {
     /// Sums of each thing.
-    pub sums: Vec<[ExactSum; N]>,
+    pub of: Vec<[ExactSum; N]>,
     /// Time of the last row of the history, s.
     pub since: f64,
 }
 
-impl<const N: usize> ExactBooks<N> {
+impl<const N: usize> ExactSums<N> {
     /// Nothing is booked of so many things.
     pub(in crate::solver) fn new(things: usize, time: f64) -> Self {
-        Self { sums: vec![std::array::from_fn(|_| ExactSum::new()); things], since: time }
+        Self { of: vec![std::array::from_fn(|_| ExactSum::new()); things], since: time }
     }
 
     /// Collective. Totals over all ranks, exact before they are rounded once.
@@ -38,9 +38,9 @@ impl<const N: usize> ExactBooks<N> {
         all.chunks_exact(N).map(|sums| std::array::from_fn(|i| sums[i].to_f64())).collect()
     }
 
-    /// Collective. As [`ExactBooks::totals`], not rounded: those of one thing after those of another.
+    /// Collective. As [`ExactSums::totals`], not rounded: those of one thing after those of another.
     pub fn exact_totals(&self, comm: &Comm) -> Vec<ExactSum> {
-        let mut all: Vec<ExactSum> = self.sums.iter().flatten().cloned().collect();
+        let mut all: Vec<ExactSum> = self.of.iter().flatten().cloned().collect();
         if !all.is_empty() {
             ExactSum::sum_over_ranks(comm, &mut all);
         }
@@ -55,7 +55,7 @@ impl<const N: usize> ExactBooks<N> {
 
     /// Not collective. Starts the first sums of each thing anew at a time, s.
     pub fn forget(&mut self, first: usize, time: f64) {
-        self.sums.iter_mut().for_each(|sums| sums[..first].fill_with(ExactSum::new));
+        self.of.iter_mut().for_each(|sums| sums[..first].fill_with(ExactSum::new));
         self.since = time;
     }
 }
@@ -66,7 +66,7 @@ pub struct Contacts<const D: usize> {
     /// State of each collider; the same on all ranks.
     pub states: Vec<ColliderState<D>>,
     /// What is booked of them.
-    pub books: ExactBooks<SUMS>,
+    pub sums: ExactSums<SUMS>,
 }
 
 impl<const D: usize> Contacts<D> {
@@ -74,7 +74,7 @@ impl<const D: usize> Contacts<D> {
     pub(in crate::solver) fn new(physics: &Physics<D>, time: f64) -> Self {
         Self {
             states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
-            books: ExactBooks::new(physics.colliders.len(), time),
+            sums: ExactSums::new(physics.colliders.len(), time),
         }
     }
 }

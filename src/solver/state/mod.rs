@@ -20,7 +20,7 @@ use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{Contacts, ExactBooks, LOAD_SUMS};
+use crate::solver::state::bookings::{Contacts, ExactSums, LOAD_SUMS};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
@@ -110,7 +110,7 @@ pub struct Solver<const D: usize> {
     /// Where the colliders are, and their reactions.
     pub contacts: Contacts<D>,
     /// What is booked of the loads.
-    pub load_books: ExactBooks<LOAD_SUMS>,
+    pub load_sums: ExactSums<LOAD_SUMS>,
     /// The way to equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.

@@ -11,7 +11,7 @@ use crate::grid::plan::Block;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::{ExactBooks, Reaction, SUMS};
+use crate::solver::state::bookings::{ExactSums, Reaction, SUMS};
 use crate::solver::state::phases::Phase;
 
 /// What one node gives to a collider.
@@ -124,14 +124,14 @@ impl<const D: usize> Solver<D> {
         to: f64,
         dt: f64,
     ) {
-        for (sums, step) in self.contacts.books.sums.iter_mut().zip(&step) {
+        for (sums, step) in self.contacts.sums.of.iter_mut().zip(&step) {
             sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
         }
         let gravity = self.physics.gravity.at(to - 0.5 * dt);
         let mut impulses = vec![[0.0; SUMS]; step.len()];
         if self.physics.colliders.iter().any(|collider| collider.free().is_some()) {
             let comm = &self.comm;
-            let step = ExactBooks { sums: step, since: to };
+            let step = ExactSums { of: step, since: to };
             impulses = self.phases.time(Phase::Reduce, || step.totals(comm));
         }
         let all = self.physics.colliders.iter().zip(&mut self.contacts.states);
@@ -145,16 +145,16 @@ impl<const D: usize> Solver<D> {
     /// Collective. Mean force and torque on each collider since the last row of the history, that is, the momentum
     /// given to it over the time since. Exact before it is rounded once.
     pub fn reactions(&self) -> Vec<Reaction> {
-        let books = &self.contacts.books;
-        let mean = |impulse: f64| books.mean(impulse, self.clock.time);
-        let all = books.totals(&self.comm).into_iter();
+        let sums = &self.contacts.sums;
+        let mean = |impulse: f64| sums.mean(impulse, self.clock.time);
+        let all = sums.totals(&self.comm).into_iter();
         all.map(|[x, y, z, a, b, c]| Reaction { force: [x, y, z].map(mean), torque: [a, b, c].map(mean) })
             .collect()
     }
 
     /// Not collective. Starts the means of [`Solver::reactions`] anew.
     pub fn forget_reactions(&mut self) {
-        self.contacts.books.forget(SUMS, self.clock.time);
+        self.contacts.sums.forget(SUMS, self.clock.time);
     }
 
     /// Bound on the next step from the colliders: none may cross more than the Courant number's part of a cell of a

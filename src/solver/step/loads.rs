@@ -71,7 +71,7 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn book_loads(&mut self, pushes: &[Push<D>]) {
         for push in pushes {
             let row = &self.grid.fields.rows[push.node].0;
-            let sums = &mut self.load_books.sums[push.load];
+            let sums = &mut self.load_sums.of[push.load];
             for a in 0..D {
                 sums[a].add(push.impulse[a]);
                 // A product of two numbers, rounded once; the sum is exact.
@@ -82,8 +82,8 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Mean force and work of each load.
     pub fn load_totals(&self) -> Vec<LoadTotals> {
-        let mean = |impulse: f64| self.load_books.mean(impulse, self.clock.time);
-        let all = self.load_books.totals(&self.comm).into_iter();
+        let mean = |impulse: f64| self.load_sums.mean(impulse, self.clock.time);
+        let all = self.load_sums.totals(&self.comm).into_iter();
         all.map(|[x, y, z, work]| LoadTotals { force: [x, y, z].map(mean), work }).collect()
     }
 }

@@ -1,0 +1,134 @@
+//! The files of a run: outputs, checkpoints and the last picture.
+use std::path::PathBuf;
+use std::time::Instant;
+
+use super::{Run, RunError, restart};
+use crate::io::picture;
+use crate::io::snapshot::{PointField, Scalars, View};
+use crate::job::Problem;
+use crate::solver::Solver;
+use crate::solver::state::phases::Phase;
+
+/// Names that files carry, in the order of the numbers in tags.
+pub(super) struct Names {
+    materials: Vec<String>,
+    bodies: Vec<String>,
+    histories: Vec<String>,
+}
+
+impl Names {
+    pub(super) fn of<const D: usize>(problem: &Problem<D>, solver: &Solver<D>) -> Self {
+        Self {
+            materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
+            bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
+            histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
+        }
+    }
+}
+
+impl<const D: usize> Run<'_, D> {
+    /// Collective. Draws the last state. All results are on disk by now, so a failure is only a message.
+    pub(super) fn picture(&self) -> Result<Option<PathBuf>, String> {
+        let problem = self.problem;
+        if !problem.output.picture {
+            return Ok(None);
+        }
+        let plastic = self.solver.physics.materials.iter().any(|material| material.is_plastic());
+        let usual = if plastic { PointField::PlasticStrain } else { PointField::Speed };
+        let field = problem.output.picture_field.unwrap_or(usual);
+        let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
+        let path = problem.output.directory.join(format!("{}.png", problem.name));
+        let scalars = Scalars::default();
+        let view = view(problem, &self.solver, &self.names, &scalars);
+        picture::draw(self.comm, &view, field, &picture::Settings::new(title), &path)
+            .map_err(|error| error.to_string())?;
+        Ok(Some(path))
+    }
+
+    /// Collective. Writes the next output. One that `is_due` by its time keeps its number; any other is written because the
+    /// run ends here, and the next output of a run that goes on takes its place.
+    pub(super) fn write_output(&mut self, is_due: bool) -> Result<(), RunError> {
+        let start = Instant::now();
+        let step = Some(self.solver.clock.step);
+        let next = self.outputs.next() + u64::from(is_due);
+        let scalars = self.scalars(next, step);
+        let fields = self.leaf_fields();
+        let view = view(self.problem, &self.solver, &self.names, &scalars);
+        let view = View { leaf_fields: &fields, ..view };
+        self.comm.agree(self.recorder.sync())?;
+        self.outputs.write(self.comm, &view)?;
+        if !is_due {
+            self.outputs.give_back_number();
+        }
+        self.output_step = step;
+        self.solver.phases.book(Phase::Output, start.elapsed());
+        Ok(())
+    }
+
+    /// Collective. What a state holds beside particles and tree.
+    pub(super) fn scalars(&self, next_output: u64, output_step: Option<u64>) -> Scalars {
+        let mut scalars = restart::scalars(self.comm, &self.solver, next_output, output_step);
+        scalars.counts.extend(self.recorder.last_row().map(|step| (restart::ROW_STEP.into(), step)));
+        scalars
+    }
+
+    /// Collective. Fields of leaves for the file of the tree.
+    pub(super) fn leaf_fields(&mut self) -> Vec<(String, Vec<f64>)> {
+        let refinement = self.solver.refinement();
+        refinement.map_or_else(Vec::new, |refinement| {
+            vec![
+                ("refinement_indicator".into(), refinement.urgency),
+                ("wanted_level".into(), refinement.wanted),
+            ]
+        })
+    }
+
+    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it implies are
+    /// on disk before.
+    pub(super) fn settle(&mut self, wait: bool) -> Result<(), RunError> {
+        if self.outputs.is_pending() && (wait || self.outputs.is_on_disk(self.comm)) {
+            let synced = self.comm.agree(self.recorder.sync());
+            // The checkpoint counts for more than rows: without them a run can still go on from it.
+            self.outputs.settle(self.comm)?;
+            synced?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn checkpoint(&mut self) -> Result<PathBuf, RunError> {
+        let start = Instant::now();
+        self.settle(true)?;
+        let scalars = self.scalars(self.outputs.next(), self.output_step);
+        let view = view(self.problem, &self.solver, &self.names, &scalars);
+        let path = self.outputs.checkpoint(self.comm, &view, self.problem.checkpoint.keep)?;
+        self.schedule.checkpoint_written(self.solver.clock.time);
+        self.solver.phases.book(Phase::Output, start.elapsed());
+        Ok(path)
+    }
+}
+
+/// The state of a run as files show it.
+fn view<'a, const D: usize>(
+    problem: &'a Problem<D>,
+    solver: &'a Solver<D>,
+    names: &'a Names,
+    scalars: &'a Scalars,
+) -> View<'a, D> {
+    View {
+        leaves: solver.forest.leaves(),
+        chunks: &solver.chunks,
+        leaf_fields: &[],
+        origin: problem.origin,
+        root_edge: problem.root_edge,
+        brick: problem.brick,
+        materials: &names.materials,
+        bodies: &names.bodies,
+        histories: &names.histories,
+        job_digest: problem.digest,
+        job_text: &problem.text,
+        step: solver.clock.step,
+        time: solver.clock.time,
+        dt: solver.clock.dt,
+        scalars,
+    }
+}
