@@ -23,6 +23,8 @@ pub struct Collider<const D: usize> {
     pub contact: Contact,
     /// How it moves.
     pub motion: Motion<D>,
+    /// Time from which that of its motion is counted, s; infinite where it is not there.
+    pub start: f64,
 }
 
 /// Where a collider is and how fast it moves, between two steps.
@@ -37,11 +39,17 @@ pub struct ColliderState<const D: usize> {
 impl<const D: usize> Collider<D> {
     /// The state at a time (s); of a free body that at the start.
     pub fn state_at(&self, time: f64) -> ColliderState<D> {
+        let own = if self.is_present() { time - self.start } else { 0.0 };
         let rate = match &self.motion {
             Motion::Table(_) => Rate::REST,
-            motion => motion.mean_rate(time, 0.0),
+            motion => motion.mean_rate(own, 0.0),
         };
-        self.state(self.motion.place(time), rate)
+        self.state(self.motion.place(own), rate)
+    }
+
+    /// Whether it acts on the material, and moves.
+    pub fn is_present(&self) -> bool {
+        self.start.is_finite()
     }
 
     /// A state from its numbers: way of the reference point (m) with the angle (rad), and velocities.
@@ -100,6 +108,7 @@ impl<const D: usize> Collider<D> {
     /// to it in the step acts from the next one on.
     pub fn step_rate(&self, state: &ColliderState<D>, gravity: &[f64; D], time: f64, dt: f64) -> Rate<D> {
         match &self.motion {
+            _ if !self.is_present() => Rate::REST,
             Motion::Free(free) => Rate {
                 velocity: std::array::from_fn(|a| {
                     let fall = if free.along[a] { gravity[a] } else { 0.0 };
@@ -107,7 +116,7 @@ impl<const D: usize> Collider<D> {
                 }),
                 spin: state.rate.spin,
             },
-            motion => motion.mean_rate(time, dt),
+            motion => motion.mean_rate(time - self.start, dt),
         }
     }
 
@@ -123,7 +132,12 @@ impl<const D: usize> Collider<D> {
         impulse: [f64; D],
         torque: [f64; 3],
     ) -> ColliderState<D> {
-        let Motion::Free(free) = &self.motion else { return self.state(self.motion.place(time), *mean) };
+        if !self.is_present() {
+            return *state;
+        }
+        let Motion::Free(free) = &self.motion else {
+            return self.state(self.motion.place(time - self.start), *mean);
+        };
         let mut rate = state.rate;
         let mut translation = state.pose.translation;
         for a in (0..D).filter(|&a| free.along[a]) {
@@ -143,8 +157,9 @@ impl<const D: usize> Collider<D> {
     /// `time` on, m/s; of a free body that of the state.
     pub fn greatest_speed(&self, state: &ColliderState<D>, extent: &[f64; D], time: f64) -> f64 {
         let (speed, spin) = match &self.motion {
+            _ if !self.is_present() => (0.0, 0.0),
             Motion::Free(_) => (length(&state.rate.velocity), state.rate.spin.abs()),
-            motion => motion.greatest_speeds(time),
+            motion => motion.greatest_speeds(time - self.start),
         };
         if spin == 0.0 {
             return speed;
@@ -202,6 +217,7 @@ mod tests {
             axis: [0.0, 0.0, 1.0],
             contact: Contact::Sticky,
             motion,
+            start: 0.0,
         }
     }
 

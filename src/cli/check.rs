@@ -66,7 +66,7 @@ fn report<const D: usize>(
     // On this thread alone: MPI must start before the program starts threads.
     let estimate = estimate(problem).map_err(|error| Failure::Usage(error.to_string()))?;
     if !estimate.is_cut {
-        check_counts(problem, &estimate.particles)?;
+        (0..problem.stages.len()).try_for_each(|stage| check_counts(problem, &estimate.particles, stage))?;
     }
     let may_refine = problem.adaptivity.is_some() && !estimate.is_cut && estimate.memory < MOST_MEMORY;
     let refined = if may_refine { refined(problem, &estimate, world)? } else { None };

@@ -89,8 +89,12 @@ pub struct Problem<const D: usize> {
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
-    /// Equilibrium at which the run ends, if it asks for one.
-    pub equilibrium: Option<Equilibrium>,
+    /// Stages of the run, at least one.
+    pub stages: Vec<Stage<D>>,
+    /// Stages in which each load acts.
+    pub load_stages: Vec<InStages>,
+    /// Stages in which each collider is there.
+    pub collider_stages: Vec<InStages>,
     /// What happens to particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.
@@ -136,6 +140,35 @@ impl<const D: usize> Problem<D> {
     /// A point in the coordinates of the job, m, with z = 0 in plane strain: where quantities are taken.
     pub fn place(&self, x: &[f64; D]) -> [f64; 3] {
         std::array::from_fn(|a| if a < D { self.origin[a] + x[a] } else { 0.0 })
+    }
+
+    /// Whether stages or the run end at an equilibrium.
+    pub fn has_equilibrium(&self) -> bool {
+        self.stages.iter().any(|stage| stage.equilibrium.is_some())
+    }
+
+    /// Bodies that come with a stage, in the order of the job.
+    pub fn bodies_of_stage(&self, stage: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
+    }
+
+    /// Whether two bodies are there in one stage.
+    pub fn are_together(&self, first: usize, second: usize) -> bool {
+        let [first, second] = [first, second].map(|body| self.stages_of_body(body));
+        first.start.max(second.start) < first.end.min(second.end)
+    }
+
+    /// Gravity at the start of a stage, its time counted from there or from where it began to hold.
+    pub fn gravity_of_stage(&self, stage: usize) -> &Gravity<D> {
+        let mut changes = self.stages[..=stage].iter().rev().filter_map(|stage| stage.gravity.as_ref());
+        changes.next().unwrap_or(&self.gravity)
+    }
+
+    /// The stages in which a body is there.
+    pub fn stages_of_body(&self, body: usize) -> std::ops::Range<usize> {
+        let first = self.bodies[body].stage;
+        let removed = (first..self.stages.len()).find(|&stage| self.stages[stage].removed.contains(&body));
+        first..removed.unwrap_or(self.stages.len())
     }
 
     /// The finest level that the job asks for.
@@ -199,10 +232,69 @@ pub struct Body<const D: usize> {
     pub angular_velocity: [f64; 3],
     /// The point that the angular velocity turns about: the centre of the bounding box, m.
     pub centre: [f64; D],
+    /// The stage at whose start it comes; 0: it is there from the start.
+    pub stage: usize,
     /// Particles per cell along each axis; not necessarily a whole number.
     pub particles_per_cell: f64,
     /// Stress at the start, if it does not begin without.
     pub stress: Option<InitialStress>,
+}
+
+/// A stage of the run: what it changes at its start, and when it ends.
+#[derive(Clone, Debug)]
+pub struct Stage<const D: usize> {
+    /// Name; empty in a job without stages.
+    pub name: String,
+    /// Longest duration, s; infinite where only the end of the run or equilibrium ends it.
+    pub duration: f64,
+    /// Equilibrium to which kinetic damping leads, and at which the stage ends.
+    pub equilibrium: Option<Equilibrium>,
+    /// Bodies that are taken away.
+    pub removed: Vec<usize>,
+    /// Bodies with their new materials.
+    pub materials: Vec<(usize, usize)>,
+    /// New gravity, its time counted from the start of the stage.
+    pub gravity: Option<Gravity<D>>,
+    /// New conditions on faces.
+    pub faces: [[Option<Contact>; 2]; D],
+    /// What happens from now on to particles that leave the domain.
+    pub leaving: Option<LeavingPolicy>,
+    /// Whether all material is at rest at the start.
+    pub at_rest: bool,
+}
+
+impl<const D: usize> Stage<D> {
+    /// A stage that changes nothing and lasts to the end of the run.
+    pub fn whole_run(equilibrium: Option<Equilibrium>) -> Self {
+        Self {
+            name: String::new(),
+            duration: f64::INFINITY,
+            equilibrium,
+            removed: Vec::new(),
+            materials: Vec::new(),
+            gravity: None,
+            faces: [[None; 2]; D],
+            leaving: None,
+            at_rest: false,
+        }
+    }
+}
+
+/// The stages in which a load or a collider acts; all of them: `None`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InStages(pub Option<Vec<usize>>);
+
+impl InStages {
+    /// Whether it acts in a stage.
+    pub fn has(&self, stage: usize) -> bool {
+        self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
+    }
+
+    /// Time from which its own time is counted, s, with the times at which stages began. Infinite until it acts for the first time.
+    pub fn clock(&self, starts: &[f64]) -> f64 {
+        let first = self.0.as_ref().map_or(0, |stages| stages.iter().copied().min().unwrap_or(0));
+        starts.get(first).copied().unwrap_or(f64::INFINITY)
+    }
 }
 
 /// Stress of a body at the start.

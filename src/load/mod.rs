@@ -7,17 +7,22 @@ use crate::quantity::Quantity;
 
 /// Acceleration of gravity, which may change in time.
 #[derive(Clone, Debug)]
-pub struct Gravity<const D: usize>(pub [Quantity; D]);
+pub struct Gravity<const D: usize> {
+    /// Components, m/s².
+    pub acceleration: [Quantity; D],
+    /// Time from which theirs is counted, s.
+    pub start: f64,
+}
 
 impl<const D: usize> Gravity<D> {
     /// The same at all times, m/s².
     pub fn constant(acceleration: [f64; D]) -> Self {
-        Self(acceleration.map(Quantity::Constant))
+        Self { acceleration: acceleration.map(Quantity::Constant), start: 0.0 }
     }
 
     /// Acceleration at a time (s), m/s².
     pub fn at(&self, time: f64) -> [f64; D] {
-        std::array::from_fn(|axis| self.0[axis].at(&[0.0; 3], time))
+        std::array::from_fn(|axis| self.acceleration[axis].at(&[0.0; 3], time - self.start))
     }
 }
 
@@ -30,9 +35,11 @@ pub struct Load<const D: usize> {
     pub kind: Kind<D>,
     /// Where it acts, relative to the lower corner of the domain; everywhere without.
     pub region: Option<Shape<D>>,
-    /// Time from which it acts, s.
+    /// Time from which its own time is counted, s; infinite where it does not act.
+    pub start: f64,
+    /// Its own time from which it acts, s.
     pub from: f64,
-    /// Time until which it acts, s.
+    /// Its own time until which it acts, s.
     pub until: f64,
     /// Lower corner of the domain, m: expressions are in the job's coordinates.
     pub origin: [f64; D],
@@ -52,7 +59,8 @@ pub enum Kind<const D: usize> {
 impl<const D: usize> Load<D> {
     /// Whether it acts in a step that begins at `time`, s.
     pub fn is_active(&self, time: f64) -> bool {
-        self.from <= time && time < self.until
+        let own = time - self.start;
+        self.from <= own && own < self.until
     }
 
     /// Whether it acts at a point, m from the lower corner of the domain.
@@ -64,6 +72,7 @@ impl<const D: usize> Load<D> {
     /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
     /// the prescribed motion to second order.
     pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
+        let middle = middle - self.start;
         let mut place = [0.0; 3];
         for axis in 0..D {
             place[axis] = self.origin[axis] + x[axis];
@@ -95,7 +104,15 @@ mod tests {
     use crate::quantity::{Expression, Table};
 
     fn load(kind: Kind<2>) -> Load<2> {
-        Load { name: "load".into(), kind, region: None, from: 1.0, until: 2.0, origin: [10.0, 0.0] }
+        Load {
+            name: "load".into(),
+            kind,
+            region: None,
+            start: 0.0,
+            from: 1.0,
+            until: 2.0,
+            origin: [10.0, 0.0],
+        }
     }
 
     #[test]
@@ -115,6 +132,22 @@ mod tests {
         let mut velocity = [7.0, 8.0];
         grip.apply(&mut velocity, &[0.0, 0.0], 1.5, 0.1);
         assert_eq!(velocity, [7.0, 3.0]);
+    }
+
+    /// In stages, times of a load are those since the first stage in which it acts.
+    #[test]
+    fn a_load_of_a_later_stage_has_a_time_of_its_own() {
+        let mut ramp = load(Kind::BodyForce([
+            Quantity::Table(Table::new(&[(1.0, 0.0), (2.0, 8.0)]).unwrap()),
+            Quantity::default(),
+        ]));
+        ramp.start = 100.0;
+        let mut velocity = [0.0; 2];
+        ramp.apply(&mut velocity, &[0.0; 2], 101.5, 0.5);
+        assert_eq!(velocity, [2.0, 0.0]);
+        assert!(!ramp.is_active(1.5) && ramp.is_active(101.5));
+        ramp.start = f64::INFINITY;
+        assert!(!ramp.is_active(1.5) && !ramp.is_active(101.5));
     }
 
     /// Two half steps damp as much as a whole one.

@@ -38,13 +38,13 @@ const COLUMNS: [Column<'static>; 20] = [
     column("left_mass", "kg"),
 ];
 
-/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; on the way to equilibrium those of it; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
+/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; on the way to equilibrium those of it; with stages their number, from 1; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
 /// its place follow the others.
 pub fn columns<const D: usize>(
     loads: &[Load<D>],
     colliders: &[Collider<D>],
     is_adaptive: bool,
-    relaxes: bool,
+    [relaxes, has_stages]: [bool; 2],
 ) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -53,6 +53,9 @@ pub fn columns<const D: usize>(
     }
     if relaxes {
         columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    if has_stages {
+        columns.push(("stage".to_owned(), ""));
     }
     for load in loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));

@@ -21,7 +21,7 @@ use self::stop::StopRequest;
 use crate::io::history::Kept;
 use crate::io::snapshot::Outputs;
 use crate::job::Problem;
-use crate::setup;
+use crate::setup::{self, stages};
 use crate::solver::{Clock, Requests, Solver, StepReport};
 use crate::text::quantity;
 
@@ -155,19 +155,19 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to meet the
     /// end, so that a run to a later end takes the same steps.
     fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
-        let mut settled = self.is_settled();
-        while self.solver.clock.time < self.problem.time.end && !settled {
+        while !self.is_over() {
+            if self.stage_is_over() {
+                self.next_stage()?;
+            }
             let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
-            let report = self.step(requests)?;
-            let granted = report.granted;
-            settled = report.settled;
+            let granted = self.step(requests)?.granted;
             self.solver.regrid().map_err(|source| self.step_error(source))?;
             self.write_due(granted.checkpoint)?;
             if granted.stop {
                 let checkpoint = self.checkpoint()?;
                 return Ok(Outcome::Stopped { checkpoint });
             }
-            if self.solver.clock.time < self.problem.time.end && !settled {
+            if !self.is_over() && !self.stage_is_over() {
                 self.solver.balance_if_due();
             }
         }
@@ -180,9 +180,42 @@ impl<'a, const D: usize> Run<'a, D> {
         solver.physics.equilibrium.is_some_and(|asked| solver.relaxation.is_settled(&asked))
     }
 
+    /// Not collective. Whether the stage under way has reached its end; the same on all ranks.
+    fn stage_is_over(&self) -> bool {
+        let physics = &self.solver.physics;
+        let begun = physics.stage_starts.last().copied().unwrap_or(0.0);
+        let duration = self.problem.stages[physics.stage()].duration;
+        self.is_settled() || self.solver.clock.time - begun >= duration
+    }
+
+    /// Not collective. Whether the run has reached its end; the same on all ranks.
+    fn is_over(&self) -> bool {
+        let is_last = self.solver.physics.stage() + 1 == self.problem.stages.len();
+        self.solver.clock.time >= self.problem.time.end || is_last && self.stage_is_over()
+    }
+
+    /// Collective. Ends the stage under way with an output and a row of the history, and begins the next one.
+    fn next_stage(&mut self) -> Result<(), RunError> {
+        self.tell_equilibrium();
+        let step = self.solver.clock.step;
+        if self.output_step != Some(step) {
+            self.write_output(true)?;
+        }
+        if self.recorder.last_row() != Some(step) {
+            self.recorder.write(self.comm, &mut self.solver, true, false)?;
+        }
+        stages::enter_next(self.comm, self.problem, &mut self.solver).map_err(RunError::Seed)?;
+        let (physics, time) = (&self.solver.physics, quantity(self.solver.clock.time, "s"));
+        let (number, all) = (physics.stage() + 1, self.problem.stages.len());
+        let name = &self.problem.stages[physics.stage()].name;
+        self.recorder
+            .message(&format!("stage {number} of {all}, {name}, begins at t = {time} (step {step})"));
+        Ok(())
+    }
+
     /// Not collective. Says how the way to equilibrium has ended.
     fn tell_equilibrium(&mut self) {
-        if self.problem.equilibrium.is_none() {
+        if self.solver.physics.equilibrium.is_none() {
             return;
         }
         let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
@@ -190,7 +223,23 @@ impl<'a, const D: usize> Run<'a, D> {
         if self.is_settled() {
             self.recorder.message(&format!("equilibrium at t = {time} (step {step}): {way}"));
         } else {
-            self.recorder.warning(&format!("no equilibrium until the end, t = {time}: {way}"));
+            let what = if self.problem.stages.len() > 1 { "of the stage" } else { "of the run" };
+            self.recorder.warning(&format!("no equilibrium until the end {what}, t = {time}: {way}"));
+        }
+    }
+
+    /// Not collective. Warns of stages that the run has not come to.
+    fn tell_missed_stages(&mut self) {
+        let missed: Vec<&str> = self
+            .problem
+            .stages
+            .iter()
+            .skip(self.solver.physics.stage() + 1)
+            .map(|stage| &*stage.name)
+            .collect();
+        if !missed.is_empty() {
+            self.recorder
+                .warning(&format!("the run ended at time.end before these stages: {}", missed.join(", ")));
         }
     }
 
@@ -211,7 +260,7 @@ impl<'a, const D: usize> Run<'a, D> {
         if clock.step.is_multiple_of(self.problem.telemetry_every) {
             self.settle(false)?;
         }
-        if self.schedule.output_due(self.outputs.next(), clock.time) {
+        if self.schedule.output_due(clock.time) {
             self.write_output(true)?;
         }
         if self.schedule.checkpoint_due(clock.step, clock.time) || checkpoint {
@@ -235,6 +284,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
         self.recorder.finish(self.comm, &self.solver);
         self.tell_equilibrium();
+        self.tell_missed_stages();
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;

@@ -21,6 +21,8 @@ pub struct Recorder {
     progress: Progress,
     /// Lower corner of the domain, m.
     origin: Vec<f64>,
+    /// Whether the history has columns of the way to equilibrium, and of the stage.
+    has: [bool; 2],
     history_every: u64,
     telemetry_every: u64,
     /// Step of the last row of the history; the same on all ranks.
@@ -50,11 +52,12 @@ impl Recorder {
         let Clock { step, time, .. } = solver.clock;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
+        let has = [problem.has_equilibrium(), problem.stages.len() > 1];
         let named = history::columns(
             &solver.physics.loads,
             &solver.physics.colliders,
             solver.physics.adaptivity.is_some(),
-            solver.physics.equilibrium.is_some(),
+            has,
         );
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), kept) {
@@ -77,6 +80,7 @@ impl Recorder {
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
             origin: problem.origin.to_vec(),
+            has,
             history_every: problem.history_every,
             telemetry_every: problem.telemetry_every,
             last_row,
@@ -198,8 +202,11 @@ impl Recorder {
             if let Some(ledger) = &ledger {
                 values.extend(history::ledger_values(ledger));
             }
-            if solver.physics.equilibrium.is_some() {
+            if self.has[0] {
                 values.extend(history::relaxation_values(&solver.relaxation));
+            }
+            if self.has[1] {
+                values.push((solver.physics.stage() + 1) as f64);
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);

@@ -41,6 +41,8 @@ pub const OUTPUT_STEP: &str = "output_step";
 /// Name of the counter that holds the step of the last row of the history.
 pub const ROW_STEP: &str = "row_step";
 const BOUND: &str = "time_step_bound";
+/// Name of the counter that holds the number of stages that have begun, in jobs with stages.
+const STAGES: &str = "stages";
 /// Names of the counters of particles that crossed faces of the domain.
 const CROSSINGS: [&str; 3] = ["put_back", "deleted", "left"];
 /// Names of the masses deleted and left.
@@ -65,6 +67,9 @@ pub fn scalars<const D: usize>(
     counts.extend(CROSSINGS.iter().map(|name| String::from(*name)).zip(numbers));
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
     let mut reals = vec![(BOUND.into(), solver.clock.bound)];
+    let starts = &solver.physics.stage_starts;
+    counts.push((STAGES.into(), starts.len() as u64));
+    reals.extend((0..).zip(starts).skip(1).map(|(stage, &start)| (stage_start(stage), start)));
     let mut exact: Vec<(String, Vec<i64>)> = CROSSED_MASSES
         .iter()
         .zip(&mut crossings.masses)
@@ -95,6 +100,23 @@ pub fn scalars<const D: usize>(
         }
     }
     Scalars { reals, counts, exact }
+}
+
+/// Name of the time at which a stage began.
+fn stage_start(stage: usize) -> String {
+    format!("stage_start_{stage}")
+}
+
+/// Times at which stages began. `None` if the file lacks one, or no run of the job writes them.
+fn stage_starts<const D: usize>(problem: &Problem<D>, header: &Header) -> Option<Vec<f64>> {
+    let count = usize::try_from(header.scalars.count(STAGES)?).ok()?;
+    if !(1..=problem.stages.len()).contains(&count) {
+        return None;
+    }
+    let starts: Option<Vec<f64>> = (0..count)
+        .map(|stage| if stage == 0 { Some(0.0) } else { header.scalars.real(&stage_start(stage)) })
+        .collect();
+    starts.filter(|starts| starts.is_sorted() && starts.last().is_some_and(|&last| last <= header.time))
 }
 
 /// Collective. Appends the exact sums of some kind of thing: those of all ranks, counted through all things.
@@ -295,7 +317,10 @@ fn restored<const D: usize>(
         dt: header.dt,
         bound: header.scalars.real(BOUND).unwrap_or(0.0),
     };
-    let mut solver = Solver::new(comm, setup::physics(problem), forest, chunks, clock);
+    let starts =
+        stage_starts(problem, &header).ok_or_else(|| refused("the stages of the run are missing"))?;
+    let physics = setup::stages::physics(problem, &starts);
+    let mut solver = Solver::new(comm, physics, forest, chunks, clock);
     // Every rank has read the same header.
     let (rank, scalars) = (comm.rank(), &header.scalars);
     restore_colliders(&mut solver, scalars)

@@ -9,6 +9,8 @@ use crate::job::problem::CheckpointSetup;
 #[derive(Clone, Debug)]
 pub struct Schedule {
     output_every: Option<f64>,
+    /// Simulated time until which outputs have been looked for, s.
+    looked_until: f64,
     checkpoint: CheckpointSetup,
     next_checkpoint: f64,
     last_checkpoint: Instant,
@@ -19,6 +21,7 @@ impl Schedule {
     pub fn new<const D: usize>(problem: &Problem<D>, time: f64) -> Self {
         let mut schedule = Self {
             output_every: problem.output.every,
+            looked_until: time,
             checkpoint: problem.checkpoint,
             next_checkpoint: f64::INFINITY,
             last_checkpoint: Instant::now(),
@@ -27,9 +30,17 @@ impl Schedule {
         schedule
     }
 
-    /// Whether output number `next` is due.
-    pub fn output_due(&self, next: u64, time: f64) -> bool {
-        self.output_every.is_some_and(|every| time >= next as f64 * every)
+    /// Whether an output has become due since this was asked last.
+    pub fn output_due(&mut self, time: f64) -> bool {
+        let before = std::mem::replace(&mut self.looked_until, time);
+        self.output_every.is_some_and(|every| {
+            // The number of the next one after the time of the last look; a product decides, not a rounded quotient.
+            let mut next = (before / every).floor();
+            while next * every <= before {
+                next += 1.0;
+            }
+            time >= next * every
+        })
     }
 
     /// Whether a checkpoint is due by steps or by simulated time.

@@ -89,7 +89,7 @@ fn at<const D: usize>(
     columns: &mut Columns<D>,
 ) -> Result<Stressed, NoState> {
     let place = problem.place(x);
-    let gravity = problem.gravity.at(0.0);
+    let gravity = problem.gravity_of_stage(body.stage).at(0.0);
     let up = Up::new(&gravity);
     let pressures = match &initial.kind {
         StressKind::Components(components) => {
@@ -103,7 +103,7 @@ fn at<const D: usize>(
                         let depth = (surface.at(&place, 0.0) - place[up.axis]) * up.sign;
                         problem.materials[body.material].density * depth.max(0.0)
                     }
-                    None => columns.at(problem, up, x, interval).mass_above(x[up.axis] * up.sign),
+                    None => columns.at(problem, body.stage, up, x, interval).mass_above(x[up.axis] * up.sign),
                 };
             let vertical = weight + surcharge.at(&place, 0.0);
             [vertical, vertical * ratio.at(&place, 0.0)]
@@ -111,7 +111,7 @@ fn at<const D: usize>(
         StressKind::Depth { rows, surface } => {
             let depth = match surface {
                 Some(surface) => (surface.at(&place, 0.0) - place[up.axis]) * up.sign,
-                None => columns.at(problem, up, x, interval).top() - x[up.axis] * up.sign,
+                None => columns.at(problem, body.stage, up, x, interval).top() - x[up.axis] * up.sign,
             };
             interpolate(rows, depth)
         }
@@ -172,21 +172,27 @@ impl<const D: usize> Default for Columns<D> {
 
 impl<const D: usize> Columns<D> {
     /// What stands on the vertical line through a point. Layers thinner than `interval` (m) may be missed.
-    fn at(&mut self, problem: &Problem<D>, up: Up, x: &[f64; D], interval: f64) -> &Standing {
+    fn at(&mut self, problem: &Problem<D>, stage: usize, up: Up, x: &[f64; D], interval: f64) -> &Standing {
         let mut foot = *x;
         foot[up.axis] = 0.0;
         let found = self.0.iter().position(|(other, _)| *other == foot).unwrap_or_else(|| {
-            self.0.push((foot, standing(problem, up, &foot, interval)));
+            self.0.push((foot, standing(problem, stage, up, &foot, interval)));
             self.0.len() - 1
         });
         &self.0[found].1
     }
 }
 
-fn standing<const D: usize>(problem: &Problem<D>, up: Up, foot: &[f64; D], interval: f64) -> Standing {
+fn standing<const D: usize>(
+    problem: &Problem<D>,
+    stage: usize,
+    up: Up,
+    foot: &[f64; D],
+    interval: f64,
+) -> Standing {
     let mut pieces = Vec::new();
     let extent = problem.size()[up.axis];
-    for body in &problem.bodies {
+    for body in problem.bodies_of_stage(stage).map(|body| &problem.bodies[body]) {
         let bounds = body.shape.bounds();
         let (low, high) = (bounds.lower[up.axis].max(0.0), bounds.upper[up.axis].min(extent));
         let point = |height: f64| {
@@ -286,10 +292,10 @@ shape = { kind = "box", min = [1, -2], max = [5, -1] }
             (3.5, 1.25, 1000.0),
             (3.5, 2.75, 250.0),
         ] {
-            let found = standing(&problem, up, &[x, 0.0], 0.1).mass_above(height);
+            let found = standing(&problem, 0, up, &[x, 0.0], 0.1).mass_above(height);
             assert!((found / expected - 1.0).abs() < 1e-14, "{x}, {height}: {found} for {expected}");
         }
-        assert_eq!(standing(&problem, up, &[1.5, 0.0], 0.1).top(), 2.5);
+        assert_eq!(standing(&problem, 0, up, &[1.5, 0.0], 0.1).top(), 2.5);
     }
 
     #[test]

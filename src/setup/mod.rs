@@ -17,11 +17,18 @@ use crate::solver::{Clock, Physics, Solver, StepControl};
 pub mod estimate;
 pub mod initial_stress;
 pub mod seed;
+pub mod stages;
 pub mod warnings;
 
-/// The constant part of a run.
+/// What is solved in the first stage of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
+    stages::physics(problem, &[0.0])
+}
+
+/// What no stage changes.
+fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     Physics {
+        stage_starts: vec![0.0],
         origin: problem.origin,
         root_edge: problem.root_edge,
         graded: problem.tree.graded,
@@ -32,7 +39,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         colliders: problem.colliders.clone(),
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
-        equilibrium: problem.equilibrium,
+        equilibrium: None,
         transfer: problem.transfer,
         boxes: problem.boxes,
         control: StepControl {
@@ -85,7 +92,7 @@ pub fn solver_within<const D: usize, R>(
         counts[usize::from(Tag::unpack(*tag).body)] += 1;
     }
     comm.sum_u64(&mut counts);
-    comm.agree(check_counts(problem, &counts))?;
+    comm.agree(check_counts(problem, &counts, 0))?;
     Ok(Ok(solver))
 }
 
@@ -95,25 +102,38 @@ fn seeded<const D: usize>(
     problem: &Problem<D>,
     forest: Forest<D>,
 ) -> Result<Solver<D>, Disagreement> {
-    let mut chunks = comm.agree(seed(&forest, problem))?;
+    let mut chunks = comm.agree(seed(&forest, problem, 0))?;
     let physics = physics(problem);
-    let mut id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
-    for chunk in &mut chunks {
+    let id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
+    number(&mut chunks, id);
+    give_history(&mut chunks, &physics);
+    let stressed = forest.leaves().par_iter().zip(&mut chunks);
+    let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
+    let stressed: Result<(), SeedError> = stressed.collect();
+    comm.agree(stressed)?;
+    Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
+}
+
+/// Numbers particles from `id` on along the curve, so that no number depends on the partition.
+fn number<const D: usize>(chunks: &mut [Chunk<D>], mut id: u64) {
+    for chunk in chunks {
         for p in 0..chunk.len() {
-            // Along the curve, so that no id depends on the partition.
             chunk.ids_mut()[p] = id;
             id += 1;
+        }
+    }
+}
+
+/// Gives particles the history with which their materials begin.
+fn give_history<const D: usize>(chunks: &mut [Chunk<D>], physics: &Physics<D>) {
+    for chunk in chunks {
+        for p in 0..chunk.len() {
             let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
             for (h, value) in physics.materials[material].initial_history().into_iter().enumerate() {
                 chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
             }
         }
     }
-    let stressed = forest.leaves().par_iter().zip(&mut chunks);
-    let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
-    let stressed: Result<(), SeedError> = stressed.collect();
-    comm.agree(stressed)?;
-    Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 
 /// Collective. The tree that the job asks for before its criteria are looked at.
@@ -138,7 +158,7 @@ fn partition_by_seeds<const D: usize>(
     // Counted, not filled: leaves of other ranks must take no memory here.
     let count = |leaf: &Octant<D>| {
         let mut counts = vec![0; problem.bodies.len()];
-        count_leaf(problem, leaf, &mut counts).map(|()| counts.iter().sum())
+        count_leaf(problem, leaf, 0, &mut counts).map(|()| counts.iter().sum())
     };
     let counted: Result<Vec<u64>, SeedError> = forest.leaves().par_iter().map(count).collect();
     let weights = match &counted {
@@ -154,14 +174,18 @@ fn partition_by_seeds<const D: usize>(
     counted.map(|_| size)
 }
 
-/// Not collective. The particles of the own leaves, ids not yet given.
-fn seed<const D: usize>(forest: &Forest<D>, problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedError> {
+/// Not collective. The particles of the own leaves that come with a stage, ids not yet given.
+fn seed<const D: usize>(
+    forest: &Forest<D>,
+    problem: &Problem<D>,
+    stage: usize,
+) -> Result<Vec<Chunk<D>>, SeedError> {
     forest
         .leaves()
         .par_iter()
         .map(|leaf| {
             let mut chunk = Chunk::new();
-            fill_leaf(problem, leaf, &mut chunk)?;
+            fill_leaf(problem, leaf, stage, &mut chunk)?;
             Ok(chunk)
         })
         .collect()

@@ -65,7 +65,7 @@ pub fn leaf_is_touched<const D: usize>(problem: &Problem<D>, octant: &Octant<D>)
     problem.bodies.iter().any(|body| body.shape.classify(&cell) != Side::Outside)
 }
 
-/// Not collective. Appends all particles of the leaf, at rest in their undeformed state except for the
+/// Not collective. Appends all particles of the leaf that come with a stage, at rest in their undeformed state except for the
 /// velocity of their body: bodies in the order of the job, points of a body in lexicographic order.
 /// Identifiers are 0; the run numbers them along the curve.
 ///
@@ -74,9 +74,10 @@ pub fn leaf_is_touched<const D: usize>(problem: &Problem<D>, octant: &Octant<D>)
 pub fn fill_leaf<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
+    stage: usize,
     chunk: &mut Chunk<D>,
 ) -> Result<(), SeedError> {
-    visit(problem, octant, 0..problem.bodies.len(), |index, points| {
+    visit(problem, octant, problem.bodies_of_stage(stage), |index, points| {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
         let volume: f64 = [spacing; D].iter().product();
@@ -114,9 +115,10 @@ pub fn fill_leaf<const D: usize>(
 pub fn count_leaf<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
+    stage: usize,
     counts: &mut [u64],
 ) -> Result<(), SeedError> {
-    count_bodies(problem, octant, 0..problem.bodies.len(), |body, points| counts[body] += points)
+    count_bodies(problem, octant, problem.bodies_of_stage(stage), |body, points| counts[body] += points)
 }
 
 /// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles of in the leaf.
@@ -142,12 +144,16 @@ pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &A
     (0..D).fold(1, |all, a| all.saturating_mul(along(a)))
 }
 
-/// Not collective. Checks the number of particles of each body in all leaves of all ranks together.
+/// Not collective. Checks the number of particles of each body that comes with a stage, in all leaves of all ranks together.
 ///
 /// # Errors
 /// A body has none.
-pub fn check_counts<const D: usize>(problem: &Problem<D>, counts: &[u64]) -> Result<(), SeedError> {
-    match counts.iter().position(|count| *count == 0) {
+pub fn check_counts<const D: usize>(
+    problem: &Problem<D>,
+    counts: &[u64],
+    stage: usize,
+) -> Result<(), SeedError> {
+    match problem.bodies_of_stage(stage).find(|&body| counts[body] == 0) {
         Some(empty) => {
             Err(SeedError::Empty { place: place(problem, empty), body: problem.bodies[empty].name.clone() })
         }
@@ -238,7 +244,8 @@ fn visit<const D: usize>(
         if side == Side::Crosses {
             points.retain(|x| body.shape.contains(x));
         }
-        for &(other, _) in near.iter().filter(|(other, _)| *other != index) {
+        let together = |other: usize| other != index && problem.are_together(index, other);
+        for &(other, _) in near.iter().filter(|(other, _)| together(*other)) {
             // Bodies that touch may both claim a point by a rounding; it belongs to the first.
             let rounding = -1e-9 * spacing;
             let neighbour = &problem.bodies[other];

@@ -16,10 +16,10 @@ where
 fn seeded<const D: usize>(problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedError> {
     let fill = |leaf| {
         let mut chunk = Chunk::new();
-        fill_leaf(problem, leaf, &mut chunk)?;
+        fill_leaf(problem, leaf, 0, &mut chunk)?;
         assert!(leaf_is_touched(problem, leaf) || chunk.is_empty());
         let mut counts = vec![0; problem.bodies.len()];
-        count_leaf(problem, leaf, &mut counts)?;
+        count_leaf(problem, leaf, 0, &mut counts)?;
         assert_eq!(counts.iter().sum::<u64>(), chunk.len() as u64);
         let cell = problem.octant_box(leaf);
         assert!((0..chunk.len()).all(|p| cell.contains(&chunk.position(p))));
@@ -136,6 +136,6 @@ fn a_body_without_particles_is_refused() {
     let problem = problem::<2>(&job(2, 0, &body("dot", rest)));
     let count: usize = seeded(&problem).unwrap().iter().map(Chunk::len).sum();
     assert_eq!(count, 0);
-    assert!(check_counts(&problem, &[0]).is_err());
-    assert!(check_counts(&problem, &[1]).is_ok());
+    assert!(check_counts(&problem, &[0], 0).is_err());
+    assert!(check_counts(&problem, &[1], 0).is_ok());
 }

@@ -12,6 +12,7 @@
 //! | [`step`] | phases of a step |
 //! | [`refinement`] | the tree follows the material |
 //! | [`balance`] | load balance: measured costs, new partitions |
+//! | [`stage`] | the next stage of a run |
 //! | [`diagnostics`] | totals; weights of given boxes |
 pub mod balance;
 pub mod diagnostics;
@@ -19,6 +20,7 @@ pub mod migration;
 pub mod physics;
 pub mod refinement;
 pub mod sorting;
+pub mod stage;
 pub mod state;
 pub mod step;
 
@@ -87,7 +89,7 @@ impl<const D: usize> Solver<D> {
         solver.provide_reach(reach);
         if clock == Clock::default() {
             // A box without a bin stops the first step, which says so.
-            let _ = solver.moments_from_affine();
+            let _ = solver.moments_from_affine(&vec![0; solver.chunks.len()]);
             solver.leaf_data.signal = solver.signals_under_stress();
             solver.clock.bound = comm.min_f64(solver.local_bound());
         }

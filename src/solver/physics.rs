@@ -5,7 +5,7 @@ use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::Material;
 
-/// What is solved: the same on every rank, constant over a run.
+/// What is solved: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
     /// Lower corner of the domain in the coordinates of the job, m; all positions are relative to it.
     pub origin: [f64; D],
@@ -15,6 +15,8 @@ pub struct Physics<const D: usize> {
     pub graded: bool,
     /// Materials by index.
     pub materials: Vec<Box<dyn Material>>,
+    /// Times at which the stages so far have begun, s; the last is the one under way.
+    pub stage_starts: Vec<f64>,
     /// Acceleration of gravity.
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
@@ -29,7 +31,7 @@ pub struct Physics<const D: usize> {
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
-    /// Equilibrium at which the run ends, and to which kinetic damping leads; `None`: neither.
+    /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
@@ -58,6 +60,11 @@ pub struct StepControl {
 }
 
 impl<const D: usize> Physics<D> {
+    /// Number of the stage under way, from 0.
+    pub fn stage(&self) -> usize {
+        self.stage_starts.len().saturating_sub(1)
+    }
+
     /// What the kernels need to know.
     pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
         Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)

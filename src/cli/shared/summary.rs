@@ -3,6 +3,7 @@ use std::io::Write;
 
 use crate::adaptivity::Adaptivity;
 use crate::job::Problem;
+use crate::job::problem::InStages;
 use crate::load::{Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
@@ -43,14 +44,27 @@ pub(in crate::cli) fn write<const D: usize>(
     }
     if !problem.colliders.is_empty() {
         writeln!(out, "colliders    {}", problem.colliders.len())?;
-        for collider in &problem.colliders {
-            writeln!(out, "  {:18} {}", excerpt(&collider.name, NAME), collider)?;
+        for (number, collider) in problem.colliders.iter().enumerate() {
+            let stages = in_stages(problem, &problem.collider_stages[number]);
+            writeln!(out, "  {:18} {}{stages}", excerpt(&collider.name, NAME), collider)?;
+        }
+    }
+    if problem.stages.len() > 1 {
+        writeln!(out, "stages       {}", problem.stages.len())?;
+        for stage in &problem.stages {
+            let duration = match stage.duration.is_finite() {
+                true => format!("at most {}", quantity(stage.duration, "s")),
+                false => "to the end of the run".to_owned(),
+            };
+            let until = if stage.equilibrium.is_some() { "to equilibrium, " } else { "" };
+            writeln!(out, "  {:18} {until}{duration}", excerpt(&stage.name, NAME))?;
         }
     }
     if !problem.loads.is_empty() {
         writeln!(out, "loads        {}", problem.loads.len())?;
-        for load in &problem.loads {
-            writeln!(out, "  {:18} {}", excerpt(&load.name, NAME), load_in_words(load))?;
+        for (number, load) in problem.loads.iter().enumerate() {
+            let stages = in_stages(problem, &problem.load_stages[number]);
+            writeln!(out, "  {:18} {}{stages}", excerpt(&load.name, NAME), load_in_words(load))?;
         }
     }
     writeln!(out, "leaves       {least}{}", grouped(estimate.total_leaves()))?;
@@ -136,6 +150,14 @@ fn plural(ranks: u32) -> String {
 }
 
 /// What a load does, and where and when.
+/// The stages in which something acts, in words, if it names them.
+fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String {
+    stages.0.as_ref().map_or_else(String::new, |stages| {
+        let names: Vec<_> = stages.iter().map(|&stage| excerpt(&problem.stages[stage].name, NAME)).collect();
+        format!(", in {}", names.join(", "))
+    })
+}
+
 fn load_in_words<const D: usize>(load: &Load<D>) -> String {
     let value = |quantity: &Quantity, unit: &str| match quantity {
         Quantity::Constant(value) => self::quantity(*value, unit),

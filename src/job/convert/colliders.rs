@@ -59,7 +59,7 @@ fn collider<const D: usize>(
         Some(WrittenContact::Slip {}) => Contact::Slip,
         Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },
     };
-    Some(Collider { name: written.name.clone(), shape, reference, axis, contact, motion })
+    Some(Collider { name: written.name.clone(), shape, reference, axis, contact, motion, start: 0.0 })
 }
 
 /// The centre of a box, along each axis cut by the domain where it is unbounded.

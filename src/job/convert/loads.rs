@@ -83,7 +83,15 @@ fn load<const D: usize>(
             Kind::Damping(rate)
         }
     };
-    Some(Load { name: written.name.clone(), kind, region, from: written.from, until, origin: space.origin })
+    Some(Load {
+        name: written.name.clone(),
+        kind,
+        region,
+        start: 0.0,
+        from: written.from,
+        until,
+        origin: space.origin,
+    })
 }
 
 /// As many quantities as the job has dimensions, or faults.

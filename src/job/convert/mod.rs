@@ -9,13 +9,14 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
+//! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
 use self::colliders::colliders;
 use self::loads::{loads, vector};
-use self::settings::{digest, faces, named_faces, numerics, output, report};
+use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, QUOTED, names as listed};
 use super::parse::source::{Node, Path};
 use super::problem::*;
@@ -36,6 +37,7 @@ mod loads;
 mod overlap;
 pub(super) mod settings;
 mod shapes;
+mod stages;
 mod stress;
 
 /// Most leaves that a uniform tree of the base level may have.
@@ -84,9 +86,18 @@ fn problem<const D: usize>(
         None => Some(Gravity::constant([0.0; D])),
     };
     let loads = loads(checks, &file.loads, file.colliders.len(), &space, &root.key("loads"));
+    let stages = stages::stages(checks, file, &root);
+    let load_stages =
+        stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
+    let collider_stages = stages::of_each(
+        checks,
+        file,
+        file.colliders.iter().map(|collider| &collider.stages),
+        &root.key("colliders"),
+    );
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
-    let (tree, bodies) = (tree?, bodies?);
+    let (tree, bodies, faces) = (tree?, bodies?, faces?);
     let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
     let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
     let output = output(checks, file, &name, &root.key("output"));
@@ -109,18 +120,13 @@ fn problem<const D: usize>(
         bodies,
         gravity: gravity?,
         loads: loads?,
-        faces: faces?,
-        named_faces: named_faces(&file.boundaries),
+        faces: faces.map(|pair| pair.map(Option::unwrap_or_default)),
+        named_faces: faces.map(|pair| pair.map(|face| face.is_some())),
         colliders: colliders?,
-        leaving: match file.boundaries.leaving {
-            file::Leaving::Error => LeavingPolicy::Error,
-            file::Leaving::Delete => LeavingPolicy::Delete,
-            file::Leaving::Clamp => LeavingPolicy::Clamp,
-        },
-        equilibrium: file
-            .equilibrium
-            .as_ref()
-            .map(|asked| crate::solver::Equilibrium { speed: asked.speed, acceleration: asked.acceleration }),
+        leaving: settings::leaving(file.boundaries.leaving.unwrap_or_default()),
+        stages: stages?,
+        load_stages,
+        collider_stages,
         time: TimeSetup {
             end: file.time.end,
             cfl: file.time.cfl,
@@ -152,7 +158,7 @@ fn problem<const D: usize>(
 }
 
 /// Gravity is the same everywhere.
-fn gravity<const D: usize>(
+pub(super) fn gravity<const D: usize>(
     checks: &mut Checks,
     written: &[file::Quantity],
     path: &Path,
@@ -162,7 +168,7 @@ fn gravity<const D: usize>(
         let message = "found an expression of place; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
         checks.fault(&path.index(axis), message.into());
     }
-    Some(Gravity(components))
+    Some(Gravity { acceleration: components, start: 0.0 })
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -377,6 +383,7 @@ fn body<const D: usize>(
         material: material?,
         velocity: velocity?,
         angular_velocity: angular_velocity?,
+        stage: stages::of_body(checks, body, file, path),
         particles_per_cell: body.particles_per_cell,
         stress: match &body.stress {
             Some(written) => {

@@ -8,12 +8,12 @@ use crate::text::{number, written};
 /// Most output files of one run.
 const MAX_OUTPUTS: f64 = 100_000.0;
 
-/// Conditions on the faces of the domain.
+/// Conditions on those faces of the domain that are named.
 pub(in crate::job) fn faces<const D: usize>(
     checks: &mut Checks,
     boundaries: &file::Boundaries,
     path: &Path,
-) -> Option<[[Contact; 2]; D]> {
+) -> Option<[[Option<Contact>; 2]; D]> {
     let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
     if D == 2 {
         for (key, face) in [("z_min", z_min), ("z_max", z_max)] {
@@ -24,23 +24,24 @@ pub(in crate::job) fn faces<const D: usize>(
             }
         }
     }
-    let condition = |face: &Option<file::Face>| match face {
-        None => Contact::default(),
-        Some(file::Face::Slip {}) => Contact::Slip,
-        Some(file::Face::Sticky {}) => Contact::Sticky,
-        Some(file::Face::Separating { friction }) => Contact::Separating { friction: *friction },
-        Some(file::Face::Symmetric {}) => Contact::Symmetric,
-        Some(file::Face::Outflow {}) => Contact::Outflow,
+    let condition = |face: &file::Face| match face {
+        file::Face::Slip {} => Contact::Slip,
+        file::Face::Sticky {} => Contact::Sticky,
+        file::Face::Separating { friction } => Contact::Separating { friction: *friction },
+        file::Face::Symmetric {} => Contact::Symmetric,
+        file::Face::Outflow {} => Contact::Outflow,
     };
     let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
-    Some(std::array::from_fn(|a| all[a].map(condition)))
+    Some(std::array::from_fn(|a| all[a].map(|face| face.as_ref().map(condition))))
 }
 
-/// Which faces of the domain the job names.
-pub(in crate::job) fn named_faces<const D: usize>(boundaries: &file::Boundaries) -> [[bool; 2]; D] {
-    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
-    let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
-    std::array::from_fn(|a| all[a].map(Option::is_some))
+/// What happens to particles that leave the domain.
+pub(in crate::job) fn leaving(written: file::Leaving) -> LeavingPolicy {
+    match written {
+        file::Leaving::Error => LeavingPolicy::Error,
+        file::Leaving::Delete => LeavingPolicy::Delete,
+        file::Leaving::Clamp => LeavingPolicy::Clamp,
+    }
 }
 
 /// Transfer and box policy.

@@ -20,6 +20,11 @@ pub struct Collider {
     /// How it moves; not at all by default.
     #[serde(default)]
     pub motion: Option<Motion>,
+    /// Names of the stages in which it is there; all by default. With them the times of its motion are counted from the start of the
+    /// first of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 20))]
+    pub stages: Option<Vec<String>>,
     /// Point about which it turns and to which its torque refers, m; by default the centre of its bounding box, cut by
     /// the domain where it is unbounded.
     #[serde(default)]

@@ -7,6 +7,7 @@ use super::common::yes;
 pub use super::common::{AxisName, Spin};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
+pub use super::stages::Stage;
 pub use super::stress::Stress;
 use crate::geometry::written::Shape;
 pub use crate::geometry::written::Vector;
@@ -61,9 +62,13 @@ pub struct JobFile {
     pub colliders: Vec<Collider>,
     /// End of the run and time step.
     pub time: Time,
-    /// The way to equilibrium; none by default.
+    /// The way to equilibrium; none by default. Jobs with stages have it there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
+    /// Stages of the run; one without changes by default.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 20))]
+    pub stages: Vec<Stage>,
     /// Choices of the method.
     #[serde(default)]
     pub numerics: Numerics,
@@ -124,9 +129,9 @@ pub struct Boundaries {
     #[schemars(extend("x-dimension" = 3))]
     pub z_max: Option<Face>,
     /// What happens to particles that leave the domain through other faces than those of kind `outflow`. Particles that
-    /// rounding alone takes through a face are put back and counted in any case.
-    #[serde(default)]
-    pub leaving: Leaving,
+    /// rounding alone takes through a face are put back and counted in any case. An error by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaving: Option<Leaving>,
 }
 
 /// Condition on a face of the domain.
@@ -233,6 +238,9 @@ pub struct Body {
     /// number in 2D (about z, counter-clockwise).
     #[serde(default)]
     pub angular_velocity: Option<Spin>,
+    /// Name of the stage at whose start it comes, into the cells that the tree then has; it is there from the start by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<String>,
     /// Stress at the start; none by default. With it, `density` is that of the body as it stands, under its stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Stress>,

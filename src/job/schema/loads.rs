@@ -32,6 +32,11 @@ pub struct Load {
     /// Where it acts; everywhere by default.
     #[serde(default)]
     pub shape: Option<Shape>,
+    /// Names of the stages in which it acts; all by default. With them all times of the load are counted from the start of the first
+    /// of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 20))]
+    pub stages: Option<Vec<String>>,
     /// Time from which it acts, s; 0 by default.
     #[serde(default)]
     #[schemars(range(min = -1e12, max = 1e12))]

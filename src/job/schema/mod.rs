@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`stress`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`stages`], [`stress`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
@@ -15,6 +15,7 @@ pub(super) mod json;
 pub mod loads;
 pub mod output;
 pub mod reference;
+pub mod stages;
 pub mod stress;
 
 /// Keys that files of earlier versions may have: path, and why the key is gone with what to do.

@@ -37,7 +37,7 @@ fn apply_colliders<const D: usize>(
         let cell = plan.cell(block.level);
         let nodes_box = nodes_box(block, cell);
         for (index, ((collider, state), rate)) in colliders.iter().zip(states).zip(rates).enumerate() {
-            if collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
+            if !collider.is_present() || collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
                 continue;
             }
             let real = block.real_nodes();

@@ -36,8 +36,8 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
-    /// keep none.
-    pub(in crate::solver) fn moments_from_affine(&mut self) -> Result<(), BinMissing> {
+    /// keep none. In each own leaf the first particles, as many as `done`, have theirs.
+    pub(in crate::solver) fn moments_from_affine(&mut self, done: &[usize]) -> Result<(), BinMissing> {
         match self.physics.transfer {
             Transfer::Apic => {}
             Transfer::Tpic => return Ok(()),
@@ -66,7 +66,8 @@ impl<const D: usize> Solver<D> {
             for i in 0..D {
                 for k in 0..D {
                     let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
-                    column.into_iter().zip(&spreads).for_each(|(value, spread)| *value *= spread[k]);
+                    let new = column.into_iter().zip(&spreads).skip(done[leaf]);
+                    new.for_each(|(value, spread)| *value *= spread[k]);
                 }
             }
         });

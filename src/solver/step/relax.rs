@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
+use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::state::Solver;
 use crate::solver::state::phases::Phase;
@@ -53,12 +54,15 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Reduce, || ExactSum::sum_over_ranks(comm, motion));
         let [kinetic, mass] = self.motion.each_ref().map(ExactSum::to_f64);
         if self.relaxation.note(kinetic, mass, dt) {
-            for chunk in &mut self.chunks {
-                let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
-                let affine = Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D;
-                velocity.chain(affine).for_each(|column| chunk.column_mut(column).fill(0.0));
-            }
+            self.chunks.iter_mut().for_each(stop);
         }
         self.relaxation.is_settled(&asked)
     }
+}
+
+/// Sets all velocities and their gradients to 0.
+pub(in crate::solver) fn stop<const D: usize>(chunk: &mut Chunk<D>) {
+    let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
+    let affine = Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D;
+    velocity.chain(affine).for_each(|column| chunk.column_mut(column).fill(0.0));
 }

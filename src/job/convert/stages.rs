@@ -1,0 +1,162 @@
+//! Stages of the run.
+use super::checks::Checks;
+use super::settings;
+use crate::job::parse::error::{QUOTED, names as listed};
+use crate::job::parse::source::Path;
+use crate::job::problem::{InStages, Stage};
+use crate::job::schema::job_file::{Body, Equilibrium as Written, JobFile};
+use crate::solver::Equilibrium;
+use crate::text::{excerpt, nearest, written as number};
+
+/// All stages, at least one, or faults.
+pub(super) fn stages<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    root: &Path,
+) -> Option<Vec<Stage<D>>> {
+    if file.stages.is_empty() {
+        return Some(vec![Stage::whole_run(file.equilibrium.as_ref().map(equilibrium))]);
+    }
+    if file.equilibrium.is_some() {
+        let message = "found [equilibrium] in a job with stages; expected it in the stages that end with it";
+        checks.fault(&root.key("equilibrium"), message.into());
+    }
+    let here = root.key("stages");
+    let mut all = Vec::new();
+    for number in 0..file.stages.len() {
+        all.push(stage(checks, file, number, &here.index(number)));
+    }
+    all.into_iter().collect()
+}
+
+fn equilibrium(written: &Written) -> Equilibrium {
+    Equilibrium { speed: written.speed, acceleration: written.acceleration }
+}
+
+fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path: &Path) -> Option<Stage<D>> {
+    let written = &file.stages[index];
+    checks.column_name(
+        &written.name,
+        file.stages[..index].iter().map(|stage| &*stage.name),
+        &path.key("name"),
+    );
+    if index + 1 < file.stages.len() && written.duration.is_none() && written.equilibrium.is_none() {
+        let message = format!(
+            "found the stage \"{}\" without an end before the next one; expected a duration, an equilibrium, or both",
+            excerpt(&written.name, QUOTED)
+        );
+        checks.fault(path, message);
+    }
+    let begins: f64 = file.stages[..index].iter().map(|stage| stage.duration.unwrap_or(0.0)).sum();
+    let ends_in_time = file.stages[..index].iter().all(|stage| stage.equilibrium.is_none());
+    if ends_in_time && begins >= file.time.end {
+        let (begins, end) = (number(begins), number(file.time.end));
+        let message =
+            format!("found a stage that begins at {begins} s; expected it before time.end = {end} s");
+        checks.fault(path, message);
+    }
+    let bodies = |body: &Body| body.name.clone();
+    let mut removed = Vec::new();
+    for (i, name) in written.remove.iter().enumerate() {
+        let here = path.key("remove").index(i);
+        let body = find(checks, name, "a body", file.bodies.iter().map(bodies), &here)?;
+        let comes = file.bodies[body].stage.as_ref();
+        let comes =
+            comes.and_then(|name| file.stages.iter().position(|stage| stage.name == *name)).unwrap_or(0);
+        if index <= comes {
+            let message = format!(
+                "found the body \"{}\", which is not there before this stage; expected one that is",
+                excerpt(name, QUOTED)
+            );
+            checks.fault(&here, message);
+        }
+        removed.push(body);
+    }
+    let mut materials = Vec::new();
+    for (i, new) in written.materials.iter().enumerate() {
+        let here = path.key("materials").index(i);
+        let body = find(checks, &new.body, "a body", file.bodies.iter().map(bodies), &here.key("body"));
+        let names = file.materials.iter().map(|material| material.name.clone());
+        let material = find(checks, &new.material, "a material", names, &here.key("material"));
+        materials.push((body?, material?));
+    }
+    let gravity = match &written.gravity {
+        Some(gravity) => Some(super::gravity(checks, gravity, &path.key("gravity"))?),
+        None => None,
+    };
+    let faces = match &written.boundaries {
+        Some(boundaries) => settings::faces(checks, boundaries, &path.key("boundaries"))?,
+        None => [[None; 2]; D],
+    };
+    let leaving = written.boundaries.as_ref().and_then(|boundaries| boundaries.leaving);
+    Some(Stage {
+        name: written.name.clone(),
+        duration: written.duration.unwrap_or(f64::INFINITY),
+        equilibrium: written.equilibrium.as_ref().map(equilibrium),
+        removed,
+        materials,
+        gravity,
+        faces,
+        leaving: leaving.map(settings::leaving),
+        at_rest: written.at_rest,
+    })
+}
+
+/// Number of the thing with a name, or a fault with what is there.
+fn find(
+    checks: &mut Checks,
+    name: &str,
+    what: &str,
+    names: impl Iterator<Item = String>,
+    path: &Path,
+) -> Option<usize> {
+    let names: Vec<String> = names.collect();
+    let found = names.iter().position(|other| other == name);
+    if found.is_none() {
+        let known = || names.iter().map(String::as_str);
+        let guess = nearest(name, known());
+        let guess = guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
+        let (name, known) = (excerpt(name, QUOTED), listed(known()));
+        checks.fault(path, format!("found \"{name}\"; expected the name of {what}: {known}{guess}"));
+    }
+    found
+}
+
+/// Number of a stage by its name, or a fault.
+fn stage_named(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> Option<usize> {
+    if file.stages.is_empty() {
+        let name = excerpt(name, QUOTED);
+        let message = format!("found \"{name}\"; expected a job with [[stages]] to name one of them");
+        checks.fault(path, message);
+        return None;
+    }
+    find(checks, name, "a stage", file.stages.iter().map(|stage| stage.name.clone()), path)
+}
+
+/// The stage at whose start a body comes; a fault where there is none of that name.
+pub(super) fn of_body(checks: &mut Checks, body: &Body, file: &JobFile, path: &Path) -> usize {
+    let Some(name) = &body.stage else { return 0 };
+    stage_named(checks, file, name, &path.key("stage")).unwrap_or(0)
+}
+
+/// The stages in which each load or collider acts, or faults.
+pub(super) fn of_each<'a>(
+    checks: &mut Checks,
+    file: &JobFile,
+    written: impl Iterator<Item = &'a Option<Vec<String>>>,
+    path: &Path,
+) -> Vec<InStages> {
+    let mut all = Vec::new();
+    for (number, names) in written.enumerate() {
+        let here = path.index(number).key("stages");
+        let stages = names.as_ref().map(|names| {
+            let named = names
+                .iter()
+                .enumerate()
+                .filter_map(|(i, name)| stage_named(checks, file, name, &here.index(i)));
+            named.collect()
+        });
+        all.push(InStages(stages));
+    }
+    all
+}

@@ -1,0 +1,125 @@
+//! What the stages of a run change: physics, and the particles that come and go.
+use partition::comm::{Comm, Disagreement};
+
+use super::initial_stress::put_under_stress;
+use super::seed::check_counts;
+use crate::job::Problem;
+use crate::particle::chunk::{Chunk, Tag};
+use crate::solver::stage::Change;
+use crate::solver::{Physics, Solver};
+
+/// What is solved in the last of the stages that began at these times, s.
+pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<D> {
+    let mut physics = super::constant_physics(problem);
+    for (stage, &start) in problem.stages.iter().zip(starts) {
+        if let Some(gravity) = &stage.gravity {
+            physics.gravity = gravity.clone();
+            physics.gravity.start = start;
+        }
+        for (now, new) in physics.faces.as_flattened_mut().iter_mut().zip(stage.faces.as_flattened()) {
+            *now = new.unwrap_or(*now);
+        }
+        physics.leaving = stage.leaving.unwrap_or(physics.leaving);
+        physics.equilibrium = stage.equilibrium;
+    }
+    physics.stage_starts = starts.to_vec();
+    let stage = physics.stage();
+    for (load, stages) in physics.loads.iter_mut().zip(&problem.load_stages) {
+        load.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
+    }
+    for (collider, stages) in physics.colliders.iter_mut().zip(&problem.collider_stages) {
+        collider.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
+    }
+    physics
+}
+
+/// What the particles of a body are made of in a stage.
+fn material_of<const D: usize>(problem: &Problem<D>, body: usize, stage: usize) -> usize {
+    let changes = problem.stages[..=stage].iter().flat_map(|stage| &stage.materials);
+    changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
+}
+
+/// Collective. Takes a solver into the next stage of its job: bodies go, change and come.
+///
+/// # Errors
+/// A body that comes has no particle, or cannot have its stress; the same on all ranks.
+pub fn enter_next<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    solver: &mut Solver<D>,
+) -> Result<(), Disagreement> {
+    let mut starts = solver.physics.stage_starts.clone();
+    starts.push(solver.clock.time);
+    let physics = physics(problem, &starts);
+    let stage = physics.stage();
+    let mut added = comm.agree(super::seed(&solver.forest, problem, stage))?;
+    for chunk in &mut added {
+        for tag in chunk.tags_mut() {
+            let was = Tag::unpack(*tag);
+            let material = material_of(problem, usize::from(was.body), stage) as u16;
+            *tag = Tag { material, ..was }.pack();
+        }
+    }
+    super::give_history(&mut added, &physics);
+    let leaves = solver.forest.leaves().iter().zip(&mut added);
+    let stressed = leaves.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
+    comm.agree(stressed.collect::<Result<(), _>>())?;
+    let mut counts = vec![0; problem.bodies.len()];
+    added.iter().flat_map(Chunk::tags).for_each(|tag| counts[usize::from(Tag::unpack(*tag).body)] += 1);
+    comm.sum_u64(&mut counts);
+    comm.agree(check_counts(problem, &counts, stage))?;
+    let first = comm.exclusive_sum_u64(added.iter().map(|chunk| chunk.len() as u64).sum());
+    super::number(&mut added, solver.next_root() + first);
+    let is_removed = |body| problem.stages[stage].removed.contains(&body);
+    let bodies = 0..problem.bodies.len();
+    let change = Change {
+        is_removed: bodies.clone().map(is_removed).collect(),
+        materials: bodies.map(|body| material_of(problem, body, stage) as u16).collect(),
+        at_rest: problem.stages[stage].at_rest,
+        added,
+    };
+    solver.enter_stage(physics, change);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Problem;
+
+    fn job() -> Problem<2> {
+        let text = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nsize = [2, 1]\nroot_edge = 1\n\
+            [[materials]]\nname = 'a'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e6\npoisson = 0.2\n\
+            [[materials]]\nname = 'b'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 2e6\npoisson = 0.2\n\
+            [[bodies]]\nname = 'ground'\nmaterial = 'a'\nshape = { kind = 'box', min = [0, 0], max = [2, 0.25] }\n\
+            [[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = ['t', 0]\nstages = ['shake']\n\
+            [[colliders]]\nname = 'press'\nshape = { kind = 'box', min = [0, 0.25], max = [1, 0.5] }\nstages = ['press', 'shake']\n\
+            motion = { kind = 'steady', velocity = [0, -1] }\n\
+            [time]\nend = 9\n\
+            [[stages]]\nname = 'settle'\nduration = 1\n\
+            [[stages]]\nname = 'press'\nduration = 2\ngravity = [0, '-10 - t']\nboundaries = { x_min = { kind = 'sticky' } }\n\
+            materials = [{ body = 'ground', material = 'b' }]\n\
+            [[stages]]\nname = 'shake'\nboundaries = { x_max = { kind = 'outflow' } }\n";
+        let path = std::path::Path::new("job.toml");
+        crate::job::parse(text, path).expect("a job").try_into().expect("in 2D")
+    }
+
+    /// What a stage changes stays; loads and colliders have the time since the first of their stages.
+    #[test]
+    fn changes_stay_and_clocks_begin_with_the_first_stage() {
+        let problem = job();
+        let first = physics(&problem, &[0.0]);
+        assert!(!first.loads[0].is_active(0.5) && !first.colliders[0].is_present());
+        assert_eq!(first.gravity.at(5.0), [0.0, -10.0]);
+        let second = physics(&problem, &[0.0, 1.25]);
+        assert_eq!(second.gravity.at(2.25), [0.0, -11.0]);
+        assert!(second.colliders[0].is_present() && !second.loads[0].is_active(2.0));
+        assert_eq!(second.colliders[0].state_at(2.25).pose.translation, [0.0, -1.0]);
+        let third = physics(&problem, &[0.0, 1.25, 3.5]);
+        assert_eq!(third.gravity.at(2.25), [0.0, -11.0]);
+        assert_eq!(third.colliders[0].state_at(3.25).pose.translation, [0.0, -2.0]);
+        assert!(third.loads[0].is_active(3.5) && !third.loads[0].is_active(3.25));
+        assert_eq!(third.faces[0], [crate::boundary::Contact::Sticky, crate::boundary::Contact::Outflow]);
+        assert_eq!([0, 1, 2].map(|stage| material_of(&problem, 0, stage)), [0, 1, 1]);
+    }
+}

@@ -1,0 +1,91 @@
+//! The next stage of a run: other physics, and particles that go, change or come.
+use crate::particle::Chunk;
+use crate::particle::chunk::{Layout, Tag};
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
+use crate::solver::state::relaxation::Relaxation;
+use crate::solver::step::relax::stop;
+
+/// What a stage changes in the particles. Lists go over the bodies of the job.
+pub struct Change<const D: usize> {
+    /// Whether the particles of a body go.
+    pub is_removed: Vec<bool>,
+    /// What the particles of a body are made of.
+    pub materials: Vec<u16>,
+    /// Whether all particles are at rest.
+    pub at_rest: bool,
+    /// Particles that come, by own leaf.
+    pub added: Vec<Chunk<D>>,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective. The lowest root that no particle has; see [`crate::adaptivity::resample::ids`].
+    pub fn next_root(&self) -> u64 {
+        // What merges have used and given up counts as well.
+        if self.physics.adaptivity.is_some() { self.ledger.next_root } else { self.first_free_root() }
+    }
+
+    /// Collective. Goes on with the physics of another stage after a change of the particles, and with the time step that these
+    /// allow.
+    pub fn enter_stage(&mut self, physics: Physics<D>, change: Change<D>) {
+        let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
+        self.comm.sum_u64(&mut added);
+        self.ledger.next_root = self.next_root() + added[0];
+        let before = std::mem::replace(&mut self.physics, physics);
+        for (index, collider) in self.physics.colliders.iter().enumerate() {
+            if collider.is_present() && !before.colliders[index].is_present() {
+                self.contacts.states[index] = collider.state_at(self.clock.time);
+            }
+        }
+        let had: Vec<usize> = self
+            .chunks
+            .iter_mut()
+            .map(|chunk| {
+                remove(chunk, &change.is_removed);
+                change_materials(chunk, &change.materials, &self.physics);
+                if change.at_rest {
+                    stop(chunk);
+                }
+                chunk.len()
+            })
+            .collect();
+        for (chunk, added) in self.chunks.iter_mut().zip(&change.added) {
+            (0..added.len()).for_each(|p| chunk.push_from(added, p));
+        }
+        self.leaf_data.reset(self.chunks.len());
+        let reach = self.agreed_reach();
+        self.rebuild_grid(reach);
+        // A box without a bin stops the first step, which says so.
+        let _ = self.moments_from_affine(&had);
+        self.leaf_data.signal = self.signals_under_stress();
+        self.clock.bound = self.comm.min_f64(self.local_bound());
+        self.relaxation = Relaxation::default();
+    }
+}
+
+/// Removes the particles of some bodies.
+fn remove<const D: usize>(chunk: &mut Chunk<D>, is_removed: &[bool]) {
+    let goes = |tag: &u64| is_removed[usize::from(Tag::unpack(*tag).body)];
+    if chunk.tags().iter().any(goes) {
+        let stay: Vec<u32> = (0..).zip(chunk.tags()).filter(|(_, tag)| !goes(tag)).map(|(p, _)| p).collect();
+        chunk.keep(&stay);
+    }
+}
+
+/// Gives the particles of each body its material; where that has other history variables, they begin anew.
+fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[u16], physics: &Physics<D>) {
+    for p in 0..chunk.len() {
+        let was = Tag::unpack(chunk.tags()[p]);
+        let material = materials[usize::from(was.body)];
+        if material == was.material {
+            continue;
+        }
+        chunk.tags_mut()[p] = Tag { material, ..was }.pack();
+        let [old, new] = [was.material, material].map(|m| &physics.materials[usize::from(m)]);
+        if old.history_names() != new.history_names() {
+            for (h, value) in new.initial_history().into_iter().enumerate() {
+                chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
+            }
+        }
+    }
+}
