@@ -14,6 +14,7 @@ pub mod load;
 pub mod material;
 pub mod memory;
 pub mod particle;
+pub mod probe;
 pub mod quantity;
 pub mod run;
 pub mod setup;

@@ -83,7 +83,7 @@ impl Lines {
 }
 
 /// Creates a file in the place of an old one. A symbolic link is replaced, not followed.
-pub(super) fn create_new(path: &Path) -> std::io::Result<File> {
+pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
         _ => OpenOptions::new().write(true).create_new(true).open(path),

@@ -4,7 +4,7 @@ pub mod cause;
 pub mod frame;
 pub mod hdf5_file;
 pub mod history;
-mod lines;
+pub(crate) mod lines;
 pub mod picture;
 pub mod progress;
 pub mod series;

@@ -11,6 +11,7 @@ pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
+use crate::probe::Probe;
 use crate::quantity::Quantity;
 use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
@@ -109,6 +110,10 @@ pub struct Problem<const D: usize> {
     pub checkpoint: CheckpointSetup,
     /// Steps between rows of `history.csv`.
     pub history_every: u64,
+    /// Whether it has the forces on the faces of the domain.
+    pub face_forces: bool,
+    /// What it measures of the material.
+    pub probes: Vec<Probe<D>>,
     /// Steps between lines of `telemetry.jsonl`.
     pub telemetry_every: u64,
     /// Evaluation at the end of the run.

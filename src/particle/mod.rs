@@ -3,6 +3,7 @@ pub mod chunk;
 mod column;
 pub mod lanes;
 mod layout;
+pub mod volume;
 mod widest;
 
 pub use chunk::{Chunk, Layout};

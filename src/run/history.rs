@@ -4,7 +4,8 @@ use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::history::Column;
-use crate::load::Load;
+use crate::job::Problem;
+use crate::probe::Probe;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{LoadTotals, Reaction};
@@ -38,30 +39,33 @@ const COLUMNS: [Column<'static>; 20] = [
     column("left_mass", "kg"),
 ];
 
-/// Names and units of the columns after the step. With dynamic refinement those of splits and merges follow; on the way to equilibrium those of it; with stages their number, from 1; then for each load those of its mean force and its work; for each collider those of its force, its torque and, if it moves, of
-/// its place follow the others.
-pub fn columns<const D: usize>(
-    loads: &[Load<D>],
-    colliders: &[Collider<D>],
-    is_adaptive: bool,
-    [relaxes, has_stages]: [bool; 2],
-) -> Vec<(String, &'static str)> {
+/// Names and units of the columns after the step. What a job has adds its own in this order: splits and merges of dynamic
+/// refinement; the way to equilibrium; the number of the stage, from 1; loads; probes; faces of the domain; colliders.
+pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
-    if is_adaptive {
+    if problem.adaptivity.is_some() {
         columns.extend(LEDGER.map(|(name, unit)| (name.to_owned(), unit)));
     }
-    if relaxes {
+    if problem.has_equilibrium() {
         columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));
     }
-    if has_stages {
+    if problem.stages.len() > 1 {
         columns.push(("stage".to_owned(), ""));
     }
-    for load in loads {
+    for load in &problem.loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
         columns.push((format!("work_{}", load.name), "J"));
     }
-    for collider in colliders {
+    columns.extend(problem.probes.iter().flat_map(Probe::columns));
+    if problem.face_forces {
+        for name in &AXES[..D] {
+            for side in ["min", "max"] {
+                columns.extend(AXES[..D].iter().map(|along| (format!("force{name}_{side}{along}"), "N")));
+            }
+        }
+    }
+    for collider in &problem.colliders {
         let mut add = |what: &str, axis: &str, unit| {
             columns.push((format!("{what}_{}{axis}", collider.name), unit));
         };

@@ -8,6 +8,7 @@ pub mod report;
 pub mod restart;
 pub mod schedule;
 pub mod stop;
+pub mod summary_file;
 
 use partition::comm::{Comm, Disagreement};
 
@@ -54,7 +55,7 @@ struct Run<'a, const D: usize> {
     solver: Solver<D>,
     outputs: Outputs,
     schedule: Schedule,
-    recorder: Recorder,
+    recorder: Recorder<'a, D>,
     names: Names,
     /// Step of the last output.
     output_step: Option<u64>,
@@ -74,6 +75,10 @@ impl<'a, const D: usize> Run<'a, D> {
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
         claim.take(comm, problem)?;
+        if comm.rank() == 0 {
+            // That of an earlier run would be taken for this one's.
+            let _ = std::fs::remove_file(summary_file::path(problem));
+        }
         let mut run = Self::with(comm, problem, options, solver, outputs, None, None, claim)?;
         run.recorder.write(comm, &mut run.solver, true, true)?;
         run.write_output(true)?;
@@ -290,7 +295,9 @@ impl<'a, const D: usize> Run<'a, D> {
             let mass = self.solver.particle_totals().mass;
             report::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
         });
-        Ok(Summary { series: self.outputs.series().to_owned(), picture, collapse })
+        let summary = Summary { series: self.outputs.series().to_owned(), picture, collapse };
+        self.recorder.report(&self.solver, &summary);
+        Ok(summary)
     }
 }
 

@@ -3,30 +3,30 @@ use std::time::Instant;
 
 use partition::comm::{Comm, Traffic};
 
-use super::{Options, RunError, history};
+use super::summary_file::{self, Report};
+use super::{Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
+use crate::solver::state::bookings::FACE_SUMS;
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 use crate::text::quantity;
 
 /// Writes history, telemetry and messages of a run. Rank 0 holds the files, all ranks make the same calls.
-pub struct Recorder {
+pub struct Recorder<'a, const D: usize> {
+    problem: &'a Problem<D>,
     history: Option<History>,
     telemetry: Option<Telemetry>,
     progress: Progress,
-    /// Lower corner of the domain, m.
-    origin: Vec<f64>,
-    /// Whether the history has columns of the way to equilibrium, and of the stage.
-    has: [bool; 2],
-    history_every: u64,
-    telemetry_every: u64,
     /// Step of the last row of the history; the same on all ranks.
     last_row: Option<u64>,
+    /// What is known for the report of the run.
+    report: Report,
+    began: Instant,
     since: Instant,
     since_step: u64,
     since_traffic: Traffic,
@@ -39,12 +39,12 @@ fn on_all_ranks(comm: &Comm, known: Option<u64>) -> Option<u64> {
     known[0].checked_sub(1)
 }
 
-impl Recorder {
+impl<'a, const D: usize> Recorder<'a, D> {
     /// Collective. Opens new files, or goes on with those that an earlier part of the run has left, with the rows of the
     /// history that are `kept`.
-    pub fn open<const D: usize>(
+    pub fn open(
         comm: &Comm,
-        problem: &Problem<D>,
+        problem: &'a Problem<D>,
         options: &Options,
         solver: &mut Solver<D>,
         kept: Option<Kept>,
@@ -52,13 +52,7 @@ impl Recorder {
         let Clock { step, time, .. } = solver.clock;
         let path = |suffix: &str| problem.output.directory.join(format!("{}.{suffix}", problem.name));
         let (rows, lines) = (path("history.csv"), path("telemetry.jsonl"));
-        let has = [problem.has_equilibrium(), problem.stages.len() > 1];
-        let named = history::columns(
-            &solver.physics.loads,
-            &solver.physics.colliders,
-            solver.physics.adaptivity.is_some(),
-            has,
-        );
+        let named = history::columns(problem);
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let files = match (comm.rank(), kept) {
             (0, None) => History::create(&rows, &columns)
@@ -76,14 +70,13 @@ impl Recorder {
             _ => on_all_ranks(comm, last),
         };
         let mut recorder = Self {
+            problem,
             history,
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
-            origin: problem.origin.to_vec(),
-            has,
-            history_every: problem.history_every,
-            telemetry_every: problem.telemetry_every,
             last_row,
+            report: Report { ranks: comm.size(), threads: options.threads, ..Report::default() },
+            began: Instant::now(),
             since: Instant::now(),
             since_step: step,
             since_traffic: solver.traffic(),
@@ -102,21 +95,19 @@ impl Recorder {
     }
 
     /// Not collective. Has the next step note what its record needs.
-    fn prepare<const D: usize>(&self, solver: &mut Solver<D>) {
-        if (solver.clock.step + 1).is_multiple_of(self.telemetry_every) {
+    fn prepare(&self, solver: &mut Solver<D>) {
+        if (solver.clock.step + 1).is_multiple_of(self.problem.telemetry_every) {
             solver.weigh_next_step();
         }
     }
 
     /// Collective. After a step: what is due by step number.
-    pub fn after_step<const D: usize>(
-        &mut self,
-        comm: &Comm,
-        solver: &mut Solver<D>,
-    ) -> Result<(), RunError> {
+    pub fn after_step(&mut self, comm: &Comm, solver: &mut Solver<D>) -> Result<(), RunError> {
         let step = solver.clock.step;
-        let (row, record) =
-            (step.is_multiple_of(self.history_every), step.is_multiple_of(self.telemetry_every));
+        let (row, record) = (
+            step.is_multiple_of(self.problem.history_every),
+            step.is_multiple_of(self.problem.telemetry_every),
+        );
         if row || record {
             self.write(comm, solver, row, record)?;
         }
@@ -126,7 +117,7 @@ impl Recorder {
     }
 
     /// Collective. A row of the history and a record of telemetry.
-    pub fn write<const D: usize>(
+    pub fn write(
         &mut self,
         comm: &Comm,
         solver: &mut Solver<D>,
@@ -169,7 +160,7 @@ impl Recorder {
     }
 
     /// Collective. Sums over nodes and particles of the current state.
-    fn totals<const D: usize>(
+    fn totals(
         &mut self,
         comm: &Comm,
         solver: &mut Solver<D>,
@@ -184,7 +175,7 @@ impl Recorder {
     }
 
     /// Collective. Writes a row of the history.
-    fn row<const D: usize>(
+    fn row(
         &mut self,
         comm: &Comm,
         solver: &mut Solver<D>,
@@ -194,6 +185,8 @@ impl Recorder {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let loads = solver.load_totals();
+        let readings = solver.read_probes(&self.problem.probes);
+        let faces = solver.face_forces();
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
         let mut written = Ok(());
@@ -202,27 +195,35 @@ impl Recorder {
             if let Some(ledger) = &ledger {
                 values.extend(history::ledger_values(ledger));
             }
-            if self.has[0] {
+            if self.problem.has_equilibrium() {
                 values.extend(history::relaxation_values(&solver.relaxation));
             }
-            if self.has[1] {
+            if self.problem.stages.len() > 1 {
                 values.push((solver.physics.stage() + 1) as f64);
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
+            let probes = self.problem.probes.iter().zip(&readings);
+            probes.for_each(|(probe, readings)| values.extend(readings.values(probe, &self.problem.origin)));
+            faces.iter().for_each(|force| values.extend(&force[..D]));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
             for ((collider, state), reaction) in all {
-                values.extend(history::collider_values(collider, state, reaction, &self.origin));
+                values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
             }
             written = history.row(clock.step, &values);
+            let columns = history::columns(self.problem).into_iter().zip(values);
+            self.report.history =
+                columns.map(|((name, unit), value)| (name, (value, unit.to_owned()))).collect();
+            self.report.particles = particles.count;
         }
         // Where the row of this step has been written already, there is nothing to forget.
         solver.forget_reactions();
         solver.load_sums.forget(3, clock.time);
+        solver.face_sums.forget(FACE_SUMS, clock.time);
         written
     }
 
     /// Collective. Speed, traffic and memory since the last record.
-    fn record<const D: usize>(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
+    fn record(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
         let phases: Vec<(&'static str, f64)> =
             Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
@@ -271,17 +272,44 @@ impl Recorder {
     /// Not collective. Warns the user, on rank 0 alone.
     pub fn warning(&mut self, text: &str) {
         if self.history.is_some() {
+            self.report.warnings.push(text.to_owned());
             self.progress.warning(text);
         }
     }
 
     /// Not collective. Shows a line to the user.
     pub fn message(&mut self, text: &str) {
+        self.report.messages.push(text.to_owned());
         self.progress.message(text);
     }
 
+    /// Not collective. Writes the report of the run, on rank 0. All results are on disk by now, so a failure is only a warning.
+    pub fn report(&mut self, solver: &Solver<D>, summary: &Summary) {
+        if self.history.is_none() {
+            return;
+        }
+        let (problem, starts) = (self.problem, &solver.physics.stage_starts);
+        let stages = problem.stages.iter().filter(|_| problem.stages.len() > 1).zip(starts);
+        let report = Report {
+            program: format!("agimp {}", env!("CARGO_PKG_VERSION")),
+            job: problem.name.clone(),
+            title: problem.title.clone(),
+            steps: solver.clock.step,
+            time: solver.clock.time,
+            wall_seconds: self.began.elapsed().as_secs_f64(),
+            stages: stages.map(|(stage, start)| (stage.name.clone(), *start)).collect(),
+            column_collapse: summary.collapse.as_ref().map(Into::into),
+            outputs: summary.series.clone(),
+            picture: summary.picture.clone().ok().flatten(),
+            ..std::mem::take(&mut self.report)
+        };
+        if let Err(error) = report.write(&summary_file::path(problem)) {
+            self.warning(&format!("no report: {error}"));
+        }
+    }
+
     /// Collective. The run is over.
-    pub fn finish<const D: usize>(&mut self, comm: &Comm, solver: &Solver<D>) {
+    pub fn finish(&mut self, comm: &Comm, solver: &Solver<D>) {
         self.progress.finish(solver.clock.step, solver.clock.time, solver.clock.dt);
         let crossings = solver.crossings.gather(comm).to_string();
         if !crossings.is_empty() {

@@ -36,6 +36,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
         faces: problem.faces,
+        face_forces: problem.face_forces,
         colliders: problem.colliders.clone(),
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,

@@ -62,6 +62,7 @@ impl<const D: usize> Solver<D> {
             leaf_data: LeafData::default(),
             contacts: Contacts::new(&physics, clock.time),
             load_sums: ExactSums::new(physics.loads.len(), clock.time),
+            face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
             relaxation: Relaxation::default(),
             motion: Default::default(),
             physics,

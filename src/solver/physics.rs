@@ -23,6 +23,8 @@ pub struct Physics<const D: usize> {
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
+    /// Whether the forces on these faces are summed up.
+    pub face_forces: bool,
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
     /// Dynamic refinement; `None`: tree and particles keep their sizes.

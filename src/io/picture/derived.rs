@@ -3,10 +3,11 @@
 use super::{Tint, source};
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::checked::Checked;
-use crate::io::snapshot::fields::{det_f, mean, von_mises};
+use crate::io::snapshot::fields::{mean, von_mises};
 use crate::io::snapshot::{Header, PointField};
 use crate::material::{PLASTIC_STRAIN, PLASTIC_VOLUME};
 use crate::particle::chunk::Tag;
+use crate::particle::volume::det_f;
 
 /// Numbers of each particle, row by row.
 struct Table {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::View;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 
 /// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit (empty for pure numbers), values of all
 /// particles of a view in order.
@@ -162,37 +163,9 @@ pub(crate) fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 
     chunk.column(Layout::<D>::PLASTIC_STRAIN)[p]
 }
 
-/// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
-fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
-    let at = |component: usize| chunk.column(first + component)[p];
-    let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
-    [at(0), at(1), at(2), at(3), yz, xz]
-}
-
 /// Mass over current volume, kg/m³.
 fn density<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
-    let volume = (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p);
-    chunk.column(Layout::<D>::MASS)[p] / volume
-}
-
-fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    let elastic = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
-    det_f(elastic, chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
-}
-
-/// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
-/// variable (0 where a model has none).
-pub(crate) fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
-    let [xx, yy, zz, xy, yz, xz] = elastic;
-    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    determinant.sqrt() * libm::exp(plastic_volume)
-}
-
-/// σ = τ / det F.
-fn cauchy_stress<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
-    let ratio = volume_ratio(chunk, p);
-    symmetric(chunk, Layout::<D>::STRESS, p).map(|component| component / ratio)
+    chunk.column(Layout::<D>::MASS)[p] / volume(chunk, p)
 }
 
 /// A third of the trace.

@@ -6,22 +6,25 @@ use crate::load::{Kind, Load};
 use crate::quantity::{Expression, Quantity, Table};
 use crate::text::written as number;
 
-/// Most exact sums of colliders (six each) and loads (four each) that a checkpoint's header has room for.
+/// Most exact sums of colliders (six each), faces (one for each axis) and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
 
 /// All loads, or faults.
 pub(super) fn loads<const D: usize>(
     checks: &mut Checks,
     loads: &[Written],
-    colliders: usize,
+    taken: usize,
     space: &Space<D>,
     path: &Path,
 ) -> Option<Vec<Load<D>>> {
-    let most = (MAX_SUMS - 6 * colliders.min(MAX_SUMS / 6)) / 4;
+    let most = MAX_SUMS.saturating_sub(taken) / 4;
     if loads.len() > most {
         checks.fault(
             path,
-            format!("found {} loads; expected at most {most} beside {colliders} colliders", loads.len()),
+            format!(
+                "found {} loads; expected at most {most} beside the colliders and face forces of this job",
+                loads.len()
+            ),
         );
         return None;
     }

@@ -9,6 +9,7 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
+//! | `probes` | probes |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
@@ -35,6 +36,7 @@ mod checks;
 mod colliders;
 mod loads;
 mod overlap;
+mod probes;
 pub(super) mod settings;
 mod shapes;
 mod stages;
@@ -85,7 +87,9 @@ fn problem<const D: usize>(
         Some(gravity) => self::gravity(checks, gravity, &root.key("gravity")),
         None => Some(Gravity::constant([0.0; D])),
     };
-    let loads = loads(checks, &file.loads, file.colliders.len(), &space, &root.key("loads"));
+    let faces_with_sums = if file.history.face_forces { 2 * D } else { 0 };
+    let taken = 6 * file.colliders.len() + D * faces_with_sums;
+    let loads = loads(checks, &file.loads, taken, &space, &root.key("loads"));
     let stages = stages::stages(checks, file, &root);
     let load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
@@ -100,6 +104,7 @@ fn problem<const D: usize>(
     let (tree, bodies, faces) = (tree?, bodies?, faces?);
     let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
     let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
+    let probes = probes::probes(checks, file, &space, &root.key("probes"));
     let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
@@ -143,6 +148,8 @@ fn problem<const D: usize>(
             keep: file.checkpoint.keep as usize,
         },
         history_every: file.history.every_steps,
+        face_forces: file.history.face_forces,
+        probes: probes?,
         telemetry_every: file.telemetry.every_steps,
         report,
     };

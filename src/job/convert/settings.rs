@@ -170,6 +170,7 @@ pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     state.output = file::Output::default();
     state.checkpoint = file::Checkpoint::default();
     state.history = file::History::default();
+    state.probes.clear();
     state.telemetry = file::Telemetry::default();
     state.report = None;
     state.time.end = 0.0;

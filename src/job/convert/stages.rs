@@ -103,7 +103,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
 }
 
 /// Number of the thing with a name, or a fault with what is there.
-fn find(
+pub(super) fn find(
     checks: &mut Checks,
     name: &str,
     what: &str,

@@ -7,6 +7,7 @@ use super::common::yes;
 pub use super::common::{AxisName, Spin};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
+pub use super::probes::Probe;
 pub use super::stages::Stage;
 pub use super::stress::Stress;
 use crate::geometry::written::Shape;
@@ -81,6 +82,10 @@ pub struct JobFile {
     /// Table of scalars, `history.csv`.
     #[serde(default)]
     pub history: History,
+    /// Measurements of the material, columns of `history.csv`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 1000))]
+    pub probes: Vec<Probe>,
     /// Measurements of the run itself, `telemetry.jsonl`.
     #[serde(default)]
     pub telemetry: Telemetry,

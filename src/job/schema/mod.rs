@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`stages`], [`stress`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`probes`], [`stages`], [`stress`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
@@ -14,6 +14,7 @@ pub mod job_file;
 pub(super) mod json;
 pub mod loads;
 pub mod output;
+pub mod probes;
 pub mod reference;
 pub mod stages;
 pub mod stress;

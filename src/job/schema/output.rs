@@ -86,15 +86,23 @@ fn default_keep() -> u32 {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct History {
-    /// Steps between rows; 10 by default.
+    /// Steps between rows.
+    #[serde(default = "ten")]
     #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: u64,
+    /// Whether it has the mean force on each face of the domain since the row before, N: `force_x_min_x` and so on.
+    #[serde(default)]
+    pub face_forces: bool,
 }
 
 impl Default for History {
     fn default() -> Self {
-        Self { every_steps: 10 }
+        Self { every_steps: ten(), face_forces: false }
     }
+}
+
+fn ten() -> u64 {
+    10
 }
 
 /// Measurements of the run itself, `telemetry.jsonl`.

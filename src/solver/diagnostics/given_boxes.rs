@@ -97,6 +97,7 @@ impl<const D: usize> GivenBoxes<D> {
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
             faces: [[Contact::Slip; 2]; D],
+            face_forces: false,
             colliders: Vec::new(),
             adaptivity: None,
             leaving: Leaving::default(),

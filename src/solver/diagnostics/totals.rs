@@ -151,12 +151,12 @@ fn together(mut sum: ExactSum, other: ExactSum) -> ExactSum {
     sum
 }
 
-/// Mass, momentum and angular momentum of nothing.
 /// How much the mass on the nodes differs from that of the particles, as a share of it; 0 where there is no mass.
 pub fn mass_error(nodes: f64, particles: f64) -> f64 {
     if nodes == particles { 0.0 } else { (nodes - particles) / particles }
 }
 
+/// Mass, momentum and angular momentum of nothing.
 fn empty_sums() -> Vec<ExactSum> {
     vec![ExactSum::new(); 7]
 }
@@ -210,13 +210,15 @@ const SUMS: usize = 8;
 
 /// A sum of twice the usual precision: the rounding errors of `high` add up in `low` (Knuth's two-sum).
 #[derive(Clone, Copy, Debug, Default)]
-struct DoubleDouble {
+pub(super) struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
 impl DoubleDouble {
-    fn add(&mut self, other: Self) {
+    /// Adds a number or a sum.
+    pub(super) fn add(&mut self, other: impl Into<Self>) {
+        let other = other.into();
         let sum = self.high + other.high;
         let part = sum - self.high;
         let error = (self.high - (sum - part)) + (other.high - part);
@@ -224,11 +226,17 @@ impl DoubleDouble {
     }
 
     /// Adds this to an exact sum. Without the errors, which are no numbers, where the sum is not finite.
-    fn enter(&self, sum: &mut ExactSum) {
+    pub(super) fn enter(&self, sum: &mut ExactSum) {
         sum.add(self.high);
         if self.low.is_finite() {
             sum.add(self.low);
         }
+    }
+}
+
+impl From<f64> for DoubleDouble {
+    fn from(value: f64) -> Self {
+        Self { high: value, low: 0.0 }
     }
 }
 
@@ -302,7 +310,7 @@ fn leaf_totals<const D: usize>(
 }
 
 /// Elastic energy of the particles from `first` on per reference volume, J/m³.
-fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first: usize) -> Lanes {
+pub(super) fn elastic_energy<const D: usize>(physics: &Physics<D>, chunk: &Chunk<D>, first: usize) -> Lanes {
     let mut state = State::new([Lanes::splat(0.0); 6]);
     for (c, elastic) in state.elastic.iter_mut().enumerate().take(Layout::<D>::SYMMETRIC) {
         *elastic = Lanes::new(chunk.values(Layout::<D>::LEFT_CAUCHY_GREEN + c, first));

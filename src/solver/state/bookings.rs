@@ -1,4 +1,4 @@
-//! What is booked of colliders and loads on the way.
+//! What is booked of colliders, faces and loads on the way.
 use partition::comm::Comm;
 
 use crate::boundary::ColliderState;
@@ -78,6 +78,9 @@ impl<const D: usize> Contacts<D> {
         }
     }
 }
+
+/// Components of the impulse on a face.
+pub const FACE_SUMS: usize = 3;
 
 /// Sums of a load: three components of the impulse since the last row (kg m/s), and the work since the start (J), of the nodes
 /// that this rank counts.

@@ -70,7 +70,7 @@ impl<const D: usize> Solver<D> {
         std::mem::swap(&mut grid.fields.rows, &mut grid.increments.rows);
         if matches!(self.physics.transfer, Transfer::Xpic { .. }) {
             // These are velocities, which the filter may have turned towards a wall.
-            apply_faces(&mut grid.fields, &grid.plan, &self.physics.faces);
+            apply_faces(&mut grid.fields, &grid.plan, &self.physics.faces, |_, _, _| ());
         }
         self.prolong();
         let grid = &mut self.grid;

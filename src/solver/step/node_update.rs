@@ -25,11 +25,35 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
         let pushes = self.apply_loads(dt);
         let impulses = self.collide(rates);
-        let (grid, faces) = (&mut self.grid, &self.physics.faces);
-        self.phases.time(Phase::Nodes, || apply_faces(&mut grid.fields, &grid.plan, faces));
+        self.apply_faces();
         self.book_loads(&pushes);
         self.note_motion();
         impulses
+    }
+
+    /// Not collective. Holds the nodes on faces of the domain to their conditions, and sums up the impulses on these if that is asked
+    /// for, from the nodes that this rank counts.
+    fn apply_faces(&mut self) {
+        let (grid, faces) = (&mut self.grid, &self.physics.faces);
+        let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
+        self.phases.time(Phase::Nodes, || {
+            if sums.is_empty() {
+                return apply_faces(&mut grid.fields, plan, faces, |_, _, _| ());
+            }
+            apply_faces(&mut grid.fields, plan, faces, |face, node, impulse: [f64; D]| {
+                let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
+                if plan.blocks[block].owned >> bit & 1 == 1 {
+                    sums[face].iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
+                }
+            });
+        });
+    }
+
+    /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and upper along each axis; nothing
+    /// where nobody asks.
+    pub fn face_forces(&self) -> Vec<[f64; 3]> {
+        let mean = |impulse: f64| self.face_sums.mean(impulse, self.clock.time);
+        self.face_sums.totals(&self.comm).into_iter().map(|impulse| impulse.map(mean)).collect()
     }
 
     /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the increments alike.
@@ -70,11 +94,13 @@ pub fn update_velocity<const D: usize>(
     });
 }
 
-/// Applies the conditions of the domain's faces to the real nodes on them, axis by axis.
+/// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` gets face, node and what the node gives
+/// to the face, kg m/s.
 pub fn apply_faces<const D: usize>(
     fields: &mut NodeFields<D>,
     plan: &GridPlan<D>,
     faces: &[[Contact; 2]; D],
+    mut note: impl FnMut(usize, usize, [f64; D]),
 ) {
     for &(node, on) in
         plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)])
@@ -85,7 +111,10 @@ pub fn apply_faces<const D: usize>(
             for (side, inward) in [1.0, -1.0].into_iter().enumerate() {
                 if on >> (2 * axis + side) & 1 == 1 {
                     let normal = std::array::from_fn(|a| if a == axis { inward } else { 0.0 });
+                    let before = velocity;
                     faces[axis][side].apply(&mut velocity, &normal);
+                    let impulse = std::array::from_fn(|a| row[3] * (before[a] - velocity[a]));
+                    note(2 * axis + side, node as usize, impulse);
                 }
             }
         }

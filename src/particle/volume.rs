@@ -1,0 +1,35 @@
+//! Volume and Cauchy stress of a particle.
+use super::chunk::{Chunk, Layout};
+
+/// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
+pub fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
+    let at = |component: usize| chunk.column(first + component)[p];
+    let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
+    [at(0), at(1), at(2), at(3), yz, xz]
+}
+
+/// Volume over reference volume, det F.
+pub fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let elastic = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+    det_f(elastic, chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
+}
+
+/// Volume, m³; in plane strain of one metre of thickness.
+pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
+    (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p)
+}
+
+/// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
+/// variable (0 where a model has none).
+pub fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = elastic;
+    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    determinant.sqrt() * libm::exp(plastic_volume)
+}
+
+/// Cauchy stress σ = τ / det F, Pa, in the order of [`symmetric`].
+pub fn cauchy_stress<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let ratio = volume_ratio(chunk, p);
+    symmetric(chunk, Layout::<D>::STRESS, p).map(|component| component / ratio)
+}

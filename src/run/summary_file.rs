@@ -1,0 +1,94 @@
+//! `JOB.report.json`: what a finished run says of itself, for scripts.
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::report::Collapse;
+use crate::io::hdf5_file::FileError;
+use crate::io::lines::create_new;
+use crate::job::Problem;
+
+/// What a finished run says of itself. Quantities are in SI units.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Program and version.
+    pub program: String,
+    /// Name of the job.
+    pub job: String,
+    /// Title of the job.
+    pub title: String,
+    /// Steps done.
+    pub steps: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Ranks of the last part of the run.
+    pub ranks: usize,
+    /// Threads of each rank.
+    pub threads: usize,
+    /// Wall time of the last part of the run, s.
+    pub wall_seconds: f64,
+    /// Stages that have begun, with the times at which they did, s; empty in a job without stages.
+    pub stages: Vec<(String, f64)>,
+    /// Particles at the end.
+    pub particles: u64,
+    /// Last row of the history: value and unit by name of the column; no value where it is not a number.
+    pub history: BTreeMap<String, (f64, String)>,
+    /// Evaluation of a column collapse.
+    pub column_collapse: Option<ColumnCollapse>,
+    /// What the run has said on its way.
+    pub messages: Vec<String>,
+    /// What it has warned of.
+    pub warnings: Vec<String>,
+    /// Index of the outputs.
+    pub outputs: PathBuf,
+    /// Picture of the last state.
+    pub picture: Option<PathBuf>,
+}
+
+/// Final shape of a collapsed column, m, beside published laws.
+#[derive(Clone, Debug, Serialize)]
+pub struct ColumnCollapse {
+    /// Initial height over radius or half width.
+    pub aspect: f64,
+    /// Radius within which 98 % of the mass lies.
+    pub run_out: f64,
+    /// Outer edge of the connected deposit.
+    pub outer_edge: f64,
+    /// Height at the centre.
+    pub height: f64,
+    /// Run-out and height by authors.
+    pub laws: BTreeMap<&'static str, [Option<f64>; 2]>,
+}
+
+impl From<&Collapse> for ColumnCollapse {
+    fn from(collapse: &Collapse) -> Self {
+        Self {
+            aspect: collapse.aspect,
+            run_out: collapse.front,
+            outer_edge: collapse.edge,
+            height: collapse.height,
+            laws: collapse.laws.iter().map(|law| (law.authors, [law.edge, law.height])).collect(),
+        }
+    }
+}
+
+/// Where the report of a job is.
+pub fn path<const D: usize>(problem: &Problem<D>) -> PathBuf {
+    problem.output.directory.join(format!("{}.report.json", problem.name))
+}
+
+impl Report {
+    /// Not collective. Writes it, under a temporary name first.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let part = path.with_added_extension("part");
+        let save = || -> std::io::Result<()> {
+            let mut text = serde_json::to_string_pretty(self).map_err(std::io::Error::other)?;
+            text.push('\n');
+            create_new(&part)?.write_all(text.as_bytes())?;
+            std::fs::rename(&part, path)
+        };
+        save().map_err(|source| FileError::System { path: path.into(), action: "write the report", source })
+    }
+}

@@ -1,0 +1,99 @@
+//! What probes read.
+use rayon::prelude::*;
+
+use super::totals::{DoubleDouble, elastic_energy};
+use crate::exact_sum::ExactSum;
+use crate::particle::Layout;
+use crate::particle::chunk::{Chunk, Tag};
+use crate::particle::volume::{cauchy_stress, volume};
+use crate::probe::{Measured, Probe, Readings};
+use crate::simd::{LANES, Lanes, Vector};
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
+
+/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress and plastic strain.
+const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1;
+
+/// Sums and extremes over particles of one or more leaves.
+#[derive(Clone)]
+struct Partial<const D: usize> {
+    sums: [DoubleDouble; SUMS],
+    /// Greatest squared speed, and negative least and greatest coordinates.
+    greatest: Vec<f64>,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective. What the probes read of the present state, in their order.
+    pub fn read_probes(&self, probes: &[Probe<D>]) -> Vec<Readings<D>> {
+        probes.iter().map(|probe| self.read(probe)).collect()
+    }
+
+    fn read(&self, probe: &Probe<D>) -> Readings<D> {
+        let physics = &self.physics;
+        let leaves: Vec<Option<Partial<D>>> =
+            self.chunks.par_iter().with_min_len(4).map(|chunk| of_leaf(physics, probe, chunk)).collect();
+        let mut sums = vec![ExactSum::new(); SUMS];
+        let mut greatest = vec![f64::NEG_INFINITY; 1 + 2 * D];
+        for leaf in leaves.iter().flatten() {
+            sums.iter_mut().zip(&leaf.sums).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
+            greatest.iter_mut().zip(&leaf.greatest).for_each(|(all, one)| *all = all.max(*one));
+        }
+        ExactSum::sum_over_ranks(&self.comm, &mut sums);
+        self.comm.max_f64s(&mut greatest);
+        let of = |i: usize| sums[i].to_f64();
+        Readings {
+            mass: of(0),
+            volume: of(1),
+            mass_place: std::array::from_fn(|a| of(2 + a)),
+            momentum: std::array::from_fn(|a| of(5 + a)),
+            energies: [of(8), of(9), of(10)],
+            volume_stress: std::array::from_fn(|c| of(11 + c)),
+            volume_strain: of(17),
+            greatest_speed: greatest[0].max(0.0).sqrt(),
+            extent: [std::array::from_fn(|a| -greatest[1 + a]), std::array::from_fn(|a| greatest[1 + D + a])],
+        }
+    }
+}
+
+/// Sums over the particles of a leaf that count, in their order; none: `None`.
+fn of_leaf<const D: usize>(physics: &Physics<D>, probe: &Probe<D>, chunk: &Chunk<D>) -> Option<Partial<D>> {
+    let mut all = None;
+    let mut energies = [0.0; LANES];
+    let wants_energy = probe.quantities.contains(&Measured::ElasticEnergy);
+    let mut energies_from = usize::MAX;
+    for p in 0..chunk.len() {
+        let x = chunk.position(p);
+        if !probe.counts(&x, Tag::unpack(chunk.tags()[p]).body) {
+            continue;
+        }
+        let first = p / LANES * LANES;
+        if wants_energy && energies_from != first {
+            energies_from = first;
+            energies = Lanes::to_array(elastic_energy(physics, chunk, first));
+        }
+        let value = |column: usize| chunk.column(column)[p];
+        let (mass, volume) = (value(Layout::<D>::MASS), volume(chunk, p));
+        let reference = (2.0 * value(Layout::<D>::HALF)).powi(D as i32);
+        let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
+        let speed_squared = velocity.iter().fold(0.0, |sum: f64, v| v.mul_add(*v, sum));
+        let [xx, yy, zz, xy, yz, xz] = cauchy_stress(chunk, p);
+        let mut values = [0.0; SUMS];
+        (values[0], values[1]) = (mass, volume);
+        for a in 0..D {
+            (values[2 + a], values[5 + a]) = (mass * x[a], mass * velocity[a]);
+        }
+        values[8] = 0.5 * mass * speed_squared;
+        values[9] = if wants_energy { reference * energies[p - first] } else { 0.0 };
+        values[10] = reference * value(Layout::<D>::WORK);
+        values[11..17].copy_from_slice(&[xx, yy, zz, xy, xz, yz].map(|component| volume * component));
+        values[17] = volume * value(Layout::<D>::PLASTIC_STRAIN);
+        let partial = all.get_or_insert_with(|| Partial::<D> {
+            sums: [DoubleDouble::default(); SUMS],
+            greatest: vec![f64::NEG_INFINITY; 1 + 2 * D],
+        });
+        partial.sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value));
+        let extremes = [speed_squared].into_iter().chain(x.map(|x| -x)).chain(x);
+        partial.greatest.iter_mut().zip(extremes).for_each(|(all, one)| *all = all.max(one));
+    }
+    all
+}

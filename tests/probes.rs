@@ -1,0 +1,125 @@
+//! Measurements of a run through the whole program: probes, forces on faces and the report, against closed forms, with the same results on
+//! any ranks and across restarts.
+#[path = "common/history.rs"]
+#[allow(dead_code, reason = "each test uses its part")]
+mod history;
+#[path = "mpi_runs/launch.rs"]
+#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
+mod launch;
+#[path = "common/mpirun.rs"]
+mod mpirun;
+#[path = "common/restart.rs"]
+mod restart;
+
+use history::History;
+use launch::{run, succeed};
+
+fn history_of(name: &str, job: &str) -> (History, serde_json::Value) {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join(format!("{name}.toml"));
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &[]));
+    let report = directory.path().join(format!("out/{name}/{name}.report.json"));
+    let report = serde_json::from_str(&std::fs::read_to_string(report).expect("report")).expect("JSON");
+    (History::read(directory.path(), name), report)
+}
+
+const TWO_BLOCKS: &str = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nmin = [1, 0]\nsize = [2, 2]\nroot_edge = 1\n\
+    [boundaries]\ny_min.kind = 'sticky'\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_max.kind = 'separating'\n\
+    [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+    [[bodies]]\nname = 'left'\nmaterial = 'm'\nshape = { kind = 'box', min = [1.25, 1], max = [1.5, 1.5] }\n\
+    [[bodies]]\nname = 'right'\nmaterial = 'm'\nshape = { kind = 'box', min = [2.25, 1], max = [2.75, 1.5] }\nvelocity = [0, 2]\n\
+    [[probes]]\nname = 'left'\nbodies = ['left']\nquantities = ['mass', 'centre', 'velocity', 'momentum', 'kinetic_energy', 'extent', 'volume']\n\
+    [[probes]]\nname = 'right'\nbodies = ['right']\nquantities = ['mass', 'centre', 'velocity', 'momentum', 'kinetic_energy', 'extent', 'greatest_speed']\n\
+    [[probes]]\nname = 'below'\nshape = { kind = 'box', min = [1, 0], max = [3, 0.5] }\nquantities = ['mass', 'centre', 'stress', 'pressure']\n";
+
+/// Bodies in free flight: centre, velocity and energy of each are those of a parabola, sums over bodies those of the run, and a shape
+/// that nothing has reached has no mass and no mean.
+#[test]
+fn bodies_in_flight_follow_their_parabolas() {
+    let (history, report) = history_of("flight", &format!("{TWO_BLOCKS}[time]\nend = 0.2\n"));
+    let t = history.last("time");
+    for (name, mass, height, start) in [("left", 125.0, 1.25, 0.0), ("right", 250.0, 1.25, 2.0)] {
+        let of = |what: &str, axis: &str| history.last(&format!("{what}_{name}{axis}"));
+        let close = |found: f64, exact: f64| {
+            assert!((found - exact).abs() < 1e-11 * exact.abs(), "{name}: {found} for {exact}")
+        };
+        close(of("mass", ""), mass);
+        close(of("velocity", "_y"), start - 10.0 * t);
+        close(of("momentum", "_y"), mass * (start - 10.0 * t));
+        close(of("kinetic_energy", ""), 0.5 * mass * (start - 10.0 * t).powi(2));
+        // Each step moves with its last velocity: behind the parabola by half a step.
+        let (exact, late) = (height + start * t - 5.0 * t * t, 5.0 * t * history.last("dt"));
+        let found = of("centre", "_y");
+        assert!((found - exact + late).abs() < 0.5 * late, "{found} for {exact}, late by {late}");
+        // Centres of particles: an eighth of a cell, 1/16 m, from the surface.
+        close(of("greatest", "_y") - of("least", "_y"), 0.5 - 0.125);
+    }
+    assert!(
+        (history.last("centre_left_x") - 1.375).abs() < 1e-12
+            && (history.last("volume_left") - 0.125).abs() < 1e-12
+    );
+    let (fastest, mean) = (history.last("greatest_speed_right"), history.last("velocity_right_y").abs());
+    assert!((fastest - mean).abs() < 1e-13 * mean, "{fastest} {mean}");
+    let total = history.last("momentum_left_y") + history.last("momentum_right_y");
+    assert!((total - history.last("momentum_y")).abs() < 1e-11 * total.abs());
+    assert_eq!(history.last("mass_below"), 0.0);
+    assert!(history.last("pressure_below").is_nan() && history.last("centre_below_y").is_nan());
+    assert_eq!(report["steps"].as_u64(), Some(history.last("step") as u64));
+    assert_eq!(report["history"]["momentum_y"][0].as_f64(), Some(history.last("momentum_y")));
+    assert_eq!(report["history"]["momentum_y"][1], "kg m/s");
+    assert!(
+        report["history"]["pressure_below"][0].is_null()
+            && report["warnings"].as_array().is_some_and(Vec::is_empty)
+    );
+}
+
+/// A column of water-like stress at rest: the faces carry its weight and its side pressure, and the mean stress in a layer is that of
+/// the weight above. The probes of two halves add up to that of the whole.
+#[test]
+fn a_column_at_rest_weighs_on_its_floor() {
+    let job = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nsize = [2, 2]\nroot_edge = 1\n\
+        [boundaries]\ny_min.kind = 'slip'\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_max.kind = 'separating'\n\
+        [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'hencky'\nyoung = 1e8\npoisson = 0.25\n\
+        [[bodies]]\nname = 'ground'\nmaterial = 'm'\nshape = { kind = 'box', min = [0, 0], max = [2, 1.125] }\n\
+        stress = { kind = 'geostatic', k0 = 0.5 }\n\
+        [[probes]]\nname = 'layer'\nshape = { kind = 'box', min = [0, 0.25], max = [2, 0.75] }\nquantities = ['stress', 'pressure', 'mass']\n\
+        [history]\nface_forces = true\n[time]\nend = 0.01\n";
+    let (history, _) = history_of("ground", job);
+    let (weight, side) = (1000.0 * 10.0 * 2.0 * 1.125, 0.5 * 0.5 * 1e4 * 1.125 * 1.125);
+    let close = |name: &str, exact: f64| {
+        let found = history.last(name);
+        println!("{name}: {found} for {exact}");
+        assert!((found - exact).abs() <= 1e-9 * weight, "{name}: {found} for {exact}");
+    };
+    close("force_y_min_y", -weight);
+    close("force_y_max_y", 0.0);
+    close("force_x_min_x", -side);
+    close("force_x_max_x", side);
+    close("force_x_min_y", 0.0);
+    // Mean depth of the layer: 1.125 m - 0.5 m.
+    let vertical = -1e4 * 0.625;
+    for (name, exact) in [("xx", 0.5 * vertical), ("yy", vertical), ("zz", 0.5 * vertical), ("xy", 0.0)] {
+        close(&format!("stress_layer_{name}"), exact);
+    }
+    close("pressure_layer", -2.0 * vertical / 3.0);
+    close("mass_layer", 1000.0);
+}
+
+/// Blocks fall into a graded tree and onto a floor: probes and face forces have the same bits on 1 to 3 ranks and across a restart, and
+/// the floor's impulse is what the momentum lacks.
+#[test]
+fn measurements_are_the_same_on_any_ranks_and_across_restart() {
+    let rest = "[history]\nface_forces = true\nevery_steps = 5\n[time]\nend = 0.6\n[checkpoint]\nevery_steps = 20\nkeep = 99\n\
+                [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [1, 0], max = [3, 0.6] }\n";
+    restart::assert_same_on_any_ranks(&format!("{TWO_BLOCKS}{rest}"), "blocks", |directory, _| {
+        let history = History::read(directory, "blocks");
+        let impulse = history.integral("force_y_min_y", 0.0);
+        let (t, mass) = (history.last("time"), history.last("mass"));
+        let free = 500.0 - 10.0 * mass * t;
+        let lost = free - history.last("momentum_y");
+        println!("impulse {impulse} on the floor, momentum lost {lost}");
+        assert!(impulse < -100.0 && (impulse - lost).abs() < 1e-9 * lost.abs(), "{impulse} for {lost}");
+        assert!(history.column("mass_below").iter().any(|&mass| mass > 0.0));
+    });
+}
