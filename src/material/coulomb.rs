@@ -8,7 +8,7 @@ use super::parameters::Lame;
 use crate::simd::{Vector, VectorMask};
 
 /// A pyramid, for each particle.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Pyramid<V> {
     /// sin φ.
     pub friction: V,
@@ -31,21 +31,97 @@ pub(super) struct Returned<V: Vector> {
     pub opens: V::Mask,
 }
 
-impl<V: Vector> Pyramid<V> {
+/// What follows from a pyramid and the elastic constants: for pyramids that do not change, once for all.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slopes<V> {
+    /// Stress per flow on the face between 1 and 3, along 1, 2 and 3, Pa.
+    stress: [V; 3],
+    /// Flow per excess of f on this face, 1/Pa.
+    face: V,
+    /// The same per sum of the excesses of f on this face and the one between 1 and 2, where they share the flow.
+    low_edge: V,
+    /// The same with the face between 2 and 3.
+    high_edge: V,
     /// Mean stress of the apex, Pa; infinite without friction.
+    pub apex: V,
+}
+
+impl<V: Copy> Pyramid<V> {
+    /// With other numbers.
     #[inline(always)]
-    pub(super) fn apex(&self) -> V {
-        let zero = V::splat(0.0);
-        zero.lt(self.friction).select(self.strength * 0.5 / self.friction, V::splat(f64::INFINITY))
+    pub(super) fn map<W>(&self, change: impl Fn(V) -> W) -> Pyramid<W> {
+        Pyramid {
+            friction: change(self.friction),
+            dilation: change(self.dilation),
+            strength: change(self.strength),
+            tension: change(self.tension),
+        }
+    }
+}
+
+impl<V: Copy> Slopes<V> {
+    /// With other numbers.
+    #[inline(always)]
+    pub(super) fn map<W>(&self, change: impl Fn(V) -> W) -> Slopes<W> {
+        let [first, second, third] = self.stress;
+        Slopes {
+            stress: [change(first), change(second), change(third)],
+            face: change(self.face),
+            low_edge: change(self.low_edge),
+            high_edge: change(self.high_edge),
+            apex: change(self.apex),
+        }
+    }
+}
+
+impl<V: Vector> Pyramid<V> {
+    /// What follows from it.
+    #[inline(always)]
+    pub(super) fn slopes(&self, elastic: &Lame) -> Slopes<V> {
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let (friction, dilation) = (self.friction, self.dilation);
+        let (twice_mu, lambda) = (2.0 * elastic.mu, elastic.lambda);
+        let bulk = dilation * (2.0 * lambda);
+        let first = (one + dilation).mul_add(V::splat(twice_mu), bulk);
+        let third = (one - dilation).mul_add(V::splat(-twice_mu), bulk);
+        // How much a flow lowers f on its own face and on the two faces beside.
+        let product = friction * dilation;
+        let common = product * (4.0 * lambda);
+        let own = (product + one).mul_add(V::splat(2.0 * twice_mu), common);
+        let beside_low = ((one + friction) * (one + dilation)).mul_add(V::splat(twice_mu), common);
+        let beside_high = ((one - friction) * (one - dilation)).mul_add(V::splat(twice_mu), common);
+        let apex = self.strength * 0.5 / friction;
+        Slopes {
+            stress: [first, bulk, third],
+            face: one / own,
+            low_edge: one / (own + beside_low),
+            high_edge: one / (own + beside_high),
+            apex: zero.lt(friction).select(apex, V::splat(f64::INFINITY)),
+        }
     }
 
-    /// Whether a stress with this mean and this norm of the deviator may lie outside. A cheap test that errs to the safe side.
+    /// Whether a stress with this mean and this norm of the deviator lies inside whatever its Lode angle, or outside whatever
+    /// its Lode angle. Where it is neither, [`Pyramid::may_hold`] has to tell.
     #[inline(always)]
-    pub(super) fn may_flow(&self, mean: V, norm: V) -> V::Mask {
-        // s₁ - s₃ <= √2 |dev|, and no principal stress is further from the mean than √(2/3) |dev|.
+    pub(super) fn surely(&self, mean: V, norm: V, slopes: &Slopes<V>) -> [V::Mask; 2] {
+        // √(3/2) |dev| <= s₁ - s₃ <= √2 |dev|; no principal stress is further from the mean than √(2/3) |dev|, and the sum of the
+        // greatest and the least from twice the mean by √(1/6) |dev|.
         let far = norm * (2.0_f64 / 3.0).sqrt();
-        let least = norm.mul_add(V::splat(2.0_f64.sqrt()), (mean + mean + far) * self.friction);
-        self.strength.lt(least) | self.tension.min(self.apex()).lt(mean + far)
+        let beside = norm * (1.0_f64 / 6.0).sqrt();
+        let twice = mean + mean;
+        let most = norm.mul_add(V::splat(2.0_f64.sqrt()), (twice + far) * self.friction);
+        let least = norm.mul_add(V::splat(1.5_f64.sqrt()), (twice - beside) * self.friction);
+        let holds = most.le(self.strength) & (mean + far).le(self.tension.min(slopes.apex));
+        [holds, self.strength.lt(least)]
+    }
+
+    /// Whether a stress, greatest first, lies inside although each value may be wrong by `slack`.
+    #[inline(always)]
+    pub(super) fn holds(&self, stress: &[V; 3], slack: V) -> V::Mask {
+        let [high, _, low] = *stress;
+        let (high, low) = (high + slack, low - slack);
+        let face = (high - low) + (high + low + slack + slack).mul_add(self.friction, -self.strength);
+        face.le(V::splat(0.0)) & high.le(self.tension)
     }
 
     /// Value of f, Pa, where the pyramid is that between two stresses.
@@ -56,46 +132,32 @@ impl<V: Vector> Pyramid<V> {
 
     /// The stress to which a trial stress, greatest first, returns.
     #[inline(always)]
-    pub(super) fn returned(&self, trial: &[V; 3], elastic: &Lame) -> Returned<V> {
-        let one = V::splat(1.0);
+    pub(super) fn returned(&self, trial: &[V; 3], slopes: &Slopes<V>, elastic: &Lame) -> Returned<V> {
         let [s1, s2, s3] = *trial;
-        let (friction, dilation) = (self.friction, self.dilation);
-        let (twice_mu, lambda) = (2.0 * elastic.mu, elastic.lambda);
-        // Stress per flow on the face between 1 and 3: along 1, 2 and 3.
-        let bulk = dilation * (2.0 * lambda);
-        let d1 = (one + dilation).mul_add(V::splat(twice_mu), bulk);
-        let d3 = (one - dilation).mul_add(V::splat(-twice_mu), bulk);
-        // How much this lowers f there and on the two faces beside.
-        let product = friction * dilation;
-        let common = product * (4.0 * lambda);
-        let own = (product + one).mul_add(V::splat(2.0 * twice_mu), common);
-        let beside_low = ((one + friction) * (one + dilation)).mul_add(V::splat(twice_mu), common);
-        let beside_high = ((one - friction) * (one - dilation)).mul_add(V::splat(twice_mu), common);
-
+        let [d1, bulk, d3] = slopes.stress;
         let excess = self.face(s1, s3);
-        let flow = excess / own;
+        let flow = excess * slopes.face;
         let face = [flow.neg_mul_add(d1, s1), flow.neg_mul_add(bulk, s2), flow.neg_mul_add(d3, s3)];
         // Two equal stresses after the return share the flow of their faces.
-        let low = (excess + self.face(s1, s2)) / (own + beside_low);
+        let low = (excess + self.face(s1, s2)) * slopes.low_edge;
         let pair = low.neg_mul_add(bulk + d3, s2 + s3) * 0.5;
         let low_edge = [low.neg_mul_add(d1, s1), pair, pair];
-        let high = (excess + self.face(s2, s3)) / (own + beside_high);
+        let high = (excess + self.face(s2, s3)) * slopes.high_edge;
         let pair = high.neg_mul_add(bulk + d1, s1 + s2) * 0.5;
         let high_edge = [pair, pair, high.neg_mul_add(d3, s3)];
 
         let (is_low, is_high) = (face[1].lt(face[2]), face[0].lt(face[1]));
-        let apex = self.apex();
         let at_apex = (is_low & low_edge[0].lt(low_edge[1])) | (is_high & high_edge[1].lt(high_edge[2]));
         let mut flows = V::splat(0.0).lt(excess);
         let mut opens = flows & at_apex;
         let mut stress = *trial;
         for k in 0..3 {
             let edge = is_high.select(high_edge[k], is_low.select(low_edge[k], face[k]));
-            stress[k] = flows.select(at_apex.select(apex, edge), trial[k]);
+            stress[k] = flows.select(at_apex.select(slopes.apex, edge), trial[k]);
         }
         let torn = self.tension.lt(stress[0]);
         if torn.any() {
-            let cut = self.cut_off(trial, [d1, bulk, d3], elastic);
+            let cut = self.cut_off(trial, slopes.stress, elastic);
             for k in 0..3 {
                 stress[k] = torn.select(cut[k], stress[k]);
             }
@@ -282,7 +344,7 @@ mod tests {
                 tension: Lanes::splat(tension),
             };
             let lanes = [0, 1, 2].map(|k| Lanes::new(trials.map(|trial| trial[k])));
-            let returned = pyramid.returned(&lanes, &elastic);
+            let returned = pyramid.returned(&lanes, &pyramid.slopes(&elastic), &elastic);
             let stress = returned.stress.map(Lanes::to_array);
             for (lane, trial) in trials.into_iter().enumerate() {
                 let expected = by_all_sets(trial, [friction, dilation, strength, tension], &elastic);

@@ -106,6 +106,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     /// See [`Material::wave_speed`].
     fn wave_speed(&self) -> f64;
 
+    /// See [`Material::viscous_speed`].
+    fn viscous_speed(&self, _cell: f64) -> f64 {
+        0.0
+    }
+
     /// See [`Material::history_names`].
     fn history_names(&self) -> &'static [&'static str] {
         &[]
@@ -157,6 +162,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Greatest wave speed of the undeformed material, m/s.
     fn wave_speed(&self) -> f64;
 
+    /// How much faster waves of the undeformed material count on cells of edge `cell` (m), so that explicit viscous stress is
+    /// stable, m/s.
+    fn viscous_speed(&self, cell: f64) -> f64;
+
     /// Names of the history variables in use, at most [`HISTORIES`]. The first, if there are any, is a measure of plastic
     /// strain; the second, if there are two, the logarithm of the plastic volume ratio; more belong to the model.
     fn history_names(&self) -> &'static [&'static str];
@@ -202,6 +211,10 @@ impl<L: Law> Material for L {
 
     fn wave_speed(&self) -> f64 {
         Law::wave_speed(self)
+    }
+
+    fn viscous_speed(&self, cell: f64) -> f64 {
+        Law::viscous_speed(self, cell)
     }
 
     fn history_names(&self) -> &'static [&'static str] {

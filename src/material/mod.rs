@@ -9,6 +9,7 @@
 //! | `initial.rs` | states under a given stress |
 //! | `laws/` | the models, one file each, and the list of them |
 //! | `parameters/` | what models share of their parameters: elastic constants, checks, reading them from text |
+//! | `angle.rs` | angles of friction and dilation that may soften |
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `root.rs` | roots of scalar equations, lane by lane |
@@ -16,6 +17,7 @@
 //! | `driver/` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
+mod angle;
 mod coulomb;
 pub mod driver;
 mod hardening;

@@ -8,13 +8,27 @@ const MOST: usize = 80;
 /// Relative change below which a lane has converged.
 const TOLERANCE: f64 = 4.0 * f64::EPSILON;
 
+/// A function of lanes. What captures more than a few numbers is a type of its own, with its method marked `inline(always)`, and not
+/// a closure: the compiler may make closures functions of their own, which lack the instructions of the kernel that calls them.
+pub(super) trait Function<V, R> {
+    /// Its value.
+    fn at(&self, x: V) -> R;
+}
+
+impl<V, R, F: Fn(V) -> R> Function<V, R> for F {
+    #[inline(always)]
+    fn at(&self, x: V) -> R {
+        self(x)
+    }
+}
+
 /// The root of a decreasing function above 0, by Newton's method within a bracket.
 ///
 /// `function` gives value and slope; its value is positive at 0 and not positive at `high`. A value of at most `noise` counts as
 /// zero. The first point is `guess`, above 0 and at most `high`; lanes that are not `active` stay there.
 #[inline(always)]
 pub(super) fn newton<V: Vector>(
-    function: impl Fn(V) -> [V; 2],
+    function: impl Function<V, [V; 2]>,
     guess: V,
     high: V,
     noise: V,
@@ -28,7 +42,7 @@ pub(super) fn newton<V: Vector>(
         if !pending.any() {
             break;
         }
-        let [value, slope] = function(x);
+        let [value, slope] = function.at(x);
         let left = zero.lt(value);
         low = (pending & left).select(x, low);
         above = (pending & !left).select(x, above);
@@ -48,13 +62,19 @@ pub(super) fn newton<V: Vector>(
 /// The root of a continuous function between 0 and `high`, where it has values of different signs, positive at 0: regula
 /// falsi in the form of Anderson and Björck (1973), with a bisection where three steps have not halved the bracket.
 ///
-/// A value of at most `noise` counts as zero. Lanes that are not `active` stay at 0.
+/// `at_zero` is the value at 0; that at `high` need not be known and counts as its negative. The first point is `guess`. A value of
+/// at most `noise` counts as zero. Lanes that are not `active` stay at 0.
 #[inline(always)]
-pub(super) fn bracketed<V: Vector>(function: impl Fn(V) -> V, high: V, noise: V, active: V::Mask) -> V {
+pub(super) fn bracketed<V: Vector>(
+    function: impl Function<V, V>,
+    [at_zero, guess, high]: [V; 3],
+    noise: V,
+    active: V::Mask,
+) -> V {
     let zero = V::splat(0.0);
     let half = V::splat(0.5);
     let (mut low, mut above) = (zero, high);
-    let (mut at_low, mut at_above) = (function(low), function(above));
+    let (mut at_low, mut at_above) = (at_zero, -at_zero);
     let mut x = zero;
     let mut pending = active & !at_low.abs().le(noise);
     let mut width = high;
@@ -65,7 +85,10 @@ pub(super) fn bracketed<V: Vector>(function: impl Fn(V) -> V, high: V, noise: V,
         if !pending.any() {
             break;
         }
-        let secant = low + (above - low) * (at_low / (at_low - at_above));
+        let secant = match step {
+            0 => guess,
+            _ => low + (above - low) * (at_low / (at_low - at_above)),
+        };
         let middle = (low + above) * 0.5;
         let inside = low.lt(secant) & secant.lt(above);
         let mut next = inside.select(secant, middle);
@@ -74,7 +97,7 @@ pub(super) fn bracketed<V: Vector>(function: impl Fn(V) -> V, high: V, noise: V,
             next = slow.select(middle, next);
             width = above - low;
         }
-        let value = function(next);
+        let value = function.at(next);
         let left = zero.lt(value);
         // An end that stays twice gets a smaller value, so that the next secant comes nearer to it.
         let shrink = |old: V| {
@@ -131,7 +154,8 @@ mod tests {
             let load = Lanes::new(std::array::from_fn(|lane| 0.05 + 0.1 * lane as f64));
             let function = |x: Lanes| load - x - (x - Lanes::splat(corner)).max(Lanes::splat(0.0)) * 50.0;
             let one = Lanes::splat(1.0);
-            let x = bracketed(function, one, one * 1e-16, Mask::from_bits(ALL));
+            let points = [function(Lanes::splat(0.0)), load, one];
+            let x = bracketed(function, points, one * 1e-16, Mask::from_bits(ALL));
             for value in function(x).to_array() {
                 assert!(value.abs() <= 5e-14, "{value}");
             }

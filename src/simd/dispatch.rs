@@ -14,7 +14,7 @@ pub trait Kernel {
     type Output;
 
     /// Does the work. To be marked `inline(always)`, and so is all that it calls with vectors: functions of their own, as those
-    /// that map arrays can become, are compiled without AVX-512, and then call one for each operation.
+    /// that map arrays and closures that are called twice can become, are compiled without AVX-512, and then call one for each operation.
     fn run<V: Vector>(self) -> Self::Output;
 }
 

@@ -17,6 +17,7 @@ use super::hencky::Hencky;
 use super::von_mises::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
+use crate::material::root::Function;
 use crate::material::tensor::strain::Strain;
 use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask};
@@ -283,6 +284,58 @@ impl Law for Dry {
     }
 }
 
+/// The cone of a particle as it shears.
+struct Cone<'a, V> {
+    law: &'a Cohesive,
+    step: &'a Step,
+    /// Plastic strain and temperature at the start of the step.
+    strain: V,
+    temperature: V,
+}
+
+impl<V: Vector> Cone<'_, V> {
+    /// k after an increment of the norm of the plastic shear strain, and its derivative, Pa.
+    #[inline(always)]
+    fn strength(&self, increment: V) -> [V; 2] {
+        let root = (2.0_f64 / 3.0).sqrt();
+        let flow = Flow { increment: increment * root, temperature: [self.temperature, V::splat(0.0)] };
+        let strain = increment.mul_add(V::splat(root), self.strain);
+        let [value, slope] = self.law.cohesion.strength(strain, &flow, self.step);
+        [value * self.law.strength, slope * (self.law.strength * root)]
+    }
+
+    /// Increment at which a load, less by `stiffness` for each, meets the strength of the cone; `first` is that at the start.
+    #[inline(always)]
+    fn slip(&self, [load, first]: [V; 2], stiffness: f64, active: V::Mask) -> V {
+        let least = V::splat(f64::MIN_POSITIVE);
+        let high = (load * (1.0 / stiffness)).max(least);
+        let guess = ((load - first) * (1.0 / stiffness)).max(least).min(high);
+        let excess = Excess { cone: self, load, stiffness };
+        let slip = root::newton(excess, guess, high, load.abs() * f64::EPSILON, active);
+        active.select(slip, V::splat(0.0))
+    }
+}
+
+/// What is left of a load after an increment of the norm of the plastic shear strain, beyond the strength then, Pa.
+struct Excess<'a, V> {
+    cone: &'a Cone<'a, V>,
+    load: V,
+    stiffness: f64,
+}
+
+impl<V: Vector> Function<V, [V; 2]> for Excess<'_, V> {
+    #[inline(always)]
+    fn at(&self, increment: V) -> [V; 2] {
+        let [mut value, mut slope] = self.cone.strength(increment);
+        if let Some(overstress) = self.cone.law.overstress {
+            let [own, change] = overstress.of(increment, self.cone.step.dt);
+            (value, slope) = (value + own, slope + change);
+        }
+        let stiffness = V::splat(self.stiffness);
+        [increment.neg_mul_add(stiffness, self.load) - value, -(slope + stiffness)]
+    }
+}
+
 impl Cohesive {
     /// What the parameters ask for beside dry friction, if anything.
     fn new(p: &Parameters, lame: Lame, density: f64) -> Option<Self> {
@@ -310,6 +363,13 @@ impl Cohesive {
         self.volume_correction && self.beta > 0.0
     }
 
+    /// Greatest trace that a cone of this strength carries, Pa.
+    #[inline(always)]
+    fn tip<V: Vector>(&self, strength: V) -> V {
+        let apex = if self.alpha > 0.0 { strength * (1.0 / self.alpha) } else { V::splat(f64::INFINITY) };
+        apex.min(V::splat(3.0 * self.tension))
+    }
+
     /// Any cohesion, dilation, cut-off, hardening and overstress: `f = |dev τ| + α tr τ - k`, flow along `|dev τ| + β tr τ`.
     #[inline(always)]
     fn respond<V: Vector>(&self, solid: &Hencky, state: &mut State<V>, step: &Step) {
@@ -329,23 +389,12 @@ impl Cohesive {
         let trial = Strain::of(&state.elastic, step.plane);
         let strain = trial.trace + booked;
         let (norm, trace) = (trial.norm * twice_mu, strain * (3.0 * self.bulk));
-        let kappa = shear * root;
-        // k after an increment of the norm of the plastic shear strain, and its derivative.
-        let strength = |increment: V| {
-            let flow = Flow { increment: increment * root, temperature: [temperature, zero] };
-            let [value, slope] =
-                self.cohesion.strength(increment.mul_add(V::splat(root), kappa), &flow, step);
-            [value * self.strength, slope * (self.strength * root)]
-        };
-        let tip = |strength: V| {
-            let apex = if self.alpha > 0.0 { strength * (1.0 / self.alpha) } else { V::splat(f64::INFINITY) };
-            apex.min(V::splat(3.0 * self.tension))
-        };
-        let [first, _] = strength(zero);
+        let cone = Cone { law: self, step, strain: shear * root, temperature };
+        let [first, _] = cone.strength(zero);
         let excess = trace.mul_add(V::splat(self.alpha), norm) - first;
         let shears = zero.lt(excess);
         // Nothing flows by its rate without a step, but the material opens at once.
-        let torn = tip(first).lt(trace);
+        let torn = self.tip(first).lt(trace);
         let returns = zero.lt(booked.abs());
         let none = V::Mask::from_bits(0);
         let yields = if self.overstress.is_some() && step.dt <= 0.0 { none } else { shears };
@@ -354,38 +403,25 @@ impl Cohesive {
         let (mut kept, mut end_trace, mut opens) = (one, trace, none);
         state.work = zero;
         if flows.any() {
-            // Increment at which the norm, less by 2μ for each, and the trace, less by `bulk` α for each, meet the cone.
-            let on_cone = |load: V, stiffness: f64, active: V::Mask| {
-                let function = |increment: V| {
-                    let [mut value, mut slope] = strength(increment);
-                    if let Some(overstress) = self.overstress {
-                        let [own, change] = overstress.of(increment, step.dt);
-                        (value, slope) = (value + own, slope + change);
-                    }
-                    [increment.neg_mul_add(V::splat(stiffness), load) - value, -(slope + V::splat(stiffness))]
-                };
-                let high = (load * (1.0 / stiffness)).max(V::splat(f64::MIN_POSITIVE));
-                let guess = ((load - first) * (1.0 / stiffness)).max(V::splat(f64::MIN_POSITIVE)).min(high);
-                active.select(root::newton(function, guess, high, load.abs() * f64::EPSILON, active), zero)
-            };
             let volumetric = 9.0 * self.bulk * self.beta;
             let load = trace.mul_add(V::splat(self.alpha), norm);
-            let mut slip = on_cone(load, twice_mu + volumetric * self.alpha, yields);
+            let mut slip = cone.slip([load, first], twice_mu + volumetric * self.alpha, yields);
             end_trace = slip.neg_mul_add(V::splat(volumetric), trace);
             let whole = trial.norm;
-            let [mut end_strength, _] = strength(slip.min(whole));
+            let [mut end_strength, _] = cone.strength(slip.min(whole));
             let cut =
-                (flows & tip(end_strength).lt(end_trace)) | (torn & !yields) | (yields & whole.lt(slip));
+                (flows & self.tip(end_strength).lt(end_trace)) | (torn & !yields) | (yields & whole.lt(slip));
             if cut.any() {
                 // At the apex all shear goes; at the cut-off there is a corner with the cone, or none goes.
                 let mean = V::splat(3.0 * self.tension);
                 let is_apex = first.le(mean * self.alpha);
                 let load = is_apex.select(zero, mean).mul_add(V::splat(self.alpha), norm);
                 let corner = cut & yields & !is_apex & first.lt(load);
-                let own = (cut & yields & is_apex).select(whole, on_cone(load, twice_mu, corner).min(whole));
+                let own = (cut & yields & is_apex)
+                    .select(whole, cone.slip([load, first], twice_mu, corner).min(whole));
                 slip = cut.select(own, slip);
-                [end_strength, _] = strength(slip);
-                end_trace = cut.select(tip(end_strength), end_trace);
+                [end_strength, _] = cone.strength(slip);
+                end_trace = cut.select(self.tip(end_strength), end_trace);
             }
             opens = cut;
             let left = whole - slip;

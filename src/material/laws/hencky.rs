@@ -13,13 +13,15 @@ use crate::simd::{Vector, each};
 pub struct Hencky {
     lame: Lame,
     density: f64,
+    /// One over the density, m³/kg.
+    per_density: f64,
 }
 
 impl Model for Hencky {
     type Parameters = Elastic;
 
     fn new(p: &Elastic, density: f64) -> Self {
-        Self { lame: Lame::new(p.young, p.poisson), density }
+        Self::of(p.young, p.poisson, density)
     }
 
     fn examples() -> &'static [&'static str] {
@@ -30,7 +32,7 @@ impl Model for Hencky {
 impl Hencky {
     /// The elastic part of a plastic model: Young's modulus, Pa, Poisson's ratio and density, kg/m³.
     pub(super) fn of(young: f64, poisson: f64, density: f64) -> Self {
-        Self { lame: Lame::new(young, poisson), density }
+        Self { lame: Lame::new(young, poisson), density, per_density: 1.0 / density }
     }
 
     /// Shear modulus, Pa.
@@ -59,7 +61,7 @@ impl Hencky {
     #[inline(always)]
     fn wave_speed_under<V: Vector>(&self, stress: &Symmetric<V>) -> V {
         let compression = greatest_bound(&each(*stress, |s| -s)).max(V::splat(0.0));
-        ((compression + V::splat(self.lame.pressure_wave())) * (1.0 / self.density)).sqrt()
+        ((compression + V::splat(self.lame.pressure_wave())) * self.per_density).sqrt()
     }
 }
 

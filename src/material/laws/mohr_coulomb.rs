@@ -11,13 +11,15 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
-use crate::material::coulomb::{Pyramid, Returned};
+use crate::material::angle::Angle;
+use crate::material::coulomb::{Pyramid, Returned, Slopes};
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
-use crate::material::tensor::principal::Principal;
+use crate::material::root::Function;
+use crate::material::tensor::principal::{Lone, Principal};
 use crate::material::tensor::strain::{Strain, finish};
-use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
-use crate::simd::{Vector, VectorMask, each};
+use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::simd::{Lanes, Vector, VectorMask, each};
 
 /// How the material flows at yield.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -26,7 +28,7 @@ pub enum FlowRule {
     /// Along the pyramid of the dilation angle: exact on faces, edges and at the apex.
     #[default]
     Pyramid,
-    /// Along the deviator, at constant volume; faster, as it needs no more than the eigenvalues.
+    /// Along the deviator, at constant volume.
     Radial,
 }
 
@@ -78,55 +80,31 @@ fn yes() -> bool {
     true
 }
 
-/// An angle that may soften.
-#[derive(Clone, Copy, Debug)]
-struct Angle {
-    /// Sine and cosine at the start.
-    sine: f64,
-    cosine: f64,
-    /// What softens away, radians.
-    softens: f64,
-}
-
-impl Angle {
-    /// From degrees at the start and at the end.
-    fn new(first: f64, last: f64) -> Self {
-        let angle = first.to_radians();
-        Self { sine: libm::sin(angle), cosine: libm::cos(angle), softens: (first - last).to_radians() }
-    }
-
-    /// Sine and cosine once a part, from 0 to 1, of what may soften has gone.
-    #[inline(always)]
-    fn softened<V: Vector>(self, lost: V) -> [V; 2] {
-        let (sine, cosine) = (V::splat(self.sine), V::splat(self.cosine));
-        if self.softens == 0.0 {
-            return [sine, cosine];
-        }
-        // Taylor series of the change, which is below π/2.
-        let x = lost * self.softens;
-        let square = x * x;
-        let series = |first: u32| {
-            (1..=11).rev().fold(V::splat(1.0), |sum, term| {
-                let n = f64::from(2 * term + first);
-                (square * sum).neg_mul_add(V::splat(1.0 / (n * (n - 1.0))), V::splat(1.0))
-            })
-        };
-        let (s, c) = (x * series(1), series(0));
-        [sine * c - cosine * s, cosine * c + sine * s]
-    }
-}
-
 /// Mohr-Coulomb material.
 #[derive(Clone, Debug)]
-pub struct MohrCoulomb {
+pub struct MohrCoulomb(pub(super) Properties);
+
+/// The same where the pyramid depends on the state, or does not: kernels of their own, which are smaller and faster.
+#[derive(Clone, Debug)]
+struct Only<const HARDENS: bool>(MohrCoulomb);
+
+/// What the parameters say.
+#[derive(Clone, Debug)]
+pub(super) struct Properties {
     solid: Hencky,
     elastic: Lame,
+    /// Bulk modulus, Pa; one over it, and one over twice the shear modulus, 1/Pa.
+    bulk: f64,
+    per_bulk: f64,
+    per_twice_mu: f64,
     cohesion: Curve,
     friction: Angle,
     dilation: Angle,
     tension: f64,
     radial: bool,
     volume_correction: bool,
+    /// The pyramid where it does not depend on the state.
+    fixed: Option<(Pyramid<f64>, Slopes<f64>)>,
 }
 
 impl Model for MohrCoulomb {
@@ -134,14 +112,20 @@ impl Model for MohrCoulomb {
 
     fn new(p: &Parameters, density: f64) -> Self {
         let softening = |angle: f64, residual: Option<f64>| Angle::new(angle, residual.unwrap_or(angle));
-        Self {
+        let own = Properties {
             friction: softening(p.friction_angle, p.residual_friction_angle),
             dilation: softening(p.dilation_angle, p.residual_dilation_angle),
             tension: p.tension_cutoff.unwrap_or(f64::INFINITY),
             radial: p.flow == FlowRule::Radial,
             volume_correction: p.volume_correction,
-            ..Self::of(p.young, p.poisson, density, Curve::new(&p.hardening, p.cohesion, density))
-        }
+            fixed: None,
+            ..Properties::of(p.young, p.poisson, density, Curve::new(&p.hardening, p.cohesion, density))
+        };
+        Self(own.with_fixed_pyramid())
+    }
+
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+        Self::new(p, density).0.boxed()
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
@@ -188,19 +172,50 @@ impl Model for MohrCoulomb {
     }
 }
 
-impl MohrCoulomb {
+impl Properties {
     /// Without friction, dilation and cut-off, and with this cohesion.
     pub(super) fn of(young: f64, poisson: f64, density: f64, cohesion: Curve) -> Self {
-        Self {
+        let elastic = Lame::new(young, poisson);
+        let bulk = elastic.lambda + 2.0 / 3.0 * elastic.mu;
+        let own = Self {
             solid: Hencky::of(young, poisson, density),
-            elastic: Lame::new(young, poisson),
+            elastic,
+            bulk,
+            per_bulk: 1.0 / bulk,
+            per_twice_mu: 1.0 / (2.0 * elastic.mu),
             cohesion,
             friction: Angle::new(0.0, 0.0),
             dilation: Angle::new(0.0, 0.0),
             tension: f64::INFINITY,
             radial: false,
             volume_correction: false,
+            fixed: None,
+        };
+        own.with_fixed_pyramid()
+    }
+
+    /// The law as the solver calls it.
+    pub(super) fn boxed(self) -> Box<dyn material::Material> {
+        let whole = MohrCoulomb(self);
+        match whole.0.fixed {
+            Some(_) => Box::new(Only::<false>(whole)),
+            None => Box::new(Only::<true>(whole)),
         }
+    }
+
+    /// Works out what does not depend on the state, once for all.
+    fn with_fixed_pyramid(mut self) -> Self {
+        if !self.hardens() {
+            let pyramid = Pyramid {
+                friction: Lanes::splat(self.friction.sine),
+                dilation: Lanes::splat(self.dilation.sine),
+                strength: Lanes::splat(2.0 * self.cohesion.initial() * self.friction.cosine),
+                tension: Lanes::splat(self.tension),
+            };
+            let first = |lanes: Lanes| lanes.to_array()[0];
+            self.fixed = Some((pyramid.map(first), pyramid.slopes(&self.elastic).map(first)));
+        }
+        self
     }
 
     /// Whether volume that has opened is booked apart from that of dilation.
@@ -215,23 +230,29 @@ impl MohrCoulomb {
 
     /// The pyramid at a plastic strain, of which `increment` came in this step.
     #[inline(always)]
-    fn pyramid<V: Vector>(&self, strain: V, increment: V, temperature: V, step: &Step) -> Pyramid<V> {
-        let tension = V::splat(self.tension);
-        if !self.hardens() {
-            return Pyramid {
-                friction: V::splat(self.friction.sine),
-                dilation: V::splat(self.dilation.sine),
-                strength: V::splat(2.0 * self.cohesion.initial() * self.friction.cosine),
-                tension,
-            };
+    fn pyramid<V: Vector, const HARDENS: bool>(
+        &self,
+        strain: V,
+        increment: V,
+        temperature: V,
+        step: &Step,
+    ) -> (Pyramid<V>, Slopes<V>) {
+        if let (false, Some((pyramid, slopes))) = (HARDENS, &self.fixed) {
+            return (pyramid.map(V::splat), slopes.map(V::splat));
         }
         let zero = V::splat(0.0);
         let flow = Flow { increment, temperature: [temperature, zero] };
         let [cohesion, _] = self.cohesion.strength(strain, &flow, step);
-        let lost = V::splat(1.0) - self.cohesion.progress(strain, step);
-        let [sine, cosine] = self.friction.softened(lost);
-        let [dilation, _] = self.dilation.softened(lost);
-        Pyramid { friction: sine, dilation, strength: cohesion * cosine * 2.0, tension }
+        let (mut friction, mut cosine) = (V::splat(self.friction.sine), V::splat(self.friction.cosine));
+        let mut dilation = V::splat(self.dilation.sine);
+        if self.friction.softens != 0.0 || self.dilation.softens != 0.0 {
+            let lost = V::splat(1.0) - self.cohesion.progress(strain, step);
+            [friction, cosine] = self.friction.softened(lost);
+            [dilation, _] = self.dilation.softened(lost);
+        }
+        let strength = cohesion * cosine * 2.0;
+        let pyramid = Pyramid { friction, dilation, strength, tension: V::splat(self.tension) };
+        (pyramid, pyramid.slopes(&self.elastic))
     }
 }
 
@@ -239,17 +260,67 @@ impl MohrCoulomb {
 #[derive(Clone, Copy)]
 struct Outcome<V: Vector> {
     returned: Returned<V>,
+    /// Mean of the stresses, Pa.
+    mean: V,
     /// Increment of the norm of the plastic shear strain.
     shear: V,
 }
 
-impl Law for MohrCoulomb {
-    const HISTORIES: usize = OWN + 1;
+/// The return of a trial stress.
+struct Return<'a, V> {
+    law: &'a Properties,
+    step: &'a Step,
+    /// Principal stresses, greatest first, and their mean, Pa.
+    stress: [V; 3],
+    mean: V,
+    /// Plastic strain and temperature at the start of the step.
+    strain: V,
+    temperature: V,
+}
 
+impl<V: Vector> Return<'_, V> {
+    /// To a pyramid.
     #[inline(always)]
-    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+    fn to(&self, pyramid: &Pyramid<V>, slopes: &Slopes<V>) -> Outcome<V> {
+        let returned = match self.law.radial {
+            false => pyramid.returned(&self.stress, slopes, &self.law.elastic),
+            true => radial(pyramid, slopes, &self.stress, self.mean),
+        };
+        let end = &returned.stress;
+        let mean = (end[0] + end[1] + end[2]) * (1.0 / 3.0);
+        let mut square = V::splat(0.0);
+        for k in 0..3 {
+            let slip = (self.stress[k] - self.mean) - (end[k] - mean);
+            square = slip.mul_add(slip, square);
+        }
+        Outcome { returned, mean, shear: square.sqrt() * self.law.per_twice_mu }
+    }
+
+    /// To the pyramid after an increment of the plastic strain.
+    #[inline(always)]
+    fn after(&self, increment: V) -> Outcome<V> {
+        let strain = self.strain + increment;
+        let (pyramid, slopes) = self.law.pyramid::<V, true>(strain, increment, self.temperature, self.step);
+        self.to(&pyramid, &slopes)
+    }
+}
+
+/// Plastic strain that comes of the return to the pyramid after an increment, beyond that increment.
+impl<V: Vector> Function<V, V> for &Return<'_, V> {
+    #[inline(always)]
+    fn at(&self, increment: V) -> V {
+        self.after(increment).shear * (2.0_f64 / 3.0).sqrt() - increment
+    }
+}
+
+impl Properties {
+    /// The law. `HARDENS`: whether the pyramid depends on the state.
+    #[inline(always)]
+    fn flow<V: Vector, const HARDENS: bool>(&self, state: &mut State<V>, step: &Step) {
         let zero = V::splat(0.0);
-        let (twice_mu, bulk) = (2.0 * self.elastic.mu, self.elastic.lambda + 2.0 / 3.0 * self.elastic.mu);
+        let none = V::Mask::from_bits(0);
+        let root = (2.0_f64 / 3.0).sqrt();
+        let twice_mu = 2.0 * self.elastic.mu;
         let shear = state.history[PLASTIC_STRAIN];
         let volume = state.history[PLASTIC_VOLUME];
         let booked = match (self.volume_correction, self.books_apart()) {
@@ -257,71 +328,52 @@ impl Law for MohrCoulomb {
             (true, false) => volume,
             (true, true) => state.history[OWN],
         };
-        let heats = self.cohesion.temperature().is_some();
+        let heats = HARDENS && self.cohesion.temperature().is_some();
         let temperature = if heats { state.history[OWN] } else { zero };
         let trial = Strain::of(&state.elastic, step.plane);
         let trace = trial.trace + booked;
-        let (mean, norm) = (trace * bulk, trial.norm * twice_mu);
+        let (mean, norm) = (trace * self.bulk, trial.norm * twice_mu);
         state.work = zero;
-        let kappa = shear * (2.0_f64 / 3.0).sqrt();
-        let first = self.pyramid(kappa, zero, temperature, step);
+        let strain = shear * root;
+        let (pyramid, slopes) = self.pyramid::<V, HARDENS>(strain, zero, temperature, step);
         let returns = zero.lt(booked.abs());
-        if !(first.may_flow(mean, norm) | returns).any() {
-            return trial.finish(
-                &self.solid,
-                state,
-                [trace, zero],
-                V::Mask::from_bits(0),
-                V::Mask::from_bits(0),
-                step.plane,
-            );
+        let [holds, yields] = pyramid.surely(mean, norm, &slopes);
+        if !(!holds | returns).any() {
+            return trial.finish(&self.solid, state, [trace, zero], none, none, step.plane);
         }
-        let principal = Principal::of(&trial.deviator, trial.norm);
+        let lone = Lone::of(&trial.deviator, trial.norm);
+        if !(yields | returns).any() {
+            let stress = each(lone.nearly_sorted(), |strain| strain.mul_add(V::splat(twice_mu), mean));
+            if (holds | pyramid.holds(&stress, norm * 1e-6)).all() {
+                return trial.finish(&self.solid, state, [trace, zero], none, none, step.plane);
+            }
+        }
+        let principal = Principal::of(&lone);
         let deviator = principal.sorted();
         let stress = each(deviator, |strain| strain.mul_add(V::splat(twice_mu), mean));
-        let returned = |pyramid: &Pyramid<V>| -> Outcome<V> {
-            let returned = match self.radial {
-                false => pyramid.returned(&stress, &self.elastic),
-                true => radial(pyramid, &stress, mean),
-            };
-            let end = &returned.stress;
-            let end_mean = (end[0] + end[1] + end[2]) * (1.0 / 3.0);
-            let mut square = zero;
-            for k in 0..3 {
-                let slip = (stress[k] - mean) - (end[k] - end_mean);
-                square = slip.mul_add(slip, square);
-            }
-            Outcome { returned, shear: square.sqrt() * (1.0 / twice_mu) }
-        };
-        let mut outcome = returned(&first);
-        if self.hardens() {
+        let whole = Return { law: self, step, stress, mean, strain, temperature };
+        let mut outcome = whole.to(&pyramid, &slopes);
+        if HARDENS {
             let flows = outcome.returned.flows;
-            let root = (2.0_f64 / 3.0).sqrt();
-            let at = |increment: V| self.pyramid(kappa + increment, increment, temperature, step);
-            let excess = |increment: V| returned(&at(increment)).shear * root - increment;
-            let high = trial.norm * (2.0 * root);
-            let increment = root::bracketed(excess, high, trial.norm * f64::EPSILON, flows);
-            outcome = returned(&at(flows.select(increment, zero)));
+            let at_once = outcome.shear * root;
+            let points = [at_once, at_once, trial.norm * (2.0 * root)];
+            let increment = root::bracketed(&whole, points, trial.norm * f64::EPSILON, flows);
+            outcome = whole.after(flows.select(increment, zero));
             outcome.returned.flows = flows;
         }
-        let Returned { stress: end, flows, opens } = outcome.returned;
+        let Outcome { returned: Returned { stress: end, flows, opens }, mean: end_mean, shear: slip } =
+            outcome;
         let changed = flows | returns;
-        let end_mean = (end[0] + end[1] + end[2]) * (1.0 / 3.0);
-        let end_trace = flows.select(end_mean * (1.0 / bulk), trace);
-        let kept = each(end, |stress| (stress - end_mean) * (1.0 / twice_mu));
-        let composed = principal.compose(&kept);
-        let mut end_deviator = trial.deviator;
+        let end_trace = flows.select(end_mean * self.per_bulk, trace);
+        let kept = each(end, |stress| (stress - end_mean) * self.per_twice_mu);
         let mut work = zero;
-        for c in 0..6 {
-            end_deviator[c] = flows.select(composed[c], end_deviator[c]);
-        }
         for k in 0..3 {
             let plastic = (deviator[k] - kept[k]) + (trace - end_trace) * (1.0 / 3.0);
             work = end[k].mul_add(plastic, work);
         }
         let work = flows.select(work, zero).max(zero);
         state.work = work;
-        state.history[PLASTIC_STRAIN] = flows.select(shear + outcome.shear, shear);
+        state.history[PLASTIC_STRAIN] = flows.select(shear + slip, shear);
         state.history[PLASTIC_VOLUME] = changed.select(volume + (trial.trace - end_trace), volume);
         if !self.volume_correction {
             // Not given back, but part of the volume all the same.
@@ -336,47 +388,103 @@ impl Law for MohrCoulomb {
         if heats {
             state.history[OWN] = work.mul_add(V::splat(self.cohesion.heat()), temperature);
         }
+        let composed = principal.compose(&kept);
+        let mut end_deviator = trial.deviator;
+        for c in 0..6 {
+            end_deviator[c] = flows.select(composed[c], end_deviator[c]);
+        }
         finish(&trial, &self.solid, state, (end_trace, &end_deviator), changed, step.plane);
+    }
+}
+
+impl Law for MohrCoulomb {
+    const HISTORIES: usize = OWN + 1;
+
+    #[inline(always)]
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        match self.0.fixed {
+            Some(_) => self.0.flow::<V, false>(state, step),
+            None => self.0.flow::<V, true>(state, step),
+        }
     }
 
     #[inline(always)]
     fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
-        self.solid.energy(state, plane)
+        Law::energy(&self.0.solid, state, plane)
     }
 
     fn density(&self) -> f64 {
-        Law::density(&self.solid)
+        Law::density(&self.0.solid)
     }
 
     fn wave_speed(&self) -> f64 {
-        Law::wave_speed(&self.solid)
+        Law::wave_speed(&self.0.solid)
     }
 
     fn history_names(&self) -> &'static [&'static str] {
-        self.cohesion.frictional_history(self.books_apart())
+        self.0.cohesion.frictional_history(self.0.books_apart())
     }
 
     fn initial_history(&self) -> [f64; HISTORIES] {
-        self.cohesion.initial_history()
+        self.0.cohesion.initial_history()
     }
 
     fn softens(&self) -> bool {
-        self.cohesion.softens()
+        self.0.cohesion.softens()
     }
 
     fn solid(&self) -> Option<&Hencky> {
-        Some(&self.solid)
+        Some(&self.0.solid)
+    }
+}
+
+impl<const HARDENS: bool> Law for Only<HARDENS> {
+    const HISTORIES: usize = <MohrCoulomb as Law>::HISTORIES;
+
+    #[inline(always)]
+    fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+        let Self(MohrCoulomb(properties)) = self;
+        properties.flow::<V, HARDENS>(state, step);
+    }
+
+    #[inline(always)]
+    fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
+        Law::energy(&self.0, state, plane)
+    }
+
+    fn density(&self) -> f64 {
+        Law::density(&self.0)
+    }
+
+    fn wave_speed(&self) -> f64 {
+        Law::wave_speed(&self.0)
+    }
+
+    fn history_names(&self) -> &'static [&'static str] {
+        Law::history_names(&self.0)
+    }
+
+    fn initial_history(&self) -> [f64; HISTORIES] {
+        Law::initial_history(&self.0)
+    }
+
+    fn softens(&self) -> bool {
+        Law::softens(&self.0)
+    }
+
+    fn solid(&self) -> Option<&Hencky> {
+        self.0.solid()
     }
 }
 
 /// Shrinks the deviator to the pyramid at constant mean.
 #[inline(always)]
-fn radial<V: Vector>(pyramid: &Pyramid<V>, stress: &[V; 3], mean: V) -> Returned<V> {
+fn radial<V: Vector>(pyramid: &Pyramid<V>, slopes: &Slopes<V>, stress: &[V; 3], mean: V) -> Returned<V> {
     let zero = V::splat(0.0);
     let deviator = each(*stress, |stress| stress - mean);
     let size = (deviator[0] + deviator[2]).mul_add(pyramid.friction, deviator[0] - deviator[2]);
     let allowed = (mean * -2.0).mul_add(pyramid.friction, pyramid.strength);
-    let (apex, flows) = (pyramid.apex(), allowed.lt(size));
+    let (apex, flows) = (slopes.apex, allowed.lt(size));
     let opens = flows & apex.le(mean);
     let kept = (allowed / size).max(zero);
     let mut end = *stress;

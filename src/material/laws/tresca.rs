@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
-use super::mohr_coulomb::MohrCoulomb;
+use super::mohr_coulomb::{MohrCoulomb, Properties};
 use crate::material::hardening::{Curve, Hardening};
 use crate::material::parameters::OutOfRange;
-use crate::material::{HISTORIES, Law, State, Step};
+use crate::material::{self, HISTORIES, Law, State, Step};
 use crate::simd::Vector;
 
 /// Hencky elasticity with Tresca yield.
@@ -38,7 +38,12 @@ impl Model for Tresca {
 
     fn new(p: &Parameters, density: f64) -> Self {
         let cohesion = Curve::new(&p.hardening, p.yield_stress, density).halved();
-        Self(MohrCoulomb::of(p.young, p.poisson, density, cohesion))
+        Self(MohrCoulomb(Properties::of(p.young, p.poisson, density, cohesion)))
+    }
+
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+        let Self(MohrCoulomb(properties)) = Self::new(p, density);
+        properties.boxed()
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
@@ -58,7 +63,7 @@ impl Model for Tresca {
 }
 
 impl Law for Tresca {
-    const HISTORIES: usize = MohrCoulomb::HISTORIES;
+    const HISTORIES: usize = <MohrCoulomb as Law>::HISTORIES;
 
     #[inline(always)]
     fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {

@@ -12,6 +12,7 @@ use super::Model;
 use super::hencky::Hencky;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::OutOfRange;
+use crate::material::root::Function;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
 use crate::simd::math::{exp, ln};
@@ -174,6 +175,36 @@ impl Law for VonMises {
     }
 }
 
+/// What is left of a trial stress after an increment of the plastic strain, beyond the strength then, Pa.
+struct Excess<'a, V> {
+    law: &'a VonMises,
+    step: &'a Step,
+    /// Trial `q`, Pa.
+    stress: V,
+    /// Plastic strain and temperature at the start of the step.
+    strain: V,
+    temperature: V,
+    three_mu: f64,
+}
+
+impl<V: Vector> Function<V, [V; 2]> for Excess<'_, V> {
+    #[inline(always)]
+    fn at(&self, increment: V) -> [V; 2] {
+        let (root, heat) = (1.5_f64.sqrt(), self.law.curve.heat());
+        let left = increment.neg_mul_add(V::splat(self.three_mu), self.stress);
+        let gained = left * increment * heat;
+        let rise = (left - increment * self.three_mu) * heat;
+        let flow = Flow { increment, temperature: [self.temperature + gained, rise] };
+        let [mut strength, mut slope] = self.law.curve.strength(self.strain + increment, &flow, self.step);
+        if let Some(overstress) = self.law.overstress {
+            let [value, change] = overstress.of(increment * root, self.step.dt);
+            strength = value.mul_add(V::splat(root), strength);
+            slope = change.mul_add(V::splat(1.5), slope);
+        }
+        [left - strength, -(slope + V::splat(self.three_mu))]
+    }
+}
+
 impl VonMises {
     /// Closed form for linear hardening without overstress.
     #[inline(always)]
@@ -204,10 +235,9 @@ impl VonMises {
     fn return_curved<V: Vector>(&self, state: &mut State<V>, step: &Step) {
         let zero = V::splat(0.0);
         let one = V::splat(1.0);
-        let root = (1.5_f64).sqrt();
         let three_mu = 3.0 * self.solid.shear_modulus();
         let trial = Strain::of(&state.elastic, step.plane);
-        let stress = trial.norm * (2.0 * root * self.solid.shear_modulus());
+        let stress = trial.norm * (2.0 * 1.5_f64.sqrt() * self.solid.shear_modulus());
         let (strain, temperature) = (state.history[PLASTIC_STRAIN], state.history[TEMPERATURE]);
         let still = Flow { increment: zero, temperature: [temperature, zero] };
         let [strength, _] = self.curve.strength(strain, &still, step);
@@ -220,19 +250,7 @@ impl VonMises {
         state.work = zero;
         if flows.any() {
             let heat = self.curve.heat();
-            let excess = |increment: V| {
-                let left = increment.neg_mul_add(V::splat(three_mu), stress);
-                let gained = left * increment * heat;
-                let rise = (left - increment * three_mu) * heat;
-                let flow = Flow { increment, temperature: [temperature + gained, rise] };
-                let [mut strength, mut slope] = self.curve.strength(strain + increment, &flow, step);
-                if let Some(overstress) = self.overstress {
-                    let [value, change] = overstress.of(increment * root, step.dt);
-                    strength = value.mul_add(V::splat(root), strength);
-                    slope = change.mul_add(V::splat(1.5), slope);
-                }
-                [left - strength, -(slope + V::splat(three_mu))]
-            };
+            let excess = Excess { law: self, step, stress, strain, temperature, three_mu };
             let high = stress * (1.0 / three_mu);
             let guess = flows.select((stress - strength) * (1.0 / three_mu), high);
             let increment = root::newton(excess, guess, high, stress * f64::EPSILON, flows);

@@ -6,41 +6,125 @@
 use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, VectorMask, each};
 
-/// A deviator taken apart. It is `norm` times a tensor of unit norm.
+/// `cos(arccos(x)/3)` for x from 0 to 1 as a polynomial in `x - 1/2`: Chebyshev interpolation, errors below 1e-16.
+const COSINE_OF_THIRD: [f64; 20] = [
+    0.939_692_620_785_908_4,
+    0.131_643_614_544_899_48,
+    -0.025_725_655_950_657_5,
+    0.008_853_239_646_703_792,
+    -0.003_738_324_470_471_647_7,
+    0.001_757_261_395_740_149_8,
+    -0.000_882_641_818_327_069_4,
+    0.000_463_781_080_382_938_07,
+    -0.000_251_785_393_649_707_75,
+    0.000_140_122_206_505_798_29,
+    -7.951_322_720_916_29e-5,
+    4.583_048_375_763_111e-5,
+    -2.673_100_799_493_431_7e-5,
+    1.577_549_228_227_639_6e-5,
+    -9.550_727_248_319_559e-6,
+    5.736_581_603_520_285e-6,
+    -2.942_182_630_296_114_5e-6,
+    1.783_136_164_845_402_9e-6,
+    -2.078_718_841_416_756_5e-6,
+    1.281_889_492_221_668_7e-6,
+];
+
+/// `1/(2 cos²(arccos(x)/3) - 1/2)` likewise, errors below 1.2e-8.
+const INVERSE: [f64; 10] = [
+    0.789_861_694_793,
+    -0.308_707_876_209,
+    0.159_356_812_088,
+    -0.089_718_829_126_6,
+    0.052_765_376_339_2,
+    -0.031_805_435_567_5,
+    0.018_958_968_896_6,
+    -0.011_754_068_459_9,
+    0.009_819_450_394_23,
+    -0.006_207_346_748_06,
+];
+
+/// A deviator of known norm with the eigenvalue that stands alone: enough to know all three nearly.
+pub(crate) struct Lone<V> {
+    /// Frobenius norm of the deviator.
+    norm: V,
+    /// The deviator over its norm.
+    unit: Symmetric<V>,
+    /// The eigenvalue of `unit` that stands alone.
+    value: V,
+    /// `|cos 3θ| - 1/2` of the Lode angle.
+    angle: V,
+}
+
+/// A deviator taken apart. It is `norm` times a tensor U of unit norm.
+///
+/// `P = (U² + lone U + (lone² - 1/2) I) inverse` is the projector on the direction of `lone`, and `R = U + lone/2 I - 3/2 lone P` what U
+/// has in the plane across, with eigenvalues `half` and `-half`.
 pub(crate) struct Principal<V> {
     /// Frobenius norm of the deviator.
     norm: V,
-    /// The eigenvalue that stands alone, of the tensor of unit norm.
+    /// The eigenvalue of U that stands alone.
     lone: V,
-    /// Half the difference of the other two eigenvalues, likewise.
+    /// Half the difference of the other two eigenvalues of U, and one over it or 0.
     half: V,
-    /// Projector on the direction of `lone`.
-    projector: Symmetric<V>,
-    /// What the tensor of unit norm has in the plane across, with eigenvalues `half` and `-half`.
-    rest: Symmetric<V>,
+    half_inverse: V,
+    /// U and U².
+    unit: Symmetric<V>,
+    square: Symmetric<V>,
+    /// P as a polynomial: factors of I, U and U².
+    projector: [V; 3],
+    /// R likewise.
+    rest: [V; 3],
 }
 
-impl<V: Vector> Principal<V> {
-    /// Takes a deviator of known Frobenius norm apart.
+impl<V: Vector> Lone<V> {
+    /// Of a deviator with this Frobenius norm.
     #[inline(always)]
     pub(crate) fn of(deviator: &Symmetric<V>, norm: V) -> Self {
         let one = V::splat(1.0);
         let scale = one / norm.max(V::splat(f64::MIN_POSITIVE));
         let unit = each(*deviator, |component| component * scale);
-        let [xx, yy, zz, xy, xz, yz] = unit;
         let determinant = determinant(&unit);
-        // Eigenvalues are 2 √(1/6) cos(θ + 2πk/3) with cos 3θ = 3√6 det; y = cos θ is the root of 4y³ - 3y = |cos 3θ| from
-        // √3/2 to 1. The first guess is exact at both ends.
-        let cosine = (determinant.abs() * (3.0 * 6.0_f64.sqrt())).min(one);
-        let half_root = 0.75_f64.sqrt();
-        let curvature = V::splat(1.0 - half_root - 1.0 / 6.0);
-        let mut y = cosine.mul_add(cosine.mul_add(curvature, V::splat(1.0 / 6.0)), V::splat(half_root));
-        for _ in 0..3 {
-            let square = y * y;
-            let excess = y.mul_add(square.mul_add(V::splat(4.0), V::splat(-3.0)), -cosine);
-            y = y - excess / square.mul_add(V::splat(12.0), V::splat(-3.0));
+        // Eigenvalues are 2 √(1/6) cos(θ + 2πk/3) with cos 3θ = 3√6 det.
+        let x = (determinant.abs() * (3.0 * 6.0_f64.sqrt())).min(one) - V::splat(0.5);
+        // Even and odd terms apart, to shorten the chain.
+        let square = x * x;
+        let (mut even, mut odd) = (V::splat(COSINE_OF_THIRD[18]), V::splat(COSINE_OF_THIRD[19]));
+        for n in (0..9).rev() {
+            even = even.mul_add(square, V::splat(COSINE_OF_THIRD[2 * n]));
+            odd = odd.mul_add(square, V::splat(COSINE_OF_THIRD[2 * n + 1]));
         }
-        let lone = (y * (2.0 / 6.0_f64.sqrt())).copysign(determinant);
+        let value = (odd.mul_add(x, even) * (2.0 / 6.0_f64.sqrt())).copysign(determinant);
+        Self { norm, unit, value, angle: x }
+    }
+
+    /// Eigenvalues of the deviator, greatest first, each wrong by at most 1e-7 of the norm where two are nearly equal.
+    #[inline(always)]
+    pub(crate) fn nearly_sorted(&self) -> [V; 3] {
+        let half = (self.value * self.value).neg_mul_add(V::splat(0.75), V::splat(0.5));
+        sorted(self.norm, self.value, half.max(V::splat(0.0)).sqrt())
+    }
+}
+
+/// Eigenvalues, greatest first, of a deviator with this norm: those of the unit tensor are `lone` and, on both sides of `-lone/2` at
+/// the distance `half`, the other two.
+#[inline(always)]
+fn sorted<V: Vector>(norm: V, lone: V, half: V) -> [V; 3] {
+    let zero = V::splat(0.0);
+    let first = zero.lt(lone);
+    let lone = lone * norm;
+    let (middle, half) = (lone * -0.5, half * norm);
+    let (high, low) = (middle + half, middle - half);
+    [first.select(lone, high), first.select(high, low), first.select(low, lone)]
+}
+
+impl<V: Vector> Principal<V> {
+    /// Takes a deviator apart.
+    #[inline(always)]
+    pub(crate) fn of(from: &Lone<V>) -> Self {
+        let one = V::splat(1.0);
+        let Lone { norm, unit, value: lone, angle } = *from;
+        let [xx, yy, zz, xy, xz, yz] = unit;
         let square = [
             xx.mul_add(xx, xy.mul_add(xy, xz * xz)),
             yy.mul_add(yy, xy.mul_add(xy, yz * yz)),
@@ -51,30 +135,35 @@ impl<V: Vector> Principal<V> {
         ];
         // (U - a)(U - b) with the other two eigenvalues a and b, over its value for `lone`.
         let lone_square = lone * lone;
-        let product = lone_square - V::splat(0.5);
-        let inverse = one / lone_square.mul_add(V::splat(3.0), V::splat(-0.5));
-        let (mut projector, mut rest) = (unit, unit);
-        for c in 0..6 {
-            let unit_part = if c < 3 { product } else { V::splat(0.0) };
-            projector[c] = (lone.mul_add(unit[c], square[c]) + unit_part) * inverse;
-            let plane = if c < 3 { lone.mul_add(V::splat(0.5), unit[c]) } else { unit[c] };
-            rest[c] = (lone * 1.5).neg_mul_add(projector[c], plane);
+        // A polynomial and a step of Newton's method take less time than a division.
+        let x = angle * angle;
+        let (mut even, mut odd) = (V::splat(INVERSE[8]), V::splat(INVERSE[9]));
+        for n in (0..4).rev() {
+            even = even.mul_add(x, V::splat(INVERSE[2 * n]));
+            odd = odd.mul_add(x, V::splat(INVERSE[2 * n + 1]));
         }
-        let [xx, yy, zz, xy, xz, yz] = rest;
+        let near = odd.mul_add(angle, even);
+        let whole = lone_square.mul_add(V::splat(3.0), V::splat(-0.5));
+        let inverse = near.mul_add(whole.neg_mul_add(near, one), near);
+        let projector = [(lone_square - V::splat(0.5)) * inverse, lone * inverse, inverse];
+        let apart = lone * 1.5;
+        let rest = [
+            apart.neg_mul_add(projector[0], lone * 0.5),
+            apart.neg_mul_add(projector[1], one),
+            -(apart * projector[2]),
+        ];
+        let [xx, yy, zz, xy, xz, yz] = polynomial(&rest, &unit, &square);
         let shear = xy.mul_add(xy, xz.mul_add(xz, yz * yz));
         let half = (xx.mul_add(xx, yy.mul_add(yy, zz.mul_add(zz, shear + shear))) * 0.5).sqrt();
-        Self { norm, lone, half, projector, rest }
+        let zero = V::splat(0.0);
+        let half_inverse = zero.lt(half).select(one / half, zero);
+        Self { norm, lone, half, half_inverse, unit, square, projector, rest }
     }
 
     /// Eigenvalues of the deviator, greatest first.
     #[inline(always)]
     pub(crate) fn sorted(&self) -> [V; 3] {
-        let zero = V::splat(0.0);
-        let lone = self.lone * self.norm;
-        let (middle, half) = (lone * -0.5, self.half * self.norm);
-        let (high, low) = (middle + half, middle - half);
-        let first = zero.lt(lone);
-        [first.select(lone, high), first.select(high, low), first.select(low, lone)]
+        sorted(self.norm, self.lone, self.half)
     }
 
     /// The tensor with the same directions and these eigenvalues, in the order of [`Principal::sorted`].
@@ -86,17 +175,26 @@ impl<V: Vector> Principal<V> {
         let high = first.select(sorted[1], sorted[0]);
         let low = first.select(sorted[2], sorted[1]);
         let mean = (high + low) * 0.5;
-        let slope = zero.lt(self.half).select((high - low) * 0.5 / self.half, zero);
+        let slope = (high - low) * 0.5 * self.half_inverse;
         let apart = lone - mean;
-        let mut tensor = self.projector;
-        for c in 0..6 {
-            tensor[c] = apart.mul_add(self.projector[c], slope * self.rest[c]);
-            if c < 3 {
-                tensor[c] += mean;
-            }
+        let mut factors = self.rest;
+        for n in 0..3 {
+            factors[n] = apart.mul_add(self.projector[n], slope * self.rest[n]);
         }
-        tensor
+        factors[0] += mean;
+        polynomial(&factors, &self.unit, &self.square)
     }
+}
+
+/// `f₀ I + f₁ U + f₂ U²`.
+#[inline(always)]
+fn polynomial<V: Vector>(factors: &[V; 3], unit: &Symmetric<V>, square: &Symmetric<V>) -> Symmetric<V> {
+    let mut tensor = *unit;
+    for c in 0..6 {
+        let linear = if c < 3 { factors[1].mul_add(unit[c], factors[0]) } else { factors[1] * unit[c] };
+        tensor[c] = factors[2].mul_add(square[c], linear);
+    }
+    tensor
 }
 
 #[cfg(test)]
@@ -122,7 +220,8 @@ mod tests {
         let deviator: Symmetric =
             std::array::from_fn(|c| Lanes::splat(if c < 3 { tensor[c] - mean } else { tensor[c] }));
         let size = norm(&deviator);
-        let principal = Principal::of(&deviator, Lanes::splat(size));
+        let lone = Lone::of(&deviator, Lanes::splat(size));
+        let principal = Principal::of(&lone);
         let sorted = principal.sorted();
         // Rotations want a positive definite matrix.
         let mut shifted = deviator;
@@ -134,6 +233,9 @@ mod tests {
         for k in 0..3 {
             let error = (at(sorted[k]) - expected[k]).abs();
             prop_assert!(error <= 3e-15 * size, "{k}: {} {}", at(sorted[k]), expected[k]);
+        }
+        for (near, exact) in lone.nearly_sorted().into_iter().zip(sorted) {
+            prop_assert!((at(near) - at(exact)).abs() <= 1e-7 * size);
         }
         let back = principal.compose(&sorted);
         for c in 0..6 {
@@ -170,7 +272,7 @@ mod tests {
     #[test]
     fn no_deviator_has_equal_values() {
         let zero = Lanes::splat(0.0);
-        let principal = Principal::of(&[zero; 6], zero);
+        let principal = Principal::of(&Lone::of(&[zero; 6], zero));
         for value in principal.sorted() {
             assert_eq!(at(value), 0.0);
         }

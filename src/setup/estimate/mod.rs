@@ -191,7 +191,8 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
         .bodies
         .iter()
         .map(|body| &problem.materials[body.material])
-        .map(|material| material::build(&material.model, material.density).wave_speed())
+        .map(|material| material::build(&material.model, material.density))
+        .map(|material| material.wave_speed() + material.viscous_speed(problem.cell_edge(finest)))
         .fold(0.0, f64::max);
     let norm = |v: &[f64]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let speed = problem

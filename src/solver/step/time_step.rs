@@ -50,39 +50,44 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, m/s, from the materials at rest: quick, for
     /// each change of the tree.
     pub(in crate::solver) fn signals_at_rest(&self) -> Vec<f64> {
-        let physics = &self.physics;
-        self.chunks.par_iter().with_min_len(64).map(|chunk| physics.signal_at_rest(chunk)).collect()
+        let (physics, plan) = (&self.physics, &self.grid.plan);
+        let signal = |(leaf, chunk): (usize, _)| physics.signal_at_rest(chunk, plan.finest_cell(leaf));
+        self.chunks.par_iter().enumerate().with_min_len(64).map(signal).collect()
     }
 
     /// Not collective. The same with the wave speeds under the stress that the particles have, where these are greater: for the
     /// first step of bodies that begin under stress.
     pub(in crate::solver) fn signals_under_stress(&self) -> Vec<f64> {
-        let physics = &self.physics;
-        let signal = |chunk| physics.signal_at_rest(chunk).max(physics.signal_under_stress(chunk));
-        self.chunks.par_iter().with_min_len(64).map(signal).collect()
+        let (physics, plan) = (&self.physics, &self.grid.plan);
+        let signal = |(leaf, chunk): (usize, _)| {
+            let cell = plan.finest_cell(leaf);
+            physics.signal_at_rest(chunk, cell).max(physics.signal_under_stress(chunk, cell))
+        };
+        self.chunks.par_iter().enumerate().with_min_len(64).map(signal).collect()
     }
 }
 
 impl<const D: usize> Physics<D> {
-    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest.
-    fn signal_at_rest(&self, chunk: &Chunk<D>) -> f64 {
+    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest on cells of edge `cell` (m).
+    fn signal_at_rest(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let mut fastest: f64 = 0.0;
         for (tile, tags) in tiles_of(chunk) {
             for (&tag, speed) in tags.iter().zip(speeds::<D>(tile)) {
                 let material = &self.materials[usize::from(Tag::unpack(tag).material)];
-                fastest = fastest.max(material.wave_speed() + speed);
+                fastest = fastest.max(material.wave_speed() + material.viscous_speed(cell) + speed);
             }
         }
         fastest
     }
 
-    /// Greatest `c + |v|` of those of a leaf's particles, eight at a time, that are under stress, m/s.
-    fn signal_under_stress(&self, chunk: &Chunk<D>) -> f64 {
+    /// Greatest `c + |v|` of those of a leaf's particles, eight at a time, that are under stress, m/s, on cells of
+    /// edge `cell` (m).
+    fn signal_under_stress(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let mut fastest: f64 = 0.0;
         for (tile, tags) in tiles_of(chunk) {
             let stresses = &tile[Layout::<D>::STRESS..][..Layout::<D>::SYMMETRIC];
             if stresses.iter().any(|line| line[..tags.len()].iter().any(|&stress| stress != 0.0)) {
-                let waves = self.waves_under_stress(tile, tags).to_array();
+                let waves = self.waves_under_stress(tile, tags, cell).to_array();
                 for (wave, speed) in waves.into_iter().zip(speeds::<D>(tile)).take(tags.len()) {
                     fastest = fastest.max(wave + speed);
                 }
@@ -91,8 +96,8 @@ impl<const D: usize> Physics<D> {
         fastest
     }
 
-    /// Wave speeds of the particles of a tile in their present state, m/s.
-    fn waves_under_stress(&self, tile: &[[f64; TILE]], tags: &[u64]) -> Lanes {
+    /// Wave speeds of the particles of a tile in their present state on cells of edge `cell` (m), m/s.
+    fn waves_under_stress(&self, tile: &[[f64; TILE]], tags: &[u64], cell: f64) -> Lanes {
         let mut state = State::new([Lanes::splat(0.0); 6]);
         for c in 0..Layout::<D>::SYMMETRIC {
             state.elastic[c] = Lanes::load(&tile[Layout::<D>::LEFT_CAUCHY_GREEN + c]);
@@ -102,7 +107,7 @@ impl<const D: usize> Physics<D> {
         }
         let last = tags.len() - 1;
         let index = std::array::from_fn(|lane| Tag::unpack(tags[lane.min(last)]).material);
-        material::update(&self.materials, &index, &mut state, &Step::rest(D == 2));
+        material::update(&self.materials, &index, &mut state, &Step { cell, ..Step::rest(D == 2) });
         state.wave_speed
     }
 }

@@ -94,8 +94,7 @@ impl Law for Fluid {
         state.history[PLASTIC_STRAIN] = strain.norm.mul_add(V::splat(2.0_f64.sqrt()), shear);
         state.work = viscous * strain.norm * strain.norm;
         let sound = (stiffness * (1.0 / self.density)).sqrt();
-        state.wave_speed =
-            volume.mul_add(V::splat(8.0 / 3.0 * viscosity / (self.density * step.cell)), sound);
+        state.wave_speed = volume.mul_add(V::splat(Law::viscous_speed(self, step.cell)), sound);
     }
 
     /// `W = K/γ (J^(1-γ)/(γ-1) + J - γ/(γ-1))`
@@ -116,6 +115,10 @@ impl Law for Fluid {
 
     fn wave_speed(&self) -> f64 {
         (self.parameters.bulk_modulus / self.density).sqrt()
+    }
+
+    fn viscous_speed(&self, cell: f64) -> f64 {
+        8.0 / 3.0 * self.parameters.viscosity / (self.density * cell)
     }
 
     fn history_names(&self) -> &'static [&'static str] {

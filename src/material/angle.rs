@@ -1,0 +1,40 @@
+//! Angles of friction and dilation that may soften.
+use crate::simd::Vector;
+
+/// An angle that may soften.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Angle {
+    /// Sine and cosine at the start.
+    pub sine: f64,
+    pub cosine: f64,
+    /// What softens away, radians.
+    pub softens: f64,
+}
+
+impl Angle {
+    /// From degrees at the start and at the end.
+    pub(super) fn new(first: f64, last: f64) -> Self {
+        let angle = first.to_radians();
+        Self { sine: libm::sin(angle), cosine: libm::cos(angle), softens: (first - last).to_radians() }
+    }
+
+    /// Sine and cosine once a part, from 0 to 1, of what may soften has gone.
+    #[inline(always)]
+    pub(super) fn softened<V: Vector>(self, lost: V) -> [V; 2] {
+        let (sine, cosine) = (V::splat(self.sine), V::splat(self.cosine));
+        if self.softens == 0.0 {
+            return [sine, cosine];
+        }
+        // Taylor series of the change, which is below π/2.
+        let x = lost * self.softens;
+        let square = x * x;
+        let [mut s, mut c] = [V::splat(1.0); 2];
+        for term in (1..=11).rev() {
+            let n = 2.0 * f64::from(term);
+            s = (square * s).neg_mul_add(V::splat(1.0 / (n * (n + 1.0))), V::splat(1.0));
+            c = (square * c).neg_mul_add(V::splat(1.0 / (n * (n - 1.0))), V::splat(1.0));
+        }
+        let s = x * s;
+        [sine * c - cosine * s, cosine * c + sine * s]
+    }
+}
