@@ -41,8 +41,9 @@ fn field(name: &str) -> Result<PointField, String> {
 /// A file cannot be read or does not show a field, or the page cannot be written.
 pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
-    let files = expand(&arguments.files).map_err(failed)?;
-    let (first, out) = (&arguments.files[0], arguments.out.as_deref());
+    let given = without_trees(&arguments.files);
+    let files = expand(&given).map_err(failed)?;
+    let (first, out) = (&given[0], arguments.out.as_deref());
     let out = out.map_or_else(|| beside(first), Path::to_path_buf);
     let name = out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let title = arguments.title.clone().unwrap_or(name);
@@ -51,6 +52,15 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let times = if files.len() == 1 { "one time".into() } else { format!("{} times", files.len()) };
     writeln!(std::io::stdout(), "{} ({times}, {}; open in a browser)", out.display(), bytes(size as f64))?;
     Ok(())
+}
+
+/// What a pattern such as `out/a/*.hdf` gives, without the trees, whose outputs are there as well.
+fn without_trees(files: &[PathBuf]) -> Vec<PathBuf> {
+    let is_tree = |file: &&PathBuf| file.to_string_lossy().ends_with(".tree.hdf");
+    if files.iter().all(|file| is_tree(&file)) {
+        return files.to_vec();
+    }
+    files.iter().filter(|file| !is_tree(file)).cloned().collect()
 }
 
 /// `a/b.hdf.series` and `a/b.hdf` have their page in `a/b.html`.
@@ -66,6 +76,15 @@ fn beside(file: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pattern_may_take_trees_along() {
+        let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+        let all = paths(&["a_000000.hdf", "a_000000.tree.hdf", "a_000001.hdf"]);
+        assert_eq!(without_trees(&all), paths(&["a_000000.hdf", "a_000001.hdf"]));
+        // A tree alone is refused by its name.
+        assert_eq!(without_trees(&all[1..2]), all[1..2]);
+    }
 
     #[test]
     fn page_lies_beside_the_file() {

@@ -46,7 +46,7 @@ impl<const D: usize> Shape<D> {
                 }
                 _ => self.classify_by_distance(cell),
             },
-            Self::Polygon(_) | Self::Rotated(..) => self.classify_by_distance(cell),
+            Self::Polygon(_) | Self::Mesh(_) | Self::Rotated(..) => self.classify_by_distance(cell),
             Self::Union(parts) => union(parts.iter().map(|s| s.classify(cell))),
             Self::Intersection(parts) => parts.iter().map(|s| s.classify(cell)).fold(Side::Inside, intersect),
             Self::Difference(from, removed) => match union(removed.iter().map(|s| s.classify(cell))) {

@@ -1,4 +1,5 @@
 //! Gradients of signed distances: the outward normals of the surfaces.
+use super::shape::in_space;
 use super::{Aabb, Frustum, Shape};
 
 impl<const D: usize> Shape<D> {
@@ -15,6 +16,10 @@ impl<const D: usize> Shape<D> {
             Self::Polygon(points) => {
                 let [gx, gy] = of_polygon(points, [x[0], x[1]], self.distance(x) < 0.0);
                 std::array::from_fn(|a| [gx, gy, 0.0][a])
+            }
+            Self::Mesh(mesh) => {
+                let normal = mesh.gradient(&in_space(x));
+                std::array::from_fn(|a| normal[a])
             }
             Self::Rotated(shape, placement) => {
                 let own = shape.gradient(&placement.to_own(x));

@@ -6,6 +6,7 @@
 mod classify;
 mod common_point;
 mod gradient;
+pub mod mesh;
 mod primitives;
 mod rotation;
 mod shape;
@@ -13,6 +14,7 @@ pub mod written;
 
 pub use classify::Side;
 pub use common_point::common_point;
+pub use mesh::Mesh;
 pub use rotation::rotation;
 pub use shape::{Frustum, Placement, Shape};
 

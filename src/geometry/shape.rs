@@ -1,8 +1,8 @@
 //! The shape type and what can be asked of it.
-use super::Aabb;
 use super::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };
+use super::{Aabb, Mesh};
 
 /// A truncated cone; a cylinder when both radii are equal, a cone when the upper one is 0.
 ///
@@ -71,6 +71,8 @@ pub enum Shape<const D: usize> {
     },
     /// A simple polygon in the plane of the first two axes.
     Polygon(Vec<[f64; 2]>),
+    /// A solid bounded by triangles; 3D only.
+    Mesh(Mesh),
     /// A shape turned about a point.
     Rotated(Box<Shape<D>>, Placement<D>),
     /// Points of any of the parts.
@@ -90,6 +92,7 @@ impl<const D: usize> Shape<D> {
             Self::Frustum(frustum) => frustum_distance(frustum, x),
             Self::HalfSpace { point, normal } => half_space_distance(point, normal, x),
             Self::Polygon(points) => polygon_distance(points, [x[0], x[1]]),
+            Self::Mesh(mesh) => mesh.distance(&in_space(x)),
             Self::Rotated(shape, placement) => shape.distance(&placement.to_own(x)),
             Self::Union(parts) => parts.iter().map(|s| s.distance(x)).fold(f64::INFINITY, f64::min),
             Self::Intersection(parts) => {
@@ -112,9 +115,11 @@ impl<const D: usize> Shape<D> {
             Self::Union(parts) => parts.iter().any(|s| s.contains(x)),
             Self::Intersection(parts) => parts.iter().all(|s| s.contains(x)),
             Self::Difference(from, removed) => from.contains(x) && !removed.iter().any(|s| s.contains(x)),
-            Self::Sphere { .. } | Self::Frustum(_) | Self::HalfSpace { .. } | Self::Polygon(_) => {
-                self.distance(x) < 0.0
-            }
+            Self::Sphere { .. }
+            | Self::Frustum(_)
+            | Self::HalfSpace { .. }
+            | Self::Polygon(_)
+            | Self::Mesh(_) => self.distance(x) < 0.0,
         }
     }
 
@@ -133,6 +138,10 @@ impl<const D: usize> Shape<D> {
                 one.upper[..2].copy_from_slice(p);
                 hull.hull(&one)
             }),
+            Self::Mesh(mesh) => {
+                let bounds = mesh.bounds();
+                Aabb::new(std::array::from_fn(|a| bounds.lower[a]), std::array::from_fn(|a| bounds.upper[a]))
+            }
             Self::Rotated(shape, placement) => rotated_bounds(&shape.bounds(), placement),
             Self::Union(parts) => parts.iter().fold(Aabb::EMPTY, |hull, s| hull.hull(&s.bounds())),
             Self::Intersection(parts) => {
@@ -141,6 +150,11 @@ impl<const D: usize> Shape<D> {
             Self::Difference(from, _) => from.bounds(),
         }
     }
+}
+
+/// A point of the job as one of space.
+pub(super) fn in_space<const D: usize>(x: &[f64; D]) -> [f64; 3] {
+    std::array::from_fn(|a| if a < D { x[a] } else { 0.0 })
 }
 
 impl<const D: usize> Frustum<D> {

@@ -23,6 +23,10 @@ pub(crate) fn bound_items(schema: &mut schemars::Schema, limit: f64) {
     }
 }
 
+fn one() -> f64 {
+    1.0
+}
+
 /// A region of space.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
@@ -99,6 +103,32 @@ pub enum Shape {
         /// Corners in order, m; at least three.
         #[schemars(length(max = 10_000))]
         points: Vec<Vector>,
+    },
+    /// A solid bounded by triangles, from a file; 3D only. The surface is closed, and its triangles face one way.
+    #[schemars(extend("x-dimension" = 3))]
+    Mesh {
+        /// File in STL (text or binary), OBJ or PLY (text or binary), by its ending; relative to the directory of the job file.
+        file: String,
+        /// Metres per unit of the file: 0.001 for millimetres.
+        #[serde(default = "one")]
+        #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
+        scale: f64,
+        /// Where the origin of the file lies, m; the origin of the job by default.
+        #[serde(default)]
+        origin: Option<Vector>,
+    },
+    /// Terrain: the solid below a surface of heights, from a raster; 3D only, z points up.
+    #[schemars(extend("x-dimension" = 3))]
+    Terrain {
+        /// ESRI ASCII grid (`.asc`), every cell with a height; relative to the directory of the job file.
+        file: String,
+        /// Where the origin of the raster's coordinates lies, m; the origin of the job by default.
+        #[serde(default)]
+        origin: Option<Vector>,
+        /// Height in the raster down to which the solid reaches, m; by default a tenth of the raster's length below its least height.
+        #[serde(default)]
+        #[schemars(range(min = -1e9, max = 1e9))]
+        base: Option<f64>,
     },
     /// A shape turned about a point.
     Rotated {

@@ -77,7 +77,8 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<An
         .map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
 }
 
-/// Checks the text of a job file. Nothing is read from `path`: its stem becomes the name of the job.
+/// Checks the text of a job file. Nothing is read from `path` itself: its stem becomes the name of the job, and files that the job
+/// names lie relative to its directory.
 ///
 /// # Errors
 /// All faults that were found.

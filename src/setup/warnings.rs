@@ -126,7 +126,7 @@ fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
         Shape::Sphere { radius, .. } => 2.0 * radius,
         Shape::Frustum(frustum) => frustum.height.min(2.0 * frustum.lower_radius.max(frustum.upper_radius)),
         Shape::HalfSpace { .. } => f64::INFINITY,
-        Shape::Polygon(_) => least_edge(&shape.bounds()),
+        Shape::Polygon(_) | Shape::Mesh(_) => least_edge(&shape.bounds()),
         Shape::Rotated(inner, _) => thickness(inner),
         Shape::Union(parts) => parts.iter().map(thickness).fold(0.0, f64::max),
         Shape::Intersection(parts) => parts.iter().map(thickness).fold(f64::INFINITY, f64::min),

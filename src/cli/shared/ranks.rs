@@ -38,5 +38,20 @@ pub(in crate::cli) fn load(comm: &Comm, path: &Path, settings: &Settings) -> Res
     let read = if comm.rank() == 0 { job::read(path) } else { Ok(Vec::new()) };
     let mut bytes = together(comm, read.map_err(Failure::from))?;
     comm.broadcast_bytes(0, &mut bytes);
-    together(comm, job::from_bytes(bytes, path, settings).map_err(Failure::from))
+    let problem = together(comm, job::from_bytes(bytes, path, settings).map_err(Failure::from))?;
+    // Each rank has read the files that the job names.
+    let own = match &problem {
+        AnyProblem::Two(problem) => problem.digest,
+        AnyProblem::Three(problem) => problem.digest,
+    };
+    let mut first = own.to_ne_bytes().to_vec();
+    comm.broadcast_bytes(0, &mut first);
+    let same = own.to_ne_bytes() == *first;
+    let reason = || {
+        format!(
+            "rank {} has read other files (meshes) than rank 0; expected the same on all ranks",
+            comm.rank()
+        )
+    };
+    together(comm, if same { Ok(problem) } else { Err(Failure::Usage(reason())) })
 }

@@ -12,6 +12,10 @@ pub(in crate::job) struct Checks<'t> {
     pub text: &'t str,
     /// Line and column, both from 1, of a byte of the text.
     pub position: &'t dyn Fn(usize) -> (usize, usize),
+    /// Directory of the job file, from which names of files in it go.
+    pub directory: &'t std::path::Path,
+    /// Checksum of the files that the job names, as far as they have been read; 0 without.
+    pub files: u64,
     /// What is wrong so far.
     pub faults: Vec<Fault>,
 }

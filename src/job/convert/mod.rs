@@ -53,7 +53,8 @@ pub(super) fn convert(
     position: &dyn Fn(usize) -> (usize, usize),
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
-    let mut checks = Checks { tree, text, position, faults: Vec::new() };
+    let directory = path.parent().unwrap_or(std::path::Path::new(""));
+    let mut checks = Checks { tree, text, position, directory, files: 0, faults: Vec::new() };
     let problem = if file.dimension == 2 {
         problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
@@ -115,7 +116,7 @@ fn problem<const D: usize>(
         path: path.to_path_buf(),
         text: checks.text.to_owned(),
         title: file.title.clone(),
-        digest: digest(file),
+        digest: digest(file) ^ checks.files,
         origin,
         root_edge,
         brick,

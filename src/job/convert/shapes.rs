@@ -1,9 +1,11 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
 use super::checks::{Checks, Space};
+use crate::geometry::mesh::{self, Terrain, Triangles};
 use crate::geometry::written::{Shape as Written, Vector};
-use crate::geometry::{Aabb, Frustum, Placement, Shape, rotation};
+use crate::geometry::{Aabb, Frustum, Mesh, Placement, Shape, rotation};
+use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
-use crate::text::written;
+use crate::text::{excerpt, written};
 
 impl Checks<'_> {
     /// The shape in coordinates relative to the domain's lower corner.
@@ -67,6 +69,30 @@ impl Checks<'_> {
                 self.only(2, D, "polygon", "union of boxes", path)?;
                 self.polygon(points, space, &path.key("points"))
             }
+            Written::Mesh { file, scale, origin } => {
+                self.only(3, D, "mesh", "polygon", path)?;
+                let origin = self.origin_of_file(origin.as_ref(), space, path)?;
+                let triangles =
+                    self.read(file, "a mesh in STL, OBJ or PLY", &path.key("file"), mesh::read)?;
+                self.solid(triangles, *scale, &origin, file, &path.key("file"))
+            }
+            Written::Terrain { file, origin, base } => {
+                self.only(3, D, "terrain", "polygon", path)?;
+                let origin = self.origin_of_file(origin.as_ref(), space, path)?;
+                let terrain = self.read(file, "an ESRI ASCII grid", &path.key("file"), Terrain::read)?;
+                let [least, _] = terrain.range();
+                let base = base.unwrap_or(least - 0.1 * terrain.length());
+                if base >= least {
+                    let message = format!(
+                        "found {}; expected less than the least height, {}",
+                        written(base),
+                        written(least)
+                    );
+                    self.fault(&path.key("base"), message);
+                    return None;
+                }
+                self.solid(terrain.solid_above(base), 1.0, &origin, file, &path.key("file"))
+            }
             Written::Rotated { shape, centre, axis, angle } => {
                 let inner = self.shape(shape, space, &path.key("shape"))?;
                 let pivot = self.point(centre, space, &path.key("centre"))?;
@@ -82,6 +108,64 @@ impl Checks<'_> {
                 let from = self.shape(from, space, &path.key("from"));
                 let remove = self.parts(remove, space, &path.key("remove"));
                 Some(Shape::Difference(Box::new(from?), remove?))
+            }
+        }
+    }
+
+    /// Where the origin of a file lies, m from the lower corner of the domain.
+    fn origin_of_file<const D: usize>(
+        &mut self,
+        origin: Option<&Vector>,
+        space: &Space<D>,
+        path: &Path,
+    ) -> Option<[f64; D]> {
+        match origin {
+            Some(origin) => self.point(origin, space, &path.key("origin")),
+            None => Some(space.origin.map(|c| -c)),
+        }
+    }
+
+    /// What a file that the job names holds, or a fault.
+    fn read<T>(
+        &mut self,
+        file: &str,
+        expected: &str,
+        path: &Path,
+        read: impl Fn(&std::path::Path) -> Result<T, mesh::ReadError>,
+    ) -> Option<T> {
+        let from = self.directory.join(file);
+        read(&from)
+            .map_err(|error| {
+                let message = format!(
+                    "found \"{}\", but {error} ({}); expected {expected}, its name relative to the job file",
+                    excerpt(file, QUOTED),
+                    from.display()
+                );
+                self.fault(path, message);
+            })
+            .ok()
+    }
+
+    /// The solid of the triangles of a file with its origin at a point, m from the lower corner of the domain.
+    fn solid<const D: usize>(
+        &mut self,
+        mut triangles: Triangles,
+        scale: f64,
+        origin: &[f64; D],
+        file: &str,
+        path: &Path,
+    ) -> Option<Shape<D>> {
+        for vertex in &mut triangles.vertices {
+            *vertex = std::array::from_fn(|a| scale * vertex[a] + if a < D { origin[a] } else { 0.0 });
+        }
+        match Mesh::new(triangles) {
+            Ok(mesh) => {
+                self.files = self.files.rotate_left(1) ^ mesh.checksum();
+                Some(Shape::Mesh(mesh))
+            }
+            Err(error) => {
+                self.fault(path, format!("\"{}\": {error}", excerpt(file, QUOTED)));
+                None
             }
         }
     }

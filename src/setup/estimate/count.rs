@@ -97,6 +97,7 @@ fn work<const D: usize>(shape: &Shape<D>) -> u64 {
         Shape::Box(_) | Shape::Sphere { .. } | Shape::HalfSpace { .. } => 2,
         Shape::Frustum(_) => 4,
         Shape::Polygon(corners) => 2 * corners.len() as u64,
+        Shape::Mesh(_) => 32,
         Shape::Rotated(inner, _) => 2 + work(inner),
         Shape::Union(parts) | Shape::Intersection(parts) => parts.iter().map(work).sum(),
         Shape::Difference(from, removed) => work(from) + removed.iter().map(work).sum::<u64>(),

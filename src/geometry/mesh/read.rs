@@ -1,0 +1,185 @@
+//! Triangles from STL (text and binary), OBJ and PLY (text and binary).
+use std::io::{BufReader, Cursor};
+use std::path::Path;
+
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, Property};
+
+/// Triangles with the places of their corners; the corners are checked to be there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Triangles {
+    /// Places, in the units of the file.
+    pub vertices: Vec<[f64; 3]>,
+    /// Corners of each triangle, counter-clockwise seen from outside.
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// Why a file gives no triangles.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// It cannot be read.
+    #[error("it cannot be read: {0}")]
+    System(#[from] std::io::Error),
+    /// It has another ending.
+    #[error("its name ends with neither .stl, .obj nor .ply")]
+    Kind,
+    /// It is damaged.
+    #[error("it is no {kind} file, or damaged: {reason}")]
+    Damaged {
+        /// What it should be.
+        kind: &'static str,
+        /// What the reader says.
+        reason: String,
+    },
+}
+
+/// Most bytes of a file.
+pub(super) const MOST_BYTES: u64 = 1 << 31;
+
+/// Reads the triangles of a file, whose ending says what it is. Polygons are cut into fans.
+///
+/// # Errors
+/// The file cannot be read, is of no known kind, or damaged.
+pub fn read(path: &Path) -> Result<Triangles, ReadError> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let parse: fn(&[u8]) -> Result<Triangles, ReadError> = match ending.as_str() {
+        "stl" => stl,
+        "obj" => obj,
+        "ply" => ply,
+        _ => return Err(ReadError::Kind),
+    };
+    let triangles = parse(&whole_file(path, MOST_BYTES)?)?;
+    let count = triangles.vertices.len();
+    match triangles.indices.iter().flatten().find(|&&corner| corner as usize >= count) {
+        Some(corner) => Err(ReadError::Damaged {
+            kind: "mesh",
+            reason: format!("a triangle names the vertex {corner}, and there are {count}"),
+        }),
+        None => Ok(triangles),
+    }
+}
+
+/// The bytes of a plain file of at most `most` bytes.
+pub(super) fn whole_file(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Err(std::io::Error::other("it is not a plain file"));
+    }
+    if metadata.len() > most {
+        return Err(std::io::Error::other(format!(
+            "it has {} bytes, and at most {most} are read",
+            metadata.len()
+        )));
+    }
+    std::fs::read(path)
+}
+
+fn stl(bytes: &[u8]) -> Result<Triangles, ReadError> {
+    let damaged = |reason: String| ReadError::Damaged { kind: "STL", reason };
+    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|error| damaged(error.to_string()))?;
+    let index = |corner: usize| u32::try_from(corner).map_err(|_| damaged("too many vertices".into()));
+    let mut triangles = Triangles::default();
+    triangles.vertices.extend(mesh.vertices.iter().map(|v| [v[0], v[1], v[2]].map(f64::from)));
+    for face in &mesh.faces {
+        let [a, b, c] = face.vertices;
+        triangles.indices.push([index(a)?, index(b)?, index(c)?]);
+    }
+    Ok(triangles)
+}
+
+fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
+    let damaged = |reason: String| ReadError::Damaged { kind: "OBJ", reason };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    // Colours are of no interest here.
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(bytes), &options, no_materials)
+        .map_err(|error| damaged(error.to_string()))?;
+    let mut triangles = Triangles::default();
+    for model in models {
+        let first = triangles.vertices.len() as u64;
+        triangles.vertices.extend(model.mesh.positions.as_chunks::<3>().0);
+        for corners in model.mesh.indices.as_chunks::<3>().0 {
+            let mut indices = [0; 3];
+            for (index, corner) in indices.iter_mut().zip(corners) {
+                let sum = first + u64::from(*corner);
+                *index = u32::try_from(sum).map_err(|_| damaged("too many vertices".into()))?;
+            }
+            triangles.indices.push(indices);
+        }
+    }
+    Ok(triangles)
+}
+
+fn ply(bytes: &[u8]) -> Result<Triangles, ReadError> {
+    let damaged = |reason: String| ReadError::Damaged { kind: "PLY", reason };
+    let parser = Parser::<DefaultElement>::new();
+    let mut reader = Reader::new(Cursor::new(bytes));
+    let header = parser.read_header(&mut reader).map_err(|error| damaged(error.to_string()))?;
+    // Elements without properties take no bytes: as many as one likes would fit.
+    let all: u128 = header.elements.values().map(|element| element.count as u128).sum();
+    if all > bytes.len() as u128 {
+        return Err(damaged(format!(
+            "its header announces {all} elements, and it has {} bytes",
+            bytes.len()
+        )));
+    }
+    let payload = parser.read_payload(&mut reader, &header).map_err(|error| damaged(error.to_string()))?;
+    let elements = |name: &str| payload.iter().find(|(key, _)| key.as_str() == name).map(|(_, all)| all);
+    let missing = |what: &str| damaged(format!("it has no {what}"));
+    let mut triangles = Triangles::default();
+    for vertex in elements("vertex").ok_or_else(|| missing("vertices"))? {
+        let mut x = [0.0; 3];
+        for (c, name) in x.iter_mut().zip(["x", "y", "z"]) {
+            *c = property(vertex, name).and_then(number).ok_or_else(|| missing("coordinates x, y and z"))?;
+        }
+        triangles.vertices.push(x);
+    }
+    for face in elements("face").ok_or_else(|| missing("faces"))? {
+        let corners =
+            property(face, "vertex_indices").or_else(|| property(face, "vertex_index")).and_then(list);
+        let corners = corners.ok_or_else(|| missing("corners of faces (vertex_indices)"))?;
+        if let [first, rest @ ..] = &corners[..] {
+            triangles.indices.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        }
+    }
+    Ok(triangles)
+}
+
+fn property<'a>(element: &'a DefaultElement, name: &str) -> Option<&'a Property> {
+    element.iter().find(|(key, _)| key.as_str() == name).map(|(_, value)| value)
+}
+
+fn number(property: &Property) -> Option<f64> {
+    match property {
+        Property::Float(value) => Some(f64::from(*value)),
+        Property::Double(value) => Some(*value),
+        Property::Int(value) => Some(f64::from(*value)),
+        Property::UInt(value) => Some(f64::from(*value)),
+        Property::Short(value) => Some(f64::from(*value)),
+        Property::UShort(value) => Some(f64::from(*value)),
+        Property::Char(value) => Some(f64::from(*value)),
+        Property::UChar(value) => Some(f64::from(*value)),
+        _ => None,
+    }
+}
+
+/// Corners of a face; a negative one is that of no vertex.
+fn list(property: &Property) -> Option<Vec<u32>> {
+    let all = |values: &mut dyn Iterator<Item = i64>| {
+        values.map(|value| u32::try_from(value).unwrap_or(u32::MAX)).collect()
+    };
+    Some(match property {
+        Property::ListInt(values) => all(&mut values.iter().map(|v| i64::from(*v))),
+        Property::ListUInt(values) => values.clone(),
+        Property::ListShort(values) => all(&mut values.iter().map(|v| i64::from(*v))),
+        Property::ListUShort(values) => all(&mut values.iter().map(|v| i64::from(*v))),
+        Property::ListChar(values) => all(&mut values.iter().map(|v| i64::from(*v))),
+        Property::ListUChar(values) => all(&mut values.iter().map(|v| i64::from(*v))),
+        _ => return None,
+    })
+}

@@ -1,0 +1,203 @@
+//! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as collider gives the same results on any
+//! ranks and across a restart; hostile files give a message.
+#[path = "mpi_runs/launch.rs"]
+#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
+mod launch;
+#[path = "common/mpirun.rs"]
+mod mpirun;
+#[path = "common/restart.rs"]
+#[allow(dead_code, reason = "each test uses its part")]
+mod restart;
+
+use agimp::geometry::Mesh;
+use agimp::geometry::mesh::read;
+use launch::{Outcome, run, succeed, text};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A cube of edge 1 with a corner at the origin.
+const FACES: [[usize; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
+fn corner(c: usize) -> [f32; 3] {
+    [(c & 1) as f32, (c >> 1 & 1) as f32, (c >> 2) as f32]
+}
+
+fn triangles() -> impl Iterator<Item = [usize; 3]> {
+    FACES.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+}
+
+/// The cube in each format, by name of the file.
+fn cubes() -> Vec<(&'static str, Vec<u8>)> {
+    let mut text_stl = String::from("solid cube\n");
+    let mut binary_stl = vec![b' '; 80];
+    binary_stl.extend(12_u32.to_le_bytes());
+    for corners in triangles() {
+        text_stl.push_str(" facet normal 0 0 0\n  outer loop\n");
+        binary_stl.extend([0; 12]);
+        for x in corners.map(corner) {
+            let _ = writeln!(text_stl, "   vertex {} {} {}", x[0], x[1], x[2]);
+            x.iter().for_each(|c| binary_stl.extend(c.to_le_bytes()));
+        }
+        text_stl.push_str("  endloop\n endfacet\n");
+        binary_stl.extend([0; 2]);
+    }
+    text_stl.push_str("endsolid cube\n");
+    let (mut obj, mut ply) = (String::from("# squares, with a normal each\n"), String::new());
+    let _ = write!(
+        ply,
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement face 6\n\
+         property list uchar int vertex_indices\nend_header\n"
+    );
+    let mut binary_ply = ply.replace("ascii", "binary_little_endian").into_bytes();
+    for x in (0..8).map(corner) {
+        let _ = writeln!(obj, "v {} {} {}", x[0], x[1], x[2]);
+        let _ = writeln!(ply, "{} {} {}", x[0], x[1], x[2]);
+        x.iter().for_each(|c| binary_ply.extend(c.to_le_bytes()));
+    }
+    for face in FACES {
+        let [a, b, c, d] = face.map(|corner| corner + 1);
+        let _ = writeln!(obj, "f {a} {b} {c} {d}");
+        let [a, b, c, d] = face;
+        let _ = writeln!(ply, "4 {a} {b} {c} {d}");
+        binary_ply.push(4);
+        face.iter().for_each(|&corner| binary_ply.extend((corner as i32).to_le_bytes()));
+    }
+    vec![
+        ("text.stl", text_stl.into_bytes()),
+        ("binary.stl", binary_stl),
+        ("cube.OBJ", obj.into_bytes()),
+        ("text.ply", ply.into_bytes()),
+        ("binary.ply", binary_ply),
+    ]
+}
+
+/// A block of jelly over a floor.
+fn job(shape: &str, rest: &str) -> String {
+    format!(
+        "version = 1\ndimension = 3\ngravity = [0, 0, -9.81]\n[domain]\nmin = [0, 0, -0.5]\nsize = [2, 2, 2]\nroot_edge = 1\n\
+         [boundaries]\nz_min.kind = 'separating'\nz_max.kind = 'separating'\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_min.kind = 'slip'\n\
+         y_max.kind = 'slip'\n[[materials]]\nname = 'jelly'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+         [[bodies]]\nname = 'block'\nmaterial = 'jelly'\nshape = {shape}\n{rest}\n"
+    )
+}
+
+fn outcome(directory: &Path, job: &str) -> Outcome {
+    let path = directory.join("block.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory, 1, 1, &path, &["--overwrite"]));
+    Outcome::read(directory, "block")
+}
+
+/// A cube of 0.9 m from each format gives the particles, and so the run, of a box of that size.
+#[test]
+fn a_cube_from_a_file_is_a_box() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let rest = "[time]\nend = 0.05";
+    let reference = outcome(
+        directory.path(),
+        &job("{ kind = 'box', min = [0.5, 0.5, -0.1], max = [1.4, 1.4, 0.8] }", rest),
+    );
+    std::fs::create_dir(directory.path().join("tools")).expect("directory");
+    for (name, bytes) in cubes() {
+        std::fs::write(directory.path().join("tools").join(name), bytes).expect("mesh");
+        let shape =
+            format!("{{ kind = 'mesh', file = 'tools/{name}', scale = 0.9, origin = [0.5, 0.5, -0.1] }}");
+        let found = outcome(directory.path(), &job(&shape, rest));
+        assert!(found.history == reference.history, "{name}: history");
+        // The headers differ: they name the job.
+        let state = |outcome: &Outcome| -> Vec<String> {
+            outcome.digest.lines().filter(|line| line.contains("state/")).map(str::to_owned).collect()
+        };
+        assert!(state(&found).len() > 10);
+        assert_eq!(state(&found), state(&reference), "{name}");
+    }
+}
+
+/// A block falls on an edge of a turned cube: same results on 1 to 3 ranks and across a restart, and the block presses the cube down.
+#[test]
+fn a_mesh_as_collider_gives_the_same_on_any_ranks_and_across_restart() {
+    let rest = "[[colliders]]\nname = 'cube'\n[colliders.shape]\nkind = 'rotated'\ncentre = [1, 1, 0.2]\naxis = [1, 2, 0]\nangle = 40\n\
+                shape = { kind = 'mesh', file = 'MESH', scale = 0.4, origin = [0.8, 0.8, 0] }\n\
+                [time]\nend = 0.35\n[checkpoint]\nevery_steps = 20\nkeep = 99\n\
+                [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [0, 0, -0.5], max = [1, 2, 1.5] }\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let file = directory.path().join("cube.stl");
+    std::fs::write(&file, &cubes()[1].1).expect("mesh");
+    let rest = rest.replace("MESH", &file.display().to_string());
+    let block = "{ kind = 'box', min = [0.6, 0.6, 0.6], max = [1.4, 1.4, 1.1] }";
+    restart::assert_same_on_any_ranks(&job(block, &rest), "block", |directory, _| {
+        let history =
+            std::fs::read_to_string(directory.join("out/block/block.history.csv")).expect("history");
+        let names: Vec<&str> = history.lines().next().expect("header").split(',').collect();
+        let column = names.iter().position(|name| name.starts_with("force_cube_z")).expect("a force");
+        let least = history
+            .lines()
+            .skip(1)
+            .map(|row| row.split(',').nth(column).expect("a cell").parse::<f64>().expect("a number"));
+        assert!(least.fold(0.0, f64::min) < -1000.0, "the block presses the cube down");
+    });
+}
+
+/// Another mesh in the file is another job: a restart is refused.
+#[test]
+fn a_changed_mesh_is_another_job() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("block.toml");
+    std::fs::write(directory.path().join("cube.stl"), &cubes()[1].1).expect("mesh");
+    let shape = "{ kind = 'mesh', file = 'cube.stl', scale = 0.5, origin = [0.5, 0.5, 0] }";
+    std::fs::write(&path, job(shape, "[time]\nend = 0.01")).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &[]));
+    let mut other = cubes()[1].1.clone();
+    // The first coordinate of a corner, in each triangle that has it.
+    let one = 1.0_f32.to_le_bytes();
+    for at in (84..other.len()).step_by(50).flat_map(|face| [face + 12, face + 24, face + 36]) {
+        if other[at..at + 4] == one {
+            other[at..at + 4].copy_from_slice(&1.1_f32.to_le_bytes());
+        }
+    }
+    std::fs::write(directory.path().join("cube.stl"), other).expect("mesh");
+    let output = run(directory.path(), 1, 1, &path, &["--restart", "latest", "--end", "0.02"])
+        .output()
+        .expect("starts");
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+}
+
+/// Each format with bytes flipped, cut, doubled and overwritten: a mesh, or an error; never a panic, and never slow.
+#[test]
+fn damaged_files_give_a_message() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let mut random = 0x2545_f491_4f6c_dd1d_u64;
+    let mut next = move |below: usize| {
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        (random % below as u64) as usize
+    };
+    let mut read_well = 0;
+    for (name, bytes) in cubes() {
+        for _ in 0..400 {
+            let mut damaged = bytes.clone();
+            for _ in 0..=next(3) {
+                let at = next(damaged.len());
+                match next(5) {
+                    0 => damaged[at] ^= 1 << next(8),
+                    1 => damaged.truncate(at.max(1)),
+                    2 => damaged[at] = b"0123456789-.e \n"[next(15)],
+                    3 => damaged[at] = 0xff,
+                    _ => damaged.extend_from_within(at..),
+                }
+            }
+            let path = directory.path().join(name);
+            std::fs::write(&path, &damaged).expect("mesh");
+            match read(&path) {
+                Ok(triangles) => match Mesh::new(triangles) {
+                    Ok(_) => read_well += 1,
+                    Err(error) => assert!(!error.to_string().is_empty()),
+                },
+                Err(error) => assert!(!error.to_string().is_empty()),
+            }
+        }
+    }
+    println!("{read_well} of 2000 are solids all the same");
+}
