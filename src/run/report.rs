@@ -89,8 +89,13 @@ pub fn evaluate<const D: usize>(
         front: (front.unwrap_or(0) as f64 + 1.0) * width,
         edge: edge as f64 * width,
         height: top[..centre].iter().copied().fold(0.0, f64::max),
-        laws: [lube(law, aspect, radius), lajeunesse(law, aspect, radius)],
+        laws: published(law, aspect, radius),
     }
+}
+
+/// What the published laws give for a column with this aspect ratio and radius (half width), m.
+pub fn published(law: CollapseLaw, aspect: f64, radius: f64) -> [Published; 2] {
+    [lube(law, aspect, radius), lajeunesse(law, aspect, radius)]
 }
 
 /// Lube et al.: J. Fluid Mech. 508 (2004) for cylinders, Phys. Rev. E 72 (2005) for columns between walls. `a` is the aspect ratio.
