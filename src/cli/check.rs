@@ -9,6 +9,7 @@ use crate::setup;
 use crate::setup::estimate::{Estimate, LevelCount, estimate, tree_memory};
 use crate::setup::seed::check_counts;
 use crate::setup::warnings::warnings;
+use crate::solver::state::bookings::CarriedTotals;
 use partition::MAX_LEVEL;
 use partition::comm::World;
 use std::ffi::OsStr;
@@ -68,25 +69,29 @@ fn report<const D: usize>(
     if !estimate.is_cut {
         (0..problem.stages.len()).try_for_each(|stage| check_counts(problem, &estimate.particles, stage))?;
     }
-    let may_refine = problem.adaptivity.is_some() && !estimate.is_cut && estimate.memory < MOST_MEMORY;
-    let refined = if may_refine { refined(problem, &estimate, world)? } else { None };
+    let needs_particles = problem.adaptivity.is_some() || problem.loads.iter().any(|l| l.carried().is_some());
+    let is_moderate = !estimate.is_cut && estimate.memory < MOST_MEMORY;
+    let start = if needs_particles && is_moderate { start(problem, &estimate, world)? } else { None };
+    let (refined, carried) = start.map_or((None, Vec::new()), |(refined, carried)| (Some(refined), carried));
     if world.as_ref().is_none_or(|world| world.comm().rank() == 0) {
         let (shown, is_refined) = (refined.as_ref().unwrap_or(&estimate), refined.is_some());
-        summary::write(&mut std::io::stdout().lock(), arguments.ranks, problem, shown, is_refined)?;
+        let start = summary::Start { is_refined, carried: &carried };
+        summary::write(&mut std::io::stdout().lock(), arguments.ranks, problem, shown, &start)?;
         warn_of(&warnings(problem, shown.steps));
     }
     Ok(())
 }
 
-/// Memory up to which a job with criteria is set up, bytes: criteria look at the particles themselves.
+/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both look at the particles themselves.
 const MOST_MEMORY: f64 = 90e6;
 
-/// The estimate for the tree that the criteria make at the start, if that is of moderate size.
-fn refined<const D: usize>(
+/// The estimate for the tree at the start, which criteria have refined, and what particles carry of each load; if that tree is of
+/// moderate size.
+fn start<const D: usize>(
     problem: &Problem<D>,
     estimate: &Estimate,
     world: &mut Option<World>,
-) -> Result<Option<Estimate>, Failure> {
+) -> Result<Option<(Estimate, Vec<CarriedTotals>)>, Failure> {
     let world = match world {
         Some(world) => world,
         None => world.insert(World::init().map_err(|error| Failure::Run(error.to_string()))?),
@@ -94,7 +99,8 @@ fn refined<const D: usize>(
     let comm = world.comm();
     let fits = |size| if tree_memory::<D>(size) < MOST_MEMORY { Ok(()) } else { Err(()) };
     let solver = setup::solver_within(comm, problem, fits);
-    let Ok(solver) = solver.map_err(|error| Failure::Run(error.to_string()))? else { return Ok(None) };
+    // Whatever is wrong at the start is wrong with the job.
+    let Ok(solver) = solver.map_err(|error| Failure::Usage(error.to_string()))? else { return Ok(None) };
     let mut bodies = vec![0; problem.bodies.len()];
     for &tag in solver.chunks.iter().flat_map(|chunk| chunk.tags()) {
         bodies[usize::from(Tag::unpack(tag).body)] += 1;
@@ -107,5 +113,6 @@ fn refined<const D: usize>(
     comm.sum_u64(&mut bodies);
     comm.sum_u64(bytemuck::cast_slice_mut(&mut levels));
     let finest = levels.iter().rposition(|level| level.leaves > 0).unwrap_or(0);
-    Ok(Some(estimate.clone().for_tree(problem, bodies, levels[..=finest].to_vec())))
+    let carried = solver.carried_totals();
+    Ok(Some((estimate.clone().for_tree(problem, bodies, levels[..=finest].to_vec()), carried)))
 }

@@ -10,6 +10,7 @@ pub mod mesh;
 mod primitives;
 mod rotation;
 mod shape;
+pub mod surface;
 pub mod written;
 
 pub use classify::Side;

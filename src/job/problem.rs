@@ -84,6 +84,8 @@ pub struct Problem<const D: usize> {
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
+    /// Line and column of each load in the job file, both from 1; for messages.
+    pub load_places: Vec<(usize, usize)>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
     /// Which of them the job names; the others have the default.

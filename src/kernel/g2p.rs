@@ -203,6 +203,33 @@ pub fn interpolate<const D: usize>(
     }
 }
 
+/// Gathers for the selected particles and calls `each` with the particle and what it gathered, as [`Gather::whole_boxes`] does.
+/// Changes no particle.
+pub fn look<const D: usize>(
+    scratch: &mut Scratch<D>,
+    chunk: &Chunk<D>,
+    select: Select,
+    frame: &Frame<D>,
+    scheme: &Scheme,
+    fields: &Fields,
+    mut each: impl FnMut(usize, Gathered<D>),
+) {
+    let (tags, cell, extent) = (chunk.tags(), frame.cell, &frame.extent);
+    let Scratch { weights, nodes, sums, spare } = scratch;
+    for batch in Batches::new(select, chunk, Place::default()) {
+        let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+        let position: [Lanes; D] = batch.positions(tile);
+        let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
+        let half = domain::cut_at_walls(&whole, &position, cell, extent);
+        weights.fill(frame, &position, &position, &half);
+        if let Some(factors) = domain::softening(&whole, &half, cell) {
+            weights.soften(&factors);
+        }
+        sums.gather::<Lanes>(weights, nodes, &batch, cell, fields);
+        batch.members().for_each(|lane| each(batch.particle(lane), sums.row(lane)));
+    }
+}
+
 fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }

@@ -54,6 +54,12 @@ impl<const D: usize> Gathered<D> {
         std::array::from_fn(|axis| row[axis])
     }
 
+    /// Velocity gradient, 1/s.
+    pub fn gradient(&self) -> [[f64; D]; D] {
+        let columns = self.gradient.map(F64x4::to_array);
+        std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
+    }
+
     /// Adds `share` times `other`.
     pub(super) fn add(&mut self, other: &Self, share: f64) {
         let share = F64x4::splat(share);

@@ -1,7 +1,17 @@
 //! Loads: what acts on the material beside stress, contact and the faces of the domain.
 //!
-//! A load acts on real nodes inside its region, between two times. Each kind is one variant of [`Kind`] with its effect on
-//! the velocity of a node in [`Load::apply`]; the solver books impulse and work of each load from that alone.
+//! A load acts between two times. Most kinds act on real nodes inside their region: each is a variant of [`Kind`] with its
+//! effect on the velocity of a node in [`Load::apply`]. Forces on surfaces and points are carried by particles
+//! ([`Kind::Carried`]). The solver books impulse and work of each load from that alone.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `mod.rs` | gravity, loads, and what acts on nodes |
+//! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
+mod carried;
+
+pub use carried::{Carried, CarriedForce, cofactor};
+
 use crate::geometry::Shape;
 use crate::quantity::Quantity;
 
@@ -54,9 +64,16 @@ pub enum Kind<const D: usize> {
     Velocity([Option<Quantity>; D]),
     /// Drag in proportion to mass, with a rate r (1/s): `v *= exp(-r Δt)`.
     Damping(Quantity),
+    /// A force that particles carry; nothing at nodes.
+    Carried(Carried<D>),
 }
 
 impl<const D: usize> Load<D> {
+    /// What particles carry of it, if they do.
+    pub fn carried(&self) -> Option<&Carried<D>> {
+        if let Kind::Carried(carried) = &self.kind { Some(carried) } else { None }
+    }
+
     /// Whether it acts in a step that begins at `time`, s.
     pub fn is_active(&self, time: f64) -> bool {
         let own = time - self.start;
@@ -68,16 +85,22 @@ impl<const D: usize> Load<D> {
         self.region.as_ref().is_none_or(|region| region.distance(x) <= 0.0)
     }
 
-    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
-    /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
-    /// the prescribed motion to second order.
-    pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
-        let middle = middle - self.start;
+    /// A point in the job's coordinates, m; z is 0 in plane strain.
+    fn place(&self, x: &[f64; D]) -> [f64; 3] {
         let mut place = [0.0; 3];
         for axis in 0..D {
             place[axis] = self.origin[axis] + x[axis];
         }
+        place
+    }
+
+    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
+    /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
+    /// the prescribed motion to second order.
+    pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
+        let (place, middle) = (self.place(x), middle - self.start);
         match &self.kind {
+            Kind::Carried(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
                     velocity[axis] = dt.mul_add(acceleration[axis].at(&place, middle), velocity[axis]);

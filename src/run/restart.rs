@@ -15,6 +15,7 @@ use crate::io::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
 use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
+use crate::load::Load;
 use crate::particle::Chunk;
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
@@ -305,6 +306,12 @@ fn restored<const D: usize>(
     check_job(comm, problem, path)?;
     let limits = snapshot::Limits { materials: problem.materials.len(), bodies: problem.bodies.len() };
     let restored = snapshot::read::<D>(comm, path, Some(problem.digest), limits).map_err(words)?;
+    let carried = restored.chunks.iter().map(Chunk::carried_columns).max().unwrap_or(0);
+    let expected: usize =
+        problem.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum();
+    if comm.any(carried != 0 && carried != expected) {
+        return Err(refused("particles carry other loads than those of the job"));
+    }
     let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));
     let mut forest = forest.map_err(|disagreement| refused(&disagreement.message))?;
     let weights: Vec<u64> = restored.chunks.iter().map(leaf_weight).collect();

@@ -14,6 +14,7 @@ use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
 use crate::solver::{Clock, Physics, Solver, StepControl};
 
+mod carried;
 pub mod estimate;
 pub mod initial_stress;
 pub mod seed;
@@ -94,6 +95,9 @@ pub fn solver_within<const D: usize, R>(
     }
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts, 0))?;
+    let mut chunks = std::mem::take(&mut solver.chunks);
+    carried::carry(comm, problem, &solver, &mut chunks, 0)?;
+    solver.chunks = chunks;
     Ok(Ok(solver))
 }
 

@@ -56,6 +56,18 @@ pub enum SeedError {
         /// Why.
         reason: NoState,
     },
+    /// A load that particles carry finds none.
+    #[error("{place}: found no {found} for the load \"{load}\"; expected {expected}")]
+    Load {
+        /// File, line, column and key of the load.
+        place: String,
+        /// The load.
+        load: String,
+        /// What it looks for.
+        found: &'static str,
+        /// What would be right.
+        expected: &'static str,
+    },
 }
 
 /// Not collective. True when a body may have points in the leaf: never false for a leaf that
@@ -167,7 +179,7 @@ fn place<const D: usize>(problem: &Problem<D>, body: usize) -> String {
 }
 
 /// Distance of lattice points of a body in leaves of a level, m.
-fn spacing<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
+pub(super) fn spacing<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
     problem.cell_edge(level) / body.particles_per_cell
 }
 
@@ -278,6 +290,17 @@ fn visit<const D: usize>(
 
 /// The lattice points in a half-open box, lexicographic with the last axis fastest.
 fn lattice<const D: usize>(cell: &Aabb<D>, spacing: f64, points: &mut Vec<[f64; D]>) {
+    for_lattice(cell, spacing, |index| points.push(index.map(|i| coordinate(i, spacing))));
+}
+
+/// The places of [`lattice`] points along each axis.
+pub(super) fn lattice_of<const D: usize>(cell: &Aabb<D>, spacing: f64) -> Vec<[u64; D]> {
+    let mut places = Vec::new();
+    for_lattice(cell, spacing, |index| places.push(index));
+    places
+}
+
+fn for_lattice<const D: usize>(cell: &Aabb<D>, spacing: f64, mut take: impl FnMut([u64; D])) {
     let range: [(u64, u64); D] = std::array::from_fn(|a| {
         (first_at_or_after(cell.lower[a], spacing), first_at_or_after(cell.upper[a], spacing))
     });
@@ -286,7 +309,7 @@ fn lattice<const D: usize>(cell: &Aabb<D>, spacing: f64, points: &mut Vec<[f64; 
     }
     let mut index: [u64; D] = std::array::from_fn(|a| range[a].0);
     loop {
-        points.push(index.map(|i| coordinate(i, spacing)));
+        take(index);
         let mut axis = D;
         loop {
             if axis == 0 {

@@ -68,6 +68,7 @@ pub fn enter_next<const D: usize>(
     added.iter().flat_map(Chunk::tags).for_each(|tag| counts[usize::from(Tag::unpack(*tag).body)] += 1);
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts, stage))?;
+    super::carried::carry(comm, problem, solver, &mut added, stage)?;
     let first = comm.exclusive_sum_u64(added.iter().map(|chunk| chunk.len() as u64).sum());
     super::number(&mut added, solver.next_root() + first);
     let is_removed = |body| problem.stages[stage].removed.contains(&body);

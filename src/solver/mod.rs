@@ -33,6 +33,7 @@ use partition::comm::{Comm, Disagreement, Traffic};
 use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
 use crate::adaptivity::resample::ledger::Ledger;
+use crate::grid::KnownTree;
 use crate::particle::Chunk;
 use crate::solver::state::bookings::{Contacts, ExactSums};
 use crate::solver::state::cost::Costs;
@@ -63,6 +64,7 @@ impl<const D: usize> Solver<D> {
             contacts: Contacts::new(&physics, clock.time),
             load_sums: ExactSums::new(physics.loads.len(), clock.time),
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
+            pushes: Vec::new(),
             relaxation: Relaxation::default(),
             motion: Default::default(),
             physics,
@@ -124,11 +126,17 @@ impl<const D: usize> Solver<D> {
         let impulses = self.update_node_velocities(dt, &rates);
         self.prolong_velocities();
         let departed = self.nodes_to_particles(dt);
+        self.book_pushes(dt);
         let moved = self.migrate_particles(departed);
         self.move_colliders(&rates, impulses, to, dt);
         // A rank that has failed serves its neighbours to the end of the step.
         sorted?;
         Ok(moved?)
+    }
+
+    /// The own leaves and those around them.
+    pub fn known_tree(&self) -> &KnownTree<D> {
+        &self.grid.plan.tree
     }
 
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.

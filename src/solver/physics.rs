@@ -67,6 +67,11 @@ impl<const D: usize> Physics<D> {
         self.stage_starts.len().saturating_sub(1)
     }
 
+    /// Columns of what particles carry for loads.
+    pub fn carried_columns(&self) -> usize {
+        self.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
+    }
+
     /// What the kernels need to know.
     pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
         Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)

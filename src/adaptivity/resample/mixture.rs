@@ -300,7 +300,7 @@ struct Difference {
     history: f64,
 }
 
-/// Reference volume, history and plastic work. Returns the elastic Hencky strain as well, from which [`restore`] makes
+/// Reference volume, history, plastic work and what particles carry for loads. Returns the elastic Hencky strain as well, from which [`restore`] makes
 /// the elastic deformation and the stress.
 fn mix_matter<const D: usize>(
     out: &mut Chunk<D>,
@@ -345,6 +345,10 @@ fn mix_matter<const D: usize>(
     let missing = libm::log1p(excess) / D as f64;
     strain.iter_mut().take(D).for_each(|strain| *strain += missing);
 
+    for column in 0..chunk.carried_columns() {
+        let carried = chunk.carried(column);
+        out.carried_mut(column)[number] = (0..shares.len()).map(|i| carried[member(i)]).sum();
+    }
     out.write(Layout::<D>::HALF, number, &[width]);
     out.write(Layout::<D>::HISTORY, number, &mean_history);
     let work = mean(&shares, |i| chunk.read::<1>(Layout::<D>::WORK, member(i)));

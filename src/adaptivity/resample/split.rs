@@ -17,7 +17,7 @@ pub struct Split {
 ///
 /// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it its affine
 /// matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children stand at a quarter of the particle's
-/// box, so that theirs tile it. Mass, volume and centre of mass are kept bit for bit, momentum where the affine part of a
+/// box, so that theirs tile it. Each gets an equal share of what the particle carries for loads. Mass, volume and centre of mass are kept bit for bit, momentum where the affine part of a
 /// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book` gets the
 /// kinetic energy that each split adds, J, which comes out of the affine part.
 pub fn split<const D: usize>(
@@ -110,6 +110,8 @@ fn divide<const D: usize>(
             chunk.write(Layout::<D>::VELOCITY, p, &velocity);
             chunk.write(Layout::<D>::MASS, p, &[mass * share]);
             chunk.write(Layout::<D>::HALF, p, &[0.5 * width]);
+            // A power of two: the children carry exactly what the particle carried, about the same point.
+            (0..chunk.carried_columns()).for_each(|column| chunk.carried_mut(column)[p] *= share);
             write_matrix(chunk, p, &kept);
             let parent = chunk.ids()[p];
             chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);

@@ -4,9 +4,10 @@ use std::io::Write;
 use crate::adaptivity::Adaptivity;
 use crate::job::Problem;
 use crate::job::problem::InStages;
-use crate::load::{Kind as LoadKind, Load};
+use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
+use crate::solver::state::bookings::CarriedTotals;
 use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time};
 
 /// Longest name that is printed, in characters.
@@ -14,13 +15,21 @@ const NAME: usize = 60;
 /// Bodies that are listed.
 const MOST_BODIES: usize = 100;
 
-/// Writes what a job will take on some ranks; `is_refined` says whether the counts are of the tree that its criteria make.
+/// What is known of the first state of a job.
+pub(in crate::cli) struct Start<'a> {
+    /// Whether the counts are of the tree that the job's criteria make.
+    pub is_refined: bool,
+    /// What particles carry of each load that they carry; empty if that is not known.
+    pub carried: &'a [CarriedTotals],
+}
+
+/// Writes what a job will take on some ranks.
 pub(in crate::cli) fn write<const D: usize>(
     out: &mut impl Write,
     ranks: u32,
     problem: &Problem<D>,
     estimate: &Estimate,
-    is_refined: bool,
+    start: &Start<'_>,
 ) -> std::io::Result<()> {
     if !problem.title.is_empty() {
         writeln!(out, "{}", excerpt(&problem.title, 200))?;
@@ -62,9 +71,13 @@ pub(in crate::cli) fn write<const D: usize>(
     }
     if !problem.loads.is_empty() {
         writeln!(out, "loads        {}", problem.loads.len())?;
+        let mut carried = start.carried.iter();
         for (number, load) in problem.loads.iter().enumerate() {
             let stages = in_stages(problem, &problem.load_stages[number]);
             writeln!(out, "  {:18} {}{stages}", excerpt(&load.name, NAME), load_in_words(load))?;
+            if let Some(totals) = load.carried().and_then(|_| carried.next()) {
+                writeln!(out, "  {:18} {}", "", carried_in_words::<D>(totals, load.from.max(0.0)))?;
+            }
         }
     }
     writeln!(out, "leaves       {least}{}", grouped(estimate.total_leaves()))?;
@@ -88,7 +101,7 @@ pub(in crate::cli) fn write<const D: usize>(
         )?;
     }
     if let Some(adaptivity) = &problem.adaptivity {
-        write_refinement(out, adaptivity, is_refined)?;
+        write_refinement(out, adaptivity, start.is_refined)?;
     }
     let about = if estimate.is_cut { "more than" } else { "about" };
     writeln!(
@@ -149,6 +162,18 @@ fn plural(ranks: u32) -> String {
     if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
 }
 
+/// What particles carry of a load, with its force at a time, s.
+fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String {
+    let area = match (totals.area, D) {
+        (Some(area), 2) => format!(", {} of surface", quantity(area, "m")),
+        (Some(area), _) => format!(", {} m² of surface", number(area, 6)),
+        (None, _) => String::new(),
+    };
+    let force: Vec<String> = totals.force[..D].iter().map(|&f| quantity(f, "N")).collect();
+    let (particles, force) = (grouped(totals.particles), force.join(", "));
+    format!("on {particles} particles{area}, force ({force}) at {}", quantity(time, "s"))
+}
+
 /// What a load does, and where and when.
 /// The stages in which something acts, in words, if it names them.
 fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String {
@@ -176,6 +201,19 @@ fn load_in_words<const D: usize>(load: &Load<D>) -> String {
             format!("velocity {}", given.join(", "))
         }
         LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),
+        LoadKind::Carried(carried) => {
+            let vector = |components: &[Quantity; D], unit: &str| {
+                components.each_ref().map(|c| value(c, unit)).join(", ")
+            };
+            match &carried.force {
+                CarriedForce::Traction(components) => format!("traction ({})", vector(components, "Pa")),
+                CarriedForce::Pressure { pressure, follows } => {
+                    let surface = if *follows { "deformed" } else { "undeformed" };
+                    format!("pressure {} on the {surface} surface", value(pressure, "Pa"))
+                }
+                CarriedForce::Point { force, .. } => format!("point force ({})", vector(force, "N")),
+            }
+        }
     };
     let place = if load.region.is_some() { "in a region" } else { "everywhere" };
     match (load.from > 0.0, load.until.is_finite()) {

@@ -7,7 +7,7 @@ use partition::comm::{Comm, Disagreement};
 use super::checked::{self, Checked};
 use super::header::Header;
 use super::sane::{self, Limits};
-use super::state::{self, check_tree, columns, octants, path};
+use super::state::{self, CARRIED, carried_columns, carried_components, check_tree, columns, octants, path};
 use crate::io::hdf5_file::{Element, FileError, Reader};
 
 /// What identifies the state in a file, whatever the ranks that wrote it.
@@ -90,6 +90,11 @@ fn digest_in<const D: usize>(file: &Reader, header: &Header) -> Result<Digest, F
         if set.name == "position" {
             sane(sane::positions(header, &octants, &counts, &values))?;
         }
+    }
+    let columns = carried_columns(file, header)?;
+    if columns > 0 {
+        let values = checked.read_all(&path("particles", CARRIED), particles, carried_components(columns))?;
+        sane(sane::reals(CARRIED, &values, columns))?;
     }
     sane(sane::identifiers(&checked.read_all(&path("particles", "id"), particles, 0)?))?;
     let tags = checked.read_all(&path("particles", "tag"), particles, 0)?;
@@ -231,10 +236,26 @@ fn diff_in<const D: usize>(files: &[Reader; 2], headers: &[Header; 2]) -> Result
         let [a, b] = values;
         found.extend(diff_field(set.name, set.count, &pairs, &ids[0], &[a?, b?]));
     }
+    let carried = [0, 1].map(|i| carried_columns(&files[i], &headers[i]));
+    let [a, b] = carried;
+    let columns = a?.max(b?);
+    if columns > 0 {
+        let [a, b] = [0, 1].map(|i| carried_of(&files[i], &headers[i], columns));
+        found.extend(diff_field(CARRIED, columns, &pairs, &ids[0], &[a?, b?]));
+    }
     let tags =
         [read(0, "tag")?, read(1, "tag")?].map(|tags| tags.into_iter().map(|tag| tag as f64).collect());
     found.extend(diff_field("tag", 1, &pairs, &ids[0], &tags));
     Ok(found)
+}
+
+/// What particles carry, in so many columns; zeros if the file has other columns.
+fn carried_of(file: &Reader, header: &Header, columns: usize) -> Result<Vec<f64>, FileError> {
+    let rows = header.particles;
+    match carried_columns(file, header)? == columns {
+        true => read_all(file, header, &path("particles", CARRIED), rows, carried_components(columns)),
+        false => Ok(vec![0.0; rows as usize * columns]),
+    }
 }
 
 /// A whole data set with the right checksum.

@@ -118,7 +118,7 @@ pub fn start_write<const D: usize>(
         state::write_job(&mut recorded, comm, view)?;
         // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
-            state::write(file, &mut recorded, view, leaves, particles)?;
+            state::write(file, &mut recorded, comm, view, leaves, particles)?;
         }
         vtkhdf::write_particles(file, &mut recorded, comm, view, particles, options)?;
         let header = Header::new(view, leaves.total, particles.total, options.restart);

@@ -5,7 +5,7 @@ use partition::{MAX_LEVEL, Octant};
 use super::View;
 use super::fields::{PointField, Values};
 use super::header::Header;
-use super::state::columns;
+use super::state::{CARRIED, columns};
 use crate::grid::leaf_geometry::position_key;
 use crate::particle::chunk::{TILE, Tag};
 use crate::text::{number, place};
@@ -29,6 +29,12 @@ pub(super) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
             let name = sets.iter().rfind(|set| set.first <= column).map_or("", |set| set.name);
             let (id, value, position) = (chunk.ids()[p], tile[column][p % TILE], chunk.position(p));
             return Err(unstable(name, id, value, &position));
+        }
+        for column in 0..chunk.carried_columns() {
+            let carried = chunk.carried(column);
+            if let Some(p) = carried.iter().position(|number| !number.is_finite()) {
+                return Err(unstable(CARRIED, chunk.ids()[p], carried[p], &chunk.position(p)));
+            }
         }
     }
     Ok(())

@@ -64,6 +64,9 @@ pub(super) fn columns<const D: usize>() -> [Columns; 9] {
     columns
 }
 
+/// Name of the data set of what particles carry for loads, which a state has where any does.
+pub(super) const CARRIED: &str = "carried";
+
 /// The data set with the text of the job file.
 pub(super) const JOB: &str = "state/job";
 
@@ -86,6 +89,7 @@ pub(super) fn write_job<const D: usize>(
 pub(super) fn write<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
+    comm: &Comm,
     view: &View<D>,
     leaves: Rows,
     particles: Rows,
@@ -114,6 +118,7 @@ pub(super) fn write<const D: usize>(
         let texts = [("units", set.unit), ("description", set.meaning)];
         file.set_texts(&path("particles", name), &texts)?;
     }
+    write_carried(file, recorded, comm, view, particles)?;
     let ids: Vec<u64> = view.chunks.iter().flat_map(|chunk| chunk.ids()).copied().collect();
     recorded.write(&path("particles", "id"), particles, 0, &ids)?;
     let texts = [("units", ""), ("description", PointField::Id.meaning())];
@@ -123,6 +128,52 @@ pub(super) fn write<const D: usize>(
     let meaning = "Numbers of material (bits 0 to 15), body (16 to 31) and level (32 to 39).";
     file.set_texts(&path("particles", "tag"), &[("units", ""), ("description", meaning)])
 }
+
+/// Collective. Writes what particles carry, if any does.
+fn write_carried<const D: usize>(
+    file: &Writer,
+    recorded: &mut Recorded,
+    comm: &Comm,
+    view: &View<D>,
+    particles: Rows,
+) -> Result<(), FileError> {
+    let mut most = [view.chunks.iter().map(Chunk::carried_columns).max().unwrap_or(0) as u64];
+    comm.max_u64(&mut most);
+    let columns = most[0] as usize;
+    if columns == 0 {
+        return Ok(());
+    }
+    let mut values = Vec::with_capacity(particles.count as usize * columns);
+    for chunk in view.chunks {
+        let number = |p: usize, column| chunk.carried(column).get(p).copied().unwrap_or(0.0);
+        values.extend((0..chunk.len()).flat_map(|p| (0..columns).map(move |column| number(p, column))));
+    }
+    recorded.write(&path("particles", CARRIED), particles, carried_components(columns), &values)?;
+    let meaning = "For each load that particles carry, in their order: the area (m²) of a traction, the area vector of a pressure, the \
+                   share of a point force.";
+    file.set_texts(&path("particles", CARRIED), &[("units", ""), ("description", meaning)])
+}
+
+/// Components of the data set of what particles carry as [`Writer::write_slab`] counts them.
+pub(super) fn carried_components(columns: usize) -> usize {
+    if columns == 1 { 0 } else { columns }
+}
+
+/// Columns of what particles carry in a file; 0 if no particle carries anything.
+pub(super) fn carried_columns(file: &Reader, header: &Header) -> Result<usize, FileError> {
+    let name = path("particles", CARRIED);
+    if header.checksum(&name).is_none() {
+        return Ok(0);
+    }
+    let columns = file.stored(&name)?.components.max(1);
+    match columns <= MOST_CARRIED {
+        true => Ok(columns),
+        false => Err(file.refuse(format!("{name} has {columns} columns; expected at most {MOST_CARRIED}"))),
+    }
+}
+
+/// Most columns of what particles carry: three of each of as many loads as a job can have.
+const MOST_CARRIED: usize = 3 * 27;
 
 /// Collective. Reads tree and particles; each rank gets a contiguous share of the curve with about
 /// the same number of particles. Refuses a state that no run can have written.
@@ -167,6 +218,23 @@ pub(super) fn read<const D: usize>(
             let len = chunk.len();
             for (p, row) in rows.by_ref().take(len).enumerate() {
                 chunk.write(first, p, row);
+            }
+        }
+    }
+    let columns = file.agree(carried_columns(file, header))?;
+    if columns > 0 {
+        let components = carried_components(columns);
+        let values: Vec<f64> = checked.read(&path("particles", CARRIED), particles, components)?;
+        sane(sane::reals(CARRIED, &values, columns))?;
+        let mut rows = values.chunks_exact(columns);
+        for chunk in &mut chunks {
+            let rows: Vec<&[f64]> = rows.by_ref().take(chunk.len()).collect();
+            if rows.iter().any(|row| row.iter().any(|&number| number != 0.0)) {
+                chunk.carry(columns);
+                for column in 0..columns {
+                    let own = chunk.carried_mut(column).iter_mut();
+                    own.zip(&rows).for_each(|(own, row)| *own = row[column]);
+                }
             }
         }
     }

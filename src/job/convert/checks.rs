@@ -35,6 +35,11 @@ impl Checks<'_> {
         self.faults.push(Fault { key: path.to_string(), message, span, help: None, setting: None });
     }
 
+    /// Line and column of the value at `path`, both from 1.
+    pub(crate) fn place(&self, path: &Path) -> (usize, usize) {
+        (self.position)(self.tree.locate(path).start)
+    }
+
     /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
     pub(crate) fn column_name<'a>(
         &mut self,

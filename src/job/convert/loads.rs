@@ -1,10 +1,13 @@
 //! Loads of the job file to those of the solver.
 use super::checks::{Checks, Space};
+use crate::geometry::written::Vector;
+use crate::job::parse::error::{QUOTED, names as listed};
 use crate::job::parse::source::Path;
-use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity};
-use crate::load::{Kind, Load};
+use crate::job::schema::job_file::JobFile;
+use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity, Sharing};
+use crate::load::{Carried, CarriedForce, Kind, Load};
 use crate::quantity::{Expression, Quantity, Table};
-use crate::text::written as number;
+use crate::text::{excerpt, nearest, written as number};
 
 /// Most exact sums of colliders (six each), faces (one for each axis) and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
@@ -12,11 +15,12 @@ const MAX_SUMS: usize = 108;
 /// All loads, or faults.
 pub(super) fn loads<const D: usize>(
     checks: &mut Checks,
-    loads: &[Written],
+    file: &JobFile,
     taken: usize,
     space: &Space<D>,
     path: &Path,
 ) -> Option<Vec<Load<D>>> {
+    let loads = &file.loads;
     let most = MAX_SUMS.saturating_sub(taken) / 4;
     if loads.len() > most {
         checks.fault(
@@ -28,11 +32,17 @@ pub(super) fn loads<const D: usize>(
         );
         return None;
     }
-    let mut all = Vec::new();
+    let bodies: Vec<&str> = file.bodies.iter().map(|body| body.name.as_str()).collect();
+    let (mut all, mut columns) = (Vec::new(), 0);
     for (i, written) in loads.iter().enumerate() {
         let here = path.index(i);
         checks.column_name(&written.name, loads[..i].iter().map(|load| &*load.name), &here.key("name"));
-        all.push(load(checks, written, space, &here));
+        let mut load = load(checks, written, &bodies, space, &here);
+        if let Some(Load { kind: Kind::Carried(carried), .. }) = &mut load {
+            carried.first = columns;
+            columns += carried.force.columns();
+        }
+        all.push(load);
     }
     all.into_iter().collect()
 }
@@ -40,6 +50,7 @@ pub(super) fn loads<const D: usize>(
 fn load<const D: usize>(
     checks: &mut Checks,
     written: &Written,
+    bodies: &[&str],
     space: &Space<D>,
     path: &Path,
 ) -> Option<Load<D>> {
@@ -85,6 +96,30 @@ fn load<const D: usize>(
             }
             Kind::Damping(rate)
         }
+        LoadKind::Traction { traction, bodies: on, facing } => Kind::Carried(Carried {
+            force: CarriedForce::Traction(vector(checks, traction, &path.key("traction"))?),
+            first: 0,
+            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            facing: direction(checks, facing.as_ref(), &path.key("facing"))?,
+        }),
+        LoadKind::Pressure { pressure, follow, bodies: on, facing } => Kind::Carried(Carried {
+            force: CarriedForce::Pressure {
+                pressure: quantity::<D>(checks, pressure, &path.key("pressure"))?,
+                follows: *follow,
+            },
+            first: 0,
+            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            facing: direction(checks, facing.as_ref(), &path.key("facing"))?,
+        }),
+        LoadKind::PointForce { force, share, bodies: on } => Kind::Carried(Carried {
+            force: CarriedForce::Point {
+                force: vector(checks, force, &path.key("force"))?,
+                by_volume: *share == Sharing::Volume,
+            },
+            first: 0,
+            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            facing: None,
+        }),
     };
     Some(Load {
         name: written.name.clone(),
@@ -95,6 +130,46 @@ fn load<const D: usize>(
         until,
         origin: space.origin,
     })
+}
+
+/// Numbers of the bodies that are named, or a fault; `Some(None)` if none is.
+fn named(
+    checks: &mut Checks,
+    names: Option<&[String]>,
+    bodies: &[&str],
+    path: &Path,
+) -> Option<Option<Vec<u16>>> {
+    let Some(names) = names else { return Some(None) };
+    if names.is_empty() {
+        checks.fault(path, "found an empty array; expected at least one body, or no such key for all".into());
+        return None;
+    }
+    let mut numbers = Vec::new();
+    for (i, name) in names.iter().enumerate() {
+        let number = bodies.iter().position(|body| body == name);
+        if number.is_none() {
+            let guess = nearest(name, bodies.iter().copied());
+            let guess =
+                guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
+            let (found, known) = (excerpt(name, QUOTED), listed(bodies.iter().copied()));
+            let message = format!("found \"{found}\"; expected the name of a body: {known}{guess}");
+            checks.fault(&path.index(i), message);
+        }
+        numbers.extend(number.map(|number| number as u16));
+    }
+    (numbers.len() == names.len()).then_some(Some(numbers))
+}
+
+/// A unit vector, or a fault; `Some(None)` if none is given.
+fn direction<const D: usize>(
+    checks: &mut Checks,
+    written: Option<&Vector>,
+    path: &Path,
+) -> Option<Option<[f64; D]>> {
+    match written {
+        Some(vector) => checks.direction(vector, path).map(Some),
+        None => Some(None),
+    }
 }
 
 /// As many quantities as the job has dimensions, or faults.

@@ -90,7 +90,7 @@ fn problem<const D: usize>(
     };
     let faces_with_sums = if file.history.face_forces { 2 * D } else { 0 };
     let taken = 6 * file.colliders.len() + D * faces_with_sums;
-    let loads = loads(checks, &file.loads, taken, &space, &root.key("loads"));
+    let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let stages = stages::stages(checks, file, &root);
     let load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
@@ -125,6 +125,7 @@ fn problem<const D: usize>(
         materials,
         bodies,
         gravity: gravity?,
+        load_places: (0..file.loads.len()).map(|i| checks.place(&root.key("loads").index(i))).collect(),
         loads: loads?,
         faces: faces.map(|pair| pair.map(Option::unwrap_or_default)),
         named_faces: faces.map(|pair| pair.map(|face| face.is_some())),

@@ -213,7 +213,7 @@ impl Checks<'_> {
         shapes.into_iter().collect()
     }
 
-    fn direction<const D: usize>(&mut self, direction: &Vector, path: &Path) -> Option<[f64; D]> {
+    pub(super) fn direction<const D: usize>(&mut self, direction: &Vector, path: &Path) -> Option<[f64; D]> {
         let direction: [f64; D] = self.vector(direction, path)?;
         // Lengths of any size: squares of components may be too small or too large for a number.
         let greatest = direction.iter().fold(0.0, |most: f64, c| most.max(c.abs()));

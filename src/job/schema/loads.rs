@@ -1,5 +1,6 @@
 //! Loads and quantities as they are written in a job file.
-use crate::geometry::written::Shape;
+use super::common::yes;
+use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,13 +24,15 @@ impl Default for Quantity {
     }
 }
 
-/// A load: what acts on the material beside gravity, contact and the faces of the domain. It acts on nodes inside its shape.
+/// A load: what acts on the material beside gravity, contact and the faces of the domain. Body forces, grips and damping act in their
+/// shape at all times; tractions, pressures and point forces on the material that lies there at the start, wherever it goes.
 /// Its mean force (N) since the row before and its work (J) since the start are columns of `history.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Load {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Where it acts; everywhere by default.
+    /// Where it acts; everywhere by default. Of a traction or a pressure: the part of the bodies' surfaces that lies in it or on its
+    /// own surface; what lies on a face of the domain or against another body counts as no surface.
     #[serde(default)]
     pub shape: Option<Shape>,
     /// Names of the stages in which it acts; all by default. With them all times of the load are counted from the start of the first
@@ -76,4 +79,51 @@ pub enum LoadKind {
         /// Rate, 1/s.
         rate: Quantity,
     },
+    /// A dead force per undeformed area on the surface of bodies.
+    Traction {
+        /// Components, Pa: as many as the job has dimensions.
+        traction: Vec<Quantity>,
+        /// Bodies whose surfaces count; all by default.
+        #[serde(default)]
+        bodies: Option<Vec<String>>,
+        /// Only surface counts whose outward normal at the start is within 45° of this vector; all by default.
+        #[serde(default)]
+        facing: Option<Vector>,
+    },
+    /// A pressure on the surface of bodies, against its outward normal.
+    Pressure {
+        /// The pressure, Pa; below 0 it pulls.
+        pressure: Quantity,
+        /// Whether it acts on the deformed surface, along its normal; else on the undeformed one.
+        #[serde(default = "yes")]
+        follow: bool,
+        /// Bodies whose surfaces count; all by default.
+        #[serde(default)]
+        bodies: Option<Vec<String>>,
+        /// Only surface counts whose outward normal at the start is within 45° of this vector; all by default.
+        #[serde(default)]
+        facing: Option<Vector>,
+    },
+    /// A dead force, shared over the particles that lie in the shape at the start.
+    PointForce {
+        /// Components of the whole force, N; in plane strain per metre of thickness.
+        force: Vec<Quantity>,
+        /// How it is shared.
+        #[serde(default)]
+        share: Sharing,
+        /// Bodies whose particles count; all by default.
+        #[serde(default)]
+        bodies: Option<Vec<String>>,
+    },
+}
+
+/// How a force is shared over particles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sharing {
+    /// In proportion to their volumes.
+    #[default]
+    Volume,
+    /// Equally.
+    Equal,
 }

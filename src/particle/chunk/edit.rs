@@ -1,4 +1,4 @@
-//! Particles come and go; chunks as bytes for other ranks.
+//! Particles come and go.
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::{Chunk, Layout, TILE, Tag};
@@ -13,8 +13,12 @@ impl<const D: usize> Chunk<D> {
         p
     }
 
-    /// Appends a particle given by the words of its columns, with its identifier and packed tag.
-    pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64) {
+    /// Appends a particle given by the words of its columns, with its identifier, its packed tag and the words of what it carries.
+    pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64, carried: &[u64]) {
+        // What all particles of a leaf carry nothing of needs no columns.
+        if carried.iter().any(|&word| word != 0) {
+            self.carry(carried.len());
+        }
         self.grow_for(1);
         let (p, capacity) = (self.len, self.capacity);
         self.len += 1;
@@ -24,11 +28,15 @@ impl<const D: usize> Chunk<D> {
             *to = word;
         }
         (words[Self::IDS * capacity + p], words[Self::TAGS * capacity + p]) = (id, tag);
+        for column in 0..self.carried {
+            words[(Self::CARRIED + column) * capacity + p] = carried.get(column).copied().unwrap_or(0);
+        }
         self.widest.add(f64::from_bits(columns[Layout::<D>::HALF]));
     }
 
     /// Appends particle `p` of `source`.
     pub fn push_from(&mut self, source: &Self, p: usize) {
+        self.carry(source.carried);
         self.grow_for(1);
         self.len += 1;
         self.set(self.len - 1, source, p);
@@ -38,6 +46,7 @@ impl<const D: usize> Chunk<D> {
     /// Makes particle `p` a copy of particle `q` of `source`.
     pub fn replace(&mut self, p: usize, source: &Self, q: usize) {
         (self.widest, self.revision) = (Widest::UNKNOWN, None);
+        self.carry(source.carried);
         self.set(p, source, q);
     }
 
@@ -47,20 +56,23 @@ impl<const D: usize> Chunk<D> {
         for column in 0..Layout::<D>::REALS {
             to[column * TILE] = from[column * TILE];
         }
-        for column in [Self::IDS, Self::TAGS] {
+        for column in Self::IDS..Self::CARRIED + source.carried {
             self.words_mut(column)[p] = source.words(column)[q];
+        }
+        for column in source.columns()..self.columns() {
+            self.words_mut(column)[p] = 0;
         }
     }
 
     /// Makes particle `to` a copy of particle `from`.
     fn copy_within(&mut self, to: usize, from: usize) {
-        let capacity = self.capacity;
+        let (capacity, columns) = (self.capacity, self.columns());
         let words: &mut [u64] = cast_slice_mut(&mut self.block);
         let (first_to, first_from) = (Self::first_word(to), Self::first_word(from));
         for column in 0..Layout::<D>::REALS {
             words[first_to + column * TILE] = words[first_from + column * TILE];
         }
-        for column in [Self::IDS, Self::TAGS] {
+        for column in Self::IDS..columns {
             words[column * capacity + to] = words[column * capacity + from];
         }
     }
@@ -78,43 +90,9 @@ impl<const D: usize> Chunk<D> {
         for p in first..self.len {
             self.tile_of_mut(p).iter_mut().for_each(|line| line[p % TILE] = 0.0);
         }
-        [Self::IDS, Self::TAGS].into_iter().for_each(|column| self.words_mut(column)[first..].fill(0));
+        (Self::IDS..self.columns()).for_each(|column| self.words_mut(column)[first..].fill(0));
         self.widest = Widest::UNKNOWN;
         first
-    }
-
-    /// Appends all columns as bytes, to send the particles to another rank of the same job.
-    pub fn append_to(&self, bytes: &mut Vec<u8>) {
-        bytes.reserve(8 * self.len * Self::COLUMNS);
-        for column in 0..Layout::<D>::REALS {
-            let (lines, rest) = self.column(column).lines();
-            lines.for_each(|line| bytes.extend_from_slice(cast_slice(line)));
-            bytes.extend_from_slice(cast_slice(rest));
-        }
-        [Self::IDS, Self::TAGS]
-            .iter()
-            .for_each(|&column| bytes.extend_from_slice(cast_slice(self.words(column))));
-    }
-
-    /// The particles that [`Chunk::append_to`] packed; empty if the bytes are not of that form.
-    pub fn from_bytes(bytes: &[u8]) -> Self {
-        let len = bytes.len() / (8 * Self::COLUMNS);
-        let mut chunk = Self::with_capacity(len);
-        if bytes.len() != 8 * len * Self::COLUMNS || len == 0 {
-            return chunk;
-        }
-        chunk.len = len;
-        let (reals, words) = bytes.split_at(8 * len * Layout::<D>::REALS);
-        for (column, values) in reals.chunks_exact(8 * len).enumerate() {
-            for (to, value) in chunk.column_mut(column).into_iter().zip(values.as_chunks().0) {
-                *to = f64::from_ne_bytes(*value);
-            }
-        }
-        for (column, values) in (Self::IDS..).zip(words.chunks_exact(8 * len)) {
-            cast_slice_mut(chunk.words_mut(column)).copy_from_slice(values);
-        }
-        chunk.widest = Widest::UNKNOWN;
-        chunk
     }
 
     /// Removes the particles `gone` (ascending). The last of those that stay fill the gaps in order, so that the cost
@@ -155,7 +133,9 @@ impl<const D: usize> Chunk<D> {
 
     /// A chunk whose particle `q` is particle `source[q]` of this one.
     pub fn gathered(&self, source: &[u32]) -> Self {
-        let mut out = Self::with_capacity(source.len());
+        let mut out = Self::new();
+        out.carry(self.carried);
+        out.reserve_exact(source.len());
         (out.len, out.widest) = (source.len(), Widest::UNKNOWN);
         source.iter().enumerate().for_each(|(q, &p)| out.set(q, self, p as usize));
         out
@@ -168,18 +148,22 @@ impl<const D: usize> Chunk<D> {
         }
     }
 
-    /// Changes the number of tiles; ids and tags move along.
+    /// Changes the number of tiles; what lies behind them moves along.
     fn set_capacity(&mut self, capacity: usize) {
         let (before, len) = (self.capacity, self.len);
-        let lines = capacity / TILE * Self::COLUMNS;
-        // Those that would be overwritten go first.
-        let order = if capacity > before { [Self::TAGS, Self::IDS] } else { [Self::IDS, Self::TAGS] };
+        let lines = capacity / TILE * self.columns();
         if capacity > before {
             self.block.resize(lines);
         }
         let words: &mut [u64] = cast_slice_mut(&mut self.block);
-        for column in order {
-            words.copy_within(column * before..column * before + len, column * capacity);
+        let mut shift =
+            |column: usize| words.copy_within(column * before..column * before + len, column * capacity);
+        // Those that would be overwritten go first.
+        let columns = Self::IDS..Self::CARRIED + self.carried;
+        if capacity > before {
+            columns.rev().for_each(shift)
+        } else {
+            columns.for_each(&mut shift)
         }
         if capacity < before {
             self.block.resize(lines);

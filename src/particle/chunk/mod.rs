@@ -13,7 +13,9 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `mod.rs` | the chunk, and what is read and written in place |
-//! | `edit.rs` | particles come and go; bytes for other ranks |
+//! | `edit.rs` | particles come and go |
+//! | `bytes.rs` | chunks as bytes for other ranks |
+//! | `carried.rs` | what some particles carry for loads |
 //! | `place.rs` | which content a chunk has, and where in memory |
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
@@ -23,6 +25,8 @@ pub use super::layout::{Layout, Tag};
 use super::widest::Widest;
 use crate::memory::Block;
 
+mod bytes;
+mod carried;
 mod edit;
 mod place;
 #[cfg(test)]
@@ -36,7 +40,8 @@ pub const TILE: usize = 8;
 #[repr(C, align(64))]
 struct Line([f64; TILE]);
 
-/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags.
+/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags, then what particles carry for
+/// loads, in leaves with such particles (see [`Chunk::carried`]).
 ///
 /// All lie in one block, with room for whole tiles; lanes of the last tile behind the last particle hold anything. Leaves
 /// at the surface of a moving body become fuller or emptier all the time; in the heap each size that they pass through
@@ -47,6 +52,8 @@ pub struct Chunk<const D: usize> {
     capacity: usize,
     block: Block<Line>,
     widest: Widest,
+    /// Columns of what particles carry.
+    carried: usize,
     revision: Option<Revision>,
 }
 
@@ -55,8 +62,8 @@ impl<const D: usize> Chunk<D> {
     const IDS: usize = Layout::<D>::REALS;
     /// Where the tags begin.
     const TAGS: usize = Self::IDS + 1;
-    /// Words of a particle.
-    const COLUMNS: usize = Self::TAGS + 1;
+    /// Where the columns begin that only some chunks have.
+    const CARRIED: usize = Self::TAGS + 1;
 
     /// An empty chunk.
     pub fn new() -> Self {
@@ -116,7 +123,12 @@ impl<const D: usize> Chunk<D> {
         ColumnMut::new(self.lines_mut().get_mut(column..).unwrap_or_default(), Layout::<D>::REALS, len)
     }
 
-    /// Identifiers or tags.
+    /// Words of a particle.
+    fn columns(&self) -> usize {
+        Self::CARRIED + self.carried
+    }
+
+    /// Identifiers, tags, or a column of what particles carry.
     fn words(&self, column: usize) -> &[u64] {
         &cast_slice(&self.block)[column * self.capacity..][..self.len]
     }

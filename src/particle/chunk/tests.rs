@@ -78,3 +78,47 @@ fn the_last_fill_the_gaps() {
     chunk.remove(&[0, 1, 2]);
     assert!(chunk.is_empty());
 }
+
+/// What particles carry goes wherever they go, and columns come with the first that carries anything.
+#[test]
+fn what_particles_carry_goes_with_them() {
+    let tag = Tag { material: 0, body: 0, level: 0 };
+    let mut chunk = Chunk::<2>::new();
+    (0..20).for_each(|id| _ = chunk.push_zeroed(id, tag));
+    assert_eq!((chunk.carried_columns(), chunk.carried(0)), (0, &[][..]));
+    let bytes_without = chunk.heap_bytes();
+    chunk.carry(2);
+    assert!(chunk.heap_bytes() > bytes_without && chunk.carried(1) == [0.0; 20]);
+    for p in 0..20 {
+        (chunk.carried_mut(0)[p], chunk.carried_mut(1)[p]) = (p as f64, 0.5 * p as f64);
+    }
+    let check = |chunk: &Chunk<2>, expected: &[u64]| {
+        assert_eq!(chunk.ids(), expected);
+        for (p, &id) in expected.iter().enumerate() {
+            assert_eq!((chunk.carried(0)[p], chunk.carried(1)[p]), (id as f64, 0.5 * id as f64));
+        }
+    };
+    let mut other = chunk.clone();
+    other.reserve_exact(500);
+    other.remove(&[1, 3, 17]);
+    check(&other, &[0, 18, 2, 19, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]);
+    other.keep(&[0, 2, 5]);
+    check(&other, &[0, 2, 5]);
+    check(&chunk.gathered(&[3, 3, 1]), &[3, 3, 1]);
+    other.replace(1, &chunk, 7);
+    other.push_from(&chunk, 8);
+    check(&other, &[0, 7, 5, 8]);
+    let mut bytes = Vec::new();
+    other.append_to(&mut bytes);
+    check(&Chunk::from_bytes(&bytes), &[0, 7, 5, 8]);
+
+    let mut plain = Chunk::<2>::new();
+    let words = [0; Layout::<2>::REALS];
+    plain.push_words(&words, 0, tag.pack(), &[0, 0]);
+    assert_eq!(plain.carried_columns(), 0);
+    plain.push_words(&words, 6, tag.pack(), &[6.0_f64.to_bits(), 3.0_f64.to_bits()]);
+    plain.push_zeroed(0, tag);
+    check(&plain, &[0, 6, 0]);
+    plain.keep(&[]);
+    assert_eq!(plain.carried_columns(), 0);
+}

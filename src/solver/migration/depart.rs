@@ -35,6 +35,8 @@ pub struct Borders<const D: usize> {
     boxes: Vec<([f64; D], [f64; D])>,
     rules: FaceRules<D>,
     root_edge: f64,
+    /// Columns of what particles carry for loads.
+    carried: usize,
 }
 
 /// What has been taken out of one leaf.
@@ -55,42 +57,49 @@ impl Departed {
     pub(crate) fn is_any(&self) -> bool {
         !self.records.is_empty() || self.crossed.is_any() || self.error.is_some() || self.splits.is_some()
     }
+}
+
+impl<const D: usize> Borders<D> {
+    /// Of the own leaves of a plan.
+    pub(in crate::solver) fn new(plan: &GridPlan<D>, rules: FaceRules<D>, carried: usize) -> Self {
+        let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
+        let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
+        Self { boxes, rules, root_edge: plan.root_edge, carried }
+    }
+
+    /// Lower and upper corner of an own leaf, m.
+    pub(in crate::solver) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
+        &self.boxes[leaf]
+    }
+
+    /// Words of the record of a particle.
+    pub(super) fn record_words(&self) -> usize {
+        record_words::<D>(self.carried)
+    }
 
     /// Takes particles, ascending, out of a chunk.
-    pub(crate) fn take<const D: usize>(chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Self {
-        let mut departed = Self::default();
+    pub(in crate::solver) fn take(&self, chunk: &mut Chunk<D>, leavers: &[(u32, Destination)]) -> Departed {
+        let mut departed = Departed::default();
         if leavers.is_empty() {
             return departed;
         }
-        departed.records.reserve_exact(leavers.len() * record_words::<D>());
-        leavers.iter().for_each(|&(p, destination)| departed.note(chunk, p as usize, destination));
+        departed.records.reserve_exact(leavers.len() * self.record_words());
+        leavers.iter().for_each(|&(p, destination)| self.note(&mut departed, chunk, p as usize, destination));
         let gone: Vec<u32> = leavers.iter().map(|&(p, _)| p).collect();
         chunk.remove(&gone);
         departed
     }
 
     /// Notes a particle that goes somewhere.
-    fn note<const D: usize>(&mut self, chunk: &Chunk<D>, p: usize, destination: Destination) {
+    fn note(&self, departed: &mut Departed, chunk: &Chunk<D>, p: usize, destination: Destination) {
         match destination {
-            Destination::Leaf(to) => push_record(&mut self.records, u64::from(to), chunk, p),
-            Destination::Deleted => self.crossed.deleted.push(chunk.column(Layout::<D>::MASS)[p]),
-            Destination::Left => self.crossed.left.push(chunk.column(Layout::<D>::MASS)[p]),
+            Destination::Leaf(to) => {
+                push_record(&mut departed.records, u64::from(to), chunk, p, self.carried);
+            }
+            Destination::Deleted => departed.crossed.deleted.push(chunk.column(Layout::<D>::MASS)[p]),
+            Destination::Left => departed.crossed.left.push(chunk.column(Layout::<D>::MASS)[p]),
             Destination::Stay | Destination::Split => {}
         }
-    }
-}
-
-impl<const D: usize> Borders<D> {
-    /// Of the own leaves of a plan.
-    pub(in crate::solver) fn new(plan: &GridPlan<D>, rules: FaceRules<D>) -> Self {
-        let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
-        let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
-        Self { boxes, rules, root_edge: plan.root_edge }
-    }
-
-    /// Lower and upper corner of an own leaf, m.
-    pub(in crate::solver) fn of_leaf(&self, leaf: usize) -> &([f64; D], [f64; D]) {
-        &self.boxes[leaf]
     }
 
     /// Where a position is, if it is in another leaf than own leaf `leaf`.
@@ -137,7 +146,7 @@ impl<const D: usize> Borders<D> {
         let parents = resampling.map(|resampling| too_coarse(tree, chunk, resampling, &mut leavers));
         let parents = parents.unwrap_or_default();
         let mut children = chunk.gathered(&parents);
-        let mut departed = Departed::take(chunk, &leavers);
+        let mut departed = self.take(chunk, &leavers);
         departed.crossed.put_back = put_back;
         let Some(resampling) = resampling else { return Ok(departed) };
         if parents.is_empty() {
@@ -154,7 +163,7 @@ impl<const D: usize> Borders<D> {
             which = too_coarse(tree, &children, resampling, &mut leavers);
         }
         for (p, destination) in leavers {
-            departed.note(&children, p as usize, destination);
+            self.note(&mut departed, &children, p as usize, destination);
             if let Destination::Stay = destination {
                 chunk.push_from(&children, p as usize);
             }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::crossings::{Crossings, FaceRules};
 use super::depart::{Borders, Departed, outside};
-use super::records::{append_all, record_words};
+use super::records::append_all;
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::grid::{GridPlan, KnownTree};
 use crate::particle::chunk::Chunk;
@@ -78,14 +78,19 @@ pub struct Moved {
 }
 
 impl<const D: usize> Migration<D> {
-    /// Not collective. `neighbours` must be those of the plan's arena exchange.
+    /// Not collective. `neighbours` must be those of the plan's arena exchange; particles have up to `carried` columns of what they
+    /// carry for loads.
     pub(in crate::solver) fn new(
         comm: &Comm,
         plan: &GridPlan<D>,
         neighbours: Vec<usize>,
         rules: FaceRules<D>,
+        carried: usize,
     ) -> Self {
-        Self { exchange: NeighbourExchange::new(comm, neighbours, TAG), borders: Borders::new(plan, rules) }
+        Self {
+            exchange: NeighbourExchange::new(comm, neighbours, TAG),
+            borders: Borders::new(plan, rules, carried),
+        }
     }
 
     /// Messages and bytes so far.
@@ -130,7 +135,7 @@ impl<const D: usize> Migration<D> {
         let departed = leaves.map(|(leaf, (chunk, wanted))| {
             let leavers =
                 wanted.iter().filter_map(|&(p, place)| Some((p, borders.elsewhere(tree, leaf, place)?)));
-            Departed::take(chunk, &leavers.collect::<Vec<_>>())
+            borders.take(chunk, &leavers.collect::<Vec<_>>())
         });
         let departed = departed.collect();
         // None of them leaves the domain.
@@ -161,7 +166,8 @@ impl<const D: usize> Migration<D> {
         let neighbours = self.exchange.neighbours();
         let mut outgoing: Vec<Vec<u8>> = neighbours.iter().map(|_| Vec::new()).collect();
         let mut own: Vec<(u32, &[u64])> = Vec::new();
-        for record in departed.iter().flat_map(|leaf| leaf.records.chunks_exact(record_words::<D>())) {
+        let words = self.borders.record_words();
+        for record in departed.iter().flat_map(|leaf| leaf.records.chunks_exact(words)) {
             let to = record[0] as usize;
             if let Some(local) = tree.local(to) {
                 own.push((local as u32, record));
@@ -183,18 +189,19 @@ impl<const D: usize> Migration<D> {
         let (before, after) =
             messages.split_at(self.exchange.neighbours().partition_point(|&neighbour| neighbour < rank));
         let arrivals: Vec<(u32, &[u64])> =
-            of_messages::<D>(before, tree).chain(own).chain(of_messages::<D>(after, tree)).collect();
+            of_messages(before, tree, words).chain(own).chain(of_messages(after, tree, words)).collect();
         append_all(chunks, &arrivals);
         error.map_or(Ok(moved), Err)
     }
 }
 
-/// Own leaf and record of each particle in messages from other ranks.
+/// Own leaf and record, of so many words, of each particle in messages from other ranks.
 fn of_messages<'a, const D: usize>(
     messages: &'a [Vec<u64>],
     tree: &'a KnownTree<D>,
+    words: usize,
 ) -> impl Iterator<Item = (u32, &'a [u64])> {
-    let records = messages.iter().flat_map(|words| words.chunks_exact(record_words::<D>()));
+    let records = messages.iter().flat_map(move |message| message.chunks_exact(words));
     records.filter_map(|record| {
         let leaf = tree.locate(record[0]).and_then(|known| tree.local(known))?;
         Some((leaf as u32, record))

@@ -4,16 +4,24 @@ use rayon::prelude::*;
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
-/// Words of one particle: a word for the way (where it goes), columns, identifier, tag.
-pub(super) const fn record_words<const D: usize>() -> usize {
-    Layout::<D>::REALS + 3
+/// Words of one particle: a word for the way (where it goes), columns, identifier, tag, and columns of what particles carry.
+pub(super) const fn record_words<const D: usize>(carried: usize) -> usize {
+    Layout::<D>::REALS + 3 + carried
 }
 
-/// Appends the record of particle `p`.
-pub(super) fn push_record<const D: usize>(records: &mut Vec<u64>, way: u64, chunk: &Chunk<D>, p: usize) {
+/// Appends the record of particle `p`, with so many columns of what it carries.
+pub(super) fn push_record<const D: usize>(
+    records: &mut Vec<u64>,
+    way: u64,
+    chunk: &Chunk<D>,
+    p: usize,
+    carried: usize,
+) {
     records.push(way);
     records.extend(chunk.tile_of(p).iter().map(|line| line[p % TILE].to_bits()));
     records.extend([chunk.ids()[p], chunk.tags()[p]]);
+    records
+        .extend((0..carried).map(|column| chunk.carried(column).get(p).map_or(0, |value| value.to_bits())));
 }
 
 /// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given. Chunks know
@@ -23,8 +31,9 @@ pub(super) fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u
     let by_chunk = Csr::new(chunks.len(), arrivals.iter().copied());
     chunks.par_iter_mut().enumerate().with_min_len(32).for_each(|(number, chunk)| {
         for record in by_chunk.of(number) {
-            if let [_, columns @ .., id, tag] = record {
-                chunk.push_words(columns, *id, *tag);
+            if let Some((columns, [id, tag, carried @ ..])) = record[1..].split_at_checked(Layout::<D>::REALS)
+            {
+                chunk.push_words(columns, *id, *tag, carried);
             }
         }
         chunk.note_greatest_half();
@@ -43,10 +52,12 @@ mod tests {
             let p = source.push_zeroed(id, Tag { material: id as u16, body: 1, level: 2 });
             source.column_mut(Layout::<2>::MASS)[p] = id as f64;
         }
+        source.carry(3);
+        (0..20).for_each(|p| source.carried_mut(2)[p] = -(p as f64));
         let mut records = Vec::new();
-        (0..20).rev().for_each(|p| push_record(&mut records, p as u64 % 3, &source, p));
+        (0..20).rev().for_each(|p| push_record(&mut records, p as u64 % 3, &source, p, 3));
         let arrivals: Vec<(u32, &[u64])> =
-            records.chunks_exact(record_words::<2>()).map(|record| (record[0] as u32, record)).collect();
+            records.chunks_exact(record_words::<2>(3)).map(|record| (record[0] as u32, record)).collect();
         let mut chunks = vec![Chunk::<2>::new(); 4];
         append_all(&mut chunks, &arrivals);
         for (to, chunk) in chunks.iter().enumerate() {
@@ -54,6 +65,7 @@ mod tests {
             assert_eq!(chunk.ids(), expected);
             for (p, &id) in expected.iter().enumerate() {
                 assert_eq!(chunk.column(Layout::<2>::MASS)[p], id as f64);
+                assert_eq!(chunk.carried(2)[p], -(id as f64));
                 let tag = Tag { material: id as u16, body: 1, level: 2 };
                 assert_eq!(Tag::unpack(chunk.tags()[p]), tag);
             }

@@ -86,6 +86,30 @@ pub const FACE_SUMS: usize = 3;
 /// that this rank counts.
 pub const LOAD_SUMS: usize = 4;
 
+/// A load's force on one particle in one step.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct ParticlePush<const D: usize> {
+    /// Its index in its chunk.
+    pub particle: u32,
+    /// Index of the load.
+    pub load: u32,
+    /// The force, N.
+    pub force: [f64; D],
+    /// Where the particle was; after G2P the way it went, m.
+    pub way: [f64; D],
+}
+
+/// What particles carry of a load.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CarriedTotals {
+    /// Particles that carry any.
+    pub particles: u64,
+    /// Sum of the sizes of their areas, m² (in plane strain m); `None` for point forces.
+    pub area: Option<f64>,
+    /// Force, N; in plane strain per metre of thickness.
+    pub force: [f64; 3],
+}
+
 /// Mean force and work of a load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadTotals {

@@ -20,7 +20,7 @@ use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS};
+use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, ParticlePush};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
@@ -113,6 +113,8 @@ pub struct Solver<const D: usize> {
     pub load_sums: ExactSums<LOAD_SUMS>,
     /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none where nobody asks.
     pub face_sums: ExactSums<FACE_SUMS>,
+    /// Forces that particles carried in the last step, by own leaf; empty without such loads.
+    pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// The way to equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.

@@ -10,7 +10,8 @@ use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
-use crate::kernel::{Row, Scheme, arena_nodes, g2p};
+use crate::kernel::{Row, Scheme, Select, arena_nodes, g2p};
+use crate::load::{Carried, Load};
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
 use crate::solver::migration::depart::{Borders, Departed};
@@ -19,8 +20,10 @@ use crate::solver::sorting::bins::OfLeaf;
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
+use crate::solver::state::bookings::ParticlePush;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
+use crate::solver::step::carried::{follow, followers, note_ways};
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -30,6 +33,8 @@ struct Scratch<const D: usize> {
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
     sort: leaf_bins::Scratch,
+    /// Velocity gradients of particles that carry areas.
+    gradients: Vec<(u32, [[f64; D]; D])>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
@@ -41,6 +46,7 @@ impl<const D: usize> Default for Scratch<D> {
             gathered: Vec::new(),
             leavers: Leavers::default(),
             sort: leaf_bins::Scratch::default(),
+            gradients: Vec::new(),
         }
     }
 }
@@ -73,6 +79,8 @@ struct Sweep<'a, const D: usize> {
     watch: Watch,
     /// Where the particles of each leaf lie.
     places: &'a [Place],
+    /// Loads with areas that follow the deformation.
+    following: &'a [&'a Carried<D>],
 }
 
 impl<const D: usize> Solver<D> {
@@ -85,6 +93,9 @@ impl<const D: usize> Solver<D> {
         let widths = self.physics.widths(&self.grid.plan);
         let watch = adaptivity.map(|adaptivity| adaptivity.watch(self.clock.step + 1));
         self.leaf_data.begin_gather(&self.chunks);
+        self.pushes.resize_with(self.chunks.len(), Vec::new);
+        let following = self.physics.loads.iter().filter_map(Load::carried);
+        let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
         let sweep = Sweep {
             dt,
@@ -98,17 +109,19 @@ impl<const D: usize> Solver<D> {
             widths: &widths,
             watch: watch.unwrap_or_default(),
             places,
+            following: &following,
         };
-        let (chunks, lists) = (&mut self.chunks, &mut self.grid.lists);
+        let (chunks, lists, pushes) = (&mut self.chunks, &mut self.grid.lists, &mut self.pushes);
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).enumerate();
-            let departed =
-                leaves.map_init(Scratch::default, |scratch, (leaf, (((chunk, bins), maxima), signal))| {
-                    // Of empty leaves there may be very many, and to take the time costs more than they do.
-                    let is_empty = chunk.is_empty();
-                    let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, maxima, signal);
-                    if is_empty { advance() } else { times.time(leaf, advance) }
-                });
+            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).zip(pushes);
+            let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
+                let ((((chunk, bins), maxima), signal), pushes) = notes;
+                // Of empty leaves there may be very many, and to take the time costs more than they do.
+                let is_empty = chunk.is_empty();
+                let notes = (maxima, signal, &mut **pushes);
+                let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
+                if is_empty { advance() } else { times.time(leaf, advance) }
+            });
             departed.filter(Departed::is_any).collect()
         })
     }
@@ -155,12 +168,15 @@ impl<const D: usize> Sweep<'_, D> {
         leaf: usize,
         chunk: &mut Chunk<D>,
         bins: OfLeaf<'_, D>,
-        maxima: &mut LeafMaxima<D>,
-        signal: &mut f64,
+        (maxima, signal, pushes): (&mut LeafMaxima<D>, &mut f64, &mut [ParticlePush<D>]),
     ) -> Departed {
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
+        note_ways(chunk, pushes);
+        for (p, gradient) in scratch.gradients.drain(..) {
+            follow(chunk, self.following, p as usize, &gradient, self.dt);
+        }
         self.watch.after(chunk, self.dt, maxima);
         if signal.is_infinite()
             && let Some(error) = self.borders.unsound(chunk)
@@ -201,7 +217,7 @@ impl<const D: usize> Sweep<'_, D> {
     /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
     /// [`Sweep::gather`].
     fn gather_bin(&self, scratch: &mut Scratch<D>, bin: &BinView<'_, D>, chunk: &mut Chunk<D>) -> f64 {
-        let Scratch { kernel, arena, increments, gathered, leavers, .. } = scratch;
+        let Scratch { kernel, arena, increments, gathered, leavers, gradients, .. } = scratch;
         let next = self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
         if let Some(rows) = self.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
@@ -211,15 +227,29 @@ impl<const D: usize> Sweep<'_, D> {
         let nodes = Fields { velocity: &arena.rows, increment, moments };
         g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
         let Some(whole) = bin.whole else { return 0.0 };
+        if self.has_followers(chunk) {
+            let list = followers(chunk, self.following, whole);
+            g2p::look(kernel, chunk, Select::List(&list), &bin.frame, self.scheme, &nodes, |p, gathered| {
+                gradients.push((p as u32, gathered.gradient()));
+            });
+        }
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
         g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields: &nodes, leavers }
             .whole_boxes(whole, next)
     }
 
+    /// Whether particles of a leaf may carry areas that follow the deformation.
+    fn has_followers(&self, chunk: &Chunk<D>) -> bool {
+        chunk.carried_columns() > 0 && !self.following.is_empty()
+    }
+
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
-        let Scratch { kernel, gathered, leavers, .. } = scratch;
+        let Scratch { kernel, gathered, leavers, gradients, .. } = scratch;
+        if self.has_followers(chunk) {
+            gradients.extend(cut.iter().zip(&*gathered).map(|(&p, gathered)| (p, gathered.gradient())));
+        }
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
         let (scheme, dt) = (self.scheme, self.dt);
         g2p::advance_gathered(kernel, chunk, cut, gathered, scheme, dt, cell, &extent, leavers)

@@ -59,7 +59,8 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn apply_loads(&mut self, dt: f64) -> Vec<Push<D>> {
         let time = self.clock.time;
         let loads = self.physics.loads.iter().enumerate();
-        let active: Vec<(usize, &Load<D>)> = loads.filter(|(_, load)| load.is_active(time)).collect();
+        let active = loads.filter(|(_, load)| load.carried().is_none() && load.is_active(time));
+        let active: Vec<(usize, &Load<D>)> = active.collect();
         if active.is_empty() {
             return Vec::new();
         }

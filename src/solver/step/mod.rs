@@ -11,6 +11,8 @@
 //! | [`colliders`] | colliders |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
+//! | [`carried`] | loads that particles carry: their impulse and work; areas follow the deformation |
+pub mod carried;
 pub mod colliders;
 pub mod exchange;
 mod flip_xpic;

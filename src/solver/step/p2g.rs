@@ -20,11 +20,13 @@ impl<const D: usize> Solver<D> {
         self.grid.sort(&mut self.phases, &self.chunks, &widths)
     }
 
-    /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w m (v + C (x_j - x)) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
-    /// ranks; with FLIP and XPIC also `p_j` without stress.
+    /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
+    /// ranks, with the forces f that particles carry; with FLIP and XPIC also `p_j` without forces.
     pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
         self.note_velocities();
+        let before = self.push_particles(dt);
         self.nodes_from_particles(dt);
+        self.take_back_push(&before);
     }
 
     /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes.

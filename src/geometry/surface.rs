@@ -1,0 +1,269 @@
+//! Pieces of the surface of a region in a box: their area vectors, which point out of the region.
+//!
+//! Where the surface lies on faces of the box, each such face gives a piece. What lies inside the box is one piece more: the part
+//! of the region in the box has a closed surface, the sum of whose area vectors is 0, so that the piece is minus the sum over the
+//! faces of the box of their parts in the region. Both need no more than membership along lines. Plane surfaces on faces of boxes
+//! have their exact area; a plane anywhere else has it as well, but for boxes that its edges cross, and a curved surface to the
+//! second order of the edge of the box.
+use super::Aabb;
+
+/// A piece of surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch<const D: usize> {
+    /// Outward normal times area, m² (in the plane m).
+    pub area: [f64; D],
+    /// About its centre, m.
+    pub centre: [f64; D],
+    /// Whether it lies on a face of the box.
+    pub is_on_face: bool,
+}
+
+/// What [`patches`] needs to know of points.
+pub struct Region<'a, const D: usize> {
+    /// Whether a point is in the region.
+    pub inside: &'a (dyn Fn(&[f64; D]) -> bool + Sync),
+    /// Whether a point just outside may be beside a surface that counts.
+    pub free: &'a (dyn Fn(&[f64; D]) -> bool + Sync),
+    /// Whether a point of the surface counts.
+    pub counts: &'a (dyn Fn(&[f64; D]) -> bool + Sync),
+    /// The point of the surface next to a point.
+    pub project: &'a (dyn Fn(&[f64; D]) -> [f64; D] + Sync),
+}
+
+/// How far beside a face membership is looked at, as a share of the edge of the box.
+const BESIDE: f64 = 1e-7;
+/// Parts of a line that are looked at alone.
+const PARTS: usize = 4;
+/// Areas below this share of a face do not count: they come of looking beside faces.
+const LEAST: f64 = 1e-6;
+
+/// Pieces of the surface of a region in a box of equal edges.
+pub fn patches<const D: usize>(region: &Region<'_, D>, cell: &Aabb<D>) -> Vec<Patch<D>> {
+    let edge = cell.upper[0] - cell.lower[0];
+    let face_area = (1..D).fold(1.0, |area, _| area * edge);
+    let (mut found, mut closing) = (Vec::new(), [0.0; D]);
+    for axis in 0..D {
+        for (side, sign) in [(cell.lower[axis], -1.0), (cell.upper[axis], 1.0)] {
+            let beside = |x: &[f64; D], by: f64| {
+                let mut beside = *x;
+                beside[axis] += sign * by * edge;
+                beside
+            };
+            let within = |x: &[f64; D]| (region.inside)(&beside(x, -BESIDE));
+            let (share, _) = share_of_face(cell, axis, side, &within);
+            closing[axis] -= sign * share * face_area;
+            let bare = |x: &[f64; D]| {
+                let out = beside(x, BESIDE);
+                within(x) && !(region.inside)(&out) && (region.free)(&out) && (region.counts)(x)
+            };
+            let (share, centre) = share_of_face(cell, axis, side, &bare);
+            if share > LEAST {
+                let area = std::array::from_fn(|a| if a == axis { sign * share * face_area } else { 0.0 });
+                found.push(Patch { area, centre, is_on_face: true });
+            }
+        }
+    }
+    let size = closing.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if size > LEAST * face_area {
+        let mut centre = (region.project)(&cell.centre());
+        (0..D).for_each(|a| centre[a] = centre[a].clamp(cell.lower[a], cell.upper[a]));
+        // Rounding of the projection must not hide it.
+        let out = std::array::from_fn(|a| 1e-3f64.mul_add(edge * closing[a] / size, centre[a]));
+        if (region.free)(&out) && (region.counts)(&centre) {
+            found.push(Patch { area: closing, centre, is_on_face: false });
+        }
+    }
+    found
+}
+
+/// Share of a face of a box that a set covers, and the centre of that part. The face is cut into lines along one of its axes: the
+/// one along which more lines cross the edge of the set, on which it is found exactly.
+fn share_of_face<const D: usize>(
+    cell: &Aabb<D>,
+    axis: usize,
+    side: f64,
+    set: &impl Fn(&[f64; D]) -> bool,
+) -> (f64, [f64; D]) {
+    let along = |line_axis: usize| {
+        let lines = PARTS.pow(D as u32 - 2);
+        let (mut share, mut crossings, mut centre) = (0.0, 0, [0.0; D]);
+        for line in 0..lines {
+            let mut start = cell.lower;
+            start[axis] = side;
+            if let Some(other) = (0..D).find(|&a| a != axis && a != line_axis) {
+                let place = (line as f64 + 0.5) / PARTS as f64;
+                start[other] = place.mul_add(cell.upper[other] - cell.lower[other], start[other]);
+            }
+            let edge = cell.upper[line_axis] - cell.lower[line_axis];
+            let own = share_of_line(&start, line_axis, edge, set);
+            (share, crossings) = (share + own.share, crossings + own.crossings);
+            for a in 0..D {
+                let middle = if a == line_axis { own.moment * edge } else { 0.0 };
+                centre[a] += start[a].mul_add(own.share, middle);
+            }
+        }
+        let centre = centre.map(|sum| if share > 0.0 { sum / share } else { 0.0 });
+        (share / lines as f64, crossings, centre)
+    };
+    let mut axes = (0..D).filter(|&a| a != axis).map(along);
+    let first = axes.next().unwrap_or((0.0, 0, [0.0; D]));
+    let best = axes.fold(first, |best, other| if other.1 > best.1 { other } else { best });
+    (best.0, best.2)
+}
+
+/// What a set has of a line.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    /// Share of its length.
+    share: f64,
+    /// Mean place of that part, from 0 to 1, times the share.
+    moment: f64,
+    /// Ends of the set found on it.
+    crossings: u32,
+}
+
+fn share_of_line<const D: usize>(
+    start: &[f64; D],
+    axis: usize,
+    edge: f64,
+    set: &impl Fn(&[f64; D]) -> bool,
+) -> Line {
+    let has = |place: f64| {
+        let mut x = *start;
+        x[axis] = place.mul_add(edge, x[axis]);
+        set(&x)
+    };
+    let mut line = Line::default();
+    let mut add = |from: f64, to: f64| {
+        line.share += to - from;
+        line.moment += 0.5 * (to - from) * (to + from);
+    };
+    let mut crossings = 0;
+    // The ends speak for what lies just inside of them, whatever side of the surface rounding takes them to.
+    let place = |part: usize| part as f64 / PARTS as f64;
+    let looked_at = |part: usize| place(part).clamp(BESIDE, 1.0 - BESIDE);
+    let mut before = has(looked_at(0));
+    for part in 1..=PARTS {
+        let after = has(looked_at(part));
+        match (before, after) {
+            (true, true) => add(place(part - 1), place(part)),
+            (false, false) => {}
+            _ => {
+                let (mut low, mut high) = (place(part - 1), place(part));
+                for _ in 0..40 {
+                    let middle = 0.5 * (low + high);
+                    *(if has(middle) == before { &mut low } else { &mut high }) = middle;
+                }
+                let end = 0.5 * (low + high);
+                if before {
+                    add(place(part - 1), end)
+                } else {
+                    add(end, place(part))
+                }
+                crossings += 1;
+            }
+        }
+        before = after;
+    }
+    Line { crossings, ..line }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Shape;
+
+    /// All pieces of a shape in boxes of a lattice.
+    fn all<const D: usize>(shape: &Shape<D>, edge: f64, boxes: usize) -> Vec<Patch<D>> {
+        let region = Region {
+            inside: &|x| shape.distance(x) < 0.0,
+            free: &|_| true,
+            counts: &|_| true,
+            project: &|x| {
+                let (distance, normal) = (shape.distance(x), shape.gradient(x));
+                std::array::from_fn(|a| x[a] - distance * normal[a])
+            },
+        };
+        let mut found = Vec::new();
+        for mut index in 0..boxes.pow(D as u32) {
+            let lower = std::array::from_fn(|_| {
+                let place = (index % boxes) as f64 * edge;
+                index /= boxes;
+                place
+            });
+            found.extend(patches(&region, &Aabb::new(lower, lower.map(|c| c + edge))));
+        }
+        found
+    }
+
+    fn sum<const D: usize>(patches: &[Patch<D>], value: impl Fn(&Patch<D>) -> f64) -> f64 {
+        patches.iter().map(value).sum()
+    }
+
+    fn size<const D: usize>(patch: &Patch<D>) -> f64 {
+        patch.area.iter().map(|c| c * c).sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn a_box_on_faces_of_boxes_has_its_exact_surface() {
+        let block = Shape::Box(Aabb::new([0.1, 0.2, 0.3], [0.5, 0.8, 0.6]));
+        let found = all(&block, 0.1, 10);
+        assert!(found.iter().all(|patch| patch.is_on_face));
+        let exact = 2.0 * (0.4 * 0.6 + 0.4 * 0.3 + 0.6 * 0.3);
+        let total = sum(&found, size);
+        assert!((total - exact).abs() < 1e-14, "{total} {exact}");
+        let top = sum(&found, |patch| patch.area[2].max(0.0));
+        assert!((top - 0.24).abs() < 1e-15, "{top}");
+    }
+
+    /// A box whose faces lie anywhere: the closed surface has no resultant, and each plane face its area but for its edges.
+    #[test]
+    fn a_box_elsewhere_has_its_area_but_for_its_edges() {
+        let block = Shape::Box(Aabb::new([0.13, 0.17], [0.62, 0.79]));
+        let found = all(&block, 0.1, 10);
+        for axis in 0..2 {
+            assert!(sum(&found, |patch| patch.area[axis]).abs() < 1e-12);
+        }
+        let up = sum(&found, |patch| patch.area[1].max(0.0));
+        assert!((up - 0.49).abs() < 1e-10, "{up}");
+    }
+
+    /// Total area and its first moment (the volume, by the divergence theorem) of a disc and a ball converge.
+    #[test]
+    fn curved_surfaces_converge() {
+        let error = |boxes: usize| {
+            let disc = Shape::<2>::Sphere { centre: [0.51, 0.47], radius: 0.4 };
+            let found = all(&disc, 1.0 / boxes as f64, boxes);
+            for axis in 0..2 {
+                assert!(sum(&found, |patch| patch.area[axis]).abs() < 1e-5);
+            }
+            (sum(&found, size) / (0.8 * std::f64::consts::PI) - 1.0).abs()
+        };
+        let errors = [error(10), error(20), error(40)];
+        println!("disc {errors:?}");
+        assert!(errors[0] < 0.01 && errors[2] < errors[0] / 8.0, "{errors:?}");
+        let ball = Shape::<3>::Sphere { centre: [0.51, 0.47, 0.52], radius: 0.4 };
+        let found = all(&ball, 0.05, 20);
+        let area = sum(&found, size) / (0.64 * std::f64::consts::PI) - 1.0;
+        println!("ball {area}");
+        assert!(area.abs() < 0.01, "{area}");
+    }
+
+    #[test]
+    fn what_does_not_count_is_left_out_exactly() {
+        let block = Shape::Box(Aabb::new([0.0, 0.0], [1.0, 0.5]));
+        let region = Region {
+            inside: &|x: &[f64; 2]| block.distance(x) < 0.0,
+            free: &|_| true,
+            counts: &|x| (0.43..=0.76).contains(&x[0]),
+            project: &|x| *x,
+        };
+        let mut total = 0.0;
+        for i in 0..10 {
+            let lower = [f64::from(i) * 0.1, 0.4];
+            let found = patches(&region, &Aabb::new(lower, lower.map(|c| c + 0.1)));
+            total += sum(&found, |patch| patch.area[1]);
+        }
+        assert!((total - 0.33).abs() < 1e-12, "{total}");
+    }
+}

@@ -1,0 +1,179 @@
+//! Forces on surfaces and points: particles carry them.
+//!
+//! At the start each particle at a surface gets the area that it stands for, and each particle of a point force its share. These
+//! numbers go with the particles, are shared among children and add up in merges, so that the whole force is that of the
+//! definition at all times.
+use super::Load;
+use crate::quantity::Quantity;
+
+/// A force that particles carry.
+#[derive(Clone, Debug)]
+pub struct Carried<const D: usize> {
+    /// What the force is.
+    pub force: CarriedForce<D>,
+    /// First of its columns among those of what particles carry.
+    pub first: usize,
+    /// Numbers of the bodies whose particles carry it; all without.
+    pub bodies: Option<Vec<u16>>,
+    /// Unit vector: only surface counts whose outward normal is within 45° of it.
+    pub facing: Option<[f64; D]>,
+}
+
+/// What a force that particles carry is.
+#[derive(Clone, Debug)]
+pub enum CarriedForce<const D: usize> {
+    /// Dead traction t (Pa): `t A` with the undeformed area A (m², in plane strain m), which is the particle's only number.
+    Traction([Quantity; D]),
+    /// Pressure p (Pa) against the outward normal: `-p a` with the area vector a (m², in plane strain m), one number per axis.
+    Pressure {
+        /// The pressure, Pa.
+        pressure: Quantity,
+        /// Whether a is that of the deformed surface, `da = J F⁻ᵀ dA`; else that of the undeformed one.
+        follows: bool,
+    },
+    /// Dead force f (N; in plane strain per metre of thickness), of which each particle has a share.
+    Point {
+        /// The force.
+        force: [Quantity; D],
+        /// Whether shares are in proportion to volume; else all are the same.
+        by_volume: bool,
+    },
+}
+
+impl<const D: usize> CarriedForce<D> {
+    /// Numbers that a particle carries for it.
+    pub fn columns(&self) -> usize {
+        match self {
+            Self::Traction(_) | Self::Point { .. } => 1,
+            Self::Pressure { .. } => D,
+        }
+    }
+
+    /// Whether it acts on a surface.
+    pub fn is_on_surface(&self) -> bool {
+        !matches!(self, Self::Point { .. })
+    }
+}
+
+impl<const D: usize> Carried<D> {
+    /// Whether particles of a body carry it.
+    pub fn is_on(&self, body: usize) -> bool {
+        self.bodies.as_ref().is_none_or(|bodies| bodies.iter().any(|&own| usize::from(own) == body))
+    }
+
+    /// Whether the numbers follow the deformation.
+    pub fn follows(&self) -> bool {
+        matches!(self.force, CarriedForce::Pressure { follows: true, .. })
+    }
+
+    /// What a particle carries of a piece of surface with this area vector, m²: as many numbers as there are columns.
+    pub fn of_surface(&self, area: &[f64; D]) -> Vec<f64> {
+        match self.force {
+            CarriedForce::Pressure { .. } => area.to_vec(),
+            _ => vec![length(area)],
+        }
+    }
+
+    /// Whether surface with this area vector counts.
+    pub fn is_facing(&self, area: &[f64; D]) -> bool {
+        self.facing.is_none_or(|facing| {
+            let along: f64 = facing.iter().zip(area).map(|(f, a)| f * a).sum();
+            along >= std::f64::consts::FRAC_1_SQRT_2 * length(area)
+        })
+    }
+}
+
+impl<const D: usize> Load<D> {
+    /// Force (N) on a particle at `x` that carries these numbers in the columns of `carried`, which is of this load, at a time
+    /// of its own, s.
+    pub fn force(&self, carried: &Carried<D>, numbers: &[f64], x: &[f64; D], time: f64) -> [f64; D] {
+        let place = self.place(x);
+        match &carried.force {
+            CarriedForce::Traction(per_number) | CarriedForce::Point { force: per_number, .. } => {
+                per_number.each_ref().map(|component| component.at(&place, time) * numbers[0])
+            }
+            CarriedForce::Pressure { pressure, .. } => {
+                let pressure = pressure.at(&place, time);
+                std::array::from_fn(|axis| -pressure * numbers[axis])
+            }
+        }
+    }
+}
+
+/// `J F⁻ᵀ` of a deformation gradient F: what turns undeformed area vectors into deformed ones (Nanson's formula). In plane strain
+/// the thickness stays.
+pub fn cofactor<const D: usize>(f: &[[f64; D]; D]) -> [[f64; D]; D] {
+    let minor = |i: usize, j: usize| match D {
+        2 => {
+            let other = f[1 - i][1 - j];
+            if i == j { other } else { -other }
+        }
+        _ => {
+            let (a, b, c, d) = ((i + 1) % D, (i + 2) % D, (j + 1) % D, (j + 2) % D);
+            f[a][c] * f[b][d] - f[a][d] * f[b][c]
+        }
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| minor(i, j)))
+}
+
+fn length<const D: usize>(vector: &[f64; D]) -> f64 {
+    vector.iter().map(|c| c * c).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nanson: the cofactor turns the cross product of two edges into that of the deformed edges.
+    #[test]
+    fn areas_follow_the_deformation() {
+        let f = [[1.1, 0.2, -0.3], [0.05, 0.9, 0.4], [0.1, -0.2, 1.3]];
+        let turn = |m: &[[f64; 3]; 3], v: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|i| (0..3).map(|j| m[i][j] * v[j]).sum())
+        };
+        let cross = |u: [f64; 3], v: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])
+        };
+        let (u, v) = ([1.0, 0.5, 0.2], [-0.3, 0.8, 0.6]);
+        let (found, exact) = (turn(&cofactor(&f), cross(u, v)), cross(turn(&f, u), turn(&f, v)));
+        (0..3).for_each(|i| assert!((found[i] - exact[i]).abs() < 1e-15, "{found:?} {exact:?}"));
+
+        // In the plane an edge (x, y) has the outward area (y, -x).
+        let f = [[1.1, 0.2], [0.3, 0.8]];
+        let edge = |x: f64, y: f64| [f[0][0] * x + f[0][1] * y, f[1][0] * x + f[1][1] * y];
+        let [x, y] = edge(0.6, 0.7);
+        let c = cofactor(&f);
+        let found: [f64; 2] = std::array::from_fn(|i| c[i][0] * 0.7 - c[i][1] * 0.6);
+        assert!((found[0] - y).abs() < 1e-15 && (found[1] + x).abs() < 1e-15);
+    }
+
+    #[test]
+    fn pressure_is_against_the_normal_and_traction_along_its_vector() {
+        let load = |force: CarriedForce<2>| {
+            let carried = Carried { force, first: 0, bodies: None, facing: Some([0.0, 1.0]) };
+            Load {
+                name: "l".into(),
+                kind: super::super::Kind::Carried(carried),
+                region: None,
+                start: 0.0,
+                from: 0.0,
+                until: 1.0,
+                origin: [10.0, 0.0],
+            }
+        };
+        let time = Quantity::Expression(Box::new(crate::quantity::Expression::parse("x * t").unwrap()));
+        let pressure = load(CarriedForce::Pressure { pressure: time.clone(), follows: true });
+        let carried = pressure.carried().unwrap();
+        assert_eq!(carried.of_surface(&[0.0, 2.0]), [0.0, 2.0]);
+        assert!(
+            carried.is_facing(&[1.0, 2.0])
+                && !carried.is_facing(&[2.0, 1.0])
+                && !carried.is_facing(&[0.0, -1.0])
+        );
+        assert_eq!(pressure.force(carried, &[0.0, 2.0], &[0.5, 0.0], 2.0), [0.0, -42.0]);
+        let traction = load(CarriedForce::Traction([time, Quantity::Constant(3.0)]));
+        let carried = traction.carried().unwrap();
+        assert_eq!(carried.of_surface(&[3.0, 4.0]), [5.0]);
+        assert_eq!(traction.force(carried, &[5.0], &[0.5, 0.0], 2.0), [105.0, 15.0]);
+    }
+}
