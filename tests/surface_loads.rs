@@ -49,7 +49,7 @@ const LOADS: &str = "[[loads]]\nname = 'pull'\nkind = 'traction'\ntraction = [40
     shape = { kind = 'box', min = [-0.45, -0.05], max = [-0.35, 0.05] }\n";
 
 fn with_speed(text: &str) -> String {
-    text.replace("material = 'rubber'\nshape", "material = 'rubber'\nvelocity = [1.5, 0]\nshape")
+    text.replace("material = 'rubber'\nshape", "material = 'rubber'\nvelocity = [3, 0]\nshape")
 }
 
 fn history(text: &str, name: &str) -> History {
