@@ -15,6 +15,7 @@ mod plot;
 mod run;
 mod schema;
 mod shared;
+mod sweep;
 mod view;
 pub mod weights;
 
@@ -34,6 +35,8 @@ pub struct Arguments {
 pub enum Command {
     /// Run a job; under `mpirun` on all its ranks.
     Run(run::Arguments),
+    /// Run a job for each combination of values, and put the results into one table.
+    Sweep(sweep::Arguments),
     /// Check a job file and print its size and cost, without running it.
     Check(check::Arguments),
     /// Print the JSON schema of job files.
@@ -118,6 +121,7 @@ impl From<std::io::Error> for Failure {
 pub fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Run(arguments) => run::execute(&arguments),
+        Command::Sweep(arguments) => sweep::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
         Command::Schema(arguments) => schema::execute(&arguments),
         Command::New(arguments) => new::execute(&arguments),

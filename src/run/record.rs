@@ -211,8 +211,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
             }
             written = history.row(clock.step, &values);
             let columns = history::columns(self.problem).into_iter().zip(values);
-            self.report.history =
-                columns.map(|((name, unit), value)| (name, (value, unit.to_owned()))).collect();
+            self.report.history = columns
+                .map(|((name, unit), value)| {
+                    (name, (Some(value).filter(|value| value.is_finite()), unit.to_owned()))
+                })
+                .collect();
             self.report.particles = particles.count;
         }
         // Where the row of this step has been written already, there is nothing to forget.
@@ -293,6 +296,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let report = Report {
             program: format!("agimp {}", env!("CARGO_PKG_VERSION")),
             job: problem.name.clone(),
+            digest: format!("{:016x}", problem.digest),
+            end: problem.time.end,
             title: problem.title.clone(),
             steps: solver.clock.step,
             time: solver.clock.time,

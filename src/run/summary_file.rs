@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::report::Collapse;
 use crate::io::hdf5_file::FileError;
@@ -11,12 +11,16 @@ use crate::io::lines::create_new;
 use crate::job::Problem;
 
 /// What a finished run says of itself. Quantities are in SI units.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     /// Program and version.
     pub program: String,
     /// Name of the job.
     pub job: String,
+    /// Checksum of what decides the state, in hexadecimal digits.
+    pub digest: String,
+    /// End of the run that the job asks for, s.
+    pub end: f64,
     /// Title of the job.
     pub title: String,
     /// Steps done.
@@ -34,7 +38,7 @@ pub struct Report {
     /// Particles at the end.
     pub particles: u64,
     /// Last row of the history: value and unit by name of the column; no value where it is not a number.
-    pub history: BTreeMap<String, (f64, String)>,
+    pub history: BTreeMap<String, (Option<f64>, String)>,
     /// Evaluation of a column collapse.
     pub column_collapse: Option<ColumnCollapse>,
     /// What the run has said on its way.
@@ -48,7 +52,7 @@ pub struct Report {
 }
 
 /// Final shape of a collapsed column, m, beside published laws.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ColumnCollapse {
     /// Initial height over radius or half width.
     pub aspect: f64,
@@ -59,7 +63,7 @@ pub struct ColumnCollapse {
     /// Height at the centre.
     pub height: f64,
     /// Run-out and height by authors.
-    pub laws: BTreeMap<&'static str, [Option<f64>; 2]>,
+    pub laws: BTreeMap<String, [Option<f64>; 2]>,
 }
 
 impl From<&Collapse> for ColumnCollapse {
@@ -69,7 +73,7 @@ impl From<&Collapse> for ColumnCollapse {
             run_out: collapse.front,
             outer_edge: collapse.edge,
             height: collapse.height,
-            laws: collapse.laws.iter().map(|law| (law.authors, [law.edge, law.height])).collect(),
+            laws: collapse.laws.iter().map(|law| (law.authors.to_owned(), [law.edge, law.height])).collect(),
         }
     }
 }

@@ -1,0 +1,289 @@
+//! `agimp sweep`: runs a job for each combination of values, and puts the results into one table.
+//!
+//! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as `mpirun -n 4`) with a directory of its
+//! own. A run that has its report is finished and not done again, so that the same command goes on after an interruption.
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::Failure;
+use super::shared::message::warn_of;
+use crate::job::{self, AnyProblem, Settings};
+use crate::run::stop::STOPPED;
+use crate::run::summary_file::Report;
+use crate::text::excerpt;
+
+/// Most runs of a sweep.
+const MOST_RUNS: usize = 10_000;
+/// Characters of a setting in the name of a directory.
+const NAME: usize = 60;
+
+/// Arguments of `agimp sweep`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Job file (TOML).
+    job: PathBuf,
+    /// A key of the job, as for --set, and its values, separated by commas; with several keys each combination is run.
+    #[arg(long, value_name = "KEY=A,B,C", required = true)]
+    over: Vec<String>,
+    /// A value that all runs have, as for `agimp run`; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Directory of the sweep: one directory for each run, and `sweep.csv`; out/NAME.sweep by default.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Words before `agimp run`, such as "mpirun -n 4".
+    #[arg(long, value_name = "WORDS", default_value = "")]
+    launch: String,
+    /// Threads of each rank.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+/// One run of the sweep.
+struct Run {
+    /// Values in the order of the keys.
+    values: Vec<String>,
+    /// What is given to `--set`.
+    settings: Vec<String>,
+    directory: PathBuf,
+    /// What its report must say: digest of the job and end of the run.
+    digest: String,
+    end: f64,
+}
+
+/// Runs what is not finished yet, and writes the table.
+///
+/// # Errors
+/// A combination is no valid job (then nothing is run), or some run failed.
+pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let over: Vec<(String, Vec<String>)> =
+        arguments.over.iter().map(|text| key_and_values(text)).collect::<Result<_, _>>()?;
+    let runs = runs(arguments, &over)?;
+    let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (mut failed, mut rows) = (0, Vec::new());
+    let table = root(arguments).join("sweep.csv");
+    for (number, run) in runs.iter().enumerate() {
+        let what = run.settings[arguments.set.len()..].join(", ");
+        let place = format!("run {} of {}, {what}", number + 1, runs.len());
+        let report = run.directory.join(format!("{name}.report.json"));
+        let mut status = "finished";
+        if finished(&report, run).is_some() {
+            writeln!(std::io::stderr(), "{place}: finished already")?;
+        } else {
+            writeln!(std::io::stderr(), "{place}")?;
+            let code = start(arguments, run)?;
+            if code == Some(i32::from(STOPPED)) {
+                return Err(Failure::Run("stopped on request; the same command goes on".into()));
+            }
+            if code != Some(0) {
+                (failed, status) = (failed + 1, "failed");
+                warn_of(&[format!("{place}: failed; its directory is {}", run.directory.display())]);
+            }
+        }
+        rows.push((run, status, finished(&report, run)));
+        write_table(&table, &over, &rows)?;
+    }
+    writeln!(std::io::stdout(), "{} ({} runs)", table.display(), runs.len())?;
+    match failed {
+        0 => Ok(()),
+        _ => Err(Failure::Run(format!("{failed} of {} runs failed", runs.len()))),
+    }
+}
+
+/// `key=a,b,c` with its values; commas inside brackets and quotes separate nothing.
+fn key_and_values(text: &str) -> Result<(String, Vec<String>), Failure> {
+    let usage = || Failure::Usage(format!("--over {text}: found no values; expected KEY=A,B,C"));
+    let (key, list) = text.split_once('=').ok_or_else(usage)?;
+    let (mut values, mut depth, mut quote) = (vec![String::new()], 0_i32, None);
+    for c in list.chars() {
+        match (c, quote) {
+            (',', None) if depth == 0 => {
+                values.push(String::new());
+                continue;
+            }
+            ('[' | '{', None) => depth += 1,
+            (']' | '}', None) => depth -= 1,
+            ('"' | '\'', None) => quote = Some(c),
+            (c, Some(open)) if c == open => quote = None,
+            _ => {}
+        }
+        values.iter_mut().last().into_iter().for_each(|value| value.push(c));
+    }
+    values.iter_mut().for_each(|value| *value = value.trim().to_owned());
+    if key.trim().is_empty() || values.iter().any(String::is_empty) {
+        return Err(usage());
+    }
+    Ok((key.trim().to_owned(), values))
+}
+
+fn root(arguments: &Arguments) -> PathBuf {
+    arguments.out.clone().unwrap_or_else(|| {
+        let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Path::new("out").join(format!("{name}.sweep"))
+    })
+}
+
+/// All combinations, the last key changing fastest, each checked as a job.
+fn runs(arguments: &Arguments, over: &[(String, Vec<String>)]) -> Result<Vec<Run>, Failure> {
+    let count = over.iter().try_fold(1_usize, |count, (_, values)| count.checked_mul(values.len()));
+    let count = count.filter(|count| *count <= MOST_RUNS).ok_or_else(|| {
+        Failure::Usage(format!("found more than {MOST_RUNS} combinations; expected fewer values of --over"))
+    })?;
+    let bytes = job::read(&arguments.job)?;
+    (0..count)
+        .map(|number| {
+            let mut rest = number;
+            let mut values: Vec<String> = over
+                .iter()
+                .rev()
+                .map(|(_, values)| {
+                    let value = values[rest % values.len()].clone();
+                    rest /= values.len();
+                    value
+                })
+                .collect();
+            values.reverse();
+            let mut settings = arguments.set.clone();
+            settings.extend(over.iter().zip(&values).map(|((key, _), value)| format!("{key}={value}")));
+            let mut checked = Settings::default();
+            for setting in &settings {
+                checked.set(setting).map_err(Failure::Usage)?;
+            }
+            let (digest, end) = match job::from_bytes(bytes.clone(), &arguments.job, &checked)? {
+                AnyProblem::Two(problem) => (problem.digest, problem.time.end),
+                AnyProblem::Three(problem) => (problem.digest, problem.time.end),
+            };
+            let directory = root(arguments).join(directory(number + 1, over, &values));
+            Ok(Run { values, settings, directory, digest: format!("{digest:016x}"), end })
+        })
+        .collect()
+}
+
+/// Name of the directory of a run: its number, and its settings as far as a name can have them.
+fn directory(number: usize, over: &[(String, Vec<String>)], values: &[String]) -> String {
+    let mut name = format!("{number:04}");
+    for ((key, _), value) in over.iter().zip(values) {
+        let key = key.rsplit('.').next().unwrap_or_default();
+        let _ = write!(name, "_{key}={value}");
+    }
+    let name: String = name
+        .chars()
+        .map(|c| if c.is_alphanumeric() || "_=-+.".contains(c) { c } else { '_' })
+        .take(NAME)
+        .collect();
+    name
+}
+
+/// The report of a finished run of this job with these settings.
+fn finished(path: &Path, run: &Run) -> Option<Report> {
+    let report: Report = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+    (report.digest == run.digest && report.end == run.end).then_some(report)
+}
+
+/// Starts a run, from its latest state if it was interrupted. Returns its exit code, if it has one.
+fn start(arguments: &Arguments, run: &Run) -> Result<Option<i32>, Failure> {
+    let go = |how: &[&str]| {
+        let program = std::env::current_exe()?;
+        let mut words = arguments.launch.split_whitespace();
+        let mut command = match words.next() {
+            Some(first) => {
+                let mut command = Command::new(first);
+                command.args(words).arg(program);
+                command
+            }
+            None => Command::new(program),
+        };
+        command.arg("run").arg(&arguments.job).args(how);
+        command.args(run.settings.iter().flat_map(|setting| ["--set", setting]));
+        command.arg("--out").arg(&run.directory);
+        if let Some(threads) = arguments.threads {
+            command.args(["--threads", &threads.to_string()]);
+        }
+        Ok(command.arg("--quiet").status()?.code())
+    };
+    let failed = |error: std::io::Error| Failure::Run(format!("cannot start a run: {error}"));
+    let is_begun = std::fs::read_dir(&run.directory).is_ok_and(|mut entries| entries.next().is_some());
+    if is_begun {
+        // Nothing that it could go on from, or something of another job: anew.
+        match go(&["--restart", "latest"]).map_err(failed)? {
+            Some(2) => go(&["--overwrite"]).map_err(failed),
+            code => Ok(code),
+        }
+    } else {
+        go(&[]).map_err(failed)
+    }
+}
+
+/// Writes the table of all runs so far: settings, status, and the last row of each history.
+fn write_table(
+    path: &Path,
+    over: &[(String, Vec<String>)],
+    rows: &[(&Run, &str, Option<Report>)],
+) -> Result<(), Failure> {
+    let mut columns: Vec<(String, String)> = Vec::new();
+    for (name, (_, unit)) in rows.iter().filter_map(|(.., report)| report.as_ref()).flat_map(|r| &r.history) {
+        if !columns.iter().any(|(other, _)| other == name) {
+            columns.push((name.clone(), unit.clone()));
+        }
+    }
+    columns.sort();
+    let quoted = |text: &str| match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    };
+    let mut header: Vec<String> = over.iter().map(|(key, _)| quoted(key)).collect();
+    header.extend(["directory", "status", "steps", "wall_seconds (s)"].map(String::from));
+    header.extend(columns.iter().map(|(name, unit)| match unit.is_empty() {
+        true => name.clone(),
+        false => format!("{name} ({unit})"),
+    }));
+    let mut text = header.join(",") + "\n";
+    for (run, status, report) in rows {
+        let mut cells: Vec<String> = run.values.iter().map(|value| quoted(value)).collect();
+        let directory = run.directory.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        cells.extend([quoted(&directory), (*status).to_owned()]);
+        cells.push(report.as_ref().map_or_else(String::new, |report| report.steps.to_string()));
+        cells.push(report.as_ref().map_or_else(String::new, |report| format!("{:.1}", report.wall_seconds)));
+        cells.extend(columns.iter().map(|(name, _)| {
+            let value = report.as_ref().and_then(|report| report.history.get(name)?.0);
+            value.map_or_else(String::new, |value| format!("{value:?}"))
+        }));
+        text.push_str(&(cells.join(",") + "\n"));
+    }
+    let part = path.with_added_extension("part");
+    let write = || {
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        std::fs::write(&part, text)?;
+        std::fs::rename(&part, path)
+    };
+    write().map_err(|error| {
+        Failure::Run(format!("{}: cannot write: {error}", excerpt(&path.display().to_string(), 200)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_separated_outside_of_brackets_and_quotes() {
+        let parse = |text| key_and_values(text).map_err(|error| error.to_string());
+        let found = parse("bodies.0.velocity=[1, 0], [0, 2]").unwrap();
+        assert_eq!(found, ("bodies.0.velocity".into(), vec!["[1, 0]".into(), "[0, 2]".into()]));
+        assert_eq!(parse("title='a,b',c").unwrap().1, ["'a,b'", "c"]);
+        assert!(parse("time.cfl").unwrap_err().contains("expected KEY=A,B,C"));
+        assert!(parse("time.cfl=0.1,,0.2").unwrap_err().contains("found no values"));
+    }
+
+    #[test]
+    fn directories_have_names_that_any_system_takes() {
+        let over = vec![
+            ("materials.sand.friction_angle".to_owned(), vec![]),
+            ("bodies.0.velocity".to_owned(), vec![]),
+        ];
+        let name = directory(7, &over, &["30".into(), "[1, 0]".into()]);
+        assert_eq!(name, "0007_friction_angle=30_velocity=_1__0_");
+    }
+}
