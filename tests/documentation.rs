@@ -194,10 +194,11 @@ impl Copy {
     }
 }
 
-/// A job with one particle per cell that ends after a hundredth of its time.
+/// A job with one particle per cell that ends after a hundredth of its time. Forces at points need the particles that they are for.
 fn shortened(job: &str) -> String {
     let mut short = String::new();
     let mut table = "";
+    let has_points = job.contains("\"point_force\"");
     for line in job.lines() {
         table = if line.starts_with('[') {
             line.split(['[', ']']).find(|part| !part.is_empty()).unwrap_or("")
@@ -208,11 +209,11 @@ fn shortened(job: &str) -> String {
         let number = value.split('#').next().and_then(|value| value.trim().parse::<f64>().ok());
         match (table, key.trim(), number) {
             ("time", "end", Some(end)) => writeln!(short, "end = {:e}", end / 100.0),
-            (_, "particles_per_cell", _) => Ok(()),
+            (_, "particles_per_cell", _) if !has_points => Ok(()),
             _ => writeln!(short, "{line}"),
         }
         .expect("text");
-        if line.starts_with("[[bodies]]") {
+        if line.starts_with("[[bodies]]") && !has_points {
             short.push_str("particles_per_cell = 1\n");
         }
     }
