@@ -75,10 +75,6 @@ impl<'a, const D: usize> Run<'a, D> {
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
         claim.take(comm, problem)?;
-        if comm.rank() == 0 {
-            // That of an earlier run would be taken for this one's.
-            let _ = std::fs::remove_file(summary_file::path(problem));
-        }
         let mut run = Self::with(comm, problem, options, solver, outputs, None, None, claim)?;
         run.recorder.write(comm, &mut run.solver, true, true)?;
         run.write_output(true)?;
@@ -130,6 +126,10 @@ impl<'a, const D: usize> Run<'a, D> {
         claim: Claim,
     ) -> Result<Self, RunError> {
         let mut recorder = Recorder::open(comm, problem, options, &mut solver, kept)?;
+        if comm.rank() == 0 {
+            // That of an earlier end would be taken for this one's.
+            let _ = std::fs::remove_file(summary_file::path(problem));
+        }
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
         recorder.message(&format!(
             "{}: {} ranks x {} threads on {cores} cores, {} leaves",
