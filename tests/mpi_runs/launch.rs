@@ -226,7 +226,7 @@ pub(crate) fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
 pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
     let results = directory.join("out").join(name);
     let mut files = contents(&results);
-    files.retain(|file, _| !file.contains("telemetry"));
+    files.retain(|file, _| !file.contains("telemetry") && !file.ends_with(".report.json"));
     let last = files.keys().rfind(|file| file.contains("checkpoint_")).cloned();
     let mut kept = BTreeMap::new();
     for (file, contents) in files {
