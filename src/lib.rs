@@ -2,6 +2,7 @@
 pub mod adaptivity;
 pub mod bench;
 pub mod boundary;
+pub mod checksum;
 pub mod cli;
 pub mod csr;
 pub mod exact_sum;

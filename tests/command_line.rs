@@ -18,7 +18,8 @@ fn every_file_of_a_subcommand_is_a_subcommand() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let help = printed(&agimp(root, &["--help"]));
     let mut found = 0;
-    for entry in std::fs::read_dir(root.join("src/cli")).unwrap() {
+    let entries = ["src/cli", "src/cli/files"].map(|folder| std::fs::read_dir(root.join(folder)).unwrap());
+    for entry in entries.into_iter().flatten() {
         let path = entry.unwrap().path();
         let name = path.file_stem().unwrap().to_str().unwrap();
         let text = std::fs::read_to_string(&path).unwrap_or_default();

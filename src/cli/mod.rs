@@ -6,19 +6,16 @@ use clap::{Parser, Subcommand};
 // Private, so that the compiler finds a subcommand that is not in `Command`.
 mod bench;
 mod check;
-mod diff;
-mod digest;
-mod info;
+mod files;
 mod material;
 mod new;
-mod plot;
 mod run;
 mod schema;
 mod shared;
 mod sweep;
-mod view;
 pub mod weights;
 
+use self::files::{diff, digest, info, plot, view};
 pub use self::shared::message::unusable;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.

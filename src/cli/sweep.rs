@@ -9,9 +9,10 @@ use std::process::Command;
 
 use super::Failure;
 use super::shared::message::warn_of;
-use crate::job::{self, AnyProblem, Settings};
+use crate::io::lines::write_whole;
+use crate::job::{self, Settings};
+use crate::run::report::{self, Report};
 use crate::run::stop::STOPPED;
-use crate::run::summary_file::Report;
 use crate::text::excerpt;
 
 /// Most runs of a sweep.
@@ -61,13 +62,13 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let over: Vec<(String, Vec<String>)> =
         arguments.over.iter().map(|text| key_and_values(text)).collect::<Result<_, _>>()?;
     let runs = runs(arguments, &over)?;
-    let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = name(arguments);
     let (mut failed, mut rows) = (0, Vec::new());
     let table = root(arguments).join("sweep.csv");
     for (number, run) in runs.iter().enumerate() {
         let what = run.settings[arguments.set.len()..].join(", ");
         let place = format!("run {} of {}, {what}", number + 1, runs.len());
-        let report = run.directory.join(format!("{name}.report.json"));
+        let report = report::path(&run.directory, &name);
         let mut status = "finished";
         if finished(&report, run).is_some() {
             writeln!(std::io::stderr(), "{place}: finished already")?;
@@ -118,11 +119,14 @@ fn key_and_values(text: &str) -> Result<(String, Vec<String>), Failure> {
     Ok((key.trim().to_owned(), values))
 }
 
+/// Name of the job.
+fn name(arguments: &Arguments) -> String {
+    arguments.job.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Directory of the sweep.
 fn root(arguments: &Arguments) -> PathBuf {
-    arguments.out.clone().unwrap_or_else(|| {
-        let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Path::new("out").join(format!("{name}.sweep"))
-    })
+    arguments.out.clone().unwrap_or_else(|| Path::new("out").join(format!("{}.sweep", name(arguments))))
 }
 
 /// All combinations, the last key changing fastest, each checked as a job.
@@ -151,12 +155,10 @@ fn runs(arguments: &Arguments, over: &[(String, Vec<String>)]) -> Result<Vec<Run
             for setting in &settings {
                 checked.set(setting).map_err(Failure::Usage)?;
             }
-            let (digest, end) = match job::from_bytes(bytes.clone(), &arguments.job, &checked)? {
-                AnyProblem::Two(problem) => (problem.digest, problem.time.end),
-                AnyProblem::Three(problem) => (problem.digest, problem.time.end),
-            };
+            let problem = job::from_bytes(bytes.clone(), &arguments.job, &checked)?;
             let directory = root(arguments).join(directory(number + 1, over, &values));
-            Ok(Run { values, settings, directory, digest: format!("{digest:016x}"), end })
+            let digest = report::digest(problem.digest());
+            Ok(Run { values, settings, directory, digest, end: problem.end() })
         })
         .collect()
 }
@@ -252,11 +254,9 @@ fn write_table(
         }));
         text.push_str(&(cells.join(",") + "\n"));
     }
-    let part = path.with_added_extension("part");
     let write = || {
         path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        std::fs::write(&part, text)?;
-        std::fs::rename(&part, path)
+        write_whole(path, text.as_bytes())
     };
     write().map_err(|error| {
         Failure::Run(format!("{}: cannot write: {error}", excerpt(&path.display().to_string(), 200)))

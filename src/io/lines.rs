@@ -82,6 +82,15 @@ impl Lines {
     }
 }
 
+/// Writes a whole file, under a temporary name first, so that a reader never sees half of it.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let part = path.with_added_extension("part");
+    let mut file = create_new(&part)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    std::fs::rename(&part, path)
+}
+
 /// Creates a file in the place of an old one. A symbolic link is replaced, not followed.
 pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
     match std::fs::remove_file(path) {

@@ -1,6 +1,5 @@
 //! `NAME.hdf.series`: the index that gives ParaView the times of the output files.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -64,14 +63,8 @@ impl Series {
         self.entries.push(Entry { name: name.into(), time });
         let contents = Contents { version: "1.0".into(), files: self.entries.clone() };
         let text = serde_json::to_string_pretty(&contents).map_err(std::io::Error::other);
-        let part = self.path.with_added_extension("part");
-        text.and_then(|text| {
-            let mut file = super::lines::create_new(&part)?;
-            file.write_all(text.as_bytes())?;
-            file.sync_all()?;
-            std::fs::rename(&part, &self.path)
-        })
-        .map_err(|source| FileError::System { path: self.path.clone(), action: "write", source })
+        text.and_then(|text| super::lines::write_whole(&self.path, text.as_bytes()))
+            .map_err(|source| FileError::System { path: self.path.clone(), action: "write", source })
     }
 }
 

@@ -29,6 +29,24 @@ pub enum AnyProblem {
     Three(Problem<3>),
 }
 
+impl AnyProblem {
+    /// See [`Problem::digest`].
+    pub fn digest(&self) -> u64 {
+        match self {
+            Self::Two(problem) => problem.digest,
+            Self::Three(problem) => problem.digest,
+        }
+    }
+
+    /// End of the run, s.
+    pub fn end(&self) -> f64 {
+        match self {
+            Self::Two(problem) => problem.time.end,
+            Self::Three(problem) => problem.time.end,
+        }
+    }
+}
+
 impl TryFrom<AnyProblem> for Problem<2> {
     type Error = Box<Problem<3>>;
 

@@ -16,8 +16,13 @@ pub fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 
 /// Volume, m³; in plane strain of one metre of thickness.
 pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    reference_volume(chunk, p) * volume_ratio(chunk, p)
+}
+
+/// Volume of the undeformed particle, m³; in plane strain of one metre of thickness.
+pub fn reference_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
-    (0..D).fold(1.0, |product, _| product * edge) * volume_ratio(chunk, p)
+    (0..D).fold(1.0, |product, _| product * edge)
 }
 
 /// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history

@@ -1,5 +1,6 @@
 //! A whole run: from a checked job to its last file.
 mod claim;
+pub mod collapse;
 mod files;
 pub mod history;
 mod outcome;
@@ -8,7 +9,6 @@ pub mod report;
 pub mod restart;
 pub mod schedule;
 pub mod stop;
-pub mod summary_file;
 
 use partition::comm::{Comm, Disagreement};
 
@@ -128,7 +128,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let mut recorder = Recorder::open(comm, problem, options, &mut solver, kept)?;
         if comm.rank() == 0 {
             // That of an earlier end would be taken for this one's.
-            let _ = std::fs::remove_file(summary_file::path(problem));
+            let _ = std::fs::remove_file(report::path(&problem.output.directory, &problem.name));
         }
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
         recorder.message(&format!(
@@ -293,7 +293,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;
-            report::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
+            collapse::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
         });
         let summary = Summary { series: self.outputs.series().to_owned(), picture, collapse };
         self.recorder.report(&self.solver, &summary);

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use partition::comm::{Comm, Traffic};
 
-use super::summary_file::{self, Report};
+use super::report::{self, Report};
 use super::{Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, Gap, History, Kept};
@@ -24,6 +24,8 @@ pub struct Recorder<'a, const D: usize> {
     progress: Progress,
     /// Step of the last row of the history; the same on all ranks.
     last_row: Option<u64>,
+    /// Values of that row, on rank 0, if this process has written it.
+    last_values: Vec<f64>,
     /// What is known for the report of the run.
     report: Report,
     began: Instant,
@@ -75,6 +77,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             telemetry,
             progress: Progress::new(options.speaks, time, problem.time.end),
             last_row,
+            last_values: Vec::new(),
             report: Report { ranks: comm.size(), threads: options.threads, ..Report::default() },
             began: Instant::now(),
             since: Instant::now(),
@@ -210,12 +213,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
             }
             written = history.row(clock.step, &values);
-            let columns = history::columns(self.problem).into_iter().zip(values);
-            self.report.history = columns
-                .map(|((name, unit), value)| {
-                    (name, (Some(value).filter(|value| value.is_finite()), unit.to_owned()))
-                })
-                .collect();
+            self.last_values = values;
             self.report.particles = particles.count;
         }
         // Where the row of this step has been written already, there is nothing to forget.
@@ -293,22 +291,27 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         let (problem, starts) = (self.problem, &solver.physics.stage_starts);
         let stages = problem.stages.iter().filter(|_| problem.stages.len() > 1).zip(starts);
+        let columns = history::columns(problem).into_iter().zip(&self.last_values);
+        let entry = |((name, unit), value): ((String, &str), &f64)| {
+            (name, (Some(*value).filter(|value| value.is_finite()), unit.to_owned()))
+        };
         let report = Report {
             program: format!("agimp {}", env!("CARGO_PKG_VERSION")),
             job: problem.name.clone(),
-            digest: format!("{:016x}", problem.digest),
+            digest: report::digest(problem.digest),
             end: problem.time.end,
             title: problem.title.clone(),
             steps: solver.clock.step,
             time: solver.clock.time,
             wall_seconds: self.began.elapsed().as_secs_f64(),
+            history: columns.map(entry).collect(),
             stages: stages.map(|(stage, start)| (stage.name.clone(), *start)).collect(),
             column_collapse: summary.collapse.as_ref().map(Into::into),
             outputs: summary.series.clone(),
             picture: summary.picture.clone().ok().flatten(),
             ..std::mem::take(&mut self.report)
         };
-        if let Err(error) = report.write(&summary_file::path(problem)) {
+        if let Err(error) = report.write(&report::path(&problem.output.directory, &problem.name)) {
             self.warning(&format!("no report: {error}"));
         }
     }

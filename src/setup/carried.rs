@@ -18,6 +18,7 @@ use crate::grid::leaf_geometry::position_key;
 use crate::job::Problem;
 use crate::load::{Carried, CarriedForce, Load};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::volume::reference_volume;
 use crate::solver::Solver;
 use crate::text::excerpt;
 
@@ -252,10 +253,7 @@ fn share_force<const D: usize>(
     columns: usize,
 ) {
     let CarriedForce::Point { by_volume, .. } = carried.force else { return };
-    let weight = |chunk: &Chunk<D>, p: usize| {
-        let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
-        if by_volume { (0..D).fold(1.0, |volume, _| volume * edge) } else { 1.0 }
-    };
+    let weight = |chunk: &Chunk<D>, p: usize| if by_volume { reference_volume(chunk, p) } else { 1.0 };
     let is_loaded = |chunk: &Chunk<D>, p: usize| {
         let slack = ROUNDING * chunk.column(Layout::<D>::HALF)[p];
         let is_in = load.region.as_ref().is_none_or(|region| region.distance(&chunk.position(p)) <= slack);

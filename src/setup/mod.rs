@@ -9,7 +9,7 @@ use self::initial_stress::put_under_stress;
 use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
 use crate::solver::{Clock, Physics, Solver, StepControl};
@@ -107,38 +107,38 @@ fn seeded<const D: usize>(
     problem: &Problem<D>,
     forest: Forest<D>,
 ) -> Result<Solver<D>, Disagreement> {
-    let mut chunks = comm.agree(seed(&forest, problem, 0))?;
     let physics = physics(problem);
-    let id = comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
-    number(&mut chunks, id);
-    give_history(&mut chunks, &physics);
+    let chunks = new_particles(comm, problem, &forest, &physics, 0)?;
+    Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
+}
+
+/// Collective. The particles that come with the stage of this physics, in the own leaves and under their stress, numbered from `first`
+/// on along the curve, so that no number depends on the partition.
+fn new_particles<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    forest: &Forest<D>,
+    physics: &Physics<D>,
+    first: u64,
+) -> Result<Vec<Chunk<D>>, Disagreement> {
+    let stage = physics.stage();
+    let mut chunks = comm.agree(seed(forest, problem, stage))?;
+    let mut id = first + comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
+    for chunk in &mut chunks {
+        for p in 0..chunk.len() {
+            chunk.ids_mut()[p] = id;
+            id += 1;
+            let tag = Tag::unpack(chunk.tags()[p]);
+            let material = stages::material_of(problem, usize::from(tag.body), stage) as u16;
+            chunk.tags_mut()[p] = Tag { material, ..tag }.pack();
+            physics.begin_history(chunk, p);
+        }
+    }
     let stressed = forest.leaves().par_iter().zip(&mut chunks);
     let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
     let stressed: Result<(), SeedError> = stressed.collect();
     comm.agree(stressed)?;
-    Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
-}
-
-/// Numbers particles from `id` on along the curve, so that no number depends on the partition.
-fn number<const D: usize>(chunks: &mut [Chunk<D>], mut id: u64) {
-    for chunk in chunks {
-        for p in 0..chunk.len() {
-            chunk.ids_mut()[p] = id;
-            id += 1;
-        }
-    }
-}
-
-/// Gives particles the history with which their materials begin.
-fn give_history<const D: usize>(chunks: &mut [Chunk<D>], physics: &Physics<D>) {
-    for chunk in chunks {
-        for p in 0..chunk.len() {
-            let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
-            for (h, value) in physics.materials[material].initial_history().into_iter().enumerate() {
-                chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
-            }
-        }
-    }
+    Ok(chunks)
 }
 
 /// Collective. The tree that the job asks for before its criteria are looked at.

@@ -1,7 +1,6 @@
 //! What the stages of a run change: physics, and the particles that come and go.
 use partition::comm::{Comm, Disagreement};
 
-use super::initial_stress::put_under_stress;
 use super::seed::check_counts;
 use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
@@ -34,7 +33,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
 }
 
 /// What the particles of a body are made of in a stage.
-fn material_of<const D: usize>(problem: &Problem<D>, body: usize, stage: usize) -> usize {
+pub(super) fn material_of<const D: usize>(problem: &Problem<D>, body: usize, stage: usize) -> usize {
     let changes = problem.stages[..=stage].iter().flat_map(|stage| &stage.materials);
     changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
 }
@@ -52,25 +51,12 @@ pub fn enter_next<const D: usize>(
     starts.push(solver.clock.time);
     let physics = physics(problem, &starts);
     let stage = physics.stage();
-    let mut added = comm.agree(super::seed(&solver.forest, problem, stage))?;
-    for chunk in &mut added {
-        for tag in chunk.tags_mut() {
-            let was = Tag::unpack(*tag);
-            let material = material_of(problem, usize::from(was.body), stage) as u16;
-            *tag = Tag { material, ..was }.pack();
-        }
-    }
-    super::give_history(&mut added, &physics);
-    let leaves = solver.forest.leaves().iter().zip(&mut added);
-    let stressed = leaves.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
-    comm.agree(stressed.collect::<Result<(), _>>())?;
+    let mut added = super::new_particles(comm, problem, &solver.forest, &physics, solver.next_root())?;
     let mut counts = vec![0; problem.bodies.len()];
     added.iter().flat_map(Chunk::tags).for_each(|tag| counts[usize::from(Tag::unpack(*tag).body)] += 1);
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts, stage))?;
     super::carried::carry(comm, problem, solver, &mut added, stage)?;
-    let first = comm.exclusive_sum_u64(added.iter().map(|chunk| chunk.len() as u64).sum());
-    super::number(&mut added, solver.next_root() + first);
     let is_removed = |body| problem.stages[stage].removed.contains(&body);
     let bodies = 0..problem.bodies.len();
     let change = Change {

@@ -91,12 +91,18 @@ impl<const D: usize> Solver<D> {
         let reach = solver.agreed_reach();
         solver.provide_reach(reach);
         if clock == Clock::default() {
-            // A box without a bin stops the first step, which says so.
-            let _ = solver.moments_from_affine(&vec![0; solver.chunks.len()]);
-            solver.leaf_data.signal = solver.signals_under_stress();
-            solver.clock.bound = comm.min_f64(solver.local_bound());
+            solver.start_from(&vec![0; solver.chunks.len()]);
         }
         solver
+    }
+
+    /// Collective. Makes ready for the first step of particles as a job gives them: what transfers keep of their velocity gradients, and
+    /// the bound on the step. In each own leaf the first particles, as many as `done`, have had steps.
+    fn start_from(&mut self, done: &[usize]) {
+        // A box without a bin stops the first step, which says so.
+        let _ = self.moments_from_affine(done);
+        self.leaf_data.signal = self.signals_under_stress();
+        self.clock.bound = self.comm.min_f64(self.local_bound());
     }
 
     /// Collective. One time step, not beyond the time `end`. Requests of any rank are granted to all.

@@ -4,6 +4,7 @@ use crate::boundary::{Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::Material;
+use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// What is solved: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
@@ -70,6 +71,14 @@ impl<const D: usize> Physics<D> {
     /// Columns of what particles carry for loads.
     pub fn carried_columns(&self) -> usize {
         self.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
+    }
+
+    /// Gives a particle the history with which its material begins.
+    pub(crate) fn begin_history(&self, chunk: &mut Chunk<D>, p: usize) {
+        let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+        for (h, value) in self.materials[material].initial_history().into_iter().enumerate() {
+            chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
+        }
     }
 
     /// What the kernels need to know.

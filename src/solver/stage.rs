@@ -1,6 +1,6 @@
 //! The next stage of a run: other physics, and particles that go, change or come.
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Tag};
+use crate::particle::chunk::Tag;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::relaxation::Relaxation;
@@ -55,10 +55,7 @@ impl<const D: usize> Solver<D> {
         self.leaf_data.reset(self.chunks.len());
         let reach = self.agreed_reach();
         self.rebuild_grid(reach);
-        // A box without a bin stops the first step, which says so.
-        let _ = self.moments_from_affine(&had);
-        self.leaf_data.signal = self.signals_under_stress();
-        self.clock.bound = self.comm.min_f64(self.local_bound());
+        self.start_from(&had);
         self.relaxation = Relaxation::default();
     }
 }
@@ -83,9 +80,7 @@ fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[u16], phy
         chunk.tags_mut()[p] = Tag { material, ..was }.pack();
         let [old, new] = [was.material, material].map(|m| &physics.materials[usize::from(m)]);
         if old.history_names() != new.history_names() {
-            for (h, value) in new.initial_history().into_iter().enumerate() {
-                chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
-            }
+            physics.begin_history(chunk, p);
         }
     }
 }

@@ -40,13 +40,10 @@ pub(in crate::cli) fn load(comm: &Comm, path: &Path, settings: &Settings) -> Res
     comm.broadcast_bytes(0, &mut bytes);
     let problem = together(comm, job::from_bytes(bytes, path, settings).map_err(Failure::from))?;
     // Each rank has read the files that the job names.
-    let own = match &problem {
-        AnyProblem::Two(problem) => problem.digest,
-        AnyProblem::Three(problem) => problem.digest,
-    };
-    let mut first = own.to_ne_bytes().to_vec();
+    let own = problem.digest().to_ne_bytes();
+    let mut first = own.to_vec();
     comm.broadcast_bytes(0, &mut first);
-    let same = own.to_ne_bytes() == *first;
+    let same = own == *first;
     let reason = || {
         format!(
             "rank {} has read other files (meshes) than rank 0; expected the same on all ranks",

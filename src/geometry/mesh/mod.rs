@@ -17,6 +17,8 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use super::Aabb;
+use super::primitives::box_distance;
+use crate::checksum::fnv1a;
 
 mod read;
 mod solid;
@@ -64,8 +66,7 @@ impl Mesh {
         let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
         let words = vertices.iter().flatten().map(|x| x.to_bits());
         let words = words.chain(indices.iter().flatten().map(|&index| u64::from(index)));
-        let checksum = words
-            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3));
+        let checksum = fnv1a(words);
         let vertices = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
         let surface = TriMesh::with_flags(vertices, indices, TriMeshFlags::ORIENTED)
             .map_err(|error| NotSolid::Refused(error.to_string()))?;
@@ -94,7 +95,7 @@ impl Mesh {
         if let Some(bound) = self.0.raster.bound(x) {
             return bound;
         }
-        let outside = outside(&self.0.bounds, x);
+        let outside = box_distance(&self.0.bounds, x);
         if outside > self.0.raster.edge {
             return outside;
         }
@@ -106,7 +107,7 @@ impl Mesh {
         let (distance, point) = nearest(&self.0.surface, x);
         let way: [f64; 3] = std::array::from_fn(|a| (x[a] - point[a]) * distance.signum());
         let length = way.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // On the surface itself: the normal of a point a little outside of the box's size of rounding.
+        // On the surface the way has no direction.
         if length > 1e-12 * self.0.raster.edge {
             return way.map(|c| c / length);
         }
@@ -128,11 +129,6 @@ fn nearest(surface: &TriMesh, x: &[f64; 3]) -> (f64, [f64; 3]) {
     let point = [projection.point.x, projection.point.y, projection.point.z];
     let distance = (0..3).map(|a| (x[a] - point[a]) * (x[a] - point[a])).sum::<f64>().sqrt();
     (if projection.is_inside { -distance } else { distance }, point)
-}
-
-/// Distance of a point to a box, m; 0 inside.
-fn outside(aabb: &Aabb<3>, x: &[f64; 3]) -> f64 {
-    (0..3).map(|a| (aabb.lower[a] - x[a]).max(x[a] - aabb.upper[a]).max(0.0).powi(2)).sum::<f64>().sqrt()
 }
 
 impl Raster {

@@ -1,12 +1,11 @@
 //! An image to write and draw on, and its file.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use super::colour::Rgb;
 use super::font;
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::create_new;
+use crate::io::lines::write_whole;
 
 /// An image.
 pub(super) struct Canvas {
@@ -62,7 +61,6 @@ impl Canvas {
 
     /// Not collective. Writes the image as PNG, under a temporary name first.
     pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
-        let part = path.with_added_extension("part");
         let save = || -> std::io::Result<()> {
             // In memory first, as a buffered writer hides the error of its last piece.
             let mut bytes = Vec::new();
@@ -72,8 +70,7 @@ impl Canvas {
             let mut writer = encoder.write_header()?;
             writer.write_image_data(&self.pixels)?;
             writer.finish()?;
-            create_new(&part)?.write_all(&bytes)?;
-            std::fs::rename(&part, path)
+            write_whole(path, &bytes)
         };
         save().map_err(|source| FileError::System { path: path.into(), action: "write the picture", source })
     }

@@ -8,6 +8,7 @@ use super::checked::{self, Checked};
 use super::header::Header;
 use super::sane::{self, Limits};
 use super::state::{self, CARRIED, carried_columns, carried_components, check_tree, columns, octants, path};
+use crate::checksum::fnv1a;
 use crate::io::hdf5_file::{Element, FileError, Reader};
 
 /// What identifies the state in a file, whatever the ranks that wrote it.
@@ -102,12 +103,9 @@ fn digest_in<const D: usize>(file: &Reader, header: &Header) -> Result<Digest, F
     let limits = Limits { materials: header.materials.len(), bodies: usize::MAX };
     sane(sane::tags(&tags, limits))?;
     parts.extend(checked.into_sums());
-    // FNV-1a over the names and checksums.
-    let whole = parts.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, (name, crc)| {
-        name.bytes()
-            .chain(crc.to_le_bytes())
-            .fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
-    });
+    // Over the names and checksums.
+    let bytes = parts.iter().flat_map(|(name, crc)| name.bytes().chain(crc.to_le_bytes()));
+    let whole = fnv1a(bytes.map(u64::from));
     Ok(Digest { whole, parts })
 }
 

@@ -6,11 +6,10 @@ use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Thresholds};
 use crate::boundary::motion::{Knot, Motion};
 use crate::geometry::{Shape, written};
-use crate::job::parse::error::{QUOTED, names as listed};
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, BoxPolicy, TreeSetup};
 use crate::job::schema::job_file::JobFile;
-use crate::text::{excerpt, written as number};
+use crate::text::written as number;
 
 /// What the conversion needs of the rest of the job.
 pub(super) struct Context<'a, const D: usize> {
@@ -122,30 +121,13 @@ impl<const D: usize> Job<D> for Rest<'_, '_, '_, D> {
 
     fn collider(&mut self, name: &str, key: &'static str) -> Option<usize> {
         let names = || self.context.file.colliders.iter().map(|collider| collider.name.as_str());
-        named(self.checks, name, names, "collider", &self.path.key(key))
+        self.checks.named(name, "collider", names, &self.path.key(key))
     }
 
     fn material(&mut self, name: &str, key: &'static str) -> Option<usize> {
         let names = || self.context.file.materials.iter().map(|material| material.name.as_str());
-        named(self.checks, name, names, "material", &self.path.key(key))
+        self.checks.named(name, "material", names, &self.path.key(key))
     }
-}
-
-/// Index of a name among others.
-fn named<'a, I: Iterator<Item = &'a str>>(
-    checks: &mut Checks,
-    name: &str,
-    known: impl Fn() -> I,
-    what: &str,
-    path: &Path,
-) -> Option<usize> {
-    let index = known().position(|other| other == name);
-    if index.is_none() {
-        let list = if known().next().is_some() { listed(known()) } else { "there is none".into() };
-        let name = excerpt(name, QUOTED);
-        checks.fault(path, format!("found \"{name}\"; expected the name of a {what}: {list}"));
-    }
-    index
 }
 
 /// The motion of a region.

@@ -1,8 +1,8 @@
 //! What all conversions need: faults with their places, and the domain.
 use crate::geometry::written::Vector;
-use crate::job::parse::error::{Fault, MOST, QUOTED};
+use crate::job::parse::error::{Fault, MOST, QUOTED, names};
 use crate::job::parse::source::{Node, Path};
-use crate::text::{excerpt, number};
+use crate::text::{excerpt, nearest, number};
 
 /// Collects faults; knows where the keys of the file stand.
 pub(in crate::job) struct Checks<'t> {
@@ -55,6 +55,59 @@ impl Checks<'_> {
             let name = excerpt(name, QUOTED);
             self.fault(path, format!("found \"{name}\" a second time; expected a name that is not taken"));
         }
+    }
+
+    /// Index of a name among those of things of one kind, or a fault that lists them.
+    pub(crate) fn named<'a, I: Iterator<Item = &'a str>>(
+        &mut self,
+        name: &str,
+        what: &str,
+        known: impl Fn() -> I,
+        path: &Path,
+    ) -> Option<usize> {
+        let index = known().position(|other| other == name);
+        if index.is_none() {
+            self.unknown(name, what, known, path);
+        }
+        index
+    }
+
+    /// Notes that a name is not among those of things of one kind.
+    pub(crate) fn unknown<'a, I: Iterator<Item = &'a str>>(
+        &mut self,
+        name: &str,
+        what: &str,
+        known: impl Fn() -> I,
+        path: &Path,
+    ) {
+        let list = if known().next().is_some() { names(known()) } else { "there is none".into() };
+        let guess = nearest(name, known());
+        let guess = guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
+        let name = excerpt(name, QUOTED);
+        self.fault(path, format!("found \"{name}\"; expected the name of a {what}: {list}{guess}"));
+    }
+
+    /// Numbers of the bodies that are named, or a fault; `Some(None)` where no list is given.
+    pub(crate) fn bodies(
+        &mut self,
+        names: Option<&[String]>,
+        bodies: &[&str],
+        path: &Path,
+    ) -> Option<Option<Vec<u16>>> {
+        let Some(names) = names else { return Some(None) };
+        if names.is_empty() {
+            self.fault(
+                path,
+                "found an empty array; expected at least one body, or no such key for all".into(),
+            );
+            return None;
+        }
+        let mut numbers = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            let number = self.named(name, "body", || bodies.iter().copied(), &path.index(i));
+            numbers.extend(number.map(|number| number as u16));
+        }
+        (numbers.len() == names.len()).then_some(Some(numbers))
     }
 
     /// The components of a vector of the job's dimension.

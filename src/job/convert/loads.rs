@@ -1,13 +1,12 @@
 //! Loads of the job file to those of the solver.
 use super::checks::{Checks, Space};
 use crate::geometry::written::Vector;
-use crate::job::parse::error::{QUOTED, names as listed};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity, Sharing};
 use crate::load::{Carried, CarriedForce, Kind, Load};
 use crate::quantity::{Expression, Quantity, Table};
-use crate::text::{excerpt, nearest, written as number};
+use crate::text::written as number;
 
 /// Most exact sums of colliders (six each), faces (one for each axis) and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
@@ -99,7 +98,7 @@ fn load<const D: usize>(
         LoadKind::Traction { traction, bodies: on, facing } => Kind::Carried(Carried {
             force: CarriedForce::Traction(vector(checks, traction, &path.key("traction"))?),
             first: 0,
-            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            bodies: checks.bodies(on.as_deref(), bodies, &path.key("bodies"))?,
             facing: direction(checks, facing.as_ref(), &path.key("facing"))?,
         }),
         LoadKind::Pressure { pressure, follow, bodies: on, facing } => Kind::Carried(Carried {
@@ -108,7 +107,7 @@ fn load<const D: usize>(
                 follows: *follow,
             },
             first: 0,
-            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            bodies: checks.bodies(on.as_deref(), bodies, &path.key("bodies"))?,
             facing: direction(checks, facing.as_ref(), &path.key("facing"))?,
         }),
         LoadKind::PointForce { force, share, bodies: on } => Kind::Carried(Carried {
@@ -117,7 +116,7 @@ fn load<const D: usize>(
                 by_volume: *share == Sharing::Volume,
             },
             first: 0,
-            bodies: named(checks, on.as_deref(), bodies, &path.key("bodies"))?,
+            bodies: checks.bodies(on.as_deref(), bodies, &path.key("bodies"))?,
             facing: None,
         }),
     };
@@ -130,34 +129,6 @@ fn load<const D: usize>(
         until,
         origin: space.origin,
     })
-}
-
-/// Numbers of the bodies that are named, or a fault; `Some(None)` if none is.
-fn named(
-    checks: &mut Checks,
-    names: Option<&[String]>,
-    bodies: &[&str],
-    path: &Path,
-) -> Option<Option<Vec<u16>>> {
-    let Some(names) = names else { return Some(None) };
-    if names.is_empty() {
-        checks.fault(path, "found an empty array; expected at least one body, or no such key for all".into());
-        return None;
-    }
-    let mut numbers = Vec::new();
-    for (i, name) in names.iter().enumerate() {
-        let number = bodies.iter().position(|body| body == name);
-        if number.is_none() {
-            let guess = nearest(name, bodies.iter().copied());
-            let guess =
-                guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
-            let (found, known) = (excerpt(name, QUOTED), listed(bodies.iter().copied()));
-            let message = format!("found \"{found}\"; expected the name of a body: {known}{guess}");
-            checks.fault(&path.index(i), message);
-        }
-        numbers.extend(number.map(|number| number as u16));
-    }
-    (numbers.len() == names.len()).then_some(Some(numbers))
 }
 
 /// A unit vector, or a fault; `Some(None)` if none is given.

@@ -18,7 +18,7 @@ use self::checks::{Checks, Space};
 use self::colliders::colliders;
 use self::loads::{loads, vector};
 use self::settings::{digest, faces, numerics, output, report};
-use super::parse::error::{Fault, QUOTED, names as listed};
+use super::parse::error::{Fault, QUOTED};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::common::FASTEST;
@@ -27,7 +27,7 @@ use crate::geometry::{Aabb, Shape};
 use crate::load::Gravity;
 use crate::material::parameters::OutOfRange;
 use crate::quantity::Quantity;
-use crate::text::{excerpt, nearest, number, written};
+use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
 
@@ -335,11 +335,7 @@ fn body<const D: usize>(
     let material = materials.get(body.material.as_str()).copied();
     if material.is_none() {
         let known = || file.materials.iter().map(|material| material.name.as_str());
-        let guess = nearest(&body.material, known());
-        let guess = guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
-        let (found, known) = (excerpt(&body.material, QUOTED), listed(known()));
-        let message = format!("found \"{found}\"; expected the name of a material: {known}{guess}");
-        checks.fault(&path.key("material"), message);
+        checks.unknown(&body.material, "material", known, &path.key("material"));
     }
     let velocity = match &body.velocity {
         Some(velocity) => stress::fields(checks, velocity, &path.key("velocity"), FASTEST),

@@ -26,8 +26,8 @@ pub(in crate::job) fn find<const D: usize>(problem: &Problem<D>) -> Vec<Overlap<
     for second in 1..bodies.len() {
         for first in 0..second.min(pairs) {
             let common = bounds[first].intersection(&bounds[second]);
-            if !problem.are_together(first, second)
-                || (0..D).any(|axis| common.upper[axis] - common.lower[axis] <= slack)
+            if (0..D).any(|axis| common.upper[axis] - common.lower[axis] <= slack)
+                || !problem.are_together(first, second)
             {
                 continue;
             }

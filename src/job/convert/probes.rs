@@ -1,6 +1,5 @@
 //! Probes of the job file to those of the program.
 use super::checks::{Checks, Space};
-use super::stages::find;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::probe::Probe;
@@ -12,6 +11,7 @@ pub(super) fn probes<const D: usize>(
     space: &Space<D>,
     path: &Path,
 ) -> Option<Vec<Probe<D>>> {
+    let bodies: Vec<&str> = file.bodies.iter().map(|body| body.name.as_str()).collect();
     let mut all = Vec::new();
     for (i, written) in file.probes.iter().enumerate() {
         let here = path.index(i);
@@ -27,23 +27,11 @@ pub(super) fn probes<const D: usize>(
             Some(shape) => checks.shape(shape, space, &here.key("shape")).map(Some),
             None => Some(None),
         };
-        let bodies = match &written.bodies {
-            Some(names) => bodies(checks, names, file, &here.key("bodies")).map(Some),
-            None => Some(None),
-        };
+        let bodies = checks.bodies(written.bodies.as_deref(), &bodies, &here.key("bodies"));
         if let (Some(region), Some(bodies)) = (region, bodies) {
             let quantities = written.quantities.clone();
             all.push(Probe { name: written.name.clone(), region, bodies, quantities });
         }
     }
     (all.len() == file.probes.len()).then_some(all)
-}
-
-/// Bodies by their names, or faults.
-fn bodies(checks: &mut Checks, names: &[String], file: &JobFile, path: &Path) -> Option<Vec<u16>> {
-    let found = names.iter().enumerate().map(|(k, name)| {
-        let known = file.bodies.iter().map(|body| body.name.clone());
-        Some(find(checks, name, "a body", known, &path.index(k))? as u16)
-    });
-    found.collect()
 }

@@ -1,5 +1,6 @@
 //! From the file's types to a checked problem: faces, numerics, output and report.
 use super::checks::{Checks, Space};
+use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
@@ -182,7 +183,5 @@ pub(in crate::job) fn digest(file: &JobFile) -> u64 {
     let state = deciding(file);
     // Field order and shortest round-trip numbers make the text canonical.
     let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    fnv1a(text.bytes().map(u64::from))
 }

@@ -1,12 +1,12 @@
 //! Stages of the run.
 use super::checks::Checks;
 use super::settings;
-use crate::job::parse::error::{QUOTED, names as listed};
+use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::{InStages, Stage};
 use crate::job::schema::job_file::{Body, Equilibrium as Written, JobFile};
 use crate::solver::Equilibrium;
-use crate::text::{excerpt, nearest, written as number};
+use crate::text::{excerpt, written as number};
 
 /// All stages, at least one, or faults.
 pub(super) fn stages<const D: usize>(
@@ -47,6 +47,10 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         );
         checks.fault(path, message);
     }
+    if index == 0 && written.at_rest {
+        let message = "found it in the first stage; expected it in a later one: bodies begin with the velocity that they say";
+        checks.fault(&path.key("at_rest"), message.into());
+    }
     let begins: f64 = file.stages[..index].iter().map(|stage| stage.duration.unwrap_or(0.0)).sum();
     let ends_in_time = file.stages[..index].iter().all(|stage| stage.equilibrium.is_none());
     if ends_in_time && begins >= file.time.end {
@@ -55,11 +59,12 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
             format!("found a stage that begins at {begins} s; expected it before time.end = {end} s");
         checks.fault(path, message);
     }
-    let bodies = |body: &Body| body.name.clone();
+    let bodies = || file.bodies.iter().map(|body| body.name.as_str());
+    let materials_known = || file.materials.iter().map(|material| material.name.as_str());
     let mut removed = Vec::new();
     for (i, name) in written.remove.iter().enumerate() {
         let here = path.key("remove").index(i);
-        let body = find(checks, name, "a body", file.bodies.iter().map(bodies), &here)?;
+        let body = checks.named(name, "body", bodies, &here)?;
         let comes = file.bodies[body].stage.as_ref();
         let comes =
             comes.and_then(|name| file.stages.iter().position(|stage| stage.name == *name)).unwrap_or(0);
@@ -75,9 +80,8 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
     let mut materials = Vec::new();
     for (i, new) in written.materials.iter().enumerate() {
         let here = path.key("materials").index(i);
-        let body = find(checks, &new.body, "a body", file.bodies.iter().map(bodies), &here.key("body"));
-        let names = file.materials.iter().map(|material| material.name.clone());
-        let material = find(checks, &new.material, "a material", names, &here.key("material"));
+        let body = checks.named(&new.body, "body", bodies, &here.key("body"));
+        let material = checks.named(&new.material, "material", materials_known, &here.key("material"));
         materials.push((body?, material?));
     }
     let gravity = match &written.gravity {
@@ -102,26 +106,6 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
     })
 }
 
-/// Number of the thing with a name, or a fault with what is there.
-pub(super) fn find(
-    checks: &mut Checks,
-    name: &str,
-    what: &str,
-    names: impl Iterator<Item = String>,
-    path: &Path,
-) -> Option<usize> {
-    let names: Vec<String> = names.collect();
-    let found = names.iter().position(|other| other == name);
-    if found.is_none() {
-        let known = || names.iter().map(String::as_str);
-        let guess = nearest(name, known());
-        let guess = guess.map_or(String::new(), |w| format!("; did you mean \"{}\"?", excerpt(w, QUOTED)));
-        let (name, known) = (excerpt(name, QUOTED), listed(known()));
-        checks.fault(path, format!("found \"{name}\"; expected the name of {what}: {known}{guess}"));
-    }
-    found
-}
-
 /// Number of a stage by its name, or a fault.
 fn stage_named(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> Option<usize> {
     if file.stages.is_empty() {
@@ -130,7 +114,7 @@ fn stage_named(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> 
         checks.fault(path, message);
         return None;
     }
-    find(checks, name, "a stage", file.stages.iter().map(|stage| stage.name.clone()), path)
+    checks.named(name, "stage", || file.stages.iter().map(|stage| stage.name.as_str()), path)
 }
 
 /// The stage at whose start a body comes; a fault where there is none of that name.

@@ -5,7 +5,7 @@ use super::totals::{DoubleDouble, elastic_energy};
 use crate::exact_sum::ExactSum;
 use crate::particle::Layout;
 use crate::particle::chunk::{Chunk, Tag};
-use crate::particle::volume::{cauchy_stress, volume};
+use crate::particle::volume::{cauchy_stress, reference_volume, volume};
 use crate::probe::{Measured, Probe, Readings};
 use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
@@ -25,33 +25,53 @@ struct Partial<const D: usize> {
 impl<const D: usize> Solver<D> {
     /// Collective. What the probes read of the present state, in their order.
     pub fn read_probes(&self, probes: &[Probe<D>]) -> Vec<Readings<D>> {
-        probes.iter().map(|probe| self.read(probe)).collect()
-    }
-
-    fn read(&self, probe: &Probe<D>) -> Readings<D> {
-        let physics = &self.physics;
-        let leaves: Vec<Option<Partial<D>>> =
-            self.chunks.par_iter().with_min_len(4).map(|chunk| of_leaf(physics, probe, chunk)).collect();
-        let mut sums = vec![ExactSum::new(); SUMS];
-        let mut greatest = vec![f64::NEG_INFINITY; 1 + 2 * D];
-        for leaf in leaves.iter().flatten() {
-            sums.iter_mut().zip(&leaf.sums).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
-            greatest.iter_mut().zip(&leaf.greatest).for_each(|(all, one)| *all = all.max(*one));
+        if probes.is_empty() {
+            return Vec::new();
         }
+        let physics = &self.physics;
+        let (mut sums, mut greatest) = (Vec::new(), Vec::new());
+        for probe in probes {
+            let leaves = self.chunks.par_iter().with_min_len(4).map(|chunk| of_leaf(physics, probe, chunk));
+            let leaves: Vec<Option<Partial<D>>> = leaves.collect();
+            let mut all = Partial::<D>::nothing();
+            let mut exact = vec![ExactSum::new(); SUMS];
+            for leaf in leaves.iter().flatten() {
+                exact.iter_mut().zip(&leaf.sums).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
+                all.note_greatest(leaf.greatest.iter().copied());
+            }
+            sums.extend(exact);
+            greatest.extend(all.greatest);
+        }
+        // One reduction for all probes.
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         self.comm.max_f64s(&mut greatest);
-        let of = |i: usize| sums[i].to_f64();
-        Readings {
-            mass: of(0),
-            volume: of(1),
-            mass_place: std::array::from_fn(|a| of(2 + a)),
-            momentum: std::array::from_fn(|a| of(5 + a)),
-            energies: [of(8), of(9), of(10)],
-            volume_stress: std::array::from_fn(|c| of(11 + c)),
-            volume_strain: of(17),
-            greatest_speed: greatest[0].max(0.0).sqrt(),
-            extent: [std::array::from_fn(|a| -greatest[1 + a]), std::array::from_fn(|a| greatest[1 + D + a])],
-        }
+        let each = sums.chunks_exact(SUMS).zip(greatest.chunks_exact(1 + 2 * D));
+        each.map(|(sums, greatest)| readings(|i| sums[i].to_f64(), greatest)).collect()
+    }
+}
+
+/// What a probe reads, of its sums and greatest values.
+fn readings<const D: usize>(of: impl Fn(usize) -> f64, greatest: &[f64]) -> Readings<D> {
+    Readings {
+        mass: of(0),
+        volume: of(1),
+        mass_place: std::array::from_fn(|a| of(2 + a)),
+        momentum: std::array::from_fn(|a| of(5 + a)),
+        energies: [of(8), of(9), of(10)],
+        volume_stress: std::array::from_fn(|c| of(11 + c)),
+        volume_strain: of(17),
+        greatest_speed: greatest[0].max(0.0).sqrt(),
+        extent: [std::array::from_fn(|a| -greatest[1 + a]), std::array::from_fn(|a| greatest[1 + D + a])],
+    }
+}
+
+impl<const D: usize> Partial<D> {
+    fn nothing() -> Self {
+        Self { sums: [DoubleDouble::default(); SUMS], greatest: vec![f64::NEG_INFINITY; 1 + 2 * D] }
+    }
+
+    fn note_greatest(&mut self, values: impl Iterator<Item = f64>) {
+        self.greatest.iter_mut().zip(values).for_each(|(all, one)| *all = all.max(one));
     }
 }
 
@@ -72,8 +92,8 @@ fn of_leaf<const D: usize>(physics: &Physics<D>, probe: &Probe<D>, chunk: &Chunk
             energies = Lanes::to_array(elastic_energy(physics, chunk, first));
         }
         let value = |column: usize| chunk.column(column)[p];
-        let (mass, volume) = (value(Layout::<D>::MASS), volume(chunk, p));
-        let reference = (2.0 * value(Layout::<D>::HALF)).powi(D as i32);
+        let (mass, reference, volume) =
+            (value(Layout::<D>::MASS), reference_volume(chunk, p), volume(chunk, p));
         let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let speed_squared = velocity.iter().fold(0.0, |sum: f64, v| v.mul_add(*v, sum));
         let [xx, yy, zz, xy, yz, xz] = cauchy_stress(chunk, p);
@@ -87,13 +107,10 @@ fn of_leaf<const D: usize>(physics: &Physics<D>, probe: &Probe<D>, chunk: &Chunk
         values[10] = reference * value(Layout::<D>::WORK);
         values[11..17].copy_from_slice(&[xx, yy, zz, xy, xz, yz].map(|component| volume * component));
         values[17] = volume * value(Layout::<D>::PLASTIC_STRAIN);
-        let partial = all.get_or_insert_with(|| Partial::<D> {
-            sums: [DoubleDouble::default(); SUMS],
-            greatest: vec![f64::NEG_INFINITY; 1 + 2 * D],
-        });
+        let partial = all.get_or_insert_with(Partial::<D>::nothing);
         partial.sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value));
         let extremes = [speed_squared].into_iter().chain(x.map(|x| -x)).chain(x);
-        partial.greatest.iter_mut().zip(extremes).for_each(|(all, one)| *all = all.max(one));
+        partial.note_greatest(extremes);
     }
     all
 }

@@ -1,5 +1,5 @@
 //! `agimp view`: particles and tree of outputs as a page for a browser.
-use super::Failure;
+use crate::cli::Failure;
 use crate::io::frame::expand;
 use crate::io::snapshot::PointField;
 use crate::text::bytes;
@@ -39,7 +39,7 @@ fn field(name: &str) -> Result<PointField, String> {
 ///
 /// # Errors
 /// A file cannot be read or does not show a field, or the page cannot be written.
-pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
     let given = without_trees(&arguments.files);
     let files = expand(&given).map_err(failed)?;

@@ -1,5 +1,5 @@
 //! `agimp info`: what is in an output or checkpoint file.
-use super::Failure;
+use crate::cli::Failure;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::{Header, PointField, compare};
 use crate::text::{bytes, count as grouped, number, printable, quantity_to};
@@ -30,7 +30,7 @@ struct Contents {
 ///
 /// # Errors
 /// The file is damaged or not of this program.
-pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: FileError| Failure::Usage(error.to_string());
     let contents = read(arguments).map_err(failed)?;
     let mut out = std::io::stdout().lock();

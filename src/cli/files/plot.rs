@@ -1,5 +1,5 @@
 //! `agimp plot`: a picture of the particles in an output file.
-use super::Failure;
+use crate::cli::Failure;
 use crate::io::picture::{Settings, draw_file};
 use std::io::Write;
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
-pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
     let mut settings = Settings::new(arguments.title.as_deref().unwrap_or(&name));
     (settings.width, settings.height) = (arguments.width as usize, arguments.height as usize);

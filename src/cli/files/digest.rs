@@ -1,5 +1,5 @@
 //! `agimp digest`: one number that is equal for equal states, whatever the ranks that wrote them.
-use super::Failure;
+use crate::cli::Failure;
 use crate::io::snapshot::compare::digest;
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A file is damaged or holds no restart state.
-pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     for path in &arguments.files {
         let digest = digest(path).map_err(|error| Failure::Usage(error.to_string()))?;

@@ -1,5 +1,5 @@
 //! `agimp diff`: where the states in two files differ.
-use super::Failure;
+use crate::cli::Failure;
 use crate::io::snapshot::compare::diff;
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A file cannot be read, or the states differ.
-pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let differences =
         diff(&arguments.first, &arguments.second).map_err(|error| Failure::Usage(error.to_string()))?;
     let mut out = std::io::stdout().lock();

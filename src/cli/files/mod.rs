@@ -1,0 +1,12 @@
+//! Subcommands that look at output and checkpoint files.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `info.rs` | says what is in a file |
+//! | `plot.rs`, `view.rs` | draws particles: as PNG, as a page for a browser |
+//! | `digest.rs`, `diff.rs` | compares states: by a number, in detail |
+pub(super) mod diff;
+pub(super) mod digest;
+pub(super) mod info;
+pub(super) mod plot;
+pub(super) mod view;
