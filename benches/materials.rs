@@ -2,6 +2,11 @@
 //!
 //! One row for each example of each model. Every batch starts from the same trial state, which stays in the cache, so this is the
 //! law alone. Particles of a batch have different principal directions. The median over the repeats counts.
+#[path = "../tests/common/random.rs"]
+#[allow(dead_code, reason = "shared with tests, which use all of it")]
+mod random;
+
+use random::Random;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -17,26 +22,14 @@ const REPEATS: usize = 41;
 /// Sizes of strain that are tried for a state that flows.
 const SIZES: [f64; 5] = [0.01, 0.03, 0.1, 0.2, 0.4];
 
-/// Numbers from -1 to 1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
-
 /// Trial states: elastic tensors with a compression and shear of random direction.
 fn trials(material: &dyn Material, compression: f64, shear: f64) -> Vec<State> {
-    let mut random = Random(0x2545_f491_4f6c_dd1d);
+    let mut random = Random::new(1);
     (0..BATCHES)
         .map(|_| {
             let mut tensor = [[0.0; LANES]; 6];
             for lane in 0..LANES {
-                let change: [f64; 6] = std::array::from_fn(|_| shear * random.next());
+                let change: [f64; 6] = std::array::from_fn(|_| random.between(-shear, shear));
                 let mean = (change[0] + change[1] + change[2]) / 3.0;
                 for c in 0..6 {
                     tensor[c][lane] = change[c] + if c < 3 { 1.0 - compression - mean } else { 0.0 };

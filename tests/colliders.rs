@@ -1,17 +1,13 @@
 //! Colliders through the whole program: exact solutions of sliding, resting, pushing and falling, and the same bits
 //! on any ranks and threads and across restarts.
-#[path = "common/history.rs"]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
+#[path = "common/runs.rs"]
+mod runs;
 
+use runs::launch;
 use std::path::Path;
 
-use history::History;
-use launch::{Outcome, agimp, job, run, succeed};
+use runs::history::History;
+use runs::launch::{Outcome, agimp, job, run, succeed};
 
 /// Runs a 2D job on one rank: an elastic body of 1000 kg/m³ and what `rest` adds.
 fn elastic(young: f64, gravity: f64, body: &str, end: f64, rest: &str) -> History {

@@ -1,18 +1,11 @@
 //! Equilibrium through the whole program: kinetic damping leads a column to its closed form and a slope to rest, the run ends there and
 //! says so, with the same bits on any ranks and across restarts.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::run;
+use runs::history::History;
+use runs::launch::run;
+use runs::restart;
 
 /// A job with a body of 1800 kg/m³ in a box of 4 m by 2 m with slip faces at its sides.
 fn text(model: &str, shape: &str, rest: &str) -> String {

@@ -1,26 +1,19 @@
 //! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is counted; material
 //! lets go of faces that pull; states that no material can have end the run.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "shared with other tests, which use all of it")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
 #[path = "common/relaunch.rs"]
 mod relaunch;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
 use agimp::job::{Problem, parse};
 use agimp::particle::chunk::Layout;
 use agimp::setup;
 use agimp::solver::{Requests, Solver};
-use history::History;
-use launch::{run, succeed};
 use partition::comm::Comm;
 use relaunch::{ran_if_launched, relaunch};
+use runs::history::History;
+use runs::launch::{run, succeed};
+use runs::{launch, mpirun, restart};
 
 /// A block at rest in a domain whose lower corner lies at (10, 20) m.
 fn block_far_from_the_origin(comm: &Comm) -> Solver<2> {

@@ -1,15 +1,9 @@
 //! Fluids through the whole program: viscous flow by its closed form, stable from the first step.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::{run, succeed};
+use runs::history::History;
+use runs::launch::{run, succeed};
 
 /// Layers that slide over each other, `v = cos(π y / H)`, are slowed by viscosity alone: velocities fall like `exp(-ν (π/H)² t)`. The
 /// viscosity is so great that a first step chosen by sound alone would be longer than all of this.

@@ -1,18 +1,11 @@
 //! Initial stress and velocity through the whole program: ground that starts under its own weight stays at rest, the stress is that of
 //! the job, and what cannot be is refused.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::{agimp, run, succeed};
+use runs::history::History;
+use runs::launch::{agimp, run, succeed};
+use runs::restart;
 
 /// Sand of 1800 kg/m³; P waves at 120 m/s.
 const SAND: &str =

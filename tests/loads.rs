@@ -1,18 +1,11 @@
 //! Loads through the whole program: closed forms of motion under body forces, grips and damping, work against energy, and
 //! the same results on any ranks and across restarts.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::{agimp, run, succeed};
+use runs::history::History;
+use runs::launch::{agimp, run, succeed};
+use runs::restart;
 
 /// A 2D job with a rubber block that crosses a level jump, and what `rest` adds.
 fn text(gravity: &str, end: f64, rest: &str) -> String {

@@ -1,17 +1,17 @@
 //! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as collider gives the same results on any
 //! ranks and across a restart; hostile files give a message.
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
+#[path = "common/random.rs"]
 #[allow(dead_code, reason = "each test uses its part")]
-mod restart;
+mod random;
+#[path = "common/runs.rs"]
+mod runs;
 
 use agimp::geometry::Mesh;
 use agimp::geometry::mesh::read;
-use launch::{Outcome, run, succeed, text};
+use random::Random;
+use runs::history::History;
+use runs::launch::{Outcome, run, succeed, text};
+use runs::restart;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -127,15 +127,9 @@ fn a_mesh_as_collider_gives_the_same_on_any_ranks_and_across_restart() {
     let rest = rest.replace("MESH", &file.display().to_string());
     let block = "{ kind = 'box', min = [0.6, 0.6, 0.6], max = [1.4, 1.4, 1.1] }";
     restart::assert_same_on_any_ranks(&job(block, &rest), "block", |directory, _| {
-        let history =
-            std::fs::read_to_string(directory.join("out/block/block.history.csv")).expect("history");
-        let names: Vec<&str> = history.lines().next().expect("header").split(',').collect();
-        let column = names.iter().position(|name| name.starts_with("force_cube_z")).expect("a force");
-        let least = history
-            .lines()
-            .skip(1)
-            .map(|row| row.split(',').nth(column).expect("a cell").parse::<f64>().expect("a number"));
-        assert!(least.fold(0.0, f64::min) < -1000.0, "the block presses the cube down");
+        let least =
+            History::read(directory, "block").column("force_cube_z").iter().copied().fold(0.0, f64::min);
+        assert!(least < -1000.0, "the block presses the cube down");
     });
 }
 
@@ -167,13 +161,8 @@ fn a_changed_mesh_is_another_job() {
 #[test]
 fn damaged_files_give_a_message() {
     let directory = tempfile::tempdir().expect("temporary directory");
-    let mut random = 0x2545_f491_4f6c_dd1d_u64;
-    let mut next = move |below: usize| {
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        (random % below as u64) as usize
-    };
+    let mut random = Random::new(1);
+    let mut next = |below: usize| random.below(below as u64) as usize;
     let mut read_well = 0;
     for (name, bytes) in cubes() {
         for _ in 0..400 {

@@ -1,18 +1,11 @@
 //! Measurements of a run through the whole program: probes, forces on faces and the report, against closed forms, with the same results on
 //! any ranks and across restarts.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::{run, succeed};
+use runs::history::History;
+use runs::launch::{run, succeed};
+use runs::restart;
 
 fn history_of(name: &str, job: &str) -> (History, serde_json::Value) {
     let directory = tempfile::tempdir().expect("temporary directory");

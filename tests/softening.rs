@@ -1,18 +1,13 @@
 //! Softening through the whole program: load and shear band of a compressed specimen do not depend on the cells.
 #[path = "../studies/softening/band.rs"]
 mod band;
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
+#[path = "common/runs.rs"]
+mod runs;
 
 use band::Band;
-use history::History;
-use launch::{run, succeed};
+use runs::history::History;
+use runs::launch;
+use runs::launch::{run, succeed};
 
 /// What a run of the study's specimen ends with.
 struct Outcome {

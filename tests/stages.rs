@@ -1,18 +1,11 @@
 //! Stages of a run through the whole program: "settle, then excavate, then fill and load" is one job, with the same results on any ranks
 //! and across restarts, also from the step in which a stage ended.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
-use history::History;
-use launch::{Outcome, contents, run, succeed, text};
+use runs::history::History;
+use runs::launch::{Outcome, contents, run, succeed, text};
+use runs::restart;
 
 /// Ground of two bodies, of which one is dug out; a fill and a plate come in the last stage.
 const PIT: &str = "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [4, 2]\nroot_edge = 1\n\
@@ -89,6 +82,30 @@ fn restarts_from_any_step_give_the_same() {
         succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--restart", &from]));
         reference.assert_same(&Outcome::read(directory.path(), "pit"), &format!("restart from {from}"));
     }
+}
+
+/// A stage gives bodies their materials from its first step on, the first stage as well: the first time step is that of the new one.
+#[test]
+fn the_first_stage_changes_materials_as_any_other() {
+    let first_step = |material: &str, stage: &str| {
+        let job = format!(
+            "version = 1\ndimension = 2\ndomain = {{ size = [1, 1], root_edge = 1 }}\nboundaries = {{ y_max.kind = 'separating' }}\n\
+             time = {{ end = 0.01 }}\nhistory = {{ every_steps = 1 }}\n\
+             [[materials]]\nname = 'soft'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+             [[materials]]\nname = 'stiff'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e7\npoisson = 0.2\n\
+             [[bodies]]\nname = 'block'\nmaterial = '{material}'\nshape = {{ kind = 'box', min = [0.25, 0.25], max = [0.75, 0.75] }}\n\
+             {stage}"
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("block.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &[]));
+        History::read(directory.path(), "block").column("dt")[1]
+    };
+    let stiff = first_step("stiff", "");
+    assert!(stiff < 0.2 * first_step("soft", ""));
+    let changed = "[[stages]]\nname = 'one'\nmaterials = [{ body = 'block', material = 'stiff' }]\n";
+    assert_eq!(first_step("soft", changed), stiff);
 }
 
 /// A block in free flight falls from the start of the stage that has gravity, and every stage ends with an output.

@@ -1,23 +1,16 @@
 //! Tractions, pressures and point forces through the whole program: force, impulse and work are those of the definition while
 //! particles split and merge; closed forms of a pulled bar, a falling column and a cantilever; same bits on any ranks.
-#[path = "common/history.rs"]
-#[allow(dead_code, reason = "each test uses its part")]
-mod history;
-#[path = "mpi_runs/launch.rs"]
-#[allow(dead_code, reason = "shared with the tests of runs, which use all of it")]
-mod launch;
-#[path = "common/mpirun.rs"]
-mod mpirun;
-#[path = "common/restart.rs"]
-mod restart;
+#[path = "common/runs.rs"]
+mod runs;
 
 use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::setup;
 use agimp::solver::{Requests, Solver};
-use history::History;
-use launch::{agimp, run, succeed};
 use partition::comm::World;
+use runs::history::History;
+use runs::launch::{agimp, run, succeed};
+use runs::restart;
 
 /// A rubber block, free in space, and what `rest` adds. Its faces lie on those of the particles' boxes.
 fn block(tree: &str, rest: &str) -> String {

@@ -9,7 +9,7 @@ impl History {
     /// Of the run of this name in a directory.
     pub(crate) fn read(directory: &Path, name: &str) -> Self {
         let text =
-            std::fs::read_to_string(crate::launch::file(directory, name, ".history.csv")).expect("history");
+            std::fs::read_to_string(super::launch::file(directory, name, ".history.csv")).expect("history");
         let mut lines = text.lines();
         let names = lines.next().expect("header").split(',');
         let rows: Vec<Vec<f64>> =

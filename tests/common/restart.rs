@@ -1,7 +1,7 @@
 //! Runs on several ranks, and from one of their checkpoints, that must give the same. The test has the module `launch`.
 use std::path::Path;
 
-use crate::launch::{Outcome, contents, run, succeed, text};
+use super::launch::{Outcome, contents, run, succeed, text};
 
 /// Runs a job of that name on 1, 2 and 3 ranks and goes on from its second checkpoint: the results are the same. `look` sees the
 /// directory of each run, and what the run said.
