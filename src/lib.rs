@@ -8,6 +8,7 @@ pub mod csr;
 pub mod exact_sum;
 pub mod geometry;
 pub mod grid;
+pub mod input_file;
 pub mod io;
 pub mod job;
 pub mod kernel;

@@ -142,3 +142,84 @@ fn wrong_loads_are_refused_with_their_key() {
         assert!(message.contains(key) && message.contains(words), "{load}: {key} {words}\n{message}");
     }
 }
+
+/// A record in a file is the table in the job, bit by bit, whatever its columns are called; with other rows it is another job.
+#[test]
+fn a_record_in_a_file_is_a_table_over_time() {
+    let load = |acceleration: &str| {
+        format!("[[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = [{acceleration}, 0]\n")
+    };
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let inside = |name: &str| directory.path().join(name);
+    std::fs::create_dir(inside("records")).expect("directory");
+    let rows = "# station, component\nnumber;acc (g);t (s)\n1;0;0\n2;0.25;0.03\n3;-0.5;0.05\n4;0;0.11\n";
+    std::fs::write(inside("records/a.csv"), rows).expect("record");
+    let run_of = |name: &str, acceleration: &str, options: &[&str]| {
+        let path = inside(name);
+        std::fs::write(&path, text("[0, 0]", 0.12, &load(acceleration))).expect("job");
+        run(directory.path(), 1, 1, &path, options).output().expect("starts")
+    };
+    let in_file = "{ file = 'records/a.csv', time = 't (s)', value = 2, scale = 8.0 }";
+    assert!(run_of("table.toml", "[[0, 0], [0.03, 2], [0.05, -4], [0.11, 0]]", &["--quiet"]).status.success());
+    assert!(run_of("file.toml", in_file, &["--quiet"]).status.success());
+    let [table, file] = ["table", "file"].map(|name| History::read(directory.path(), name));
+    for name in ["time", "momentum_x", "work_shake", "elastic_energy"] {
+        assert_eq!(table.column(name), file.column(name), "{name}");
+    }
+    assert!(table.last("momentum_x").abs() > 1.0);
+    std::fs::write(inside("records/a.csv"), rows.replace("0.25", "0.26")).expect("record");
+    let output = run_of("file.toml", in_file, &["--restart", "latest", "--end", "0.13"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("files that the job names"), "{told}");
+}
+
+/// A stiff block on a slope with friction, shaken by the record of `jobs/shaken_slope.toml`, slides as N. M. Newmark (Géotechnique 15,
+/// 1965) says: while it moves, its acceleration is that of the record and its weight less the friction, and else it sticks.
+#[test]
+fn a_shaken_block_slides_as_newmark_says() {
+    let (slope, friction, g) = (8_f64.to_radians(), 0.3, 9.81);
+    let record = concat!(env!("CARGO_MANIFEST_DIR"), "/jobs/records/tapered_sine.csv");
+    // Top in the middle of a cell, so that the weight of the start is in equilibrium.
+    let job = format!(
+        "version = 1\ndimension = 2\ngravity = [{}, {}]\n[domain]\nsize = [1.6, 0.4]\nroot_edge = 0.4\n[tree]\nbase_level = 1\n\
+         [boundaries]\ny_min = {{ kind = 'separating', friction = {friction} }}\n\
+         [[materials]]\nname = 'stone'\ndensity = 2000\nmodel = 'neo_hookean'\nyoung = 2e6\npoisson = 0.2\n\
+         [[bodies]]\nname = 'body'\nmaterial = 'stone'\nshape = {{ kind = 'box', min = [0.2, 0], max = [0.8, 0.125] }}\n\
+         stress = {{ kind = 'geostatic', k0 = 0.25 }}\n\
+         [[loads]]\nname = 'quake'\nkind = 'body_force'\nacceleration = [{{ file = '{record}', time = 't', value = 'a', scale = {g} }}, 0]\n\
+         [[probes]]\nname = 'block'\nquantities = ['centre']\n\
+         [time]\nend = 3\n[output]\npicture = false\n[history]\nevery_steps = 20\n",
+        g * slope.sin(),
+        -g * slope.cos(),
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("body.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let history = History::read(directory.path(), "body");
+
+    let text = std::fs::read_to_string(record).expect("record");
+    let cells = text.lines().skip(2).map(|line| line.split_once(',').expect("two columns"));
+    let rows: Vec<(f64, f64)> = cells.map(|(t, a)| (t.parse().expect("t"), a.parse().expect("a"))).collect();
+    let table = agimp::quantity::Table::new(&rows).expect("a table");
+    let (dt, most) = (1e-5, friction * g * slope.cos());
+    let (mut velocity, mut way, mut ways) = (0.0_f64, 0.0, vec![0.0]);
+    for step in 0..300_000 {
+        let driving = g * (table.at((f64::from(step) + 0.5) * dt) + slope.sin());
+        let free = velocity + dt * driving;
+        // Friction takes from the motion what it can, and no more than there is.
+        velocity = free - free.signum() * free.abs().min(dt * most);
+        way += dt * velocity;
+        ways.push(way);
+    }
+    let start = history.column("centre_block_x")[0];
+    let (mut worst, all) = (0.0_f64, way);
+    for (time, x) in history.column("time").iter().zip(history.column("centre_block_x")) {
+        worst = worst.max((x - start - ways[((time / dt) as usize).min(300_000)]).abs());
+    }
+    let found = history.last("centre_block_x") - start;
+    println!("way {found} m, Newmark {all} m, greatest difference on the way {worst} m");
+    assert!(all > 0.1 && (found / all - 1.0).abs() < 0.02, "{found} against {all}");
+    assert!(worst < 0.02 * all, "{worst} of {all}");
+}

@@ -3,10 +3,12 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `expression.rs` | expressions in x, y, z, t, with `libm` behind their functions |
+//! | `record.rs` | tables over time from files of comma-separated values |
 //! | `table.rs` | tables over time, linear between rows |
 //!
 //! Knows no particles and no jobs. Values are the same on every machine: `libm` computes all elementary functions.
 mod expression;
+pub mod record;
 mod table;
 
 pub use expression::{Expression, ExpressionError};

@@ -1,4 +1,5 @@
 //! Tables over time.
+use crate::checksum::fnv1a;
 
 /// Values over time: linear between rows, constant before the first and after the last.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +53,11 @@ impl Table {
             times: rows.iter().map(|row| row.0).collect(),
             values: rows.iter().map(|row| row.1).collect(),
         })
+    }
+
+    /// Checksum of its rows.
+    pub fn checksum(&self) -> u64 {
+        fnv1a(self.times.iter().chain(&self.values).map(|value| value.to_bits()))
     }
 
     /// Value at a time, s.

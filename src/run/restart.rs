@@ -375,7 +375,7 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
     let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
     match found.len() {
-        0 => reasons.push("the texts agree, so defaults of the program have changed".into()),
+        0 => reasons.push("the texts agree, so files that the job names or defaults of the program have changed".into()),
         all if all > MOST_KEYS => reasons.push(format!("and {} more", all - MOST_KEYS)),
         _ => {}
     }

@@ -5,6 +5,8 @@ use std::path::Path;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, Property};
 
+use crate::input_file;
+
 /// Triangles with the places of their corners; the corners are checked to be there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
@@ -48,7 +50,7 @@ pub fn read(path: &Path) -> Result<Triangles, ReadError> {
         "ply" => ply,
         _ => return Err(ReadError::Kind),
     };
-    let triangles = parse(&whole_file(path, MOST_BYTES)?)?;
+    let triangles = parse(&input_file::read(path, MOST_BYTES)?)?;
     let count = triangles.vertices.len();
     match triangles.indices.iter().flatten().find(|&&corner| corner as usize >= count) {
         Some(corner) => Err(ReadError::Damaged {
@@ -57,21 +59,6 @@ pub fn read(path: &Path) -> Result<Triangles, ReadError> {
         }),
         None => Ok(triangles),
     }
-}
-
-/// The bytes of a plain file of at most `most` bytes.
-pub(super) fn whole_file(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(std::io::Error::other("it is not a plain file"));
-    }
-    if metadata.len() > most {
-        return Err(std::io::Error::other(format!(
-            "it has {} bytes, and at most {most} are read",
-            metadata.len()
-        )));
-    }
-    std::fs::read(path)
 }
 
 fn stl(bytes: &[u8]) -> Result<Triangles, ReadError> {

@@ -1,7 +1,8 @@
 //! Terrain from a raster of heights (ESRI ASCII grid): the solid between its surface and a level below.
 use std::path::Path;
 
-use super::read::{MOST_BYTES, ReadError, Triangles, whole_file};
+use super::read::{MOST_BYTES, ReadError, Triangles};
+use crate::input_file;
 
 /// Heights on a regular grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +27,7 @@ impl Terrain {
     /// # Errors
     /// The file cannot be read, is damaged, or has cells without data.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let bytes = whole_file(path, MOST_BYTES)?;
+        let bytes = input_file::read(path, MOST_BYTES)?;
         Self::parse(&String::from_utf8_lossy(&bytes))
             .map_err(|reason| ReadError::Damaged { kind: "ESRI ASCII grid", reason })
     }

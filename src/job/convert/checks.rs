@@ -110,6 +110,32 @@ impl Checks<'_> {
         (numbers.len() == names.len()).then_some(Some(numbers))
     }
 
+    /// What a file that the job names holds, or a fault.
+    pub(crate) fn read<T, E: std::fmt::Display>(
+        &mut self,
+        file: &str,
+        expected: &str,
+        path: &Path,
+        read: impl Fn(&std::path::Path) -> Result<T, E>,
+    ) -> Option<T> {
+        let from = self.directory.join(file);
+        read(&from)
+            .map_err(|error| {
+                let message = format!(
+                    "found \"{}\", but {error} ({}); expected {expected}, its name relative to the job file",
+                    excerpt(file, QUOTED),
+                    from.display()
+                );
+                self.fault(path, message);
+            })
+            .ok()
+    }
+
+    /// Notes the checksum of a file that the job names: with other contents it is another job.
+    pub(crate) fn note_file(&mut self, checksum: u64) {
+        self.files = self.files.rotate_left(1) ^ checksum;
+    }
+
     /// The components of a vector of the job's dimension.
     pub(crate) fn vector<const D: usize>(&mut self, vector: &Vector, path: &Path) -> Option<[f64; D]> {
         let array = <[f64; D]>::try_from(vector.0.as_slice()).ok();

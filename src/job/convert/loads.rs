@@ -3,8 +3,11 @@ use super::checks::{Checks, Space};
 use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
-use crate::job::schema::loads::{Load as Written, LoadKind, Quantity as WrittenQuantity, Sharing};
+use crate::job::schema::loads::{
+    Column as WrittenColumn, Load as Written, LoadKind, Quantity as WrittenQuantity, Record, Sharing,
+};
 use crate::load::{Carried, CarriedForce, Kind, Load};
+use crate::quantity::record::{self, Column};
 use crate::quantity::{Expression, Quantity, Table};
 use crate::text::written as number;
 
@@ -180,6 +183,21 @@ pub(super) fn quantity<const D: usize>(
             let rows: Vec<(f64, f64)> = rows.iter().map(|[time, value]| (*time, *value)).collect();
             Table::new(&rows).map(Quantity::Table).map_err(|error| error.to_string())
         }
+        WrittenQuantity::Record(record) => return of_file(checks, record, path),
     };
     read.map_err(|message| checks.fault(path, message)).ok()
+}
+
+/// The table in a file, or a fault.
+fn of_file(checks: &mut Checks, written: &Record, path: &Path) -> Option<Quantity> {
+    let column = |column: &WrittenColumn| match column {
+        WrittenColumn::Number(number) => Column::Number(usize::from(*number)),
+        WrittenColumn::Name(name) => Column::Name(name.clone()),
+    };
+    let (time, value) = (column(&written.time), column(&written.value));
+    let expected = "rows of a time and a value in comma-separated columns";
+    let read = |file: &std::path::Path| record::read(file, &time, &value, written.scale);
+    let table = checks.read(&written.file, expected, &path.key("file"), read)?;
+    checks.note_file(table.checksum());
+    Some(Quantity::Table(table))
 }

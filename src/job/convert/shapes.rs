@@ -125,27 +125,6 @@ impl Checks<'_> {
         }
     }
 
-    /// What a file that the job names holds, or a fault.
-    fn read<T>(
-        &mut self,
-        file: &str,
-        expected: &str,
-        path: &Path,
-        read: impl Fn(&std::path::Path) -> Result<T, mesh::ReadError>,
-    ) -> Option<T> {
-        let from = self.directory.join(file);
-        read(&from)
-            .map_err(|error| {
-                let message = format!(
-                    "found \"{}\", but {error} ({}); expected {expected}, its name relative to the job file",
-                    excerpt(file, QUOTED),
-                    from.display()
-                );
-                self.fault(path, message);
-            })
-            .ok()
-    }
-
     /// The solid of the triangles of a file with its origin at a point, m from the lower corner of the domain.
     fn solid<const D: usize>(
         &mut self,
@@ -160,7 +139,7 @@ impl Checks<'_> {
         }
         match Mesh::new(triangles) {
             Ok(mesh) => {
-                self.files = self.files.rotate_left(1) ^ mesh.checksum();
+                self.note_file(mesh.checksum());
                 Some(Shape::Mesh(mesh))
             }
             Err(error) => {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A quantity: a number; an expression in x, y, z (m) and t (s), such as "0.1 * sin(2 * pi * t)"; or a table over time,
-/// [[time, value], …], linear between its rows and constant outside.
+/// [[time, value], …] or from a file { file = "record.csv" }, linear between its rows and constant outside.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
@@ -16,6 +16,49 @@ pub enum Quantity {
     Expression(String),
     /// Rows [time (s), value] with increasing times.
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
+    /// A table in a file.
+    Record(Record),
+}
+
+/// A table over time from a file of comma-separated values (or semicolons, or tabs). Lines that begin with # are remarks, and the first line
+/// may hold names of columns. A state file belongs to the rows that the run began with: where they differ, it is of another job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Name of the file, relative to the job file.
+    pub file: String,
+    /// Column of the times, s, by its number, from 1, or by its name in the first line; the first by default.
+    #[serde(default = "first")]
+    pub time: Column,
+    /// Column of the values, by its number or name; the second by default.
+    #[serde(default = "second")]
+    pub value: Column,
+    /// Factor of the values: 9.81 for a record in g.
+    #[serde(default = "one")]
+    #[schemars(range(min = -1e12, max = 1e12))]
+    pub scale: f64,
+}
+
+/// A column of a file: its number, from 1, or its name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Column {
+    /// Its number, from 1.
+    Number(#[schemars(range(min = 1, max = 1000))] u16),
+    /// Its name in the first line.
+    Name(String),
+}
+
+fn first() -> Column {
+    Column::Number(1)
+}
+
+fn second() -> Column {
+    Column::Number(2)
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 impl Default for Quantity {
