@@ -116,3 +116,124 @@ fn measurements_are_the_same_on_any_ranks_and_across_restart() {
         assert!(history.column("mass_below").iter().any(|&mass| mass > 0.0));
     });
 }
+
+/// Blocks of 64 and 128 particles of 1 kg fly through a plane and out of an outflow face: at every row what has passed the face and what is
+/// there make up the whole exactly, and what has passed the plane is what lies beyond it or has left. A plane with the reverse normal
+/// has the reverse flux. The same on any ranks and across a restart, as are the particle that is followed and the files of a line.
+#[test]
+fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
+    let job = "version = 1\ndimension = 2\n[domain]\nmin = [-3, 7]\nsize = [1, 1]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+        [boundaries]\nx_max.kind = 'outflow'\n\
+        [[materials]]\nname = 'rubber'\ndensity = 1024\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+        [[bodies]]\nname = 'small'\nmaterial = 'rubber'\nvelocity = [4, 0.5]\nshape = { kind = 'box', min = [-2.5, 7.5], max = [-2.25, 7.75] }\n\
+        [[bodies]]\nname = 'large'\nmaterial = 'rubber'\nvelocity = [2, 0]\nshape = { kind = 'box', min = [-2.875, 7], max = [-2.625, 7.5] }\n\
+        [[fluxes]]\nname = 'gate'\npoint = [-2.2, 0]\nnormal = [3, 0]\n\
+        [[fluxes]]\nname = 'back'\npoint = [-2.2, 0]\nnormal = [-1, 0]\n\
+        [[fluxes]]\nname = 'out'\nface = 'x_max'\n\
+        [[fluxes]]\nname = 'none'\nface = 'y_max'\n\
+        [[probes]]\nname = 'beyond'\nshape = { kind = 'box', min = [-2.2, 0], max = [9, 9] }\nquantities = ['mass']\n\
+        [[tracks]]\nname = 'corner'\npoint = [-2.875, 7]\nquantities = ['centre', 'velocity', 'mass']\n\
+        [[tracks]]\nname = 'small'\npoint = [-2.9, 7]\nbodies = ['small']\n\
+        [[lines]]\nname = 'middle'\nfrom = [-3, 7.25]\nto = [-2, 7.25]\npoints = 5\n\
+        [time]\nend = 0.2\ndt_max = 1e-3\n[history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 60\nkeep = 9\n";
+    let mut line: Option<String> = None;
+    restart::assert_same_on_any_ranks(job, "flow", |directory, _| {
+        let history = History::read(directory, "flow");
+        let column = |name: &str| history.column(name);
+        let (inside, gate, back) = (column("mass"), column("passed_gate"), column("passed_back"));
+        let (out, beyond) = (column("passed_out"), column("mass_beyond"));
+        for row in 0..inside.len() {
+            assert_eq!(inside[row] + out[row], 192.0, "row {row}");
+            assert_eq!((gate[row], back[row]), (beyond[row] + out[row], -gate[row]), "row {row}");
+        }
+        assert!(
+            out.iter().any(|&mass| mass > 0.0 && mass < 64.0)
+                && column("passed_none").iter().all(|&m| m == 0.0)
+        );
+        assert!(gate.iter().any(|&mass| mass > 0.0 && mass < 64.0), "{gate:?}");
+        // The particle in the corner of the large block: an eighth of a cell from its faces, and it flies freely.
+        for (row, t) in column("time").iter().enumerate() {
+            let (x, y) = (column("centre_corner_x")[row], column("centre_corner_y")[row]);
+            let way = 1.0 / 64.0 - 2.875 + 2.0 * t;
+            assert!((x - way).abs() < 1e-12 && (y - 7.0 - 1.0 / 64.0).abs() < 1e-12, "row {row}: {x} {y}");
+            assert_eq!(column("mass_corner")[row], 1.0);
+        }
+        assert!((column("centre_small_x")[0] + 2.5 - 1.0 / 64.0).abs() < 1e-12);
+        let path = directory.join("out/flow/flow.line_middle.csv");
+        let text = std::fs::read_to_string(path).expect("the file of the line");
+        let rows: Vec<Vec<f64>> = text
+            .lines()
+            .skip(1)
+            .map(|row| row.split(',').map(|cell| cell.parse().expect("number")).collect())
+            .collect();
+        let names: Vec<&str> = text.lines().next().expect("header").split(',').collect();
+        let at =
+            |name: &str| names.iter().position(|other| *other == name).unwrap_or_else(|| panic!("{names:?}"));
+        assert_eq!(rows.len(), 5 * inside.len());
+        // The second point lies in the large block, and the third behind it.
+        let [in_block, behind] = [&rows[1], &rows[2]];
+        assert_eq!((in_block[at("point")], in_block[at("x [m]")], in_block[at("level")]), (2.0, -2.75, 1.0));
+        assert!((in_block[at("volume_fraction")] - 1.0).abs() < 1e-12, "{in_block:?}");
+        assert!((in_block[at("density [kg/m^3]")] - 1024.0).abs() < 1e-9);
+        assert!((in_block[at("velocity_x [m/s]")] - 2.0).abs() < 1e-14);
+        assert!(behind[at("volume_fraction")] == 0.0 && behind[at("pressure [Pa]")].is_nan(), "{behind:?}");
+        assert_eq!(*line.get_or_insert(text.clone()), text, "the line");
+    });
+}
+
+/// A line through ground at rest shows the stress of the weight above, exactly in the middle of linear fields, and the level of each leaf.
+#[test]
+fn a_line_through_ground_shows_the_stress_of_its_depth() {
+    let job = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nsize = [2, 2]\nroot_edge = 1\n\
+        [boundaries]\ny_min.kind = 'slip'\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_max.kind = 'separating'\n\
+        [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [0, 0], max = [0.9, 0.9] }\n\
+        [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'hencky'\nyoung = 1e8\npoisson = 0.25\n\
+        [[bodies]]\nname = 'ground'\nmaterial = 'm'\nshape = { kind = 'box', min = [0, 0], max = [2, 1.5] }\n\
+        stress = { kind = 'geostatic', k0 = 0.5 }\n\
+        [[lines]]\nname = 'depth'\nfrom = [0.5, 0.5]\nto = [0.5, 1.25]\npoints = 3\nquantities = ['stress', 'pressure']\n\
+        [time]\nend = 1e-5\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("ground.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let text =
+        std::fs::read_to_string(directory.path().join("out/ground/ground.line_depth.csv")).expect("line");
+    let mut lines = text.lines();
+    assert!(
+        lines
+            .next()
+            .expect("header")
+            .starts_with("step,time [s],point,x [m],y [m],level,stress_xx [Pa],stress_yy [Pa]")
+    );
+    for (row, (y, level)) in lines.zip([(0.5, 1.0), (0.875, 1.0), (1.25, 0.0)]) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().expect("number")).collect();
+        let vertical = -1e4 * (1.5 - y);
+        assert_eq!((cells[4], cells[5]), (y, level), "{row}");
+        assert!((cells[7] - vertical).abs() < 1e-6 * vertical.abs(), "{row}: {vertical}");
+        assert!((cells[6] - 0.5 * vertical).abs() < 1e-6 * vertical.abs(), "{row}: {vertical}");
+    }
+}
+
+/// A particle that is followed into finer leaves and out of them: it splits twice, its family is merged again, and the centre and the mass
+/// of the whole go on exactly.
+#[test]
+fn a_track_goes_on_through_splits_and_merges() {
+    let job = "version = 1\ndimension = 2\n[domain]\nsize = [8, 1]\nroot_edge = 1\n[adaptivity]\nevery_steps = 2\nbuffer = 0\n\
+        criteria = [{ kind = 'region', level = 2, shape = { kind = 'box', min = [2, 0], max = [3, 1] } }]\n\
+        [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e4\npoisson = 0.2\n\
+        [[bodies]]\nname = 'b'\nmaterial = 'm'\nvelocity = [10, 0]\nshape = { kind = 'box', min = [0.25, 0.25], max = [0.75, 0.75] }\n\
+        [[tracks]]\nname = 'middle'\npoint = [0.5, 0.5]\nquantities = ['centre', 'velocity', 'mass']\n\
+        [history]\nevery_steps = 2\n[time]\nend = 0.45\n";
+    let (history, _) = history_of("flight", job);
+    let column = |name: &str| history.column(name);
+    assert_eq!(
+        (history.last("splits"), history.last("merges"), history.last("particles")),
+        (80.0, 80.0, 16.0)
+    );
+    for (row, t) in column("time").iter().enumerate() {
+        let x = column("centre_middle_x")[row] - 0.4375 - 10.0 * t;
+        assert!(x.abs() < 1e-12 && (column("centre_middle_y")[row] - 0.4375).abs() < 1e-12, "row {row}: {x}");
+        assert!((column("velocity_middle_x")[row] - 10.0).abs() < 1e-12);
+        assert_eq!(column("mass_middle")[row], 15.625, "row {row}");
+    }
+}

@@ -52,13 +52,18 @@ impl History {
 
     /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that the finished file
     /// equals that of an uninterrupted run. What is damaged is cut out, and a warning names what is missing for that reason.
-    /// Starts a new file if there is none, or nothing of it is whole.
+    /// Starts a new file if there is none, or nothing of it is whole. Each step has so many `rows`.
     ///
     /// # Errors
     /// The file cannot be opened, or has other columns.
-    pub fn resume(path: &Path, columns: &[Column<'_>], kept: Kept) -> Result<(Self, Vec<Gap>), FileError> {
+    pub fn resume(
+        path: &Path,
+        columns: &[Column<'_>],
+        rows: usize,
+        kept: Kept,
+    ) -> Result<(Self, Vec<Gap>), FileError> {
         let expected = header(columns);
-        let mut seen = Seen::default();
+        let mut seen = Seen { rows, ..Seen::default() };
         let lines = match path.symlink_metadata() {
             Ok(_) => Some(Lines::resume(path, |line| seen.judge(line, &expected, columns.len(), kept.to))?),
             Err(_) => None,
@@ -72,7 +77,7 @@ impl History {
                 Self { lines, columns: columns.len(), last: seen.row.map(|(step, _)| step) }
             }
             _ => {
-                seen = Seen::default();
+                seen = Seen { rows, ..Seen::default() };
                 Self::create(path, columns)?
             }
         };
@@ -115,8 +120,12 @@ struct Seen {
     has_other_columns: bool,
     /// Something damaged stands behind the last good line.
     is_damaged: bool,
+    /// Rows that each step has.
+    rows: usize,
     /// Step and time of the last good row.
     row: Option<(u64, f64)>,
+    /// Good rows of that step.
+    of_step: usize,
     gaps: Vec<Gap>,
 }
 
@@ -131,11 +140,16 @@ impl Seen {
             self.has_other_columns = !self.has_header && line.starts_with(b"step,") && line.is_ascii();
             return if self.has_header || self.has_other_columns { Verdict::Keep } else { Verdict::Stop };
         }
-        let later = |step: u64| self.row.is_none_or(|(before, _)| step > before);
+        let (of_step, rows) = (self.of_step, self.rows);
+        let is_next =
+            |step: u64| self.row.is_none_or(|(before, _)| step > before || step == before && of_step < rows);
         match row(line, columns) {
             Some((step, _)) if step > to => Verdict::Stop,
-            Some((step, time)) if later(step) => {
-                if std::mem::take(&mut self.is_damaged) {
+            Some((step, time)) if is_next(step) => {
+                let is_same = self.row.is_some_and(|(before, _)| before == step);
+                let is_short = !is_same && self.row.is_some() && of_step < rows;
+                self.of_step = if is_same { of_step + 1 } else { 1 };
+                if std::mem::take(&mut self.is_damaged) | is_short {
                     self.gaps.push(Gap { after: self.row.map(|(_, time)| time), before: Some(time) });
                 }
                 self.row = Some((step, time));
@@ -205,7 +219,7 @@ mod tests {
         let torn = path(&dir, "torn.csv");
         write(&mut History::create(&torn, &COLUMNS).unwrap(), 0..15);
         append(&torn, b"15,0.3");
-        let (mut history, gaps) = History::resume(&torn, &COLUMNS, up_to(9)).unwrap();
+        let (mut history, gaps) = History::resume(&torn, &COLUMNS, 1, up_to(9)).unwrap();
         assert_eq!(gaps, []);
         write(&mut history, 10..20);
         let text = String::from_utf8(whole()).unwrap();
@@ -221,7 +235,7 @@ mod tests {
         let path = path(&dir, "h.csv");
         write(&mut History::create(&path, &COLUMNS).unwrap(), 0..3);
         append(&path, b"3,0.3");
-        drop(History::resume(&path, &COLUMNS, up_to(100)).unwrap());
+        drop(History::resume(&path, &COLUMNS, 1, up_to(100)).unwrap());
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }
 
@@ -253,7 +267,7 @@ mod tests {
         for (from, to, bytes, expected) in cases {
             let damaged = [&whole[..from], bytes, &whole[to..]].concat();
             std::fs::write(&path, &damaged).unwrap();
-            let (mut history, gaps) = History::resume(&path, &COLUMNS, up_to(15)).unwrap();
+            let (mut history, gaps) = History::resume(&path, &COLUMNS, 1, up_to(15)).unwrap();
             assert_eq!(gaps, expected, "{from}..{to}");
             history.row(16, &[1.6, 1e30]).unwrap();
             let mended = std::fs::read_to_string(&path).unwrap();
@@ -274,7 +288,7 @@ mod tests {
     #[test]
     fn a_missing_file_begins_where_the_run_goes_on() {
         let dir = tempfile::tempdir().unwrap();
-        let (_, gaps) = History::resume(&path(&dir, "h.csv"), &COLUMNS, up_to(3)).unwrap();
+        let (_, gaps) = History::resume(&path(&dir, "h.csv"), &COLUMNS, 1, up_to(3)).unwrap();
         assert_eq!(gaps, [Gap { after: None, before: None }]);
     }
 
@@ -283,7 +297,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = path(&dir, "h.csv");
         write(&mut History::create(&path, &COLUMNS).unwrap(), 0..3);
-        let error = History::resume(&path, &COLUMNS[..1], up_to(0)).unwrap_err().to_string();
+        let error = History::resume(&path, &COLUMNS[..1], 1, up_to(0)).unwrap_err().to_string();
         assert!(error.contains("columns"), "{error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }

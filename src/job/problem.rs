@@ -11,7 +11,7 @@ pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
-use crate::probe::Probe;
+use crate::probe::{Flux, Line, Probe, Track};
 use crate::quantity::Quantity;
 use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
@@ -134,6 +134,12 @@ pub struct Problem<const D: usize> {
     pub face_forces: bool,
     /// What it measures of the material.
     pub probes: Vec<Probe<D>>,
+    /// Particles that it follows.
+    pub tracks: Vec<Track<D>>,
+    /// Where it counts mass that passes.
+    pub fluxes: Vec<Flux>,
+    /// Lines with tables of their own, a row of the history apart.
+    pub lines: Vec<Line<D>>,
     /// Steps between lines of `telemetry.jsonl`.
     pub telemetry_every: u64,
     /// Evaluation at the end of the run.

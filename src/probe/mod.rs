@@ -1,7 +1,19 @@
-//! Probes: what the history measures of the material in a shape.
+//! What a run measures of the material. Sums are exact, so they do not depend on ranks.
 //!
-//! A particle counts where its centre lies in the shape. Sums are exact, so they do not depend on ranks; the flux of mass through a
-//! plane is the rate at which the mass of a probe on one side of it changes.
+//! | file | what it holds |
+//! |---|---|
+//! | this | probes: the particles whose centres lie in a shape |
+//! | `flux.rs` | fluxes: mass that has passed a plane or a face |
+//! | `line.rs` | lines: the material about points in a row |
+//! | `track.rs` | tracks: particles that are followed |
+mod flux;
+pub mod line;
+mod track;
+
+pub use flux::{Flux, Section};
+pub use line::Line;
+pub use track::{Track, Tracked};
+
 use crate::geometry::Shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,23 +36,6 @@ impl<const D: usize> Probe<D> {
     pub fn counts(&self, x: &[f64; D], body: u16) -> bool {
         self.bodies.as_ref().is_none_or(|bodies| bodies.contains(&body))
             && self.region.as_ref().is_none_or(|region| region.distance(x) <= 0.0)
-    }
-
-    /// Names and units of the columns, in the order of [`Readings::values`].
-    pub fn columns(&self) -> impl Iterator<Item = (String, &'static str)> + '_ {
-        self.quantities.iter().flat_map(move |quantity| {
-            let (stem, unit) = quantity.stem_and_unit();
-            let name = move |stem: &str, component: &&str| (format!("{stem}_{}{component}", self.name), unit);
-            let components = quantity.components::<D>();
-            match quantity {
-                Measured::Extent => {
-                    let [low, high] = ["least", "greatest"];
-                    let low = components.iter().map(|component| name(low, component));
-                    low.chain(components.iter().map(|component| name(high, component))).collect::<Vec<_>>()
-                }
-                _ => components.iter().map(|component| name(stem, component)).collect(),
-            }
-        })
     }
 }
 
@@ -76,10 +71,67 @@ pub enum Measured {
     Extent,
 }
 
+/// Names and units of the columns of quantities, in the order of [`values`]. `suffix` follows the stem of each name.
+pub fn columns<const D: usize>(quantities: &[Measured], suffix: &str) -> Vec<(String, &'static str)> {
+    quantities.iter().flat_map(|quantity| quantity.columns::<D>(suffix)).collect()
+}
+
+/// Values of quantities in a row of the history. `origin` is the lower corner of the domain, m.
+pub fn values<const D: usize>(quantities: &[Measured], readings: &Readings<D>, origin: &[f64]) -> Vec<f64> {
+    let mut values = Vec::new();
+    quantities.iter().for_each(|quantity| quantity.values(readings, origin, &mut values));
+    values
+}
+
 /// Axes as parts of names.
 const AXES: [&str; 3] = ["_x", "_y", "_z"];
 
 impl Measured {
+    /// Names and units of its columns.
+    fn columns<const D: usize>(self, suffix: &str) -> Vec<(String, &'static str)> {
+        let (stem, unit) = self.stem_and_unit();
+        let stems: &[&str] = if self == Self::Extent { &["least", "greatest"] } else { &[stem] };
+        let of_stem = |stem: &&str| {
+            let stem = (*stem).to_owned();
+            self.components::<D>().iter().map(move |component| (format!("{stem}{suffix}{component}"), unit))
+        };
+        stems.iter().flat_map(of_stem).collect()
+    }
+
+    /// Its values, appended to those of a row.
+    fn values<const D: usize>(self, of: &Readings<D>, origin: &[f64], values: &mut Vec<f64>) {
+        let mean = |sum: f64, of: f64| if of > 0.0 { sum / of } else { f64::NAN };
+        match self {
+            Self::Mass => values.push(of.mass),
+            Self::Volume => values.push(of.volume),
+            Self::Centre => {
+                values.extend((0..D).map(|a| origin[a] + mean(of.mass_place[a], of.mass)));
+            }
+            Self::Velocity => values.extend(of.momentum.map(|sum| mean(sum, of.mass))),
+            Self::Momentum => values.extend(of.momentum),
+            Self::GreatestSpeed => values.push(of.greatest_speed),
+            Self::KineticEnergy => values.push(of.energies[0]),
+            Self::ElasticEnergy => values.push(of.energies[1]),
+            Self::PlasticWork => values.push(of.energies[2]),
+            Self::Stress => {
+                let components = &of.volume_stress[..self.components::<D>().len()];
+                values.extend(components.iter().map(|sum| mean(*sum, of.volume)));
+            }
+            Self::Pressure => {
+                let [xx, yy, zz, ..] = of.volume_stress;
+                values.push(mean(-(xx + yy + zz) / 3.0, of.volume));
+            }
+            Self::PlasticStrain => values.push(mean(of.volume_strain, of.volume)),
+            Self::Extent => {
+                let is_empty = of.mass <= 0.0;
+                let place = |side: &[f64; D]| -> [f64; D] {
+                    std::array::from_fn(|a| if is_empty { f64::NAN } else { origin[a] + side[a] })
+                };
+                values.extend(of.extent.iter().flat_map(place));
+            }
+        }
+    }
+
     /// How the names of its columns begin, and their unit.
     fn stem_and_unit(self) -> (&'static str, &'static str) {
         match self {
@@ -133,46 +185,6 @@ pub struct Readings<const D: usize> {
     pub extent: [[f64; D]; 2],
 }
 
-impl<const D: usize> Readings<D> {
-    /// The values of a row of the history. `origin` is the lower corner of the domain, m.
-    pub fn values(&self, probe: &Probe<D>, origin: &[f64]) -> Vec<f64> {
-        let mean = |sum: f64, of: f64| if of > 0.0 { sum / of } else { f64::NAN };
-        let is_empty = self.mass <= 0.0;
-        let mut values = Vec::new();
-        for quantity in &probe.quantities {
-            match quantity {
-                Measured::Mass => values.push(self.mass),
-                Measured::Volume => values.push(self.volume),
-                Measured::Centre => {
-                    values.extend((0..D).map(|a| origin[a] + mean(self.mass_place[a], self.mass)));
-                }
-                Measured::Velocity => values.extend(self.momentum.map(|sum| mean(sum, self.mass))),
-                Measured::Momentum => values.extend(self.momentum),
-                Measured::GreatestSpeed => values.push(self.greatest_speed),
-                Measured::KineticEnergy => values.push(self.energies[0]),
-                Measured::ElasticEnergy => values.push(self.energies[1]),
-                Measured::PlasticWork => values.push(self.energies[2]),
-                Measured::Stress => {
-                    let components = &self.volume_stress[..quantity.components::<D>().len()];
-                    values.extend(components.iter().map(|sum| mean(*sum, self.volume)));
-                }
-                Measured::Pressure => {
-                    let [xx, yy, zz, ..] = self.volume_stress;
-                    values.push(mean(-(xx + yy + zz) / 3.0, self.volume));
-                }
-                Measured::PlasticStrain => values.push(mean(self.volume_strain, self.volume)),
-                Measured::Extent => {
-                    let place = |side: &[f64; D]| -> [f64; D] {
-                        std::array::from_fn(|a| if is_empty { f64::NAN } else { origin[a] + side[a] })
-                    };
-                    values.extend(self.extent.iter().flat_map(place));
-                }
-            }
-        }
-        values
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,7 +206,6 @@ mod tests {
     ];
 
     fn check<const D: usize>() {
-        let probe = Probe::<D> { name: "p".into(), region: None, bodies: None, quantities: ALL.to_vec() };
         let nothing = Readings {
             mass: 0.0,
             volume: 0.0,
@@ -206,8 +217,8 @@ mod tests {
             greatest_speed: 0.0,
             extent: [[f64::INFINITY; D], [f64::NEG_INFINITY; D]],
         };
-        let values = nothing.values(&probe, &[0.0; 3]);
-        let columns: Vec<_> = probe.columns().collect();
+        let values = values(&ALL, &nothing, &[0.0; 3]);
+        let columns = columns::<D>(&ALL, "_p");
         assert_eq!(columns.len(), values.len());
         // Sums of nothing are 0, means of nothing are no number, and nothing is infinite.
         for ((name, _), value) in columns.iter().zip(values) {

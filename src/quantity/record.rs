@@ -116,7 +116,8 @@ fn find_columns(
         Column::Number(number) => Ok(number - 1),
         Column::Name(name) => first.iter().position(|cell| cell == name.as_bytes()).ok_or_else(|| {
             let names: Vec<String> = first.iter().take(20).map(|cell| quoted(cell)).collect();
-            let reason = format!("found no column {}; this line has {}", quoted(name.as_bytes()), names.join(", "));
+            let reason =
+                format!("found no column {}; this line has {}", quoted(name.as_bytes()), names.join(", "));
             RecordError::Line { line, reason }
         }),
     };
@@ -188,12 +189,11 @@ mod tests {
             reason(by_number("0,1\n# remark\n0,2\n")),
             "line 3: found the time 0 s, which is not after the row above; expected times that increase"
         );
-        assert_eq!(
-            reason(by_number("0,1\n1\n")),
-            "line 2: found 1 columns; expected a number in column 2"
-        );
+        assert_eq!(reason(by_number("0,1\n1\n")), "line 2: found 1 columns; expected a number in column 2");
         assert!(reason(by_number("0,1\n1,inf\n")).starts_with("line 2: found a number that is not finite"));
-        assert!(reason(by_number("0,1\n1,1,5\n2,nan")).starts_with("line 3: found a number that is not finite"));
+        assert!(
+            reason(by_number("0,1\n1,1,5\n2,nan")).starts_with("line 3: found a number that is not finite")
+        );
         assert_eq!(reason(by_number("t,a\n")), "it holds no row of numbers");
         assert_eq!(reason(by_number("")), "it holds no row of numbers");
         assert_eq!(

@@ -5,7 +5,7 @@ use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::history::Column;
 use crate::job::Problem;
-use crate::probe::Probe;
+use crate::probe;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{LoadTotals, Reaction};
@@ -40,7 +40,8 @@ const COLUMNS: [Column<'static>; 20] = [
 ];
 
 /// Names and units of the columns after the step. What a job has adds its own in this order: splits and merges of dynamic
-/// refinement; the way to equilibrium; the number of the stage, from 1; loads; probes; faces of the domain; colliders.
+/// refinement; the way to equilibrium; the number of the stage, from 1; loads; probes; tracks;
+/// fluxes; faces of the domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -57,7 +58,12 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
         columns.push((format!("work_{}", load.name), "J"));
     }
-    columns.extend(problem.probes.iter().flat_map(Probe::columns));
+    let probes = problem.probes.iter().map(|probe| (&probe.name, &probe.quantities));
+    let tracks = problem.tracks.iter().map(|track| (&track.name, &track.quantities));
+    for (name, quantities) in probes.chain(tracks) {
+        columns.extend(probe::columns::<D>(quantities, &format!("_{name}")));
+    }
+    columns.extend(problem.fluxes.iter().map(|flux| (format!("passed_{}", flux.name), "kg")));
     if problem.face_forces {
         for name in &AXES[..D] {
             for side in ["min", "max"] {

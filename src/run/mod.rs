@@ -3,6 +3,7 @@ mod claim;
 pub mod collapse;
 mod files;
 pub mod history;
+mod lines;
 mod outcome;
 pub mod record;
 pub mod report;
@@ -71,7 +72,8 @@ impl<'a, const D: usize> Run<'a, D> {
         if !options.overwrite {
             claim::spare_results(comm, problem)?;
         }
-        let solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
+        let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
+        restart::begin_measures(problem, &mut solver);
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
         claim.take(comm, problem)?;

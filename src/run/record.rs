@@ -1,15 +1,17 @@
 //! History, telemetry and progress of a run.
+use std::path::Path;
 use std::time::Instant;
 
 use partition::comm::{Comm, Traffic};
 
 use super::report::{self, Report};
-use super::{Options, RunError, Summary, history};
+use super::{Options, RunError, Summary, history, lines};
 use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;
 use crate::io::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
+use crate::probe;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::bookings::FACE_SUMS;
 use crate::solver::state::phases::Phase;
@@ -21,6 +23,8 @@ pub struct Recorder<'a, const D: usize> {
     problem: &'a Problem<D>,
     history: Option<History>,
     telemetry: Option<Telemetry>,
+    /// The files of lines, on rank 0.
+    lines: Vec<History>,
     progress: Progress,
     /// Step of the last row of the history; the same on all ranks.
     last_row: Option<u64>,
@@ -59,11 +63,13 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let files = match (comm.rank(), kept) {
             (0, None) => History::create(&rows, &columns)
                 .and_then(|history| Ok(Some(((history, Vec::new()), Telemetry::create(&lines)?)))),
-            (0, Some(kept)) => History::resume(&rows, &columns, kept)
+            (0, Some(kept)) => History::resume(&rows, &columns, 1, kept)
                 .and_then(|history| Ok(Some((history, Telemetry::resume(&lines, step)?)))),
             _ => Ok(None),
         };
         let (history, telemetry) = comm.agree(files)?.unzip();
+        let lines = if comm.rank() == 0 { lines::open(problem, kept) } else { Ok(Vec::new()) };
+        let (lines, gaps_of_lines) = comm.agree(lines)?.into_iter().unzip();
         let (history, gaps): (Option<History>, _) = history.unzip();
         let last = history.as_ref().and_then(History::last_step);
         let last_row = match kept {
@@ -75,6 +81,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             problem,
             history,
             telemetry,
+            lines,
             progress: Progress::new(options.speaks, time, problem.time.end),
             last_row,
             last_values: Vec::new(),
@@ -84,17 +91,25 @@ impl<'a, const D: usize> Recorder<'a, D> {
             since_step: step,
             since_traffic: solver.traffic(),
         };
-        for Gap { after, before } in gaps.into_iter().flatten() {
+        recorder.tell_gaps(&rows, gaps.unwrap_or_default(), time);
+        for (line, gaps) in problem.lines.iter().zip::<Vec<Vec<Gap>>>(gaps_of_lines) {
+            recorder.tell_gaps(&lines::path(problem, line), gaps, time);
+        }
+        recorder.prepare(solver);
+        Ok(recorder)
+    }
+
+    /// Not collective. Warns of rows that a damaged file has lost. `time` is that of the state, s.
+    fn tell_gaps(&mut self, rows: &Path, gaps: Vec<Gap>, time: f64) {
+        for Gap { after, before } in gaps {
             let from =
                 after.map_or_else(|| "the start".into(), |time| format!("t = {}", quantity(time, "s")));
             let to = quantity(before.unwrap_or(time), "s");
-            recorder.warning(&format!(
+            self.warning(&format!(
                 "{}: rows are missing from {from} to t = {to}; the file was damaged, cut or moved",
                 rows.display()
             ));
         }
-        recorder.prepare(solver);
-        Ok(recorder)
     }
 
     /// Not collective. Has the next step note what its record needs.
@@ -158,7 +173,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Not collective. Brings what is written to disk: a state that gets its name now says which row was the last.
     pub fn sync(&self) -> Result<(), FileError> {
-        self.history.as_ref().map_or(Ok(()), History::sync)?;
+        self.history.iter().chain(&self.lines).try_for_each(History::sync)?;
         self.telemetry.as_ref().map_or(Ok(()), Telemetry::sync)
     }
 
@@ -189,6 +204,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let reactions = solver.reactions();
         let loads = solver.load_totals();
         let readings = solver.read_probes(&self.problem.probes);
+        let tracked = solver.read_tracks(&self.problem.tracks);
+        let passed = solver.crossings.fluxes.passed(comm, &solver.chunks);
+        let samples = solver.read_lines(&self.problem.lines);
         let faces = solver.face_forces();
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
@@ -205,14 +223,20 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 values.push((solver.physics.stage() + 1) as f64);
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
-            let probes = self.problem.probes.iter().zip(&readings);
-            probes.for_each(|(probe, readings)| values.extend(readings.values(probe, &self.problem.origin)));
+            let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
+            let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
+            for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {
+                values.extend(probe::values(quantities, readings, &self.problem.origin));
+            }
+            values.extend(passed);
             faces.iter().for_each(|force| values.extend(&force[..D]));
             let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
             for ((collider, state), reaction) in all {
                 values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
             }
-            written = history.row(clock.step, &values);
+            written = history
+                .row(clock.step, &values)
+                .and_then(|()| lines::write(&mut self.lines, self.problem, clock, &samples));
             self.last_values = values;
             self.report.particles = particles.count;
         }

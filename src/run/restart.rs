@@ -9,6 +9,7 @@ use partition::comm::Comm;
 use super::RunError;
 use crate::adaptivity::resample::ids;
 use crate::boundary::motion::Rate;
+use crate::checksum::fnv1a;
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
@@ -17,9 +18,11 @@ use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
 use crate::load::Load;
 use crate::particle::Chunk;
+use crate::probe::Tracked;
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
+use crate::solver::migration::fluxes::Fluxes;
 use crate::solver::state::bookings::ExactSums;
 use crate::solver::state::cost::leaf_weight;
 use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
@@ -58,6 +61,7 @@ pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
 /// Collective. Scalars that a restart needs beside those in every header.
 pub fn scalars<const D: usize>(
     comm: &Comm,
+    problem: &Problem<D>,
     solver: &Solver<D>,
     next_output: u64,
     output_step: Option<u64>,
@@ -76,6 +80,7 @@ pub fn scalars<const D: usize>(
         .zip(&mut crossings.masses)
         .map(|(name, sum)| ((*name).into(), sum.words().to_vec()))
         .collect();
+    write_measures(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
     write_exact_sums("face", &solver.face_sums, comm, &mut reals, &mut exact);
@@ -102,6 +107,66 @@ pub fn scalars<const D: usize>(
         }
     }
     Scalars { reals, counts, exact }
+}
+
+/// Name under which a file has something of a flux or a track.
+fn measure(kind: &str, name: &str, what: &str) -> String {
+    format!("{kind}_{what}{:016x}", fnv1a(name.bytes().map(u64::from)))
+}
+
+/// Collective. Appends what is booked of fluxes, and where tracks are.
+fn write_measures<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    solver: &Solver<D>,
+    reals: &mut Vec<(String, f64)>,
+    counts: &mut Vec<(String, u64)>,
+    exact: &mut Vec<(String, Vec<i64>)>,
+) {
+    let mut sums = solver.crossings.fluxes.gather(comm);
+    let fluxes = problem.fluxes.iter().zip(&mut sums);
+    exact.extend(fluxes.map(|(flux, sum)| (measure("flux", &flux.name, ""), sum.words().to_vec())));
+    for (track, tracked) in problem.tracks.iter().zip(&solver.tracked) {
+        // Halves of an identifier are numbers that counts may be.
+        let halves = [("low_", tracked.id & HALF), ("high_", tracked.id >> 32)];
+        counts.extend(halves.map(|(half, id)| (measure("track", &track.name, half), id)));
+        let place = tracked.place.iter().enumerate();
+        reals.extend(place.map(|(a, &x)| (measure("track", &track.name, &format!("{a}_")), x)));
+    }
+}
+
+/// The lower half of an identifier.
+const HALF: u64 = 0xffff_ffff;
+
+/// Collective. Begins to count at fluxes, and to follow tracks.
+pub fn begin_measures<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>) {
+    solver.crossings.fluxes = Fluxes::new(&problem.fluxes);
+    solver.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
+    solver.begin_tracks(&problem.tracks);
+}
+
+/// Takes over what is booked of fluxes, on rank 0, and where tracks are. Those that the file lacks begin here.
+fn restore_measures<const D: usize>(
+    rank: usize,
+    problem: &Problem<D>,
+    solver: &mut Solver<D>,
+    scalars: &Scalars,
+) {
+    begin_measures(problem, solver);
+    for (flux, sum) in problem.fluxes.iter().zip(&mut solver.crossings.fluxes.sums) {
+        let read = scalars.exact(&measure("flux", &flux.name, "")).and_then(ExactSum::from_words);
+        if let Some(read) = read {
+            *sum = if rank == 0 { read } else { ExactSum::new() };
+        }
+    }
+    for (track, tracked) in problem.tracks.iter().zip(&mut solver.tracked) {
+        let half = |half| scalars.count(&measure("track", &track.name, half));
+        let coordinate = |a: usize| scalars.real(&measure("track", &track.name, &format!("{a}_")));
+        let place: Option<Vec<f64>> = (0..D).map(coordinate).collect();
+        if let (Some(low), Some(high), Some(place)) = (half("low_"), half("high_"), place) {
+            *tracked = Tracked { id: low | high << 32, place: std::array::from_fn(|a| place[a]) };
+        }
+    }
 }
 
 /// Name of the time at which a stage began.
@@ -207,7 +272,8 @@ fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
     let [put_back, deleted, left] = CROSSINGS.map(|name| scalars.count(name));
     let [of_deleted, of_left] = CROSSED_MASSES.map(|name| scalars.exact(name).and_then(ExactSum::from_words));
     let masses = [of_deleted?, of_left?];
-    let crossings = Crossings { put_back: put_back?, deleted: deleted?, left: left?, masses };
+    let fluxes = Fluxes::default();
+    let crossings = Crossings { put_back: put_back?, deleted: deleted?, left: left?, masses, fluxes };
     if rank == 0 {
         solver.crossings = crossings;
     }
@@ -343,6 +409,7 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
+    restore_measures(comm.rank(), problem, &mut solver, &header.scalars);
     Ok((solver, header.scalars))
 }
 
@@ -375,7 +442,9 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
     let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
     match found.len() {
-        0 => reasons.push("the texts agree, so files that the job names or defaults of the program have changed".into()),
+        0 => reasons.push(
+            "the texts agree, so files that the job names or defaults of the program have changed".into(),
+        ),
         all if all > MOST_KEYS => reasons.push(format!("and {} more", all - MOST_KEYS)),
         _ => {}
     }

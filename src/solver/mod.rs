@@ -74,6 +74,7 @@ impl<const D: usize> Solver<D> {
             phases: Phases::default(),
             grid,
             crossings: Crossings::default(),
+            tracked: Vec::new(),
             ledger: Ledger::default(),
             regrids: 0,
             regrid_timers: RegridTimers::default(),

@@ -37,6 +37,7 @@ impl<const D: usize> Solver<D> {
                 self.contacts.states[index] = collider.state_at(self.clock.time);
             }
         }
+        self.crossings.fluxes.add_beyond(&self.chunks, 1.0);
         let had: Vec<usize> = self
             .chunks
             .iter_mut()
@@ -52,6 +53,7 @@ impl<const D: usize> Solver<D> {
         for (chunk, added) in self.chunks.iter_mut().zip(&change.added) {
             (0..added.len()).for_each(|p| chunk.push_from(added, p));
         }
+        self.crossings.fluxes.add_beyond(&self.chunks, -1.0);
         self.leaf_data.reset(self.chunks.len());
         let reach = self.agreed_reach();
         self.rebuild_grid(reach);

@@ -56,6 +56,12 @@ pub fn parent<const D: usize>(id: u64) -> Option<(u64, usize)> {
     Some(((id & !(number << shift)) - (1 << GENERATION_SHIFT), number as usize))
 }
 
+/// Whether two identifiers are the same, or one is an ancestor of the other.
+pub fn are_kin<const D: usize>(a: u64, b: u64) -> bool {
+    let bits = root_bits(D) + generation(a).min(generation(b)) * D as u32;
+    (a ^ b) & ((1 << bits) - 1) == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,6 +78,8 @@ mod tests {
                         let child = child::<D>(id, number).unwrap();
                         assert_eq!(parent::<D>(child), Some((id, number)));
                         assert_eq!((root::<D>(child), generation(child)), (seed, depth));
+                        assert!(are_kin::<D>(id, child) && are_kin::<D>(child, seed));
+                        assert!(!next.iter().any(|&other| are_kin::<D>(child, other)));
                         assert!(seen.insert(child));
                         next.push(child);
                     }

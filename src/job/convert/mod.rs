@@ -9,7 +9,7 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
-//! | `probes` | probes |
+//! | `probes` | probes, tracks, fluxes and lines |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
@@ -89,7 +89,7 @@ fn problem<const D: usize>(
         None => Some(Gravity::constant([0.0; D])),
     };
     let faces_with_sums = if file.history.face_forces { 2 * D } else { 0 };
-    let taken = 6 * file.colliders.len() + D * faces_with_sums;
+    let taken = 6 * file.colliders.len() + D * faces_with_sums + file.fluxes.len();
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let stages = stages::stages(checks, file, &root);
     let load_stages =
@@ -106,6 +106,9 @@ fn problem<const D: usize>(
     let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
     let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
     let probes = probes::probes(checks, file, &space, &root.key("probes"));
+    let tracks = probes::tracks(checks, file, &space, &root.key("tracks"));
+    let fluxes = probes::fluxes(checks, file, &space, &root.key("fluxes"));
+    let lines = probes::lines(checks, file, &space, &root.key("lines"));
     let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
@@ -152,6 +155,9 @@ fn problem<const D: usize>(
         history_every: file.history.every_steps,
         face_forces: file.history.face_forces,
         probes: probes?,
+        tracks: tracks?,
+        fluxes: fluxes?,
+        lines: lines?,
         telemetry_every: file.telemetry.every_steps,
         report,
     };

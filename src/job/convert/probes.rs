@@ -1,8 +1,8 @@
-//! Probes of the job file to those of the program.
+//! Measurements of the job file to those of the program.
 use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
-use crate::probe::Probe;
+use crate::probe::{Flux, Line, Probe, Section, Track};
 
 /// All probes, or faults.
 pub(super) fn probes<const D: usize>(
@@ -11,27 +11,138 @@ pub(super) fn probes<const D: usize>(
     space: &Space<D>,
     path: &Path,
 ) -> Option<Vec<Probe<D>>> {
-    let bodies: Vec<&str> = file.bodies.iter().map(|body| body.name.as_str()).collect();
     let mut all = Vec::new();
     for (i, written) in file.probes.iter().enumerate() {
         let here = path.index(i);
         let before = file.probes[..i].iter().map(|probe| &*probe.name);
         checks.column_name(&written.name, before, &here.key("name"));
-        for (k, quantity) in written.quantities.iter().enumerate() {
-            if written.quantities[..k].contains(quantity) {
-                let message = "found a quantity a second time; expected each once";
-                checks.fault(&here.key("quantities").index(k), message.into());
-            }
-        }
+        each_once(checks, &written.quantities, &here.key("quantities"));
         let region = match &written.shape {
             Some(shape) => checks.shape(shape, space, &here.key("shape")).map(Some),
             None => Some(None),
         };
-        let bodies = checks.bodies(written.bodies.as_deref(), &bodies, &here.key("bodies"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
         if let (Some(region), Some(bodies)) = (region, bodies) {
             let quantities = written.quantities.clone();
             all.push(Probe { name: written.name.clone(), region, bodies, quantities });
         }
     }
     (all.len() == file.probes.len()).then_some(all)
+}
+
+/// All tracks, or faults.
+pub(super) fn tracks<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Track<D>>> {
+    let mut all = Vec::new();
+    for (i, written) in file.tracks.iter().enumerate() {
+        let here = path.index(i);
+        // Columns of probes have names of the same form.
+        let before = file.tracks[..i].iter().map(|track| &*track.name);
+        let before = before.chain(file.probes.iter().map(|probe| &*probe.name));
+        checks.column_name(&written.name, before, &here.key("name"));
+        each_once(checks, &written.quantities, &here.key("quantities"));
+        let point = checks.point(&written.point, space, &here.key("point"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        if let (Some(point), Some(bodies)) = (point, bodies) {
+            let quantities = written.quantities.clone();
+            all.push(Track { name: written.name.clone(), point, bodies, quantities });
+        }
+    }
+    (all.len() == file.tracks.len()).then_some(all)
+}
+
+/// All fluxes, or faults.
+pub(super) fn fluxes<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Flux>> {
+    let mut all = Vec::new();
+    for (i, written) in file.fluxes.iter().enumerate() {
+        let here = path.index(i);
+        let before = file.fluxes[..i].iter().map(|flux| &*flux.name);
+        checks.column_name(&written.name, before, &here.key("name"));
+        let section = match (&written.point, &written.normal, written.face) {
+            (Some(point), Some(normal), None) => {
+                let point = checks.point::<D>(point, space, &here.key("point"));
+                let normal = checks.direction::<D>(normal, &here.key("normal"));
+                let in_space =
+                    |vector: [f64; D]| std::array::from_fn(|a| if a < D { vector[a] } else { 0.0 });
+                point.zip(normal).map(|(point, normal)| Section::Plane {
+                    point: in_space(point),
+                    normal: in_space(normal),
+                })
+            }
+            (None, None, Some(face)) => {
+                let face = face as usize;
+                Some(Section::Face { axis: face / 2, side: face % 2 })
+            }
+            _ => {
+                let message =
+                    "expected either a plane, point = [...] and normal = [...], or face = \"y_min\"";
+                let found =
+                    if written.face.is_some() { "a face and a plane" } else { "no whole plane and no face" };
+                checks.fault(&here, format!("found {found}; {message}"));
+                None
+            }
+        };
+        all.extend(section.map(|section| Flux { name: written.name.clone(), section }));
+    }
+    (all.len() == file.fluxes.len()).then_some(all)
+}
+
+/// All lines, or faults.
+pub(super) fn lines<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Line<D>>> {
+    let mut all = Vec::new();
+    for (i, written) in file.lines.iter().enumerate() {
+        let here = path.index(i);
+        let before = file.lines[..i].iter().map(|line| &*line.name);
+        checks.column_name(&written.name, before, &here.key("name"));
+        each_once(checks, &written.quantities, &here.key("quantities"));
+        let ends = [("from", &written.from), ("to", &written.to)].map(|(key, end)| {
+            let end: [f64; D] = checks.point(end, space, &here.key(key))?;
+            if (0..D).all(|a| (0.0..=space.size[a]).contains(&end[a])) {
+                return Some(end);
+            }
+            let message = format!("found {}; expected a point in the domain", space.words(&end));
+            checks.fault(&here.key(key), message);
+            None
+        });
+        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        if let ([Some(from), Some(to)], Some(bodies)) = (ends, bodies) {
+            let last = f64::from(written.points - 1);
+            let point = |k: u32| {
+                let part = f64::from(k) / last;
+                std::array::from_fn(|a| (1.0 - part).mul_add(from[a], part * to[a]))
+            };
+            let points = (0..written.points).map(point).collect();
+            let quantities = written.quantities.clone();
+            all.push(Line { name: written.name.clone(), points, bodies, quantities });
+        }
+    }
+    (all.len() == file.lines.len()).then_some(all)
+}
+
+fn body_names(file: &JobFile) -> Vec<&str> {
+    file.bodies.iter().map(|body| body.name.as_str()).collect()
+}
+
+/// Faults for quantities that are named again.
+fn each_once<T: PartialEq>(checks: &mut Checks, quantities: &[T], path: &Path) {
+    for (k, quantity) in quantities.iter().enumerate() {
+        if quantities[..k].contains(quantity) {
+            let message = "found a quantity a second time; expected each once";
+            checks.fault(&path.index(k), message.into());
+        }
+    }
 }

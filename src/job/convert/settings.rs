@@ -172,6 +172,9 @@ pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     state.checkpoint = file::Checkpoint::default();
     state.history = file::History::default();
     state.probes.clear();
+    state.tracks.clear();
+    state.fluxes.clear();
+    state.lines.clear();
     state.telemetry = file::Telemetry::default();
     state.report = None;
     state.time.end = 0.0;

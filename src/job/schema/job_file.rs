@@ -7,7 +7,7 @@ use super::common::yes;
 pub use super::common::{AxisName, Spin};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
-pub use super::probes::Probe;
+pub use super::probes::{Flux, Line, Probe, Track};
 pub use super::stages::Stage;
 pub use super::stress::Stress;
 use crate::geometry::written::Shape;
@@ -86,6 +86,18 @@ pub struct JobFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 1000))]
     pub probes: Vec<Probe>,
+    /// Particles that are followed, columns of `history.csv`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 100))]
+    pub tracks: Vec<Track>,
+    /// Mass that passes planes or faces, columns of `history.csv`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 20))]
+    pub fluxes: Vec<Flux>,
+    /// Lines at whose points the material is shown, each with a table of its own, `JOB.line_NAME.csv`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 100))]
+    pub lines: Vec<Line>,
     /// Measurements of the run itself, `telemetry.jsonl`.
     #[serde(default)]
     pub telemetry: Telemetry,

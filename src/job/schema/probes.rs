@@ -1,6 +1,7 @@
-//! Probes as they are written in a job file.
-use crate::geometry::written::Shape;
+//! Measurements of the material as they are written in a job file.
+use crate::geometry::written::{Shape, Vector};
 use crate::probe::Measured;
+use crate::probe::line::Sampled;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,4 +27,101 @@ pub struct Probe {
 
 fn usual() -> Vec<Measured> {
     vec![Measured::Mass, Measured::Centre, Measured::Velocity]
+}
+
+/// A particle that is followed, with columns of `history.csv` such as `centre_NAME_x`: at the start the one nearest to a point. Where it
+/// has split, the columns are sums and means over all into which it has; where a merge has undone a split, they are those of the whole.
+/// Once a merge of strangers has taken it, the particle nearest to its last place takes over.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Track {
+    /// Name, of letters, digits, `_` and `-`; no probe has the same.
+    pub name: String,
+    /// The point, m.
+    pub point: Vector,
+    /// Names of the bodies whose particles count; all by default.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 65_535))]
+    pub bodies: Option<Vec<String>>,
+    /// What is shown of it; centre and velocity by default.
+    #[serde(default = "usual_of_track")]
+    #[schemars(length(min = 1, max = 13))]
+    pub quantities: Vec<Measured>,
+}
+
+fn usual_of_track() -> Vec<Measured> {
+    vec![Measured::Centre, Measured::Velocity]
+}
+
+/// Mass that has passed since the start of the run, the column `passed_NAME` of `history.csv` (kg): through a plane in the direction of its
+/// normal, less what has come back; or out of the domain through a face. An exact sum: what is there, and what has passed out of the
+/// domain, make up the whole.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Flux {
+    /// Name, of letters, digits, `_` and `-`.
+    pub name: String,
+    /// A point of the plane, m.
+    #[serde(default)]
+    pub point: Option<Vector>,
+    /// Normal of the plane, any length: mass counts where it goes.
+    #[serde(default)]
+    pub normal: Option<Vector>,
+    /// A face of the domain, in the place of a plane.
+    #[serde(default)]
+    pub face: Option<FaceName>,
+}
+
+/// A face of the domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FaceName {
+    /// Lower face along x.
+    XMin,
+    /// Upper face along x.
+    XMax,
+    /// Lower face along y.
+    YMin,
+    /// Upper face along y.
+    YMax,
+    /// Lower face along z.
+    #[schemars(extend("x-dimension" = 3))]
+    ZMin,
+    /// Upper face along z.
+    #[schemars(extend("x-dimension" = 3))]
+    ZMax,
+}
+
+/// Points at equal distances on a line at which the material is shown, with a row for each in `JOB.line_NAME.csv` whenever
+/// `history.csv` has one. Values are means over the particles within a cell of the point, weighted by max(0, 1 - distance / edge of the
+/// cell) along each axis. Means are `NaN` where there is no material.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// Name, of letters, digits, `_` and `-`; part of the name of the file.
+    pub name: String,
+    /// First point, m.
+    pub from: Vector,
+    /// Last point, m.
+    pub to: Vector,
+    /// Number of points, both ends included.
+    #[serde(default = "twenty_one")]
+    #[schemars(range(min = 2, max = 1000))]
+    pub points: u32,
+    /// Names of the bodies that count; all by default.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 65_535))]
+    pub bodies: Option<Vec<String>>,
+    /// What is shown; all by default.
+    #[serde(default = "all_sampled")]
+    #[schemars(length(min = 1, max = 6))]
+    pub quantities: Vec<Sampled>,
+}
+
+fn twenty_one() -> u32 {
+    21
+}
+
+fn all_sampled() -> Vec<Sampled> {
+    Sampled::ALL.to_vec()
 }

@@ -1,4 +1,6 @@
 //! What is measured of a state.
 pub mod given_boxes;
+pub mod lines;
 pub mod probes;
 pub mod totals;
+pub mod tracks;

@@ -1,4 +1,5 @@
 //! What probes read.
+use partition::comm::Comm;
 use rayon::prelude::*;
 
 use super::totals::{DoubleDouble, elastic_energy};
@@ -16,7 +17,7 @@ const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1;
 
 /// Sums and extremes over particles of one or more leaves.
 #[derive(Clone)]
-struct Partial<const D: usize> {
+pub(super) struct Partial<const D: usize> {
     sums: [DoubleDouble; SUMS],
     /// Greatest squared speed, and negative least and greatest coordinates.
     greatest: Vec<f64>,
@@ -29,25 +30,39 @@ impl<const D: usize> Solver<D> {
             return Vec::new();
         }
         let physics = &self.physics;
-        let (mut sums, mut greatest) = (Vec::new(), Vec::new());
-        for probe in probes {
-            let leaves = self.chunks.par_iter().with_min_len(4).map(|chunk| of_leaf(physics, probe, chunk));
-            let leaves: Vec<Option<Partial<D>>> = leaves.collect();
-            let mut all = Partial::<D>::nothing();
-            let mut exact = vec![ExactSum::new(); SUMS];
-            for leaf in leaves.iter().flatten() {
-                exact.iter_mut().zip(&leaf.sums).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
-                all.note_greatest(leaf.greatest.iter().copied());
-            }
-            sums.extend(exact);
-            greatest.extend(all.greatest);
-        }
-        // One reduction for all probes.
-        ExactSum::sum_over_ranks(&self.comm, &mut sums);
-        self.comm.max_f64s(&mut greatest);
-        let each = sums.chunks_exact(SUMS).zip(greatest.chunks_exact(1 + 2 * D));
-        each.map(|(sums, greatest)| readings(|i| sums[i].to_f64(), greatest)).collect()
+        let partials = probes.iter().map(|probe| {
+            let wants_energy = probe.quantities.contains(&Measured::ElasticEnergy);
+            let leaves = self.chunks.par_iter().with_min_len(4).map(|chunk| {
+                let counts = |p| probe.counts(&chunk.position(p), Tag::unpack(chunk.tags()[p]).body);
+                of_leaf(physics, chunk, wants_energy, |p| f64::from(u8::from(counts(p))))
+            });
+            leaves.collect::<Vec<Option<Partial<D>>>>()
+        });
+        reduced(&self.comm, partials)
     }
+}
+
+/// Collective. Sums over all ranks of sets of particles, each by own leaf.
+pub(super) fn reduced<const D: usize>(
+    comm: &Comm,
+    sets: impl Iterator<Item = Vec<Option<Partial<D>>>>,
+) -> Vec<Readings<D>> {
+    let (mut sums, mut greatest) = (Vec::new(), Vec::new());
+    for leaves in sets {
+        let mut all = Partial::<D>::nothing();
+        let mut exact = vec![ExactSum::new(); SUMS];
+        for leaf in leaves.iter().flatten() {
+            exact.iter_mut().zip(&leaf.sums).for_each(|(sum, of_leaf)| of_leaf.enter(sum));
+            all.note_greatest(leaf.greatest.iter().copied());
+        }
+        sums.extend(exact);
+        greatest.extend(all.greatest);
+    }
+    // One reduction for all sets.
+    ExactSum::sum_over_ranks(comm, &mut sums);
+    comm.max_f64s(&mut greatest);
+    let each = sums.chunks_exact(SUMS).zip(greatest.chunks_exact(1 + 2 * D));
+    each.map(|(sums, greatest)| readings(|i| sums[i].to_f64(), greatest)).collect()
 }
 
 /// What a probe reads, of its sums and greatest values.
@@ -75,15 +90,19 @@ impl<const D: usize> Partial<D> {
     }
 }
 
-/// Sums over the particles of a leaf that count, in their order; none: `None`.
-fn of_leaf<const D: usize>(physics: &Physics<D>, probe: &Probe<D>, chunk: &Chunk<D>) -> Option<Partial<D>> {
+/// Sums over the particles of a leaf, in their order, each times its weight; `None` if all weights are 0.
+pub(super) fn of_leaf<const D: usize>(
+    physics: &Physics<D>,
+    chunk: &Chunk<D>,
+    wants_energy: bool,
+    weight: impl Fn(usize) -> f64,
+) -> Option<Partial<D>> {
     let mut all = None;
     let mut energies = [0.0; LANES];
-    let wants_energy = probe.quantities.contains(&Measured::ElasticEnergy);
     let mut energies_from = usize::MAX;
     for p in 0..chunk.len() {
-        let x = chunk.position(p);
-        if !probe.counts(&x, Tag::unpack(chunk.tags()[p]).body) {
+        let (weight, x) = (weight(p), chunk.position(p));
+        if weight == 0.0 {
             continue;
         }
         let first = p / LANES * LANES;
@@ -92,8 +111,11 @@ fn of_leaf<const D: usize>(physics: &Physics<D>, probe: &Probe<D>, chunk: &Chunk
             energies = Lanes::to_array(elastic_energy(physics, chunk, first));
         }
         let value = |column: usize| chunk.column(column)[p];
-        let (mass, reference, volume) =
-            (value(Layout::<D>::MASS), reference_volume(chunk, p), volume(chunk, p));
+        let (mass, reference, volume) = (
+            weight * value(Layout::<D>::MASS),
+            weight * reference_volume(chunk, p),
+            weight * volume(chunk, p),
+        );
         let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let speed_squared = velocity.iter().fold(0.0, |sum: f64, v| v.mul_add(*v, sum));
         let [xx, yy, zz, xy, yz, xz] = cauchy_stress(chunk, p);

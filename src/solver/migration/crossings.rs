@@ -1,6 +1,7 @@
 //! Particles that cross the faces of the domain: what becomes of them, and what is booked of that.
 use partition::comm::Comm;
 
+use super::fluxes::Fluxes;
 use crate::boundary::{Contact, Leaving};
 use crate::exact_sum::ExactSum;
 use crate::solver::physics::Physics;
@@ -67,13 +68,30 @@ impl<const D: usize> FaceRules<D> {
     }
 }
 
-/// The face of the domain `[0, extent)` that a position is farthest beyond, by its name in the job, and how far, m.
-pub(super) fn farthest_beyond<const D: usize>(position: &[f64; D], extent: &[f64; D]) -> (&'static str, f64) {
-    const FACES: [[&str; 2]; 3] = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]];
-    let sides = (0..D).flat_map(|axis| {
-        [(FACES[axis][0], -position[axis]), (FACES[axis][1], position[axis] - extent[axis])]
-    });
-    sides.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(("", 0.0))
+/// The face of the domain `[0, extent)` that a position is farthest beyond, by axis and side, and how far, m.
+pub(super) fn farthest_beyond<const D: usize>(
+    position: &[f64; D],
+    extent: &[f64; D],
+) -> ((usize, usize), f64) {
+    let sides =
+        (0..D).flat_map(|axis| [((axis, 0), -position[axis]), ((axis, 1), position[axis] - extent[axis])]);
+    sides.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(((0, 0), 0.0))
+}
+
+/// Name of a face of the domain in the job.
+pub(super) fn face_name((axis, side): (usize, usize)) -> &'static str {
+    [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side]
+}
+
+/// A particle that is no longer in the domain.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct Gone {
+    /// Its mass, kg.
+    pub mass: f64,
+    /// Its place, m from the lower corner of the domain; z is 0 in plane strain.
+    pub place: [f64; 3],
+    /// The face that it is farthest beyond: axis and side.
+    pub face: (usize, usize),
 }
 
 /// Particles of one leaf that crossed a face of the domain in one step.
@@ -81,10 +99,10 @@ pub(super) fn farthest_beyond<const D: usize>(position: &[f64; D], extent: &[f64
 pub(in crate::solver) struct Crossed {
     /// Number of those put back.
     pub put_back: u64,
-    /// Masses of those deleted, kg.
-    pub deleted: Vec<f64>,
-    /// Masses of those that left through outflow faces, kg.
-    pub left: Vec<f64>,
+    /// Those deleted.
+    pub deleted: Vec<Gone>,
+    /// Those that left through outflow faces.
+    pub left: Vec<Gone>,
 }
 
 impl Crossed {
@@ -105,6 +123,8 @@ pub struct Crossings {
     pub left: u64,
     /// Masses of those deleted and of those that left, kg.
     pub masses: [ExactSum; 2],
+    /// Masses that have passed planes and faces.
+    pub fluxes: Fluxes,
 }
 
 impl Crossings {
@@ -113,19 +133,22 @@ impl Crossings {
         self.put_back += crossed.put_back;
         self.deleted += crossed.deleted.len() as u64;
         self.left += crossed.left.len() as u64;
-        for (sum, masses) in self.masses.iter_mut().zip([&crossed.deleted, &crossed.left]) {
-            masses.iter().for_each(|&mass| sum.add(mass));
+        for (sum, gone) in self.masses.iter_mut().zip([&crossed.deleted, &crossed.left]) {
+            for gone in gone {
+                sum.add(gone.mass);
+                self.fluxes.book(gone);
+            }
         }
     }
 
-    /// Collective. Those of all ranks.
+    /// Collective. Those of all ranks, without fluxes.
     pub fn gather(&self, comm: &Comm) -> Self {
         let mut counts = [self.put_back, self.deleted, self.left];
         comm.sum_u64(&mut counts);
         let [put_back, deleted, left] = counts;
         let mut masses = self.masses.clone();
         ExactSum::sum_over_ranks(comm, &mut masses);
-        Self { put_back, deleted, left, masses }
+        Self { put_back, deleted, left, masses, fluxes: Fluxes::default() }
     }
 }
 
@@ -180,15 +203,17 @@ mod tests {
 
     #[test]
     fn the_farthest_face_is_named() {
-        assert_eq!(farthest_beyond(&[0.5, 2.25], &[1.0, 2.0]), ("y_max", 0.25));
-        assert_eq!(farthest_beyond(&[-0.5, 2.25], &[1.0, 2.0]), ("x_min", 0.5));
+        assert_eq!(farthest_beyond(&[0.5, 2.25], &[1.0, 2.0]), ((1, 1), 0.25));
+        assert_eq!(farthest_beyond(&[-0.5, 2.25], &[1.0, 2.0]), ((0, 0), 0.5));
+        assert_eq!(face_name((1, 1)), "y_max");
     }
 
     #[test]
     fn the_line_says_what_there_is() {
+        let gone = Gone { mass: 0.5, place: [0.0; 3], face: (0, 0) };
         let mut crossings = Crossings::default();
         assert_eq!(crossings.to_string(), "");
-        crossings.book(&Crossed { put_back: 2, deleted: Vec::new(), left: vec![0.5; 1200] });
+        crossings.book(&Crossed { put_back: 2, deleted: Vec::new(), left: vec![gone; 1200] });
         assert_eq!(
             crossings.to_string(),
             "particles at the faces of the domain: 1 200 left through outflow faces (600 kg), 2 were put back to the face that \

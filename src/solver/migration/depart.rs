@@ -2,7 +2,7 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
 //! others: to make room for their children among these would copy the leaf.
-use super::crossings::{Crossed, Crossing, FaceRules, farthest_beyond};
+use super::crossings::{Crossed, Crossing, FaceRules, Gone, face_name, farthest_beyond};
 use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
@@ -34,6 +34,8 @@ pub(in crate::solver) enum Destination {
 pub struct Borders<const D: usize> {
     boxes: Vec<([f64; D], [f64; D])>,
     rules: FaceRules<D>,
+    /// Edges of the domain, m.
+    extent: [f64; D],
     root_edge: f64,
     /// Columns of what particles carry for loads.
     carried: usize,
@@ -64,7 +66,8 @@ impl<const D: usize> Borders<D> {
     pub(in crate::solver) fn new(plan: &GridPlan<D>, rules: FaceRules<D>, carried: usize) -> Self {
         let own = plan.tree.first_own()..plan.tree.first_own() + plan.leaf_start.len() - 1;
         let boxes = plan.tree.leaves()[own].iter().map(|leaf| leaf_box(leaf, plan.root_edge)).collect();
-        Self { boxes, rules, root_edge: plan.root_edge, carried }
+        let extent = plan.tree.brick().roots.map(|roots| f64::from(roots) * plan.root_edge);
+        Self { boxes, rules, extent, root_edge: plan.root_edge, carried }
     }
 
     /// Lower and upper corner of an own leaf, m.
@@ -96,10 +99,19 @@ impl<const D: usize> Borders<D> {
             Destination::Leaf(to) => {
                 push_record(&mut departed.records, u64::from(to), chunk, p, self.carried);
             }
-            Destination::Deleted => departed.crossed.deleted.push(chunk.column(Layout::<D>::MASS)[p]),
-            Destination::Left => departed.crossed.left.push(chunk.column(Layout::<D>::MASS)[p]),
+            Destination::Deleted => departed.crossed.deleted.push(self.gone(chunk, p)),
+            Destination::Left => departed.crossed.left.push(self.gone(chunk, p)),
             Destination::Stay | Destination::Split => {}
         }
+    }
+
+    /// A particle as it leaves the domain.
+    fn gone(&self, chunk: &Chunk<D>, p: usize) -> Gone {
+        let position = chunk.position(p);
+        let mut place = [0.0; 3];
+        place[..D].copy_from_slice(&position);
+        let (face, _) = farthest_beyond(&position, &self.extent);
+        Gone { mass: chunk.column(Layout::<D>::MASS)[p], place, face }
     }
 
     /// Where a position is, if it is in another leaf than own leaf `leaf`.
@@ -197,14 +209,14 @@ impl<const D: usize> Borders<D> {
             return Err(self.too_far(chunk, p));
         }
         let roots = tree.brick().roots;
-        let extent: [f64; D] = std::array::from_fn(|axis| f64::from(roots[axis]) * self.root_edge);
+        let extent = self.extent;
         match self.rules.of(&position, &extent) {
             None => {}
             Some(Crossing::Deleted) => return Ok(Destination::Deleted),
             Some(Crossing::Left) => return Ok(Destination::Left),
             Some(Crossing::Refused) => {
                 let (face, beyond) = farthest_beyond(&position, &extent);
-                let position = self.rules.in_job(&position);
+                let (position, face) = (self.rules.in_job(&position), face_name(face));
                 return Err(MigrateError::Left { id: chunk.ids()[p], position, face, beyond });
             }
             Some(Crossing::PutBack) => {

@@ -19,6 +19,7 @@ use super::sorting::bins::BinMissing;
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
+use crate::probe::Tracked;
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, ParticlePush};
 use crate::solver::state::cost::Costs;
@@ -126,6 +127,8 @@ pub struct Solver<const D: usize> {
     pub(super) leaf_data: LeafData<D>,
     /// Particles that crossed the faces of the domain so far.
     pub crossings: Crossings,
+    /// Particles that are followed.
+    pub tracked: Vec<Tracked<D>>,
     /// Splits and merges of particles so far.
     pub ledger: Ledger,
     /// Changes of the tree since the start of this process.

@@ -1,0 +1,123 @@
+//! Lines: points in a row at which a table of its own shows the material.
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Measured, Readings};
+
+/// Points at which the material is averaged.
+#[derive(Clone, Debug)]
+pub struct Line<const D: usize> {
+    /// Name; part of the name of its file.
+    pub name: String,
+    /// The points, m from the lower corner of the domain.
+    pub points: Vec<[f64; D]>,
+    /// Bodies that count, by index; all without.
+    pub bodies: Option<Vec<u16>>,
+    /// What its table shows, each once.
+    pub quantities: Vec<Sampled>,
+}
+
+/// What a line shows at a point. Means are not a number where there is no material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampled {
+    /// Share of the space that material fills.
+    VolumeFraction,
+    /// Mass per space, kg/m³.
+    Density,
+    /// Mean velocity by mass, m/s.
+    Velocity,
+    /// Mean Cauchy stress by volume, Pa, tension positive.
+    Stress,
+    /// Mean pressure by volume, Pa.
+    Pressure,
+    /// Mean plastic strain by volume.
+    PlasticStrain,
+}
+
+impl Sampled {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::VolumeFraction,
+        Self::Density,
+        Self::Velocity,
+        Self::Stress,
+        Self::Pressure,
+        Self::PlasticStrain,
+    ];
+
+    /// What a probe measures as well.
+    fn mean(self) -> Option<Measured> {
+        match self {
+            Self::VolumeFraction | Self::Density => None,
+            Self::Velocity => Some(Measured::Velocity),
+            Self::Stress => Some(Measured::Stress),
+            Self::Pressure => Some(Measured::Pressure),
+            Self::PlasticStrain => Some(Measured::PlasticStrain),
+        }
+    }
+}
+
+/// What there is about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the edge of a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<const D: usize> {
+    /// Level of the finest leaf that holds the point.
+    pub level: u8,
+    /// Volume of a cell there, m³; the integral of the weight.
+    pub cell: f64,
+    /// The sums.
+    pub sums: Readings<D>,
+}
+
+/// The weight of a place (m) in the mean at a point (m), with cells of the edge `cell`, m.
+pub fn weight<const D: usize>(point: &[f64; D], place: &[f64; D], cell: f64) -> f64 {
+    (0..D).map(|a| (1.0 - (place[a] - point[a]).abs() / cell).max(0.0)).product()
+}
+
+impl<const D: usize> Line<D> {
+    /// Names and units of the columns behind step and time, in the order of [`Line::values`].
+    pub fn columns(&self) -> Vec<(String, &'static str)> {
+        let mut columns = vec![("point".to_owned(), "")];
+        columns.extend(["x", "y", "z"][..D].iter().map(|axis| ((*axis).to_owned(), "m")));
+        columns.push(("level".to_owned(), ""));
+        for quantity in &self.quantities {
+            match quantity.mean() {
+                Some(mean) => columns.extend(mean.columns::<D>("")),
+                None if *quantity == Sampled::Density => columns.push(("density".to_owned(), "kg/m^3")),
+                None => columns.push(("volume_fraction".to_owned(), "")),
+            }
+        }
+        columns
+    }
+
+    /// The values of a row: those of one point, counted from 1. `origin` is the lower corner of the domain, m.
+    pub fn values(&self, point: usize, sample: &Sample<D>, origin: &[f64]) -> Vec<f64> {
+        let mut values = vec![(point + 1) as f64];
+        values.extend((0..D).map(|a| origin[a] + self.points[point][a]));
+        values.push(f64::from(sample.level));
+        for quantity in &self.quantities {
+            match quantity.mean() {
+                Some(mean) => mean.values(&sample.sums, origin, &mut values),
+                None if *quantity == Sampled::Density => values.push(sample.sums.mass / sample.cell),
+                None => values.push(sample.sums.volume / sample.cell),
+            }
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Particles in the middle of the quarters of cells, each with the volume of a quarter: the weights about any point add up to one cell.
+    #[test]
+    fn weights_add_up_to_a_cell() {
+        let places = (0..40).flat_map(|i| (0..40).map(move |j| [i, j].map(|c| 0.125 + 0.25 * f64::from(c))));
+        let places: Vec<[f64; 2]> = places.collect();
+        for point in [[5.0, 5.0], [4.3, 5.9], [2.125, 7.77]] {
+            let sum: f64 = places.iter().map(|place| 0.0625 * weight(&point, place, 0.5)).sum();
+            assert!((sum - 0.25).abs() < 1e-14, "{point:?}: {sum}");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Masses that have passed planes and faces.
+use partition::comm::Comm;
+use rayon::prelude::*;
+
+use super::crossings::Gone;
+use crate::exact_sum::ExactSum;
+use crate::particle::{Chunk, Layout};
+use crate::probe::{Flux, Section};
+
+/// What is booked of the fluxes of a job.
+#[derive(Clone, Debug, Default)]
+pub struct Fluxes {
+    /// Where mass is counted.
+    pub sections: Vec<Section>,
+    /// Mass that has left the domain beyond each of them, less that beyond it at the start and what stages have added there since,
+    /// kg; this rank's part.
+    pub sums: Vec<ExactSum>,
+}
+
+impl Fluxes {
+    /// Those of a job, with nothing booked.
+    pub fn new(fluxes: &[Flux]) -> Self {
+        let sections = fluxes.iter().map(|flux| flux.section).collect();
+        Self { sections, sums: vec![ExactSum::new(); fluxes.len()] }
+    }
+
+    /// Books a particle that leaves the domain.
+    pub(super) fn book(&mut self, gone: &Gone) {
+        for (section, sum) in self.sections.iter().zip(&mut self.sums) {
+            let is_beyond = match section {
+                Section::Plane { .. } => section.is_beyond(&gone.place),
+                Section::Face { axis, side } => (*axis, *side) == gone.face,
+            };
+            if is_beyond {
+                sum.add(gone.mass);
+            }
+        }
+    }
+
+    /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 the material that is there is none that has passed: at
+    /// the start, and behind the start of a stage; with +1 before it, what a stage changes passes nothing.
+    pub fn add_beyond<const D: usize>(&mut self, chunks: &[Chunk<D>], sign: f64) {
+        for (section, sum) in self.sections.iter().zip(&mut self.sums) {
+            let leaves = chunks.par_iter().with_min_len(16).map(|chunk| {
+                let mut of_leaf = ExactSum::new();
+                for p in 0..chunk.len() {
+                    if section.is_beyond(&chunk.position(p)) {
+                        of_leaf.add(sign * chunk.column(Layout::<D>::MASS)[p]);
+                    }
+                }
+                of_leaf
+            });
+            let all = leaves.reduce(ExactSum::new, |mut sum, other| {
+                sum.merge(&other);
+                sum
+            });
+            sum.merge(&all);
+        }
+    }
+
+    /// Collective. Mass that has passed each section, kg.
+    pub fn passed<const D: usize>(&self, comm: &Comm, chunks: &[Chunk<D>]) -> Vec<f64> {
+        let mut now = self.clone();
+        now.add_beyond(chunks, 1.0);
+        now.gather(comm).iter().map(ExactSum::to_f64).collect()
+    }
+
+    /// Collective. What is booked on all ranks.
+    pub fn gather(&self, comm: &Comm) -> Vec<ExactSum> {
+        let mut sums = self.sums.clone();
+        if !sums.is_empty() {
+            ExactSum::sum_over_ranks(comm, &mut sums);
+        }
+        sums
+    }
+}
