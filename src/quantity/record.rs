@@ -115,7 +115,7 @@ fn find_columns(
     let place = |column: &Column| match column {
         Column::Number(number) => Ok(number - 1),
         Column::Name(name) => first.iter().position(|cell| cell == name.as_bytes()).ok_or_else(|| {
-            let names: Vec<String> = first.iter().take(20).map(|cell| quoted(cell)).collect();
+            let names: Vec<String> = first.iter().take(20).map(quoted).collect();
             let reason =
                 format!("found no column {}; this line has {}", quoted(name.as_bytes()), names.join(", "));
             RecordError::Line { line, reason }

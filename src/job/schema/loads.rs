@@ -17,7 +17,7 @@ pub enum Quantity {
     /// Rows [time (s), value] with increasing times.
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
     /// A table in a file.
-    Record(Record),
+    Record(Box<Record>),
 }
 
 /// A table over time from a file of comma-separated values (or semicolons, or tabs). Lines that begin with # are remarks, and the first line
