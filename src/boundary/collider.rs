@@ -1,12 +1,22 @@
-//! Rigid bodies that act on the nodes inside them, and are acted on.
+//! Rigid bodies that act on the nodes inside them, or on the particles that touch them, and are acted on.
 //!
-//! On a real node inside a collider (signed distance at most 0) the condition holds for the velocity relative to the
+//! Where they act on nodes: on a real node inside a collider (signed distance at most 0) the condition holds for the velocity relative to the
 //! collider's surface there, with the gradient of the signed distance as normal. The momentum that this takes from
 //! the material is what the material gives to the collider: its force and torque.
 use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, length};
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
+
+/// On what a collider acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ActsOn {
+    /// On the real nodes inside it.
+    #[default]
+    Nodes,
+    /// On the particles that touch its surface (see [`super::touching`]).
+    Particles,
+}
 
 /// A collider as the job describes it; it does not change in a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +31,8 @@ pub struct Collider<const D: usize> {
     pub axis: [f64; 3],
     /// What it does to material.
     pub contact: Contact,
+    /// On what it acts.
+    pub acts_on: ActsOn,
     /// How it moves.
     pub motion: Motion<D>,
     /// Time from which that of its motion is counted, s; infinite where it is not there.
@@ -67,12 +79,34 @@ impl<const D: usize> Collider<D> {
         std::array::from_fn(|a| self.reference[a] + pose.translation[a])
     }
 
+    /// Whether it acts on nodes, in this stage.
+    pub fn acts_on_nodes(&self) -> bool {
+        self.acts_on == ActsOn::Nodes && self.is_present()
+    }
+
+    /// Whether it acts on particles, in this stage.
+    pub fn acts_on_particles(&self) -> bool {
+        self.acts_on == ActsOn::Particles && self.is_present()
+    }
+
     /// Where the point `x` of space (m) lies in the collider as the job has it.
-    fn to_own(&self, x: &[f64; D], pose: &Pose<D>) -> [f64; D] {
+    pub fn to_own(&self, x: &[f64; D], pose: &Pose<D>) -> [f64; D] {
         let centre = self.centre(pose);
         std::array::from_fn(|i| {
             (0..D).fold(self.reference[i], |sum, j| pose.rotation[j][i].mul_add(x[j] - centre[j], sum))
         })
+    }
+
+    /// Where the point `y` (m) of the collider as the job has it lies in space.
+    pub fn to_space(&self, y: &[f64; D], pose: &Pose<D>) -> [f64; D] {
+        let turned = self.turned(&std::array::from_fn(|a| y[a] - self.reference[a]), pose);
+        let centre = self.centre(pose);
+        std::array::from_fn(|a| centre[a] + turned[a])
+    }
+
+    /// A vector of the collider as the job has it, turned with it.
+    pub fn turned(&self, own: &[f64; D], pose: &Pose<D>) -> [f64; D] {
+        std::array::from_fn(|i| (0..D).fold(0.0, |sum, j| pose.rotation[i][j].mul_add(own[j], sum)))
     }
 
     /// Signed distance of a point `x` (m) to the surface of the collider in a pose, m; negative inside. For booleans
@@ -89,8 +123,7 @@ impl<const D: usize> Collider<D> {
 
     /// Outward unit normal at a point: the gradient of the signed distance.
     pub fn normal(&self, x: &[f64; D], pose: &Pose<D>) -> [f64; D] {
-        let own = self.shape.gradient(&self.to_own(x, pose));
-        std::array::from_fn(|i| (0..D).fold(0.0, |sum, j| pose.rotation[i][j].mul_add(own[j], sum)))
+        self.turned(&self.shape.gradient(&self.to_own(x, pose)), pose)
     }
 
     /// Velocity of the collider at a point `x` of it: `V + ω × (x - c)`, m/s.
@@ -118,6 +151,12 @@ impl<const D: usize> Collider<D> {
             },
             motion => motion.mean_rate(time - self.start, dt),
         }
+    }
+
+    /// Where it is after a step that ends at `time` (s) and was `dt` long, in which it moved with `mean`: what material does to a free body in a
+    /// step moves it in the next.
+    pub fn next_pose(&self, state: &ColliderState<D>, mean: &Rate<D>, [time, dt]: [f64; 2]) -> Pose<D> {
+        self.advanced(state, mean, &[0.0; D], [time, dt], [0.0; D], [0.0; 3]).pose
     }
 
     /// The state after a step that ends at `time` (s) and was `dt` long, in which the collider moved with `mean`
@@ -181,6 +220,9 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
     /// Contact and motion in words.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}, ", self.contact)?;
+        if self.acts_on == ActsOn::Particles {
+            write!(f, "at particles, ")?;
+        }
         let both = |speed: f64, spin: f64| format!("{}, {}", quantity(speed, "m/s"), quantity(spin, "rad/s"));
         let speeds = |rate: &Rate<D>| both(length(&rate.velocity), rate.spin);
         match &self.motion {
@@ -216,6 +258,7 @@ mod tests {
             reference: [1.0, 0.0],
             axis: [0.0, 0.0, 1.0],
             contact: Contact::Sticky,
+            acts_on: ActsOn::Nodes,
             motion,
             start: 0.0,
         }

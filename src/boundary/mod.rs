@@ -1,10 +1,12 @@
-//! Boundary conditions on the velocities of real nodes, and what becomes of particles that leave.
+//! Boundary conditions on the velocities of real nodes, contact at particles, and what becomes of particles that leave.
 pub mod collider;
 pub mod contact;
 pub mod motion;
+pub mod touching;
 
-pub use collider::{Collider, ColliderState};
+pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
+pub use touching::{Touching, meets};
 
 /// What happens to particles that leave the domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

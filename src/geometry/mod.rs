@@ -9,6 +9,7 @@ mod gradient;
 pub mod mesh;
 mod primitives;
 mod rotation;
+pub mod sampling;
 mod shape;
 pub mod surface;
 pub mod written;
@@ -17,6 +18,7 @@ pub use classify::Side;
 pub use common_point::common_point;
 pub use mesh::Mesh;
 pub use rotation::rotation;
+pub use sampling::Sampling;
 pub use shape::{Frustum, Placement, Shape};
 
 /// An axis-aligned box, possibly unbounded or empty (`lower > upper` along some axis).

@@ -5,7 +5,7 @@
 use crate::adaptivity::{Adaptivity, least_level};
 use crate::boundary::Collider;
 pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
-use crate::geometry::{Aabb, Shape};
+use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
 pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
@@ -267,6 +267,8 @@ pub struct Body<const D: usize> {
     pub stage: usize,
     /// Particles per cell along each axis; not necessarily a whole number.
     pub particles_per_cell: f64,
+    /// How its particles lie about the points of the lattice.
+    pub sampling: Sampling<D>,
     /// Stress at the start, if it does not begin without.
     pub stress: Option<InitialStress>,
 }

@@ -60,6 +60,12 @@ impl<const D: usize> Gathered<D> {
         std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
     }
 
+    /// Affine sums `Σ w v_j ⊗ (x_j - x)`, m²/s.
+    pub fn affine(&self) -> [[f64; D]; D] {
+        let columns = self.affine.map(F64x4::to_array);
+        std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
+    }
+
     /// Adds `share` times `other`.
     pub(super) fn add(&mut self, other: &Self, share: f64) {
         let share = F64x4::splat(share);

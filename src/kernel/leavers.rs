@@ -1,5 +1,6 @@
 //! Particles that leave the box of their leaf, found by G2P while their new positions are in registers.
 use super::batch::Batch;
+use crate::particle::Chunk;
 use crate::simd::{LANES, Vector, VectorMask};
 
 /// Finds particles that are no longer in a box once they have moved.
@@ -34,6 +35,20 @@ impl<const D: usize> Leavers<D> {
             inside = inside & lower.le(position[axis]) & position[axis].lt(upper);
         }
         inside
+    }
+
+    /// Notes those of some particles of a chunk that are outside, once they have been moved anew.
+    pub fn look_again(&mut self, chunk: &Chunk<D>, moved: &[u32]) {
+        let is_inside = |p: u32| {
+            let x = chunk.position(p as usize);
+            (0..D).all(|a| self.lower[a] <= x[a] && x[a] < self.upper[a])
+        };
+        let outside: Vec<u32> = moved.iter().copied().filter(|&p| !is_inside(p)).collect();
+        if !outside.is_empty() {
+            self.found.extend(outside);
+            self.found.sort_unstable();
+            self.found.dedup();
+        }
     }
 
     /// Notes the members of a batch that moved out.

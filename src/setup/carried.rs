@@ -9,7 +9,7 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::seed::{SeedError, lattice_of, spacing};
+use super::seed::{SeedError, lattice_of, lattice_places, spacing};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
 use crate::geometry::{Aabb, Side};
@@ -46,8 +46,9 @@ pub(super) fn carry<const D: usize>(
             let tree = solver.known_tree();
             let shares = surface_shares(problem, tree, load, carried, stage);
             let own = &tree.leaves()[tree.own_leaves()];
-            let levels: Vec<u8> = own.iter().map(|leaf| leaf.level).collect();
-            hand_out(problem, &levels, chunks, (carried, columns), &shares);
+            // Bodies that overlap have no particles.
+            let places = |leaf: usize| lattice_places(problem, &own[leaf], stage).unwrap_or_default();
+            hand_out(places, chunks, (carried, columns), &shares);
         } else if !comm.any(is_carried(&solver.chunks, carried)) {
             share_force(comm, chunks, load, carried, columns);
         }
@@ -216,10 +217,10 @@ impl<const D: usize> Search<'_, D> {
     }
 }
 
-/// Adds shares to the columns of own particles, which are where they were made.
+/// Adds shares to the columns of own particles. They are as they were made, so that `places` gives bodies and places in the lattice of those of
+/// a leaf in their order.
 fn hand_out<const D: usize>(
-    problem: &Problem<D>,
-    levels: &[u8],
+    places: impl Fn(usize) -> Vec<(u16, [u64; D])>,
     chunks: &mut [Chunk<D>],
     (carried, columns): (&Carried<D>, usize),
     shares: &[Share<D>],
@@ -227,14 +228,8 @@ fn hand_out<const D: usize>(
     let mut of_leaf: FxHashMap<usize, FxHashMap<(u16, [u64; D]), usize>> = FxHashMap::default();
     for Share { leaf, body, index, numbers } in shares {
         let chunk = &mut chunks[*leaf];
-        let places = of_leaf.entry(*leaf).or_insert_with(|| {
-            let place = |p: usize| {
-                let tag = Tag::unpack(chunk.tags()[p]);
-                let spacing = spacing(problem, levels[*leaf], &problem.bodies[usize::from(tag.body)]);
-                ((tag.body, chunk.position(p).map(|c| (c / spacing) as u64)), p)
-            };
-            (0..chunk.len()).map(place).collect()
-        });
+        let of_leaf = of_leaf.entry(*leaf);
+        let places = of_leaf.or_insert_with(|| places(*leaf).into_iter().zip(0..chunk.len()).collect());
         if let Some(&p) = places.get(&(*body, *index)) {
             chunk.carry(columns);
             for (column, number) in (carried.first..).zip(numbers) {

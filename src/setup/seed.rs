@@ -2,8 +2,9 @@
 //!
 //! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per
 //! cell, anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its
-//! own points, on whichever rank it is, and no point is made twice.
-use crate::geometry::{Aabb, Side};
+//! own points, on whichever rank it is, and no point is made twice. Particles lie at these points or, by the sampling of their body, near
+//! them, within the same leaf and body.
+use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::material::initial::NoState;
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -98,6 +99,7 @@ pub fn fill_leaf<const D: usize>(
         let spin = velocity_gradient::<D>(body.angular_velocity);
         chunk.reserve_exact(chunk.len() + points.len());
         for x in points {
+            let x = &place_near(problem, octant, index, x, spacing);
             let p = chunk.push_zeroed(0, tag);
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
             for i in 0..D {
@@ -117,6 +119,48 @@ pub fn fill_leaf<const D: usize>(
             set(Layout::<D>::HALF, 0.5 * spacing);
         }
     })
+}
+
+/// Where the particle of a point of the lattice lies: as the sampling of its body says, or on the same way as near to the point as it takes to
+/// stay in the leaf and in the body and out of others.
+fn place_near<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    index: usize,
+    x: &[f64; D],
+    spacing: f64,
+) -> [f64; D] {
+    let body = &problem.bodies[index];
+    if let Sampling::Lattice = body.sampling {
+        return *x;
+    }
+    let cell = problem.octant_box(octant);
+    let way = body.sampling.way(&x.map(|c| (c / spacing) as u64), octant.level);
+    let fits = |y: &[f64; D]| {
+        let others = problem.bodies.iter().enumerate();
+        let mut others = others.filter(|&(other, _)| other != index && problem.are_together(index, other));
+        cell.contains(y) && body.shape.contains(y) && others.all(|(_, other)| !other.shape.contains(y))
+    };
+    let shares = [1.0, 0.5, 0.25, 0.125].into_iter();
+    let places = shares.map(|share| std::array::from_fn(|a| (share * spacing).mul_add(way[a], x[a])));
+    places.into_iter().find(fits).unwrap_or(*x)
+}
+
+/// Not collective. Body and place in the lattice of each particle that [`fill_leaf`] makes, in the same order.
+///
+/// # Errors
+/// A point lies in two bodies.
+pub(super) fn lattice_places<const D: usize>(
+    problem: &Problem<D>,
+    octant: &Octant<D>,
+    stage: usize,
+) -> Result<Vec<(u16, [u64; D])>, SeedError> {
+    let mut places = Vec::new();
+    visit(problem, octant, problem.bodies_of_stage(stage), |index, points| {
+        let spacing = spacing(problem, octant.level, &problem.bodies[index]);
+        places.extend(points.iter().map(|x| (index as u16, x.map(|c| (c / spacing) as u64))));
+    })?;
+    Ok(places)
 }
 
 /// Not collective. The number of particles of each body that [`fill_leaf`] makes in the leaf, added to

@@ -1,5 +1,5 @@
 //! What is allowed in a job and likely not meant.
-use crate::boundary::Collider;
+use crate::boundary::{ActsOn, Collider};
 use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;
 use crate::material::laws::drucker_prager::FrictionMatch;
@@ -72,10 +72,10 @@ fn colliders<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
         let name = excerpt(&collider.name, NAME);
         let (thickness, cell) =
             (thickness(&collider.shape), problem.cell_edge(level_at(problem, index, collider)));
-        if thickness < 2.0 * cell {
+        if collider.acts_on == ActsOn::Nodes && thickness < 2.0 * cell {
             all.push(format!(
                 "colliders[{index}].shape: \"{name}\" is {} thick, less than two cells of {}; material may pass through it: \
-                 make it thicker, or the cells there finer",
+                 let it act on particles, make it thicker, or the cells there finer",
                 quantity(thickness, "m"),
                 quantity(cell, "m")
             ));

@@ -65,6 +65,7 @@ impl<const D: usize> Solver<D> {
             load_sums: ExactSums::new(physics.loads.len(), clock.time),
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
             pushes: Vec::new(),
+            near: Vec::new(),
             relaxation: Relaxation::default(),
             motion: Default::default(),
             physics,
@@ -130,14 +131,16 @@ impl<const D: usize> Solver<D> {
         let rates = self.collider_rates(dt);
         let sorted = self.sort_into_bins();
         self.particles_to_nodes(dt);
-        let impulses = self.update_node_velocities(dt, &rates);
+        let (mut impulses, held) = self.update_node_velocities(dt, &rates);
         self.prolong_velocities();
-        let departed = self.nodes_to_particles(dt);
+        let departed = self.nodes_to_particles(&rates, to, dt);
         self.book_pushes(dt);
+        self.book_met(&mut impulses);
         let moved = self.migrate_particles(departed);
         self.move_colliders(&rates, impulses, to, dt);
         // A rank that has failed serves its neighbours to the end of the step.
         sorted?;
+        held?;
         Ok(moved?)
     }
 

@@ -35,8 +35,15 @@ const RASTER: usize = 48;
 #[derive(Clone)]
 pub struct Mesh(Arc<Inner>);
 
-struct Inner {
+/// The triangles.
+struct Surface {
     surface: TriMesh,
+    /// Not closed, so that nothing is inside.
+    is_sheet: bool,
+}
+
+struct Inner {
+    surface: Surface,
     bounds: Aabb<3>,
     raster: Raster,
     /// Checksum of vertices and triangles.
@@ -58,9 +65,25 @@ impl Mesh {
     /// # Errors
     /// They bound none.
     pub fn new(triangles: Triangles) -> Result<Self, NotSolid> {
+        Self::of(triangles, false)
+    }
+
+    /// The solid that triangles bound, or, where they are not closed, the sheet that they are: all its distances are positive.
+    ///
+    /// # Errors
+    /// There is no triangle with an area, or a vertex is at no place.
+    pub fn solid_or_sheet(triangles: Triangles) -> Result<Self, NotSolid> {
+        Self::of(triangles, true)
+    }
+
+    fn of(triangles: Triangles, may_be_sheet: bool) -> Result<Self, NotSolid> {
         let Triangles { vertices, mut indices } = solid::merged(triangles)?;
-        let volume = solid::check(&vertices, &indices)?;
-        if volume < 0.0 {
+        let volume = match solid::check(&vertices, &indices) {
+            Ok(volume) => Some(volume),
+            Err(NotSolid::Open { .. } | NotSolid::Turned(_) | NotSolid::Flat(_)) if may_be_sheet => None,
+            Err(other) => return Err(other),
+        };
+        if volume.is_some_and(|volume| volume < 0.0) {
             indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
@@ -68,10 +91,12 @@ impl Mesh {
         let words = words.chain(indices.iter().flatten().map(|&index| u64::from(index)));
         let checksum = fnv1a(words);
         let vertices = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
-        let surface = TriMesh::with_flags(vertices, indices, TriMeshFlags::ORIENTED)
+        let flags = if volume.is_some() { TriMeshFlags::ORIENTED } else { TriMeshFlags::empty() };
+        let surface = TriMesh::with_flags(vertices, indices, flags)
             .map_err(|error| NotSolid::Refused(error.to_string()))?;
+        let surface = Surface { surface, is_sheet: volume.is_none() };
         let raster = Raster::new(&surface, &bounds);
-        Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.abs() })))
+        Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.unwrap_or(0.0).abs() })))
     }
 
     /// Its bounding box, m.
@@ -79,7 +104,7 @@ impl Mesh {
         self.0.bounds
     }
 
-    /// Its volume, m³.
+    /// Its volume, m³; 0 of a sheet.
     pub fn volume(&self) -> f64 {
         self.0.volume
     }
@@ -116,23 +141,24 @@ impl Mesh {
 
     /// Normal of the triangle nearest to a point.
     fn face_normal(&self, x: &[f64; 3]) -> [f64; 3] {
-        let projection = self.0.surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
-        let normal = self.0.surface.triangle(projection.subshape).scaled_normal();
+        let projection = self.0.surface.surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
+        let normal = self.0.surface.surface.triangle(projection.subshape).scaled_normal();
         let length = (normal.x * normal.x + normal.y * normal.y + normal.z * normal.z).sqrt();
         if length > 0.0 { [normal.x / length, normal.y / length, normal.z / length] } else { [0.0, 0.0, 1.0] }
     }
 }
 
 /// Signed distance and the nearest point of the surface.
-fn nearest(surface: &TriMesh, x: &[f64; 3]) -> (f64, [f64; 3]) {
+fn nearest(surface: &Surface, x: &[f64; 3]) -> (f64, [f64; 3]) {
+    let Surface { surface, is_sheet } = surface;
     let projection = surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
     let point = [projection.point.x, projection.point.y, projection.point.z];
     let distance = (0..3).map(|a| (x[a] - point[a]) * (x[a] - point[a])).sum::<f64>().sqrt();
-    (if projection.is_inside { -distance } else { distance }, point)
+    (if projection.is_inside && !is_sheet { -distance } else { distance }, point)
 }
 
 impl Raster {
-    fn new(surface: &TriMesh, bounds: &Aabb<3>) -> Self {
+    fn new(surface: &Surface, bounds: &Aabb<3>) -> Self {
         let size: [f64; 3] = std::array::from_fn(|a| bounds.upper[a] - bounds.lower[a]);
         let edge = size.iter().fold(0.0, |longest: f64, s| longest.max(*s)) / RASTER as f64;
         let lower = bounds.lower.map(|x| x - edge);

@@ -16,6 +16,8 @@ pub(in crate::job) struct Checks<'t> {
     pub directory: &'t std::path::Path,
     /// Checksum of the files that the job names, as far as they have been read; 0 without.
     pub files: u64,
+    /// Whether shapes may be sheets: boxes that are flat along one axis, and meshes that are not closed.
+    pub takes_sheets: bool,
     /// What is wrong so far.
     pub faults: Vec<Fault>,
 }

@@ -1,11 +1,13 @@
 //! Colliders of the job file to those of the solver.
 use super::checks::{Checks, Space};
 use crate::boundary::motion::{Free, Knot, Motion, Rate};
-use crate::boundary::{Collider, Contact};
+use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::Aabb;
 use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{Contact as WrittenContact, Motion as Written, Row};
+use crate::job::schema::colliders::{
+    ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written, Row,
+};
 use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file as file;
 use crate::text::written;
@@ -42,9 +44,21 @@ fn collider<const D: usize>(
 ) -> Option<Collider<D>> {
     let motion = motion::<D>(checks, written.motion.as_ref(), &path.key("motion"));
     let here = path.key("shape");
-    let shape = checks.shape(&written.shape, space, &here)?;
+    let acts_on = match written.acts_on {
+        None | Some(WrittenActsOn::Nodes) => ActsOn::Nodes,
+        Some(WrittenActsOn::Particles) => ActsOn::Particles,
+    };
+    // Sheets have two sides for particles, and no node inside.
+    checks.takes_sheets = acts_on == ActsOn::Particles;
+    let shape = checks.shape(&written.shape, space, &here);
+    let takes_sheets = std::mem::take(&mut checks.takes_sheets);
+    let shape = shape?;
     let bounds = shape.bounds();
-    if bounds.is_empty() {
+    let is_empty = match takes_sheets {
+        true => (0..D).any(|a| bounds.lower[a] > bounds.upper[a]),
+        false => bounds.is_empty(),
+    };
+    if is_empty {
         checks.fault(&here, "found a shape without a point; expected one with a volume".into());
         return None;
     }
@@ -59,7 +73,16 @@ fn collider<const D: usize>(
         Some(WrittenContact::Slip {}) => Contact::Slip,
         Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },
     };
-    Some(Collider { name: written.name.clone(), shape, reference, axis, contact, motion, start: 0.0 })
+    Some(Collider {
+        name: written.name.clone(),
+        shape,
+        reference,
+        axis,
+        contact,
+        acts_on,
+        motion,
+        start: 0.0,
+    })
 }
 
 /// The centre of a box, along each axis cut by the domain where it is unbounded.

@@ -23,7 +23,7 @@ use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
-use crate::geometry::{Aabb, Shape};
+use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::Gravity;
 use crate::material::parameters::OutOfRange;
 use crate::quantity::Quantity;
@@ -54,7 +54,8 @@ pub(super) fn convert(
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
     let directory = path.parent().unwrap_or(std::path::Path::new(""));
-    let mut checks = Checks { tree, text, position, directory, files: 0, faults: Vec::new() };
+    let mut checks =
+        Checks { tree, text, position, directory, files: 0, takes_sheets: false, faults: Vec::new() };
     let problem = if file.dimension == 2 {
         problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
@@ -396,6 +397,7 @@ fn body<const D: usize>(
         angular_velocity: angular_velocity?,
         stage: stages::of_body(checks, body, file, path),
         particles_per_cell: body.particles_per_cell,
+        sampling: sampling(checks, body, path)?,
         stress: match &body.stress {
             Some(written) => {
                 let here = path.key("stress");
@@ -404,4 +406,24 @@ fn body<const D: usize>(
             None => None,
         },
     })
+}
+
+/// How the particles of a body lie.
+fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
+    match body.sampling {
+        None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
+        Some(file::Sampling::Jittered) => Some(Sampling::Jittered),
+        Some(file::Sampling::Poisson) => {
+            let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
+            if along_leaf.fract() != 0.0 {
+                let message = format!(
+                    "found {} with sampling = \"poisson\"; expected a multiple of 0.25, for a whole number of particles along the edge of a leaf",
+                    written(body.particles_per_cell)
+                );
+                checks.fault(&path.key("particles_per_cell"), message);
+                return None;
+            }
+            Some(Sampling::poisson(along_leaf as usize))
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
 use super::checks::{Checks, Space};
-use crate::geometry::mesh::{self, Terrain, Triangles};
+use crate::geometry::mesh::{self, NotSolid, Terrain, Triangles};
 use crate::geometry::written::{Shape as Written, Vector};
 use crate::geometry::{Aabb, Frustum, Mesh, Placement, Shape, rotation};
 use crate::job::parse::error::QUOTED;
@@ -19,9 +19,13 @@ impl Checks<'_> {
             Written::Box { min, max } => {
                 let lower = self.point(min, space, &path.key("min"))?;
                 let upper = self.point(max, space, &path.key("max"))?;
-                if let Some(a) = (0..D).find(|&a| lower[a] >= upper[a]) {
+                let is_sheet = self.takes_sheets && (0..D).filter(|&a| lower[a] == upper[a]).count() == 1;
+                let is_turned = |a: usize| lower[a] > upper[a] || (lower[a] == upper[a] && !is_sheet);
+                if let Some(a) = (0..D).find(|&a| is_turned(a)) {
                     let (found, least) = (written(max.0[a]), written(min.0[a]));
-                    let message = format!("found {found}; expected more than min[{a}] = {least}");
+                    let is_flat = lower[a] == upper[a];
+                    let hint = if is_flat { self.sheet_hint(path) } else { "" };
+                    let message = format!("found {found}; expected more than min[{a}] = {least}{hint}");
                     self.fault(&path.key("max").index(a), message);
                     return None;
                 }
@@ -137,16 +141,27 @@ impl Checks<'_> {
         for vertex in &mut triangles.vertices {
             *vertex = std::array::from_fn(|a| scale * vertex[a] + if a < D { origin[a] } else { 0.0 });
         }
-        match Mesh::new(triangles) {
+        let mesh = match self.takes_sheets {
+            true => Mesh::solid_or_sheet(triangles),
+            false => Mesh::new(triangles),
+        };
+        match mesh {
             Ok(mesh) => {
                 self.note_file(mesh.checksum());
                 Some(Shape::Mesh(mesh))
             }
             Err(error) => {
-                self.fault(path, format!("\"{}\": {error}", excerpt(file, QUOTED)));
+                let hint = if let NotSolid::Open { .. } = error { self.sheet_hint(path) } else { "" };
+                self.fault(path, format!("\"{}\": {error}{hint}", excerpt(file, QUOTED)));
                 None
             }
         }
+    }
+
+    /// What a shape without a volume needs, if it is that of a collider.
+    fn sheet_hint(&self, path: &Path) -> &'static str {
+        let is_collider = path.to_string().starts_with("colliders") && !self.takes_sheets;
+        if is_collider { "; with acts_on = \"particles\" a collider may be a sheet" } else { "" }
     }
 
     fn only(

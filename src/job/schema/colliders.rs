@@ -4,8 +4,7 @@ use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A rigid body that acts on the nodes inside it. Only nodes are held, so nothing less than two cells thick stops
-/// material. Forces, torques and places are columns of `history.csv`: `force_NAME_x` and so on, each force the mean
+/// A rigid body that acts on material, by default on the nodes inside it: then nothing less than two cells thick stops material. Forces, torques and places are columns of `history.csv`: `force_NAME_x` and so on, each force the mean
 /// since the row before.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +16,9 @@ pub struct Collider {
     /// What happens to material that touches it; by default it may leave, without friction.
     #[serde(default)]
     pub contact: Option<Contact>,
+    /// On what it acts; `nodes` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acts_on: Option<ActsOn>,
     /// How it moves; not at all by default.
     #[serde(default)]
     pub motion: Option<Motion>,
@@ -29,6 +31,18 @@ pub struct Collider {
     /// the domain where it is unbounded.
     #[serde(default)]
     pub reference: Option<Vector>,
+}
+
+/// On what a collider acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ActsOn {
+    /// On the nodes of the grid inside it: the least work. Material stays a fraction of a cell away from its surface, and what is less than two
+    /// cells thick leaks.
+    Nodes,
+    /// On the particles that touch it: contact is at its surface, and walls of any thickness hold, also sheets: boxes that are flat along one axis, and
+    /// meshes that are not closed.
+    Particles,
 }
 
 /// What happens to material that touches a collider.

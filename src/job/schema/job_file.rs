@@ -246,6 +246,9 @@ pub struct Body {
     #[serde(default = "two")]
     #[schemars(range(min = 0.5, max = 8.0))]
     pub particles_per_cell: f64,
+    /// How particles lie: on the lattice by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
     /// Components of the velocity, m/s, as many as the job has dimensions; each a number or an expression in x, y, z. At rest by
     /// default.
     #[serde(default)]
@@ -261,6 +264,18 @@ pub struct Body {
     /// Stress at the start; none by default. With it, `density` is that of the body as it stands, under its stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Stress>,
+}
+
+/// How the particles of a body lie. In each case every point of the lattice in the body has one particle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// On the lattice: exact for uniform states, but material that flows shows its planes.
+    Lattice,
+    /// At random, by at most 0.35 of their distance from the points of the lattice along each axis.
+    Jittered,
+    /// As blue noise: apart from each other by about their distance, without order. `particles_per_cell` is a multiple of 0.25.
+    Poisson,
 }
 
 fn two() -> f64 {

@@ -192,7 +192,8 @@ impl<const D: usize> GivenBoxes<D> {
     /// Not collective. G2P without moving anything: particles take velocity and affine state of the nodes.
     pub fn to_particles(&mut self, transfer: Transfer) {
         self.solver.physics.transfer = transfer;
-        self.solver.nodes_to_particles(0.0);
+        let rates = self.solver.collider_rates(0.0);
+        self.solver.nodes_to_particles(&rates, self.solver.clock.time, 0.0);
         self.solver.physics.transfer = Transfer::Apic;
     }
 

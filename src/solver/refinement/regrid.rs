@@ -147,7 +147,7 @@ impl<const D: usize> Solver<D> {
         let _ = self.sort_into_bins();
         self.nodes_from_particles(0.0);
         let rates = self.collider_rates(0.0);
-        self.update_node_velocities(0.0, &rates);
+        let _ = self.update_node_velocities(0.0, &rates);
         self.phases = phases;
     }
 

@@ -118,3 +118,23 @@ pub struct LoadTotals {
     /// Work on the material since the start, J: impulse times the velocity with which the step moves the material.
     pub work: f64,
 }
+
+/// A particle that may come to the surface of a collider in a step.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct Near<const D: usize> {
+    /// Its index in its chunk.
+    pub particle: u32,
+    /// Number of the collider.
+    pub collider: u32,
+    /// Where it was; where it was held back, if it was, m.
+    pub place: [f64; D],
+    /// What it gave to the collider there, kg m/s.
+    pub impulse: [f64; D],
+}
+
+impl<const D: usize> Near<D> {
+    /// A particle of a chunk at a place (m), ahead of the step.
+    pub(in crate::solver) fn new(collider: usize, particle: u32, place: [f64; D]) -> Self {
+        Self { particle, collider: collider as u32, place, impulse: [0.0; D] }
+    }
+}

@@ -29,6 +29,8 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) migration: Migration<D>,
     pub(in crate::solver) lists: BinLists<D>,
     pub(in crate::solver) seam: Seam,
+    /// For contact at particles; made when it is first needed.
+    pub(in crate::solver) contact: Option<Box<ContactGrid<D>>>,
     /// Bytes of the last exchange of sums.
     pub(in crate::solver) sum_bytes: u64,
 }
@@ -61,6 +63,7 @@ impl<const D: usize> Grid<D> {
             ),
             lists: BinLists::new(&plan),
             seam: exchange.seam(&plan),
+            contact: None,
             sum_bytes: 0,
             exchange,
             received,
@@ -74,6 +77,14 @@ impl<const D: usize> Grid<D> {
         self.increments = Increments::default();
         self.fields.rows = Block::default();
         self.fields.moments = Block::default();
+        self.contact = None;
+    }
+
+    /// Exchanges what particles scatter into with that of the particles in contact with colliders.
+    pub(in crate::solver) fn swap(&mut self, other: &mut ContactGrid<D>) {
+        std::mem::swap(&mut self.arenas, &mut other.arenas);
+        std::mem::swap(&mut self.fields, &mut other.fields);
+        std::mem::swap(&mut self.lists, &mut other.lists);
     }
 
     /// What the particles scattered last.
@@ -158,12 +169,30 @@ impl<const D: usize> Grid<D> {
             + self.arenas.heap_bytes()
             + self.fields.heap_bytes()
             + self.increments.heap_bytes()
+            + self
+                .contact
+                .as_ref()
+                .map_or(0, |contact| contact.arenas.heap_bytes() + contact.fields.heap_bytes())
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.
     pub fn traffic(&self) -> Traffic {
         let (arenas, particles) = (self.exchange.traffic(), self.migration.traffic());
         Traffic { messages: arenas.messages + particles.messages, bytes: arenas.bytes + particles.bytes }
+    }
+}
+
+/// What the particles in contact with colliders scatter into.
+pub(in crate::solver) struct ContactGrid<const D: usize> {
+    arenas: Arenas<D>,
+    pub(in crate::solver) fields: NodeFields<D>,
+    lists: BinLists<D>,
+}
+
+impl<const D: usize> ContactGrid<D> {
+    /// For a plan.
+    pub(in crate::solver) fn new(plan: &GridPlan<D>) -> Self {
+        Self { arenas: Arenas::default(), fields: NodeFields::new(plan), lists: BinLists::new(plan) }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::probe::Tracked;
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, ParticlePush};
+use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
@@ -116,6 +116,8 @@ pub struct Solver<const D: usize> {
     pub face_sums: ExactSums<FACE_SUMS>,
     /// Forces that particles carried in the last step, by own leaf; empty without such loads.
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
+    /// Particles near colliders that act on particles, by own leaf; empty without such colliders.
+    pub(super) near: Vec<Vec<Near<D>>>,
     /// The way to equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.

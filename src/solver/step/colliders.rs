@@ -14,11 +14,32 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{ExactSums, Reaction, SUMS};
 use crate::solver::state::phases::Phase;
 
-/// What one node gives to a collider.
-struct Touch<const D: usize> {
-    collider: usize,
-    position: [f64; D],
-    impulse: [f64; D],
+/// What one node or particle gives to a collider.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touch<const D: usize> {
+    pub collider: usize,
+    pub position: [f64; D],
+    pub impulse: [f64; D],
+}
+
+impl<const D: usize> Touch<D> {
+    /// Adds impulse and angular impulse about the reference point to the sums of the collider.
+    pub(super) fn book(
+        &self,
+        colliders: &[Collider<D>],
+        states: &[ColliderState<D>],
+        sums: &mut [[ExactSum; SUMS]],
+    ) {
+        let centre = colliders[self.collider].centre(&states[self.collider].pose);
+        let in_space = |v: &dyn Fn(usize) -> f64| -> [f64; 3] {
+            std::array::from_fn(|a| if a < D { v(a) } else { 0.0 })
+        };
+        let impulse = in_space(&|a| self.impulse[a]);
+        let turn = cross(in_space(&|a| self.position[a] - centre[a]), impulse);
+        for (sum, value) in sums[self.collider].iter_mut().zip(impulse.into_iter().chain(turn)) {
+            sum.add(value);
+        }
+    }
 }
 
 /// Applies the colliders' conditions, in their order, to the real nodes inside them. Returns what the nodes that this
@@ -37,7 +58,7 @@ fn apply_colliders<const D: usize>(
         let cell = plan.cell(block.level);
         let nodes_box = nodes_box(block, cell);
         for (index, ((collider, state), rate)) in colliders.iter().zip(states).zip(rates).enumerate() {
-            if !collider.is_present() || collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
+            if !collider.acts_on_nodes() || collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
                 continue;
             }
             let real = block.real_nodes();
@@ -90,29 +111,24 @@ impl<const D: usize> Solver<D> {
         all.map(|(collider, state)| collider.step_rate(state, &gravity, self.clock.time, dt)).collect()
     }
 
-    /// Not collective. Holds the nodes inside colliders to their conditions. Returns impulse and angular impulse on
-    /// each collider from the nodes that this rank counts.
-    pub(super) fn collide(&mut self, rates: &[Rate<D>]) -> Vec<[ExactSum; SUMS]> {
+    /// Nothing on any collider.
+    pub(super) fn no_impulses(&self) -> Vec<[ExactSum; SUMS]> {
+        vec![std::array::from_fn(|_| ExactSum::new()); self.physics.colliders.len()]
+    }
+
+    /// Not collective. Holds the nodes inside colliders that act on nodes to their conditions. Adds impulse and angular impulse on each collider
+    /// from the nodes that this rank counts.
+    pub(super) fn collide(&mut self, rates: &[Rate<D>], sums: &mut [[ExactSum; SUMS]]) {
         let colliders = &self.physics.colliders;
-        let mut sums = vec![std::array::from_fn(|_| ExactSum::new()); colliders.len()];
-        if colliders.is_empty() {
-            return sums;
+        if !colliders.iter().any(Collider::acts_on_nodes) {
+            return;
         }
         let (grid, states) = (&mut self.grid, &self.contacts.states);
         self.phases.time(Phase::Nodes, || {
             for touch in apply_colliders(&mut grid.fields, &grid.plan, colliders, states, rates) {
-                let centre = colliders[touch.collider].centre(&states[touch.collider].pose);
-                let in_space = |v: &dyn Fn(usize) -> f64| -> [f64; 3] {
-                    std::array::from_fn(|a| if a < D { v(a) } else { 0.0 })
-                };
-                let impulse = in_space(&|a| touch.impulse[a]);
-                let turn = cross(in_space(&|a| touch.position[a] - centre[a]), impulse);
-                for (sum, value) in sums[touch.collider].iter_mut().zip(impulse.into_iter().chain(turn)) {
-                    sum.add(value);
-                }
+                touch.book(colliders, states, sums);
             }
         });
-        sums
     }
 
     /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes gave to the

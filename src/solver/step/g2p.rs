@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::adaptivity::{LeafMaxima, Watch};
+use crate::boundary::motion::Rate;
 use crate::grid::arenas::Arenas;
 use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
@@ -20,10 +21,11 @@ use crate::solver::sorting::bins::OfLeaf;
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::ParticlePush;
+use crate::solver::state::bookings::{Near, ParticlePush};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::carried::{follow, followers, note_ways};
+use crate::solver::step::contact::guard::Guard;
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -81,12 +83,23 @@ struct Sweep<'a, const D: usize> {
     places: &'a [Place],
     /// Loads with areas that follow the deformation.
     following: &'a [&'a Carried<D>],
+    /// Colliders that act on particles.
+    guard: Option<Guard<'a, D>>,
 }
+
+/// What is noted of the particles of a leaf.
+type Notes<'a, const D: usize> =
+    (&'a mut LeafMaxima<D>, &'a mut f64, &'a mut [ParticlePush<D>], &'a mut [Near<D>]);
 
 impl<const D: usize> Solver<D> {
     /// Not collective. `v = Σ w v_j`, `B = Σ w v_j ⊗ (x_j - x)`, `b ← (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, return mapping, `τ(b)`,
-    /// `x ← x + Δt v`. Returns what has departed from leaves, in their order, for [`Solver::migrate_particles`].
-    pub(in crate::solver) fn nodes_to_particles(&mut self, dt: f64) -> Vec<Departed> {
+    /// `x ← x + Δt v` in a step to the time `to`, s; no way leads through colliders that act on particles. Returns what has departed from leaves, in their order, for [`Solver::migrate_particles`].
+    pub(in crate::solver) fn nodes_to_particles(
+        &mut self,
+        rates: &[Rate<D>],
+        to: f64,
+        dt: f64,
+    ) -> Vec<Departed> {
         let scheme = self.physics.scheme();
         let adaptivity = self.physics.adaptivity.as_ref();
         let resampling = Resampling::new(adaptivity, &scheme, self.grid.plan.extent());
@@ -94,6 +107,7 @@ impl<const D: usize> Solver<D> {
         let watch = adaptivity.map(|adaptivity| adaptivity.watch(self.clock.step + 1));
         self.leaf_data.begin_gather(&self.chunks);
         self.pushes.resize_with(self.chunks.len(), Vec::new);
+        self.near.resize_with(self.chunks.len(), Vec::new);
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
@@ -110,15 +124,18 @@ impl<const D: usize> Solver<D> {
             watch: watch.unwrap_or_default(),
             places,
             following: &following,
+            guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt]),
         };
-        let (chunks, lists, pushes) = (&mut self.chunks, &mut self.grid.lists, &mut self.pushes);
+        let (chunks, lists, pushes, near) =
+            (&mut self.chunks, &mut self.grid.lists, &mut self.pushes, &mut self.near);
         self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).zip(pushes);
+            let leaves =
+                chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).zip(pushes).zip(near);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
-                let ((((chunk, bins), maxima), signal), pushes) = notes;
+                let (((((chunk, bins), maxima), signal), pushes), near) = notes;
                 // Of empty leaves there may be very many, and to take the time costs more than they do.
                 let is_empty = chunk.is_empty();
-                let notes = (maxima, signal, &mut **pushes);
+                let notes = (maxima, signal, &mut **pushes, &mut **near);
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
@@ -168,11 +185,15 @@ impl<const D: usize> Sweep<'_, D> {
         leaf: usize,
         chunk: &mut Chunk<D>,
         bins: OfLeaf<'_, D>,
-        (maxima, signal, pushes): (&mut LeafMaxima<D>, &mut f64, &mut [ParticlePush<D>]),
+        (maxima, signal, pushes, near): Notes<'_, D>,
     ) -> Departed {
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
+        if let Some(guard) = &self.guard {
+            let held = guard.hold(chunk, near);
+            scratch.leavers.look_again(chunk, &held);
+        }
         note_ways(chunk, pushes);
         for (p, gradient) in scratch.gradients.drain(..) {
             follow(chunk, self.following, p as usize, &gradient, self.dt);

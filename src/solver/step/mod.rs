@@ -9,11 +9,13 @@
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders |
+//! | [`contact`] | contact of particles with colliders |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
 //! | [`carried`] | loads that particles carry: their impulse and work; areas follow the deformation |
 pub mod carried;
 pub mod colliders;
+pub mod contact;
 pub mod exchange;
 mod flip_xpic;
 pub mod g2p;

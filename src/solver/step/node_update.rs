@@ -7,33 +7,40 @@ use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::Row;
+use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. `v_j = p_j / m_j + Δt g` on real nodes, then loads, the conditions of colliders in their order, and those of
-    /// domain faces, which come last so that nothing is driven out of the domain. Returns impulse and angular impulse on each
-    /// collider from the nodes of this rank.
+    /// Collective over neighbours where colliders act on particles. `v_j = p_j / m_j + Δt g` on real nodes, then loads, the conditions of
+    /// colliders in their order, and those of domain faces, which come last so that nothing is driven out of the domain. Returns impulse and
+    /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
         dt: f64,
         rates: &[Rate<D>],
-    ) -> Vec<[ExactSum; SUMS]> {
+    ) -> (Vec<[ExactSum; SUMS]>, Result<(), BinMissing>) {
         let gravity = self.physics.gravity.at(self.clock.time + 0.5 * dt);
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
         let pushes = self.apply_loads(dt);
-        let impulses = self.collide(rates);
+        let mut impulses = self.no_impulses();
+        self.collide(rates, &mut impulses);
         self.apply_faces();
+        // What particles have between two steps needs no holding back.
+        let held = match dt > 0.0 && self.has_contact_at_particles() {
+            true => self.hold_particles(dt, rates, &mut impulses),
+            false => Ok(()),
+        };
         self.book_loads(&pushes);
         self.note_motion();
-        impulses
+        (impulses, held)
     }
 
     /// Not collective. Holds the nodes on faces of the domain to their conditions, and sums up the impulses on these if that is asked
     /// for, from the nodes that this rank counts.
-    fn apply_faces(&mut self) {
+    pub(super) fn apply_faces(&mut self) {
         let (grid, faces) = (&mut self.grid, &self.physics.faces);
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {

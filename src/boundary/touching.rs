@@ -1,0 +1,155 @@
+//! Contact of one particle with a collider: the impulse that keeps it out, bounded by Coulomb's law; and ways that meet a surface.
+//!
+//! A particle of half widths h touches a plane of unit normal n at the distance `r = √Σ (h_k n_k)²` of its centre: that of the face
+//! of its box along an axis, of the ellipsoid in the box elsewhere. Corners of boxes would not do: they stick out of the
+//! body that the particles fill, by up to 0.2 of a cell where a surface is not along an axis.
+//!
+//! The impulse J acts at the point of the surface that is nearest to the particle. It takes the relative velocity v there to one that
+//! keeps the particle out over the step, `v · n ≥ -(φ - r) / Δt` with the distance φ, of which it takes at most μ times as much along the
+//! surface as across it (Moreau 1988: a measure of contact for the step, without a penalty).
+use super::Contact;
+use super::collider::Collider;
+use super::motion::{Pose, Rate, length};
+
+/// Share of the depth under a surface by which a particle whose centre lies there is lifted in a step.
+const LIFT: f64 = 0.02;
+
+/// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces hold it.
+const HELD: f64 = 0.01;
+
+/// One particle at one collider in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Touching<const D: usize> {
+    /// Number of the collider.
+    pub collider: usize,
+    /// Unit normal, from the surface to the particle.
+    pub normal: [f64; D],
+    /// From the centre of the particle to the point of the surface, m.
+    pub arm: [f64; D],
+    /// Velocity of the collider there, m/s.
+    pub surface: [f64; D],
+    /// Least velocity along the normal relative to it, m/s.
+    pub least: f64,
+    /// Whether the surface pulls as well.
+    pub held: bool,
+    /// What happens to material there.
+    pub law: Contact,
+    /// Velocity that an impulse of 1 kg m/s on all particles in contact brings, 1/kg.
+    pub compliance: f64,
+    /// Impulse on the particle so far, kg m/s.
+    pub impulse: [f64; D],
+}
+
+/// Distance from a surface at which a particle with these half widths (m) touches it, m.
+pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> f64 {
+    length(&std::array::from_fn::<f64, D, _>(|a| half[a] * normal[a]))
+}
+
+impl<const D: usize> Touching<D> {
+    /// A particle with its centre at `x` (m), of these half widths (m), in a step of length `dt` (s). `None` if the gap to the surface is wider than
+    /// `reach`, m, which is told the normal, the velocity of the surface and the distance at which the particle touches.
+    pub fn new(
+        number: usize,
+        collider: &Collider<D>,
+        (pose, rate): (&Pose<D>, &Rate<D>),
+        x: &[f64; D],
+        half: &[f64; D],
+        dt: f64,
+        reach: impl Fn(&[f64; D], &[f64; D], f64) -> f64,
+    ) -> Option<Self> {
+        let distance = collider.distance(x, pose);
+        let normal = collider.normal(x, pose);
+        let touching = touching_distance(half, &normal);
+        let arm: [f64; D] = normal.map(|n| -n * distance.clamp(0.0, touching));
+        let at = std::array::from_fn(|a| x[a] + arm[a]);
+        let surface = collider.velocity_at(&at, pose, rate);
+        let gap = distance - touching;
+        if gap > reach(&normal, &surface, touching) {
+            return None;
+        }
+        let least = if distance < 0.0 { -LIFT * distance / dt } else { -gap.max(0.0) / dt };
+        let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
+        let (law, impulse) = (collider.contact, [0.0; D]);
+        Some(Self { collider: number, normal, arm, surface, least, held, law, compliance: 0.0, impulse })
+    }
+
+    /// Corrects the impulse for the velocity of the particle at the point of contact, m/s; returns what comes to it, kg m/s.
+    pub fn correct(&mut self, velocity: &[f64; D]) -> [f64; D] {
+        if self.compliance <= 0.0 {
+            return [0.0; D];
+        }
+        let n = &self.normal;
+        let along = |v: &[f64; D]| (0..D).fold(0.0, |sum, a| v[a].mul_add(n[a], sum));
+        let across =
+            |v: &[f64; D], along: f64| -> [f64; D] { std::array::from_fn(|a| (-along).mul_add(n[a], v[a])) };
+        let relative: [f64; D] = std::array::from_fn(|a| velocity[a] - self.surface[a]);
+        let (outward, pressed) = (along(&relative), along(&self.impulse));
+        let wanted = pressed + (self.least - outward) / self.compliance;
+        let normal = if self.held { wanted } else { wanted.max(0.0) };
+        let (sliding, held_back) = (across(&relative, outward), across(&self.impulse, pressed));
+        let mut tangential: [f64; D] = std::array::from_fn(|a| held_back[a] - sliding[a] / self.compliance);
+        let most = match self.law {
+            Contact::Sticky if self.held || normal > 0.0 => f64::INFINITY,
+            Contact::Separating { friction } => friction * normal,
+            _ => 0.0,
+        };
+        let size = length(&tangential);
+        if size > most {
+            tangential = tangential.map(|t| t * (most / size));
+        }
+        let new: [f64; D] = std::array::from_fn(|a| normal.mul_add(n[a], tangential[a]));
+        let more = std::array::from_fn(|a| new[a] - self.impulse[a]);
+        self.impulse = new;
+        more
+    }
+}
+
+/// Where a way meets the surface of a shape, which may have no thickness, in the frame of the shape.
+pub struct Met<const D: usize> {
+    /// The last place short of the surface, m.
+    pub place: [f64; D],
+    /// Normal there, towards where the way comes from.
+    pub normal: [f64; D],
+}
+
+/// Follows the way from one place to another (m) in the frame of a collider, up to a distance `close` (m) from its surface. `None` if it
+/// comes to no surface: from inside a solid, and away from a surface, all ways are free. Steps as long as the distance cannot jump over anything
+/// (Hart 1996, sphere tracing).
+pub fn meets<const D: usize>(
+    collider: &Collider<D>,
+    from: &[f64; D],
+    to: &[f64; D],
+    close: f64,
+) -> Option<Met<D>> {
+    let way: [f64; D] = std::array::from_fn(|a| to[a] - from[a]);
+    let long = length(&way);
+    let mut distance = collider.shape.distance(from);
+    if distance > long || distance < 0.0 || long == 0.0 {
+        return None;
+    }
+    let mut gone = 0.0;
+    let mut place = *from;
+    loop {
+        let normal = collider.shape.gradient(&place);
+        let inward = (0..D).fold(0.0, |sum, a| way[a].mul_add(normal[a], sum));
+        if distance <= close && inward < 0.0 {
+            return Some(Met { place, normal });
+        }
+        gone += distance.max(0.5 * close);
+        if gone >= long {
+            let distance = collider.shape.distance(to);
+            let normal = collider.shape.gradient(&place);
+            return (distance < 0.0).then_some(Met { place, normal });
+        }
+        place = std::array::from_fn(|a| way[a].mul_add(gone / long, from[a]));
+        let next = collider.shape.distance(&place);
+        if next < 0.0 {
+            // Of solids, by less than a step of half the closeness.
+            let back = (gone - distance.max(0.5 * close)) / long;
+            let place: [f64; D] = std::array::from_fn(|a| way[a].mul_add(back, from[a]));
+            let normal = collider.shape.gradient(&place);
+            return Some(Met { place, normal });
+        }
+        distance = next;
+    }
+}

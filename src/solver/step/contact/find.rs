@@ -1,0 +1,100 @@
+//! Particles in reach of surfaces.
+use rayon::prelude::*;
+
+use super::InContact;
+use crate::boundary::Touching;
+use crate::boundary::motion::Rate;
+use crate::geometry::Aabb;
+use crate::grid::leaf_geometry::leaf_box;
+use crate::kernel::{Select, domain};
+use crate::particle::chunk::{Chunk, Layout};
+use crate::solver::sorting::bins::BoxWidths;
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::Near;
+use crate::solver::state::phases::Phase;
+
+/// Gap up to which particles at rest are in contact, as a share of the distance at which they touch.
+const REACH: f64 = 0.25;
+
+/// How many times the way that a particle goes in a step it looks ahead.
+const AHEAD: f64 = 2.0;
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. The particles of each own leaf in reach of the colliders that act on particles, and in `near` those that may come to one in
+    /// this step.
+    pub(super) fn find_contacts(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<InContact<D>> {
+        let colliders: Vec<_> =
+            self.physics.colliders.iter().enumerate().zip(&self.contacts.states).zip(rates).collect();
+        let scheme = self.physics.scheme();
+        let widths = self.physics.widths(&self.grid.plan);
+        let (plan, extent) = (&self.grid.plan, self.grid.plan.extent());
+        self.near.resize_with(self.chunks.len(), Vec::new);
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&mut self.near).enumerate();
+        self.phases.time(Phase::Nodes, || {
+            let found = leaves.with_min_len(16).map(|(leaf, ((chunk, octant), near))| {
+                near.clear();
+                let mut found = InContact::default();
+                if chunk.is_empty() {
+                    return found;
+                }
+                let (lower, upper) = leaf_box(octant, plan.root_edge);
+                let aabb = Aabb::new(lower, upper);
+                // No particle goes farther in a step than a cell.
+                let way = plan.finest_cell(leaf);
+                let farthest = widths.bound(chunk) + way;
+                for &(((number, collider), state), rate) in &colliders {
+                    if !collider.acts_on_particles()
+                        || collider.distance_to_box(&aabb, &state.pose) > farthest
+                    {
+                        continue;
+                    }
+                    let close: Vec<u32> = (0..chunk.len() as u32)
+                        .filter(|&p| {
+                            let distance = collider.distance(&chunk.position(p as usize), &state.pose);
+                            if distance <= way && distance >= 0.0 {
+                                near.push(Near::new(number, p, chunk.position(p as usize)));
+                            }
+                            distance <= farthest
+                        })
+                        .collect();
+                    let mut half = Vec::new();
+                    domain::full_half_widths(
+                        chunk,
+                        Select::List(&close),
+                        plan.cell(octant.level),
+                        &extent,
+                        &scheme,
+                        &mut half,
+                    );
+                    for (&p, half) in close.iter().zip(&half) {
+                        let x = chunk.position(p as usize);
+                        let v: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p as usize);
+                        let reach = |normal: &[f64; D], surface: &[f64; D], touching: f64| {
+                            let inward =
+                                (0..D).fold(0.0, |sum, a| (surface[a] - v[a]).mul_add(normal[a], sum));
+                            (AHEAD * dt).mul_add(inward.max(0.0), REACH * touching)
+                        };
+                        if let Some(contact) =
+                            Touching::new(number, collider, (&state.pose, rate), &x, half, dt, reach)
+                        {
+                            found.push(chunk, p as usize, contact);
+                        }
+                    }
+                }
+                found
+            });
+            found.collect()
+        })
+    }
+}
+
+impl<const D: usize> InContact<D> {
+    /// Adds a contact of a particle of a chunk: a copy that carries only an impulse, with a mass of 1 kg and no stress.
+    fn push(&mut self, chunk: &Chunk<D>, p: usize, contact: Touching<D>) {
+        let own = self.particles.len();
+        self.particles.push_from(chunk, p);
+        self.particles.write(Layout::<D>::STRESS, own, &[0.0; 6][..Layout::<D>::SYMMETRIC]);
+        self.particles.write(Layout::<D>::MASS, own, &[1.0]);
+        self.touching.push(contact);
+    }
+}

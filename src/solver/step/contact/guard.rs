@@ -1,0 +1,86 @@
+//! Ways of particles that meet a surface after all.
+//!
+//! The impulses on nodes keep particles out as far as a few sweeps can. What is left over is small, but a surface of no thickness must not let
+//! anything pass, ever. So the way of each particle near a surface is followed, and one that meets it ends there; the rest of the way goes along
+//! the surface, and the law of the surface holds for the velocity of the particle. What this takes is booked as an impulse on the collider.
+use crate::boundary::motion::{Pose, Rate};
+use crate::boundary::{Collider, ColliderState, meets};
+use crate::exact_sum::ExactSum;
+use crate::particle::chunk::{Chunk, Layout};
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::{Near, SUMS};
+use crate::solver::step::colliders::Touch;
+
+/// Distance from a surface at which a way ends, as a share of the half width of a particle.
+const CLOSE: f64 = 0.01;
+
+/// The colliders over one step.
+pub(in crate::solver) struct Guard<'a, const D: usize> {
+    colliders: &'a [Collider<D>],
+    states: &'a [ColliderState<D>],
+    rates: &'a [Rate<D>],
+    /// Where they are after the step.
+    next: Vec<Pose<D>>,
+}
+
+impl<'a, const D: usize> Guard<'a, D> {
+    /// Over a step to the time `to` (s) of length `dt`; `None` without colliders that act on particles.
+    pub(in crate::solver) fn new(
+        colliders: &'a [Collider<D>],
+        states: &'a [ColliderState<D>],
+        rates: &'a [Rate<D>],
+        [to, dt]: [f64; 2],
+    ) -> Option<Self> {
+        let next = colliders.iter().zip(states).zip(rates);
+        let next = next.map(|((collider, state), rate)| collider.next_pose(state, rate, [to, dt]));
+        let is_any = colliders.iter().any(Collider::acts_on_particles);
+        is_any.then(|| Self { colliders, states, rates, next: next.collect() })
+    }
+
+    /// Holds back the particles of a leaf that have moved through a surface; notes what they gave. Returns those held back, ascending.
+    pub(in crate::solver) fn hold(&self, chunk: &mut Chunk<D>, near: &mut [Near<D>]) -> Vec<u32> {
+        let mut held = Vec::new();
+        for near in near {
+            let (p, c) = (near.particle as usize, near.collider as usize);
+            let (collider, pose) = (&self.colliders[c], &self.next[c]);
+            let to = chunk.position(p);
+            let from = collider.to_own(&near.place, &self.states[c].pose);
+            let close = CLOSE * chunk.column(Layout::<D>::HALF)[p];
+            let mut place = collider.to_own(&to, pose);
+            let Some(met) = meets(collider, &from, &place, close) else { continue };
+            // The rest of the way, along the surface.
+            let rest: [f64; D] = std::array::from_fn(|a| place[a] - met.place[a]);
+            let inward = (0..D).fold(0.0, |sum, a| rest[a].mul_add(met.normal[a], sum)).min(0.0);
+            place = std::array::from_fn(|a| (-inward).mul_add(met.normal[a], met.place[a] + rest[a]));
+            if let Some(again) = meets(collider, &met.place, &place, close) {
+                place = again.place;
+            }
+            let at = collider.to_space(&place, pose);
+            chunk.write(Layout::<D>::POSITION, p, &at);
+            let (normal, surface) =
+                (collider.turned(&met.normal, pose), collider.velocity_at(&at, pose, &self.rates[c]));
+            let before: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
+            let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
+            collider.contact.apply(&mut relative, &normal);
+            let after: [f64; D] = std::array::from_fn(|a| surface[a] + relative[a]);
+            chunk.write(Layout::<D>::VELOCITY, p, &after);
+            let mass = chunk.column(Layout::<D>::MASS)[p];
+            (near.place, near.impulse) = (at, std::array::from_fn(|a| mass * (before[a] - after[a])));
+            held.push(near.particle);
+        }
+        held.sort_unstable();
+        held.dedup();
+        held
+    }
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Adds what particles gave to the colliders whose surface they met.
+    pub(in crate::solver) fn book_met(&self, sums: &mut [[ExactSum; SUMS]]) {
+        for near in self.near.iter().flatten().filter(|near| near.impulse != [0.0; D]) {
+            let touch =
+                Touch { collider: near.collider as usize, position: near.place, impulse: near.impulse };
+            touch.book(&self.physics.colliders, &self.contacts.states, sums);
+        }
+    }
+}

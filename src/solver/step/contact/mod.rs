@@ -1,0 +1,107 @@
+//! Contact of particles with the colliders that act on particles.
+//!
+//! For each particle in reach of a surface an impulse J is sought that keeps it out over the step and obeys Coulomb's law
+//! ([`crate::boundary::touching`]). It goes to the nodes as the affine momentum of the particle does, with the weights
+//! `W_j = w_j (1 + (x_j - x) · D⁻¹ a)` of the point of contact x + a: they add up to 1 and their mean is x + a, so that momentum and angular momentum are
+//! those of J at that point, and the velocity `Σ W_j v_j` of that point, which the law asks for, is the adjoint. All impulses
+//! together are the solution of a problem of complementarity (Moreau 1988, Jean 1999); here it is sought from zero by a fixed number of Jacobi's
+//! sweeps, each scaled by what an impulse on all particles at once brings, so that uniform pressure is right after the first.
+//!
+//! The particles in contact are copied into chunks of their own, which take the way of all others through bins, sums over ranks and constrained
+//! nodes: no bit depends on ranks.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `find` | particles in reach of surfaces |
+//! | `sweeps` | from particles to nodes and back |
+//! | `guard` | ways of particles that meet a surface after all |
+mod find;
+pub(super) mod guard;
+mod sweeps;
+
+use rayon::prelude::*;
+
+use crate::boundary::Collider;
+use crate::boundary::Touching;
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
+use crate::particle::Chunk;
+use crate::solver::sorting::bins::BinMissing;
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::ContactGrid;
+use crate::solver::state::phases::Phase;
+use crate::solver::step::colliders::Touch;
+
+/// Sweeps in a step.
+const SWEEPS: usize = 6;
+
+/// The particles of a leaf that are in reach of surfaces: copies, one for each contact.
+#[derive(Default)]
+struct InContact<const D: usize> {
+    particles: Chunk<D>,
+    touching: Vec<Touching<D>>,
+}
+
+impl<const D: usize> Solver<D> {
+    /// Whether any collider acts on particles.
+    pub(super) fn has_contact_at_particles(&self) -> bool {
+        self.physics.colliders.iter().any(Collider::acts_on_particles)
+    }
+
+    /// Collective. Gives the nodes the impulses that keep particles out of the colliders that act on particles, with the conditions of other
+    /// colliders and of faces. Adds what particles give to the colliders.
+    ///
+    /// # Errors
+    /// A box that needs a bin outside the plan, on the rank that has it.
+    pub(super) fn hold_particles(
+        &mut self,
+        dt: f64,
+        rates: &[Rate<D>],
+        sums: &mut [[ExactSum; SUMS]],
+    ) -> Result<(), BinMissing> {
+        let found = self.find_contacts(dt, rates);
+        let (mut chunks, mut touching): (Vec<_>, Vec<_>) =
+            found.into_iter().map(|leaf| (leaf.particles, leaf.touching)).unzip();
+        let is_any = chunks.iter().any(|chunk: &Chunk<D>| !chunk.is_empty());
+        if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
+            return Ok(());
+        }
+        let mut other =
+            self.grid.contact.take().unwrap_or_else(|| Box::new(ContactGrid::new(&self.grid.plan)));
+        let widths = self.physics.widths(&self.grid.plan);
+        self.grid.swap(&mut other);
+        let sorted = self.grid.sort(&mut self.phases, &chunks, &widths);
+        let spreads = self.spreads_in_contact(&chunks);
+        self.find_compliances(&mut other, &mut chunks, &spreads, &mut touching);
+        for _ in 0..SWEEPS {
+            self.take_velocities(&other);
+            let velocities = self.velocities_in_contact(&chunks, &spreads, &touching);
+            let impulses: Vec<Vec<[f64; D]>> =
+                touching.par_iter_mut().zip(&velocities).map(correct).collect();
+            self.scatter_impulses(&mut chunks, &spreads, &touching, |leaf, p| impulses[leaf][p]);
+            self.add_impulses(&mut other);
+            self.grid.swap(&mut other);
+            self.collide(rates, sums);
+            self.apply_faces();
+            self.grid.swap(&mut other);
+        }
+        self.grid.swap(&mut other);
+        self.grid.contact = Some(other);
+        let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
+        for (chunk, touching) in chunks.iter().zip(&touching) {
+            for (p, contact) in touching.iter().enumerate() {
+                let x = chunk.position(p);
+                let position = std::array::from_fn(|a| x[a] + contact.arm[a]);
+                let impulse = contact.impulse.map(|j| -j);
+                Touch { collider: contact.collider, position, impulse }.book(colliders, states, sums);
+            }
+        }
+        sorted
+    }
+}
+
+/// Corrects the impulses of a leaf for the velocities at the points of contact.
+fn correct<const D: usize>((touching, velocities): (&mut Vec<Touching<D>>, &Vec<[f64; D]>)) -> Vec<[f64; D]> {
+    touching.iter_mut().zip(velocities).map(|(contact, velocity)| contact.correct(velocity)).collect()
+}

@@ -1,0 +1,201 @@
+//! Between the particles in contact and the nodes: weights of the points of contact.
+use rayon::prelude::*;
+
+use crate::boundary::Touching;
+use crate::grid::NodeFields;
+use crate::grid::mask::{bits, block_nodes};
+use crate::grid::plan::GridPlan;
+use crate::grid::sums::node_fields::VelocityArena;
+use crate::kernel::g2p::{self, Fields, Gathered, Moments};
+use crate::kernel::{Row, Transfer, spread};
+use crate::particle::Chunk;
+use crate::particle::chunk::Layout;
+use crate::solver::sorting::bin_view::BinView;
+use crate::solver::state::Solver;
+use crate::solver::state::grid::ContactGrid;
+use crate::solver::state::phases::Phase;
+use crate::solver::step::p2g::scatter;
+
+/// Second moments D of the weights, m², of the particles in contact, leaf by leaf.
+type Spreads<const D: usize> = Vec<Vec<[f64; D]>>;
+
+/// Memory that a thread reuses from leaf to leaf.
+struct Scratch<const D: usize> {
+    kernel: g2p::Scratch<D>,
+    arena: VelocityArena<D>,
+    gathered: Vec<Gathered<D>>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { kernel: g2p::Scratch::default(), arena: VelocityArena::default(), gathered: Vec::new() }
+    }
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Second moments of the weights of the particles in contact, which are sorted.
+    pub(super) fn spreads_in_contact(&self, chunks: &[Chunk<D>]) -> Spreads<D> {
+        let (plan, lists, scheme) = (&self.grid.plan, &self.grid.lists, self.physics.scheme());
+        let leaves = chunks.par_iter().enumerate().with_min_len(16);
+        let spreads = leaves.map(|(leaf, chunk)| {
+            let mut spreads = vec![[0.0; D]; chunk.len()];
+            if chunk.is_empty() {
+                return spreads;
+            }
+            for bin in BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()) {
+                if let Some(whole) = bin.whole {
+                    let constrained = bin.constrained;
+                    spread::of_particles(chunk, whole, &bin.frame, &scheme, constrained, |p, spread| {
+                        spreads[p] = spread;
+                    });
+                }
+                bin.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
+            }
+            spreads
+        });
+        spreads.collect()
+    }
+
+    /// Collective over neighbours. Velocity at each point of contact that an impulse of 1 kg m/s on all particles in contact brings. `other` has the masses
+    /// of the nodes.
+    pub(super) fn find_compliances(
+        &mut self,
+        other: &mut ContactGrid<D>,
+        chunks: &mut [Chunk<D>],
+        spreads: &Spreads<D>,
+        touching: &mut [Vec<Touching<D>>],
+    ) {
+        let unit = std::array::from_fn(|a| if a == 0 { 1.0 } else { 0.0 });
+        self.scatter_impulses(chunks, spreads, touching, |_, _| unit);
+        let masses = &other.fields.rows;
+        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+            let mass = masses[node].0[3];
+            *row = Row([if mass > 0.0 { row.0[0] / mass } else { 0.0 }, 0.0, 0.0, 0.0]);
+        });
+        let compliances = self.velocities_in_contact(chunks, spreads, touching);
+        for (touching, compliances) in touching.iter_mut().zip(&compliances) {
+            touching.iter_mut().zip(compliances).for_each(|(contact, c)| contact.compliance = c[0]);
+        }
+    }
+
+    /// Collective over neighbours. Leaves on real nodes the sums of an impulse at each point of contact.
+    pub(super) fn scatter_impulses(
+        &mut self,
+        chunks: &mut [Chunk<D>],
+        spreads: &Spreads<D>,
+        touching: &[Vec<Touching<D>>],
+        impulse: impl Fn(usize, usize) -> [f64; D],
+    ) {
+        let scheme = self.physics.scheme();
+        for (leaf, chunk) in chunks.iter_mut().enumerate() {
+            for p in 0..chunk.len() {
+                let (j, arm) = (impulse(leaf, p), &touching[leaf][p].arm);
+                chunk.write(Layout::<D>::VELOCITY, p, &j);
+                for k in 0..D {
+                    // What APIC keeps is not yet divided by D.
+                    let share = match scheme.transfer {
+                        Transfer::Apic => arm[k],
+                        _ => arm[k] / spreads[leaf][p][k],
+                    };
+                    for i in 0..D {
+                        chunk.write(Layout::<D>::AFFINE + D * i + k, p, &[j[i] * share]);
+                    }
+                }
+            }
+        }
+        let chunks: &[Chunk<D>] = chunks;
+        let times = &self.leaf_data.times;
+        self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
+            times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, 0.0, arena));
+        });
+    }
+
+    /// Not collective. Adds the impulses on real nodes to the velocities of all particles' grid.
+    pub(super) fn add_impulses(&mut self, other: &mut ContactGrid<D>) {
+        let (fields, plan) = (&mut self.grid.fields, &self.grid.plan);
+        let rows = &mut other.fields.rows;
+        self.phases.time(Phase::Nodes, || {
+            for_real_nodes(fields, plan, |node, impulse| {
+                let row = &mut rows[node].0;
+                if row[3] > 0.0 {
+                    (0..D).for_each(|a| row[a] += impulse.0[a] / row[3]);
+                }
+            });
+        });
+    }
+
+    /// Not collective. Has the real nodes around particles in contact take the velocities of all particles' grid.
+    pub(super) fn take_velocities(&mut self, other: &ContactGrid<D>) {
+        let rows = &other.fields.rows;
+        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+            let [x, y, z, _] = rows[node].0;
+            *row = Row([x, y, z, 0.0]);
+        });
+    }
+
+    /// Not collective. `Σ W_j v_j` at each point of contact, with what real nodes have as v.
+    pub(super) fn velocities_in_contact(
+        &mut self,
+        chunks: &[Chunk<D>],
+        spreads: &Spreads<D>,
+        touching: &[Vec<Touching<D>>],
+    ) -> Vec<Vec<[f64; D]>> {
+        self.prolong();
+        let scheme = self.physics.scheme();
+        let (plan, lists, fields, arenas) =
+            (&self.grid.plan, &self.grid.lists, &self.grid.fields, &self.grid.arenas);
+        let times = &self.leaf_data.times;
+        self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter().enumerate().with_min_len(8);
+            let all = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+                let mut velocities = vec![[0.0; D]; chunk.len()];
+                if chunk.is_empty() {
+                    return velocities;
+                }
+                let Scratch { kernel, arena, gathered, .. } = scratch;
+                let mut take = |p: usize, gathered: &Gathered<D>| {
+                    let (v, affine) = (gathered.velocity(), gathered.affine());
+                    let (arm, spread) = (&touching[leaf][p].arm, &spreads[leaf][p]);
+                    velocities[p] = std::array::from_fn(|i| {
+                        (0..D).fold(v[i], |sum, k| affine[i][k].mul_add(arm[k] / spread[k], sum))
+                    });
+                };
+                times.time(leaf, || {
+                    let lists = lists.of_leaf(leaf);
+                    let cut: &[u32] = lists.map_or(&[], |bins| &bins.cut);
+                    gathered.clear();
+                    gathered.resize(cut.len(), Gathered::default());
+                    for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
+                        fields.load(plan, arenas, bin.number, &bin.window, arena);
+                        let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
+                        let nodes = Fields { velocity: &arena.rows, increment: None, moments };
+                        g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+                        if let Some(whole) = bin.whole {
+                            g2p::look(kernel, chunk, whole, &bin.frame, &scheme, &nodes, |p, gathered| {
+                                take(p, &gathered);
+                            });
+                        }
+                    }
+                    cut.iter().zip(&*gathered).for_each(|(&p, gathered)| take(p as usize, gathered));
+                });
+                velocities
+            });
+            all.collect()
+        })
+    }
+}
+
+/// Calls `each` with the numbers and rows of the real nodes that particles in contact reach.
+fn for_real_nodes<const D: usize>(
+    fields: &mut NodeFields<D>,
+    plan: &GridPlan<D>,
+    mut each: impl FnMut(usize, &mut Row),
+) {
+    let nodes = block_nodes(D);
+    for (index, block) in plan.blocks.iter().enumerate().filter(|(index, _)| fields.active[*index]) {
+        for bit in bits(block.real_nodes()) {
+            let node = index * nodes + bit as usize;
+            each(node, &mut fields.rows[node]);
+        }
+    }
+}
