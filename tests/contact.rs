@@ -193,12 +193,14 @@ fn blocks_slide_as_coulomb_says(dimension: usize, surfaces: &[Incline], friction
 
 #[test]
 fn blocks_slide_down_inclines_in_the_plane() {
-    blocks_slide_as_coulomb_says(2, &[Incline::Face, Incline::HalfSpace], &[0.0, 0.1, 0.3, 0.5, 0.65]);
+    blocks_slide_as_coulomb_says(2, &[Incline::HalfSpace], &[0.0, 0.1, 0.3, 0.5, 0.65]);
+    blocks_slide_as_coulomb_says(2, &[Incline::Face], &[0.3]);
 }
 
 #[test]
 fn blocks_slide_down_inclines_in_space() {
-    blocks_slide_as_coulomb_says(3, &[Incline::Face, Incline::HalfSpace], &[0.3, 0.65]);
+    blocks_slide_as_coulomb_says(3, &[Incline::Face], &[0.65]);
+    blocks_slide_as_coulomb_says(3, &[Incline::HalfSpace], &[0.3]);
     blocks_slide_as_coulomb_says(3, &[Incline::Mesh], &[0.1]);
     blocks_slide_as_coulomb_says(3, &[Incline::Terrain], &[0.5]);
 }
@@ -242,7 +244,7 @@ fn sheets_hold_water() {
                  [[bodies]]\nname = 'column'\nmaterial = 'water'\n\
                  shape = {{ kind = 'intersection', parts = [{above}, {{ kind = 'box', min = [0, 0], max = [2, 12.77] }}] }}\n\
                  [[colliders]]\nname = 'sheet'\nacts_on = 'particles'\nshape = {sheet}\n\
-                 [[probes]]\nname = 'below'\nshape = {below}\nquantities = ['mass']\n[time]\nend = 18\n"
+                 [[probes]]\nname = 'below'\nshape = {below}\nquantities = ['mass']\n[time]\nend = 18.5\n"
             );
         let history = history(&job);
         let steps = history.last("step");
@@ -300,7 +302,7 @@ fn cylinders_between_plates_are_those_of_hertz() {
         if exact(middle) < depth { low = middle } else { high = middle }
     }
     println!("plates come closer by {:.3} cells: force {force:.0} N/m, Hertz {low:.0}", 2.0 * depth);
-    assert!((force / low - 1.0).abs() < 0.06, "{force} {low}");
+    assert!((force / low - 1.0).abs() < 0.05, "{force} {low}");
 }
 
 /// A cylinder slips down an incline where friction is below a third of the slope.
@@ -336,7 +338,9 @@ fn momentum_balances_and_ranks_and_restarts_change_no_bit() {
         let fine = format!(
             "base_level = 0\nregions = [{{ level = 2, shape = {{ kind = 'half_space', {fine} }} }}]\n"
         );
-        let job = head(dimension, gravity, size, 0.4, 0).replace("base_level = 0\n", &fine)
+        let job = head(dimension, gravity, size, 0.4, 0)
+            .replace("base_level = 0\n", &fine)
+            .replace("picture = false\n", "")
             + &elastic(
                 2e5,
                 pick(

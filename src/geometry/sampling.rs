@@ -11,8 +11,11 @@ use std::sync::Arc;
 /// Greatest jitter along each axis, as a share of the distance of particles.
 const JITTER: f64 = 0.35;
 
+/// The same of the points from which a tile begins: of the order of the lattice nothing is left.
+const LOOSE: f64 = 1.0;
+
 /// Rounds in which the points of a tile move apart.
-const ROUNDS: usize = 60;
+const ROUNDS: usize = 30;
 
 /// Distance up to which points repel each other, in distances of particles: a little more than dense packings have.
 const REPULSION: f64 = 1.2;
@@ -20,8 +23,10 @@ const REPULSION: f64 = 1.2;
 /// Share of an overlap that a round takes away.
 const STIFFNESS: f64 = 0.2;
 
-/// Most points of a tile along an edge.
-const LONGEST: usize = 32;
+/// Most points of a tile along an edge, unless a leaf has more.
+const fn longest(d: usize) -> usize {
+    if d == 2 { 32 } else { 16 }
+}
 
 /// How the particles of a body lie.
 #[derive(Clone, Debug, Default)]
@@ -64,17 +69,24 @@ impl<const D: usize> Sampling<D> {
 impl<const D: usize> Tile<D> {
     /// For leaves with so many points along an edge.
     fn new(along_leaf: usize) -> Self {
-        let leaves = (LONGEST / along_leaf.max(1)).clamp(2, 4);
+        let leaves = (longest(D) / along_leaf.max(1)).clamp(1, 4);
         let edge = along_leaf * leaves;
         let mut tile = Self { edge, ways: Vec::new() };
         let cells = edge.pow(D as u32);
         let lattice: Vec<[f64; D]> =
             (0..cells).map(|cell| tile.place(cell).map(|i| i as f64 + 0.5)).collect();
-        let jitter = |cell: usize, a: usize| JITTER * part(mixed((cell * D + a) as u64));
+        let leaf = along_leaf as f64;
+        let start = |cell: usize, a: usize| {
+            let x = LOOSE.mul_add(part(mixed((cell * D + a) as u64)), lattice[cell][a]);
+            // What would leave its leaf is turned back at the face.
+            let first = (lattice[cell][a] / leaf).floor() * leaf;
+            let inside = (x - first).abs();
+            first + if inside > leaf { 2.0 * leaf - inside } else { inside }
+        };
         let mut points: Vec<[f64; D]> =
-            (0..cells).map(|cell| std::array::from_fn(|a| lattice[cell][a] + jitter(cell, a))).collect();
+            (0..cells).map(|cell| std::array::from_fn(|a| start(cell, a))).collect();
         for _ in 0..ROUNDS {
-            points = tile.apart(&points, &lattice, along_leaf as f64);
+            points = tile.apart(&points, &lattice, leaf);
         }
         tile.ways = (0..cells).map(|c| std::array::from_fn(|a| points[c][a] - lattice[c][a])).collect();
         tile
