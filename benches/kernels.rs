@@ -125,7 +125,7 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
             let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
             let (scratch, leavers) = (&mut scratch, &mut leavers);
-            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers };
+            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers, dilation: &[] };
             greatest.max(bin.whole_boxes(Select::All, Place::default()))
         })
     });
@@ -179,7 +179,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
             let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
             let (scratch, leavers) = (&mut scratch, &mut leavers);
-            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers };
+            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers, dilation: &[] };
             greatest.max(bin.whole_boxes(Select::List(&list), Place::default()))
         })
     });

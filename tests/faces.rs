@@ -144,3 +144,47 @@ fn other_faces_keep_their_policy() {
     let last = |name| history.last(name);
     assert_eq!((last("left"), last("deleted"), last("deleted_mass")), (64.0, 0.0, 0.0));
 }
+
+/// A bar of rubber, 8 m long, between two faces that absorb waves.
+fn bar(motion: &str, more: &str) -> String {
+    let face = "{ kind = 'absorbing', p_speed = 10, s_speed = 7.0710678, density = 1000, pressure = 100 }";
+    format!(
+        "version = 1\ndimension = 2\n[domain]\nsize = [8, 0.5]\nroot_edge = 0.5\n[boundaries]\nx_min = {face}\nx_max = {face}\n\
+         y_min = {{ kind = 'slip' }}\ny_max = {{ kind = 'slip' }}\n[[materials]]\nname = 'm'\ndensity = 1000\n\
+         model = 'hencky'\nyoung = 1e5\npoisson = 0\n[[bodies]]\nname = 'bar'\nmaterial = 'm'\n\
+         shape = {{ kind = 'box', min = [0, 0], max = [8, 0.5] }}\nvelocity = {motion}\n\
+         [bodies.stress]\nkind = 'components'\nxx = -100\n{more}"
+    )
+}
+
+/// A push in the middle runs out at both ends: after the waves have passed, next to nothing of their energy is left.
+#[test]
+fn waves_leave_through_absorbing_faces() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("bar.toml");
+    let job = bar(
+        "['0.01 * exp(-2 * (x - 4)^2)', 0]",
+        "[time]\nend = 1\n[numerics]\ntransfer = 'flip'\nflip = 1.0\n",
+    );
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let kinetic = History::read(directory.path(), "bar").column("kinetic_energy").to_vec();
+    let left = kinetic[kinetic.len() - 1] / kinetic[0];
+    println!("{left:e} of the kinetic energy is left");
+    assert!(left < 1e-3, "{left}");
+}
+
+/// Under a lasting stress an absorbing face does not creep, if its pressure is that of the material.
+#[test]
+fn the_pressure_of_an_absorbing_face_holds() {
+    let job = bar(
+        "[0, 0]",
+        "[time]\nend = 0.5\n[history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 20\nkeep = 99\n",
+    );
+    restart::assert_same_on_any_ranks(&job, "bar", |directory, _| {
+        let history = History::read(directory, "bar");
+        let speed = (2.0 * history.last("kinetic_energy") / history.last("mass")).sqrt();
+        println!("{speed:e} m/s");
+        assert!(speed < 1e-14, "{speed} m/s");
+    });
+}

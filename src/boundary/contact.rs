@@ -21,6 +21,8 @@ pub enum Contact {
     /// No condition, of faces only: material moves out as it would without the face, and particles that cross it leave the
     /// domain.
     Outflow,
+    /// Waves go out, of faces only; see [`super::Absorbing`].
+    Absorbing,
 }
 
 impl Default for Contact {
@@ -39,7 +41,7 @@ impl Contact {
         let outward = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(normal[a], sum));
         let tangential: [f64; D] = std::array::from_fn(|a| (-outward).mul_add(normal[a], velocity[a]));
         match self {
-            Self::Outflow => {}
+            Self::Outflow | Self::Absorbing => {}
             Self::Sticky => *velocity = [0.0; D],
             Self::Slip | Self::Symmetric => *velocity = tangential,
             Self::Separating { friction } => {
@@ -61,6 +63,7 @@ impl Contact {
             Self::Separating { .. } => "separating",
             Self::Symmetric => "symmetric",
             Self::Outflow => "outflow",
+            Self::Absorbing => "absorbing",
         }
     }
 }

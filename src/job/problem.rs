@@ -4,6 +4,7 @@
 //! [`Problem::origin`]. All quantities are in SI units.
 use crate::adaptivity::{Adaptivity, least_level};
 use crate::boundary::Collider;
+use crate::boundary::absorbing::AbsorbingFaces;
 pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
@@ -106,6 +107,8 @@ pub struct Problem<const D: usize> {
     pub load_places: Vec<(usize, usize)>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
+    /// What is beyond those that absorb waves.
+    pub absorbing: AbsorbingFaces<D>,
     /// Which of them the job names; the others have the default.
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
@@ -124,6 +127,8 @@ pub struct Problem<const D: usize> {
     pub transfer: Transfer,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
+    /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
+    pub f_bar: bool,
     /// Output files.
     pub output: OutputSetup,
     /// Checkpoints.
@@ -290,10 +295,14 @@ pub struct Stage<const D: usize> {
     pub gravity: Option<Gravity<D>>,
     /// New conditions on faces.
     pub faces: [[Option<Contact>; 2]; D],
+    /// What is beyond those of them that absorb waves.
+    pub absorbing: AbsorbingFaces<D>,
     /// What happens from now on to particles that leave the domain.
     pub leaving: Option<LeavingPolicy>,
     /// Whether all material is at rest at the start.
     pub at_rest: bool,
+    /// Whether displacements are counted from its start.
+    pub reset_displacement: bool,
 }
 
 impl<const D: usize> Stage<D> {
@@ -307,8 +316,10 @@ impl<const D: usize> Stage<D> {
             materials: Vec::new(),
             gravity: None,
             faces: [[None; 2]; D],
+            absorbing: std::array::from_fn(|_| [None, None]),
             leaving: None,
             at_rest: false,
+            reset_displacement: false,
         }
     }
 }
@@ -386,6 +397,8 @@ pub struct OutputSetup {
     pub every: Option<f64>,
     /// Particle fields beside the position.
     pub fields: Vec<Field>,
+    /// Whether particles carry their displacement.
+    pub displacement: bool,
     /// Whether each output file carries the complete state, so that a run can restart from it.
     pub restart: bool,
     /// Whether a picture of the last state is drawn.

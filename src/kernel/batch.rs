@@ -289,6 +289,12 @@ impl Batch {
         self.merged(values, V::load(line)).store(line);
     }
 
+    /// The members' values in a list with one for each particle of the chunk.
+    #[inline(always)]
+    pub(super) fn values<V: Vector>(&self, of: &[f64]) -> V {
+        V::load(&std::array::from_fn(|lane| of.get(self.particle(lane)).copied().unwrap_or(0.0)))
+    }
+
     /// Positions.
     #[inline(always)]
     pub(super) fn positions<V: Vector, const D: usize>(&self, tile: &[[f64; LANES]]) -> [V; D] {

@@ -49,6 +49,8 @@ pub struct Gather<'a, const D: usize> {
     pub fields: &'a Fields<'a>,
     /// Notes the particles that leave its box.
     pub leavers: &'a mut Leavers<D>,
+    /// By particle, what is added to each diagonal component of its velocity gradient where that strains it, 1/s; empty for nothing.
+    pub dilation: &'a [f64],
 }
 
 impl<const D: usize> Gather<'_, D> {
@@ -84,7 +86,7 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
     fn advance_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
-        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers } = self.bin;
+        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation } = self.bin;
         let batches = Batches::new(self.select, chunk, self.next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
         let (cell, extent) = (frame.cell, &frame.extent);
@@ -105,7 +107,8 @@ impl<const D: usize> WholeBoxes<'_, D> {
                 weights.soften(&factors);
             }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
-            let speed = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, wall, leavers);
+            let update = Advance { scheme, dt, cell, dilation };
+            let speed = update.batch(tile, tags, &batch, &position, sums, wall, leavers);
             greatest = speed.max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
@@ -143,20 +146,17 @@ pub fn gather_sub_boxes<const D: usize>(
     }
 }
 
-/// Advances the particles of a list by `dt` with what they gathered, in a domain `[0, extent]`. `cell` is the least edge of the cells that their
-/// boxes overlap, m. Returns as
-/// [`Gather::whole_boxes`].
+/// Advances the particles of a list with what they gathered, in a domain `[0, extent]`. Returns as [`Gather::whole_boxes`].
 pub fn advance_gathered<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
     particles: &[u32],
     gathered: &[Gathered<D>],
-    scheme: &Scheme,
-    dt: f64,
-    cell: f64,
+    update: &Advance,
     extent: &[f64; D],
     leavers: &mut Leavers<D>,
 ) -> f64 {
+    let &Advance { scheme, cell, .. } = update;
     let (tiles, tags) = chunk.tiles_mut_and_tags();
     let Scratch { sums, spare, .. } = scratch;
     let mut greatest = Lanes::splat(0.0);
@@ -170,7 +170,7 @@ pub fn advance_gathered<const D: usize>(
         let whole = domain::whole_of_batch(tile, tags, &batch, f64::INFINITY, scheme);
         let half = domain::cut_at_walls(&whole, &position, cell, extent);
         let wall = Some(AtWall { whole, half, cell, extent });
-        let speed = advance(tile, tags, &batch, &position, sums, scheme, dt, cell, wall, leavers);
+        let speed = update.batch(tile, tags, &batch, &position, sums, wall, leavers);
         greatest = speed.max(greatest);
         batch.put_back::<D>(tiles, spare);
     }
@@ -234,119 +234,138 @@ fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }
 
-/// New state of a batch; returns wave speed plus particle speed.
-#[inline(always)]
-fn advance<V: Vector, const D: usize>(
-    tile: &mut [[f64; LANES]],
-    tags: &[u64],
-    batch: &Batch,
-    position: &[V; D],
-    sums: &Sums<D>,
-    scheme: &Scheme,
-    dt: f64,
-    cell: f64,
-    wall: Option<AtWall<V, D>>,
-    leavers: &mut Leavers<D>,
-) -> V {
-    let zero = V::splat(0.0);
-    let step = V::splat(dt);
-    let velocity = V::columns(&sums.velocity);
-    let mut square = zero;
-    let mut gradient = [[zero; D]; D];
-    for k in 0..D {
-        let column = V::columns(&sums.gradient[k]);
-        for i in 0..D {
-            gradient[i][k] = column[i];
-        }
-    }
-    let increment = if scheme.transfer.has_increments() { V::columns(&sums.increment) } else { [zero; 4] };
-    let mut moved = *position;
-    for i in 0..D {
-        moved[i] = velocity[i].mul_add(step, position[i]);
-        batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
-        let new = match scheme.transfer {
-            Transfer::Apic | Transfer::Tpic => velocity[i],
-            Transfer::Flip { blend } => {
-                let flip = batch.load::<V>(tile, Layout::<D>::VELOCITY + i) + increment[i];
-                (flip - velocity[i]).mul_add(V::splat(blend), velocity[i])
+/// What the advance of particles needs beside what they gathered.
+#[derive(Clone, Copy)]
+pub struct Advance<'a> {
+    /// What holds for all particles.
+    pub scheme: &'a Scheme<'a>,
+    /// Length of the step, s.
+    pub dt: f64,
+    /// The least edge of the cells that their boxes overlap, m.
+    pub cell: f64,
+    /// As [`Gather::dilation`].
+    pub dilation: &'a [f64],
+}
+
+impl Advance<'_> {
+    /// New state of a batch; returns wave speed plus particle speed.
+    #[inline(always)]
+    fn batch<V: Vector, const D: usize>(
+        &self,
+        tile: &mut [[f64; LANES]],
+        tags: &[u64],
+        batch: &Batch,
+        position: &[V; D],
+        sums: &Sums<D>,
+        wall: Option<AtWall<V, D>>,
+        leavers: &mut Leavers<D>,
+    ) -> V {
+        let &Self { scheme, dt, cell, dilation } = self;
+        let zero = V::splat(0.0);
+        let step = V::splat(dt);
+        let velocity = V::columns(&sums.velocity);
+        let mut square = zero;
+        let mut gradient = [[zero; D]; D];
+        for k in 0..D {
+            let column = V::columns(&sums.gradient[k]);
+            for i in 0..D {
+                gradient[i][k] = column[i];
             }
-            Transfer::Xpic { .. } => increment[i],
-        };
-        batch.store(tile, Layout::<D>::VELOCITY + i, new);
-        square = new.mul_add(new, square);
-    }
-    leavers.look(batch, &moved);
-    let kept = match (scheme.transfer, wall) {
-        (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
-        _ => None,
-    };
-    for k in 0..D {
-        let affine = V::columns(&sums.affine[k]);
+        }
+        let increment =
+            if scheme.transfer.has_increments() { V::columns(&sums.increment) } else { [zero; 4] };
+        let mut moved = *position;
         for i in 0..D {
-            let value = match scheme.transfer {
-                Transfer::Apic => match kept {
-                    Some(kept) => affine[i] * kept[k],
-                    None => affine[i],
-                },
-                Transfer::Tpic => gradient[i][k],
-                Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
+            moved[i] = velocity[i].mul_add(step, position[i]);
+            batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
+            let new = match scheme.transfer {
+                Transfer::Apic | Transfer::Tpic => velocity[i],
+                Transfer::Flip { blend } => {
+                    let flip = batch.load::<V>(tile, Layout::<D>::VELOCITY + i) + increment[i];
+                    (flip - velocity[i]).mul_add(V::splat(blend), velocity[i])
+                }
+                Transfer::Xpic { .. } => increment[i],
             };
-            batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
+            batch.store(tile, Layout::<D>::VELOCITY + i, new);
+            square = new.mul_add(new, square);
         }
-    }
-    // Jobs with one material need not read tags.
-    let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
-    let plastic = domain::plastic_lanes(|| index, scheme) != 0;
-    let mut elastic = [zero; 6];
-    for c in 0..Layout::<D>::SYMMETRIC {
-        elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
-    }
-    let trial = strained(&elastic, &gradient, step);
-    let mut state = State::new([Lanes::splat(0.0); 6]);
-    for c in 0..6 {
-        trial[c].store(state.elastic[c].as_array_mut());
-    }
-    if plastic {
-        for h in 0..material::HISTORIES {
-            if h < scheme.histories {
-                let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
-                history.store(state.history[h].as_array_mut());
+        leavers.look(batch, &moved);
+        let kept = match (scheme.transfer, wall) {
+            (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
+            _ => None,
+        };
+        for k in 0..D {
+            let affine = V::columns(&sums.affine[k]);
+            for i in 0..D {
+                let value = match scheme.transfer {
+                    Transfer::Apic => match kept {
+                        Some(kept) => affine[i] * kept[k],
+                        None => affine[i],
+                    },
+                    Transfer::Tpic => gradient[i][k],
+                    Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
+                };
+                batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
             }
         }
-    }
-    let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
-    let update = Step { dt, plane: D == 2, cell, size };
-    match scheme.materials {
-        [only] => only.update(&mut state, &update),
-        several => material::update(several, &index, &mut state, &update),
-    }
-    let result = |lanes: &Lanes| V::load(lanes.as_array());
-    // Not finite as soon as one of them is not.
-    let mut sum = zero;
-    for c in 0..Layout::<D>::SYMMETRIC {
-        elastic[c] = result(&state.elastic[c]);
-        batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, elastic[c]);
-        let stress = result(&state.stress[c]);
-        batch.store(tile, Layout::<D>::STRESS + c, stress);
-        sum += stress;
-    }
-    let ratio = determinant(&elastic);
-    if plastic {
-        for h in 0..material::HISTORIES {
-            if h < scheme.histories {
-                let history = result(&state.history[h]);
-                batch.store(tile, Layout::<D>::HISTORY + h, history);
-                sum += history;
+        // Jobs with one material need not read tags.
+        let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
+        let plastic = domain::plastic_lanes(|| index, scheme) != 0;
+        let mut elastic = [zero; 6];
+        for c in 0..Layout::<D>::SYMMETRIC {
+            elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+        }
+        if !dilation.is_empty() {
+            let added: V = batch.values(dilation);
+            (0..D).for_each(|i| gradient[i][i] += added);
+        }
+        let trial = strained(&elastic, &gradient, step);
+        let mut state = State::new([Lanes::splat(0.0); 6]);
+        for c in 0..6 {
+            trial[c].store(state.elastic[c].as_array_mut());
+        }
+        if plastic {
+            for h in 0..material::HISTORIES {
+                if h < scheme.histories {
+                    let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
+                    history.store(state.history[h].as_array_mut());
+                }
             }
         }
-        let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
-        batch.store(tile, Layout::<D>::WORK, work);
-        sum += work;
+        let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
+        let update = Step { dt, plane: D == 2, cell, size };
+        match scheme.materials {
+            [only] => only.update(&mut state, &update),
+            several => material::update(several, &index, &mut state, &update),
+        }
+        let result = |lanes: &Lanes| V::load(lanes.as_array());
+        // Not finite as soon as one of them is not.
+        let mut sum = zero;
+        for c in 0..Layout::<D>::SYMMETRIC {
+            elastic[c] = result(&state.elastic[c]);
+            batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, elastic[c]);
+            let stress = result(&state.stress[c]);
+            batch.store(tile, Layout::<D>::STRESS + c, stress);
+            sum += stress;
+        }
+        let ratio = determinant(&elastic);
+        if plastic {
+            for h in 0..material::HISTORIES {
+                if h < scheme.histories {
+                    let history = result(&state.history[h]);
+                    batch.store(tile, Layout::<D>::HISTORY + h, history);
+                    sum += history;
+                }
+            }
+            let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
+            batch.store(tile, Layout::<D>::WORK, work);
+            sum += work;
+        }
+        let speed = result(&state.wave_speed) + square.sqrt();
+        let most = V::splat(f64::MAX);
+        let is_sound = zero.lt(ratio) & ratio.le(most) & sum.abs().le(most) & speed.le(most);
+        batch.of_members(is_sound.select(speed, V::splat(f64::INFINITY)))
     }
-    let speed = result(&state.wave_speed) + square.sqrt();
-    let most = V::splat(f64::MAX);
-    let is_sound = zero.lt(ratio) & ratio.le(most) & sum.abs().le(most) & speed.le(most);
-    batch.of_members(is_sound.select(speed, V::splat(f64::INFINITY)))
 }
 
 /// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.

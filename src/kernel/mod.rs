@@ -162,6 +162,10 @@ pub struct Scheme<'a> {
     pub histories: usize,
     /// Whether any of them asks for the size of cells.
     pub softens: bool,
+    /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
+    pub f_bar: bool,
+    /// Columns of what particles carry that are shares of a whole, which add up; those behind are values, which average.
+    pub shares: usize,
 }
 
 impl<'a> Scheme<'a> {
@@ -176,7 +180,18 @@ impl<'a> Scheme<'a> {
         let is_all_plastic = is_plastic && materials.iter().all(|material| material.is_plastic());
         let histories = materials.iter().map(|material| material.history_names().len()).max().unwrap_or(0);
         let softens = materials.iter().any(|material| material.softens());
-        Self { boxes, root_cell, transfer, materials, is_plastic, is_all_plastic, histories, softens }
+        Self {
+            boxes,
+            root_cell,
+            transfer,
+            materials,
+            is_plastic,
+            is_all_plastic,
+            histories,
+            softens,
+            f_bar: false,
+            shares: 0,
+        }
     }
 
     /// Edge of a cell of a level, m.

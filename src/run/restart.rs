@@ -373,10 +373,18 @@ fn restored<const D: usize>(
     let limits = snapshot::Limits { materials: problem.materials.len(), bodies: problem.bodies.len() };
     let restored = snapshot::read::<D>(comm, path, Some(problem.digest), limits).map_err(words)?;
     let carried = restored.chunks.iter().map(Chunk::carried_columns).max().unwrap_or(0);
-    let expected: usize =
+    let loads: usize =
         problem.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum();
+    let follows = problem.output.displacement;
+    let expected = loads + if follows { D } else { 0 };
     if comm.any(carried != 0 && carried != expected) {
-        return Err(refused("particles carry other loads than those of the job"));
+        let reason = "particles carry other loads than those of the job, or it follows displacements and the job does not ask for that \
+                      field, or the other way round";
+        return Err(refused(reason));
+    }
+    if follows && restored.header.step > 0 && !comm.any(carried != 0) {
+        let reason = "particles do not carry displacements, which output.fields asks for; a run follows them from its start";
+        return Err(refused(reason));
     }
     let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));
     let mut forest = forest.map_err(|disagreement| refused(&disagreement.message))?;

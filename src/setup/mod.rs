@@ -37,6 +37,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
         faces: problem.faces,
+        absorbing: problem.absorbing.clone(),
         face_forces: problem.face_forces,
         colliders: problem.colliders.clone(),
         adaptivity: problem.adaptivity.clone(),
@@ -44,6 +45,8 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         equilibrium: None,
         transfer: problem.transfer,
         boxes: problem.boxes,
+        f_bar: problem.f_bar,
+        displacement: problem.output.displacement,
         control: StepControl {
             cfl: problem.time.cfl,
             dt_max: problem.time.dt_max,

@@ -15,6 +15,11 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
             physics.gravity = gravity.clone();
             physics.gravity.start = start;
         }
+        for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            if stage.faces[axis][side].is_some() {
+                physics.absorbing[axis][side] = stage.absorbing[axis][side].clone();
+            }
+        }
         for (now, new) in physics.faces.as_flattened_mut().iter_mut().zip(stage.faces.as_flattened()) {
             *now = new.unwrap_or(*now);
         }
@@ -63,6 +68,7 @@ pub fn enter_next<const D: usize>(
         is_removed: bodies.clone().map(is_removed).collect(),
         materials: bodies.map(|body| material_of(problem, body, stage) as u16).collect(),
         at_rest: problem.stages[stage].at_rest,
+        reset_displacement: problem.stages[stage].reset_displacement,
         added,
     };
     solver.enter_stage(physics, change);

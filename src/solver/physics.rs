@@ -1,5 +1,6 @@
 //! What is solved.
 use crate::adaptivity::Adaptivity;
+use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{Gravity, Load};
@@ -24,6 +25,8 @@ pub struct Physics<const D: usize> {
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
+    /// What is beyond those that absorb waves.
+    pub absorbing: AbsorbingFaces<D>,
     /// Whether the forces on these faces are summed up.
     pub face_forces: bool,
     /// Rigid bodies that act on the material, in the order in which they act.
@@ -38,6 +41,10 @@ pub struct Physics<const D: usize> {
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
+    /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
+    pub f_bar: bool,
+    /// Whether particles carry their displacement since they came.
+    pub displacement: bool,
     /// Choice of the time step.
     pub control: StepControl,
 }
@@ -68,8 +75,13 @@ impl<const D: usize> Physics<D> {
         self.stage_starts.len().saturating_sub(1)
     }
 
-    /// Columns of what particles carry for loads.
+    /// Columns of what particles carry: for loads, then their displacement if that is followed.
     pub fn carried_columns(&self) -> usize {
+        self.load_columns() + if self.displacement { D } else { 0 }
+    }
+
+    /// Columns of what particles carry for loads.
+    pub fn load_columns(&self) -> usize {
         self.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
     }
 
@@ -83,6 +95,7 @@ impl<const D: usize> Physics<D> {
 
     /// What the kernels need to know.
     pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
-        Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials)
+        let scheme = Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials);
+        Scheme { f_bar: self.f_bar, shares: self.load_columns(), ..scheme }
     }
 }

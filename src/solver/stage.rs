@@ -14,6 +14,8 @@ pub struct Change<const D: usize> {
     pub materials: Vec<u16>,
     /// Whether all particles are at rest.
     pub at_rest: bool,
+    /// Whether displacements are counted from here.
+    pub reset_displacement: bool,
     /// Particles that come, by own leaf.
     pub added: Vec<Chunk<D>>,
 }
@@ -46,6 +48,10 @@ impl<const D: usize> Solver<D> {
                 change_materials(chunk, &change.materials, &self.physics);
                 if change.at_rest {
                     stop(chunk);
+                }
+                if change.reset_displacement {
+                    let columns = self.physics.load_columns()..self.physics.carried_columns();
+                    columns.for_each(|column| chunk.carried_mut(column).fill(0.0));
                 }
                 chunk.len()
             })

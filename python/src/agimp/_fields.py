@@ -20,6 +20,7 @@ KNOWN: dict[str, Field] = {
     "id": Field("", "identifier of the particle"),
     "material": Field("", "material"),
     "body": Field("", "body"),
+    "displacement": Field("m", "displacement since the particle came"),
     "particle_level": Field("", "tree level that the particle was made for"),
     "leaf_level": Field("", "level of the leaf that holds the particle"),
     "plastic_strain": Field("", "first history variable of the material, as a rule the accumulated plastic strain"),

@@ -347,7 +347,10 @@ fn mix_matter<const D: usize>(
 
     for column in 0..chunk.carried_columns() {
         let carried = chunk.carried(column);
-        out.carried_mut(column)[number] = (0..shares.len()).map(|i| carried[member(i)]).sum();
+        out.carried_mut(column)[number] = match column < setting.scheme.shares {
+            true => (0..shares.len()).map(|i| carried[member(i)]).sum(),
+            false => mean(&shares, |i| [carried[member(i)]])[0],
+        };
     }
     out.write(Layout::<D>::HALF, number, &[width]);
     out.write(Layout::<D>::HISTORY, number, &mean_history);

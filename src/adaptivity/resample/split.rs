@@ -111,7 +111,8 @@ fn divide<const D: usize>(
             chunk.write(Layout::<D>::MASS, p, &[mass * share]);
             chunk.write(Layout::<D>::HALF, p, &[0.5 * width]);
             // A power of two: the children carry exactly what the particle carried, about the same point.
-            (0..chunk.carried_columns()).for_each(|column| chunk.carried_mut(column)[p] *= share);
+            let shares = chunk.carried_columns().min(setting.scheme.shares);
+            (0..shares).for_each(|column| chunk.carried_mut(column)[p] *= share);
             write_matrix(chunk, p, &kept);
             let parent = chunk.ids()[p];
             chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);

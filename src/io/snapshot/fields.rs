@@ -48,6 +48,8 @@ macro_rules! fields {
 fields! {
     /// Velocity, m/s.
     Velocity, "velocity", "m/s", |view| each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p)));
+    /// Displacement since the particle came, m; followed only where a job asks for this field.
+    Displacement, "displacement", "m", |view| each(view, 3, |chunk, p, out| out.extend(displacement(chunk, p)));
     /// Magnitude of the velocity, m/s.
     Speed, "speed", "m/s", |view| scalars(view, speed);
     /// Identifier of the particle.
@@ -151,6 +153,13 @@ fn of_tags<const D: usize>(view: &View<D>, get: fn(Tag) -> u16) -> Values {
 /// Velocity with three components.
 fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
+}
+
+/// Displacement with three components: the last that a particle carries.
+fn displacement<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
+    let first = chunk.carried_columns().saturating_sub(D);
+    let component = |axis: usize| chunk.carried(first + axis).get(p).copied().unwrap_or(0.0);
+    std::array::from_fn(|axis| if axis < D { component(axis) } else { 0.0 })
 }
 
 /// Magnitude of the velocity, m/s.

@@ -102,6 +102,7 @@ fn problem<const D: usize>(
         &root.key("colliders"),
     );
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
+    let absorbing = settings::absorbing(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
     let (tree, bodies, faces) = (tree?, bodies?, faces?);
     let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
@@ -132,6 +133,7 @@ fn problem<const D: usize>(
         load_places: (0..file.loads.len()).map(|i| checks.place(&root.key("loads").index(i))).collect(),
         loads: loads?,
         faces: faces.map(|pair| pair.map(Option::unwrap_or_default)),
+        absorbing: absorbing?,
         named_faces: faces.map(|pair| pair.map(|face| face.is_some())),
         colliders: colliders?,
         leaving: settings::leaving(file.boundaries.leaving.unwrap_or_default()),
@@ -146,6 +148,7 @@ fn problem<const D: usize>(
         },
         transfer,
         boxes,
+        f_bar: file.numerics.f_bar,
         output,
         checkpoint: CheckpointSetup {
             every_steps: file.checkpoint.every_steps,

@@ -1,5 +1,8 @@
 //! From the file's types to a checked problem: faces, numerics, output and report.
 use super::checks::{Checks, Space};
+use super::loads::quantity;
+use crate::boundary::Absorbing;
+use crate::boundary::absorbing::AbsorbingFaces;
 use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
@@ -31,9 +34,30 @@ pub(in crate::job) fn faces<const D: usize>(
         file::Face::Separating { friction } => Contact::Separating { friction: *friction },
         file::Face::Symmetric {} => Contact::Symmetric,
         file::Face::Outflow {} => Contact::Outflow,
+        file::Face::Absorbing { .. } => Contact::Absorbing,
     };
     let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
     Some(std::array::from_fn(|a| all[a].map(|face| face.as_ref().map(condition))))
+}
+
+/// What is beyond those faces that absorb waves.
+pub(in crate::job) fn absorbing<const D: usize>(
+    checks: &mut Checks,
+    boundaries: &file::Boundaries,
+    path: &Path,
+) -> Option<AbsorbingFaces<D>> {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    let all = [[x_min, x_max], [y_min, y_max], [z_min, z_max]];
+    let mut sides: AbsorbingFaces<D> = std::array::from_fn(|_| [None, None]);
+    for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+        if let Some(file::Face::Absorbing { p_speed, s_speed, density, pressure }) = all[axis][side] {
+            let key = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side];
+            let pressure = quantity::<D>(checks, pressure, &path.key(key).key("pressure"))?;
+            let face = Absorbing { p_speed: *p_speed, s_speed: *s_speed, density: *density, pressure };
+            sides[axis][side] = Some(Box::new(face));
+        }
+    }
+    Some(sides)
 }
 
 /// What happens to particles that leave the domain.
@@ -129,6 +153,7 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         directory: directory.into(),
         every: output.every,
         fields: output.fields.clone(),
+        displacement: output.follows_displacement(),
         restart: output.restart,
         picture: output.picture,
         picture_field: output.picture_field,

@@ -51,6 +51,11 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         let message = "found it in the first stage; expected it in a later one: bodies begin with the velocity that they say";
         checks.fault(&path.key("at_rest"), message.into());
     }
+    if written.reset_displacement && !file.output.follows_displacement() {
+        let message =
+            "found it where displacements are not followed; expected \"displacement\" among output.fields";
+        checks.fault(&path.key("reset_displacement"), message.into());
+    }
     let begins: f64 = file.stages[..index].iter().map(|stage| stage.duration.unwrap_or(0.0)).sum();
     let ends_in_time = file.stages[..index].iter().all(|stage| stage.equilibrium.is_none());
     if ends_in_time && begins >= file.time.end {
@@ -88,10 +93,9 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         Some(gravity) => Some(super::gravity(checks, gravity, &path.key("gravity"))?),
         None => None,
     };
-    let faces = match &written.boundaries {
-        Some(boundaries) => settings::faces(checks, boundaries, &path.key("boundaries"))?,
-        None => [[None; 2]; D],
-    };
+    let boundaries = written.boundaries.clone().unwrap_or_default();
+    let faces = settings::faces(checks, &boundaries, &path.key("boundaries"))?;
+    let absorbing = settings::absorbing(checks, &boundaries, &path.key("boundaries"))?;
     let leaving = written.boundaries.as_ref().and_then(|boundaries| boundaries.leaving);
     Some(Stage {
         name: written.name.clone(),
@@ -101,8 +105,10 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         materials,
         gravity,
         faces,
+        absorbing,
         leaving: leaving.map(settings::leaving),
         at_rest: written.at_rest,
+        reset_displacement: written.reset_displacement,
     })
 }
 

@@ -171,6 +171,22 @@ pub enum Face {
     /// An open end: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted
     /// with their mass.
     Outflow {},
+    /// Waves go out, as if the material went on: dashpots in proportion to the velocity (Lysmer and Kuhlemeyer). Alone they
+    /// creep under a lasting stress, so `pressure` holds the material at rest.
+    Absorbing {
+        /// Speed of compression waves, m/s.
+        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
+        p_speed: f64,
+        /// Speed of shear waves, m/s.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        s_speed: f64,
+        /// Density of the material at the face, kg/m³.
+        #[schemars(range(min = 1e-6, max = 1e5))]
+        density: f64,
+        /// Pressure from beyond the face, Pa: a number, an expression in x, y, z and t, or a table over time; none by default.
+        #[serde(default)]
+        pressure: Quantity,
+    },
 }
 
 /// What happens to particles that leave the domain.
@@ -348,6 +364,10 @@ pub struct Numerics {
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 8.0)))]
     pub box_stretch: Option<[f64; 2]>,
+    /// Whether the particles of a cell share one rate of dilation, the mean over those of their material (F-bar). For plastic flow
+    /// that keeps the volume, which is too stiff without; a step costs up to half as much again. Off by default.
+    #[serde(default)]
+    pub f_bar: bool,
 }
 
 /// Transfer of velocity between particles and grid.

@@ -31,6 +31,13 @@ pub struct Output {
     pub picture_field: Option<Field>,
 }
 
+impl Output {
+    /// Whether particles carry their displacement.
+    pub fn follows_displacement(&self) -> bool {
+        self.fields.contains(&Field::Displacement) || self.picture_field == Some(Field::Displacement)
+    }
+}
+
 impl Default for Output {
     fn default() -> Self {
         Self {

@@ -35,6 +35,9 @@ pub struct Stage {
     /// Whether all material is at rest at the start of the stage.
     #[serde(default)]
     pub at_rest: bool,
+    /// Whether the output field `displacement` is counted from the start of the stage.
+    #[serde(default)]
+    pub reset_displacement: bool,
 }
 
 /// A body gets another material. The elastic strain of its particles stays, so stress follows the new elastic constants; so do masses and

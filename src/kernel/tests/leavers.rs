@@ -22,6 +22,7 @@ fn leavers_are_found<const D: usize>() {
             dt: DT,
             fields: &fields,
             leavers: &mut leavers,
+            dilation: &[],
         };
         bin.whole_boxes(select, Place::default());
         let moved: Vec<u32> = match select {

@@ -23,7 +23,8 @@ fn gather<const D: usize>(
     next: Place,
 ) -> f64 {
     let (scratch, leavers) = (&mut Default::default(), &mut Leavers::default());
-    g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers }.whole_boxes(select, next)
+    g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation: &[] }
+        .whole_boxes(select, next)
 }
 
 /// As [`super::p2g::Scatter::whole_boxes`], with memory of its own.

@@ -72,9 +72,7 @@ fn parts_equal_the_whole<const D: usize>() {
         &mut parted,
         &list,
         &gathered,
-        &scheme,
-        DT,
-        CELL,
+        &g2p::Advance { scheme: &scheme, dt: DT, cell: CELL, dilation: &[] },
         &frame.extent,
         &mut Leavers::default(),
     );
@@ -330,7 +328,7 @@ fn bits_do_not_depend_on_earlier_bins() {
                 .whole_boxes(Select::All, place);
             let fields = &Fields { velocity, increment: None, moments: None };
             let (scratch, leavers) = (&mut to_particles, &mut leavers);
-            g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers }
+            g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation: &[] }
                 .whole_boxes(Select::All, place);
             arena
         };

@@ -97,12 +97,15 @@ impl<const D: usize> GivenBoxes<D> {
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
             faces: [[Contact::Slip; 2]; D],
+            absorbing: std::array::from_fn(|_| [None, None]),
             face_forces: false,
             colliders: Vec::new(),
             adaptivity: None,
             leaving: Leaving::default(),
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,
+            f_bar: false,
+            displacement: false,
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
         };
         let chunks = vec![Chunk::new(); forest.leaves().len()];

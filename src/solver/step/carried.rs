@@ -59,7 +59,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Gives particles the impulse of what they carry, for P2G. Returns the velocities that they had, by leaf, for
     /// [`Solver::take_back_push`]; nothing without such loads.
     pub(in crate::solver) fn push_particles(&mut self, dt: f64) -> Vec<Velocities<D>> {
-        if self.physics.carried_columns() == 0 {
+        if self.physics.load_columns() == 0 {
             return Vec::new();
         }
         let time = self.clock.time;
@@ -131,6 +131,24 @@ pub(super) fn note_ways<const D: usize>(chunk: &Chunk<D>, pushes: &mut [Particle
         let x = chunk.position(push.particle as usize);
         // Exact, since a step is short.
         push.way = std::array::from_fn(|a| x[a] - push.way[a]);
+    }
+}
+
+/// Positions of all particles, m.
+pub(super) fn positions<const D: usize>(chunk: &Chunk<D>) -> Vec<[f64; D]> {
+    (0..chunk.len()).map(|p| chunk.position(p)).collect()
+}
+
+/// Adds the way of a step to the displacements that particles carry from column `first` on.
+pub(super) fn add_ways<const D: usize>(chunk: &mut Chunk<D>, first: usize, start: &[[f64; D]]) {
+    let end = positions(chunk);
+    if end == *start {
+        return;
+    }
+    chunk.carry(first + D);
+    for axis in 0..D {
+        let ways = start.iter().zip(&end).map(|(start, end)| end[axis] - start[axis]);
+        chunk.carried_mut(first + axis).iter_mut().zip(ways).for_each(|(sum, way)| *sum += way);
     }
 }
 

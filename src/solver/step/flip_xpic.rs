@@ -10,7 +10,7 @@
 //! more exchange, so FLIP pays for one and XPIC(m) for m beside the usual one; APIC and TPIC pay nothing.
 use rayon::prelude::*;
 
-use super::node_update::{apply_faces, update_velocity};
+use super::node_update::{Faces, apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
@@ -70,7 +70,8 @@ impl<const D: usize> Solver<D> {
         std::mem::swap(&mut grid.fields.rows, &mut grid.increments.rows);
         if matches!(self.physics.transfer, Transfer::Xpic { .. }) {
             // These are velocities, which the filter may have turned towards a wall.
-            apply_faces(&mut grid.fields, &grid.plan, &self.physics.faces, |_, _, _| ());
+            let faces = Faces::without_absorption(&self.physics.faces);
+            apply_faces(&mut grid.fields, &grid.plan, &faces, |_, _, _| ());
         }
         self.prolong();
         let grid = &mut self.grid;

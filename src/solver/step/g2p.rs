@@ -24,8 +24,9 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{Near, ParticlePush};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{follow, followers, note_ways};
+use crate::solver::step::carried::{add_ways, follow, followers, note_ways, positions};
 use crate::solver::step::contact::guard::Guard;
+use crate::solver::step::mean_dilation::{LeafCells, MeanDilation};
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -37,6 +38,7 @@ struct Scratch<const D: usize> {
     sort: leaf_bins::Scratch,
     /// Velocity gradients of particles that carry areas.
     gradients: Vec<(u32, [[f64; D]; D])>,
+    mean_dilation: MeanDilation,
 }
 
 impl<const D: usize> Default for Scratch<D> {
@@ -49,6 +51,7 @@ impl<const D: usize> Default for Scratch<D> {
             leavers: Leavers::default(),
             sort: leaf_bins::Scratch::default(),
             gradients: Vec::new(),
+            mean_dilation: MeanDilation::default(),
         }
     }
 }
@@ -85,6 +88,8 @@ struct Sweep<'a, const D: usize> {
     following: &'a [&'a Carried<D>],
     /// Colliders that act on particles.
     guard: Option<Guard<'a, D>>,
+    /// First column of the displacements that particles carry, if they do.
+    displacement: Option<usize>,
 }
 
 /// What is noted of the particles of a leaf.
@@ -125,6 +130,7 @@ impl<const D: usize> Solver<D> {
             places,
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt]),
+            displacement: self.physics.displacement.then(|| self.physics.load_columns()),
         };
         let (chunks, lists, pushes, near) =
             (&mut self.chunks, &mut self.grid.lists, &mut self.pushes, &mut self.near);
@@ -189,10 +195,14 @@ impl<const D: usize> Sweep<'_, D> {
     ) -> Departed {
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
+        let start = self.displacement.map(|_| positions(chunk));
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
             scratch.leavers.look_again(chunk, &held);
+        }
+        if let (Some(first), Some(start)) = (self.displacement, start) {
+            add_ways(chunk, first, &start);
         }
         note_ways(chunk, pushes);
         for (p, gradient) in scratch.gradients.drain(..) {
@@ -224,12 +234,18 @@ impl<const D: usize> Sweep<'_, D> {
         if chunk.is_empty() {
             return 0.0;
         }
+        if self.scheme.f_bar {
+            self.average_dilation(scratch, leaf, chunk, lists);
+        }
         scratch.begin_cut(cut_of(lists).len());
         let mut fastest: f64 = 0.0;
         for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
             fastest = fastest.max(self.gather_bin(scratch, &bin, chunk));
         }
         let fastest = fastest.max(self.advance_cut(scratch, leaf, chunk, cut_of(lists)));
+        if self.scheme.f_bar {
+            scratch.mean_dilation.average_pressure(chunk);
+        }
         // Bins take them in turn.
         scratch.leavers.found.sort_unstable();
         fastest
@@ -238,7 +254,7 @@ impl<const D: usize> Sweep<'_, D> {
     /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
     /// [`Sweep::gather`].
     fn gather_bin(&self, scratch: &mut Scratch<D>, bin: &BinView<'_, D>, chunk: &mut Chunk<D>) -> f64 {
-        let Scratch { kernel, arena, increments, gathered, leavers, gradients, .. } = scratch;
+        let Scratch { kernel, arena, increments, gathered, leavers, gradients, mean_dilation, .. } = scratch;
         let next = self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
         if let Some(rows) = self.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
@@ -256,8 +272,37 @@ impl<const D: usize> Sweep<'_, D> {
         }
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
-        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields: &nodes, leavers }
+        let dilation = &mean_dilation.added[..];
+        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields: &nodes, leavers, dilation }
             .whole_boxes(whole, next)
+    }
+
+    /// F-bar: what the mean rate of dilation of each cell adds to the velocity gradients of the particles in it.
+    fn average_dilation(
+        &self,
+        scratch: &mut Scratch<D>,
+        leaf: usize,
+        chunk: &Chunk<D>,
+        lists: Option<&LeafBins<D>>,
+    ) {
+        let cut = cut_of(lists);
+        scratch.begin_cut(cut.len());
+        let Scratch { kernel, arena, gathered, mean_dilation, .. } = scratch;
+        mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
+        for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
+            self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
+            let nodes = Fields { velocity: &arena.rows, increment: None, moments: None };
+            g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+            if let Some(whole) = bin.whole {
+                g2p::look(kernel, chunk, whole, &bin.frame, self.scheme, &nodes, |p, gathered| {
+                    mean_dilation.note(p, &gathered.gradient());
+                });
+            }
+        }
+        for (&p, gathered) in cut.iter().zip(&*gathered) {
+            mean_dilation.note(p as usize, &gathered.gradient());
+        }
+        mean_dilation.average(chunk);
     }
 
     /// Whether particles of a leaf may carry areas that follow the deformation.
@@ -267,12 +312,13 @@ impl<const D: usize> Sweep<'_, D> {
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
-        let Scratch { kernel, gathered, leavers, gradients, .. } = scratch;
+        let Scratch { kernel, gathered, leavers, gradients, mean_dilation, .. } = scratch;
         if self.has_followers(chunk) {
             gradients.extend(cut.iter().zip(&*gathered).map(|(&p, gathered)| (p, gathered.gradient())));
         }
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
-        let (scheme, dt) = (self.scheme, self.dt);
-        g2p::advance_gathered(kernel, chunk, cut, gathered, scheme, dt, cell, &extent, leavers)
+        let (scheme, dt, dilation) = (self.scheme, self.dt, &mean_dilation.added[..]);
+        let update = g2p::Advance { scheme, dt, cell, dilation };
+        g2p::advance_gathered(kernel, chunk, cut, gathered, &update, &extent, leavers)
     }
 }

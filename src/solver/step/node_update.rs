@@ -2,11 +2,13 @@
 use rayon::prelude::*;
 
 use crate::boundary::Contact;
+use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
-use crate::grid::mask::block_nodes;
+use crate::grid::mask::{block_nodes, node_of_bit};
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::Row;
+use crate::kernel::{BLOCK, Row};
+use crate::solver::physics::Physics;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
@@ -27,7 +29,7 @@ impl<const D: usize> Solver<D> {
         let pushes = self.apply_loads(dt);
         let mut impulses = self.no_impulses();
         self.collide(rates, &mut impulses);
-        self.apply_faces();
+        self.apply_faces(dt);
         // What particles have between two steps needs no holding back.
         let held = match dt > 0.0 && self.has_contact_at_particles() {
             true => self.hold_particles(dt, rates, &mut impulses),
@@ -40,14 +42,16 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Holds the nodes on faces of the domain to their conditions, and sums up the impulses on these if that is asked
     /// for, from the nodes that this rank counts.
-    pub(super) fn apply_faces(&mut self) {
-        let (grid, faces) = (&mut self.grid, &self.physics.faces);
+    pub(super) fn apply_faces(&mut self, dt: f64) {
+        let Physics { faces, absorbing, origin, .. } = &self.physics;
+        let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
+        let faces = Faces { contacts: faces, absorbing: Some(absorbing), origin: *origin, middle, dt };
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() {
-                return apply_faces(&mut grid.fields, plan, faces, |_, _, _| ());
+                return apply_faces(&mut grid.fields, plan, &faces, |_, _, _| ());
             }
-            apply_faces(&mut grid.fields, plan, faces, |face, node, impulse: [f64; D]| {
+            apply_faces(&mut grid.fields, plan, &faces, |face, node, impulse: [f64; D]| {
                 let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
                 if plan.blocks[block].owned >> bit & 1 == 1 {
                     sums[face].iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
@@ -101,12 +105,45 @@ pub fn update_velocity<const D: usize>(
     });
 }
 
+/// Conditions on the faces of the domain in a step.
+pub struct Faces<'a, const D: usize> {
+    /// Contact at each.
+    pub contacts: &'a [[Contact; 2]; D],
+    /// What is beyond those that absorb waves.
+    pub absorbing: Option<&'a AbsorbingFaces<D>>,
+    /// Lower corner of the domain in the job's coordinates, m.
+    pub origin: [f64; D],
+    /// Middle of the step, s.
+    pub middle: f64,
+    /// Its length, s.
+    pub dt: f64,
+}
+
+impl<'a, const D: usize> Faces<'a, D> {
+    /// Contacts alone, for velocities that no step has changed.
+    pub fn without_absorption(contacts: &'a [[Contact; 2]; D]) -> Self {
+        Self { contacts, absorbing: None, origin: [0.0; D], middle: 0.0, dt: 0.0 }
+    }
+
+    /// A point in the job's coordinates, m; z is 0 in plane strain.
+    fn in_job(&self, x: &[f64; D]) -> [f64; 3] {
+        std::array::from_fn(|a| if a < D { self.origin[a] + x[a] } else { 0.0 })
+    }
+}
+
+/// Place of a node from the lower corner of the domain, and the edge of its cells, m.
+fn place<const D: usize>(plan: &GridPlan<D>, node: usize) -> ([f64; D], f64) {
+    let block = &plan.blocks[node / block_nodes(D)];
+    let (local, cell) = (node_of_bit::<D>((node % block_nodes(D)) as u32), plan.cell(block.level));
+    (std::array::from_fn(|a| f64::from(BLOCK as u32 * block.coord[a] + local[a]) * cell), cell)
+}
+
 /// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` gets face, node and what the node gives
 /// to the face, kg m/s.
 pub fn apply_faces<const D: usize>(
     fields: &mut NodeFields<D>,
     plan: &GridPlan<D>,
-    faces: &[[Contact; 2]; D],
+    faces: &Faces<'_, D>,
     mut note: impl FnMut(usize, usize, [f64; D]),
 ) {
     for &(node, on) in
@@ -119,7 +156,14 @@ pub fn apply_faces<const D: usize>(
                 if on >> (2 * axis + side) & 1 == 1 {
                     let normal = std::array::from_fn(|a| if a == axis { inward } else { 0.0 });
                     let before = velocity;
-                    faces[axis][side].apply(&mut velocity, &normal);
+                    match faces.absorbing.and_then(|absorbing| absorbing[axis][side].as_ref()) {
+                        Some(face) => {
+                            let (x, cell) = place(plan, node as usize);
+                            let pressure = face.pressure.at(&faces.in_job(&x), faces.middle);
+                            face.apply(&mut velocity, axis, inward, pressure, faces.dt, cell);
+                        }
+                        None => faces.contacts[axis][side].apply(&mut velocity, &normal),
+                    }
                     let impulse = std::array::from_fn(|a| row[3] * (before[a] - velocity[a]));
                     note(2 * axis + side, node as usize, impulse);
                 }

@@ -1,0 +1,147 @@
+//! F-bar: rate of dilation and pressure as means over each cell, against volumetric locking.
+//!
+//! Where plastic flow keeps the volume, every particle asks for no change of volume, which is more than the nodes of a cell can
+//! give: the material is too stiff and its pressure alternates. With F-bar the particles of a cell strain with
+//! `∇v + (θ̄ - tr ∇v) 1 / D`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the particles of the same material in the cell (de Souza Neto et
+//! al. 1996; for the material point method Coombs et al. 2018), and push with the same mean of their pressures,
+//! `τ + (p̄ - p) 1`, `p = Σ τ_ii / D`. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that of the
+//! strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of the leaf, so ranks have no part in it.
+use crate::kernel::BLOCK;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+
+/// The cells of a leaf.
+pub(in crate::solver) struct LeafCells<const D: usize> {
+    lower: [f64; D],
+    cells_per_metre: f64,
+}
+
+impl<const D: usize> LeafCells<D> {
+    /// Of a leaf with these lower and upper corners, m.
+    pub(in crate::solver) fn new((lower, upper): &([f64; D], [f64; D])) -> Self {
+        Self { lower: *lower, cells_per_metre: BLOCK as f64 / (upper[0] - lower[0]) }
+    }
+
+    /// Number of the cell that holds a point of the leaf.
+    pub(in crate::solver) fn cell_of(&self, x: &[f64; D]) -> usize {
+        (0..D).rev().fold(0, |number, axis| {
+            let place = ((x[axis] - self.lower[axis]) * self.cells_per_metre) as usize;
+            number * BLOCK + place.min(BLOCK - 1)
+        })
+    }
+}
+
+/// What F-bar does in a leaf. A thread reuses its memory.
+#[derive(Default)]
+pub(in crate::solver) struct MeanDilation {
+    /// By particle: while it is found, the trace of the velocity gradient, 1/s; then what is added to its diagonal, 1/s. Empty
+    /// without F-bar.
+    pub added: Vec<f64>,
+    /// Material and cell of each particle, as one number.
+    places: Vec<u32>,
+    /// Of each material and cell: value times volume, and volume.
+    sums: Vec<[f64; 2]>,
+}
+
+impl MeanDilation {
+    /// Begins with the particles of a leaf, where they are ahead of their advance.
+    pub(in crate::solver) fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, cells: &LeafCells<D>) {
+        self.added.clear();
+        self.added.resize(chunk.len(), 0.0);
+        self.places.clear();
+        self.places.extend((0..chunk.len()).map(|p| {
+            let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+            (material * BLOCK.pow(D as u32) + cells.cell_of(&chunk.position(p))) as u32
+        }));
+    }
+
+    /// Notes the velocity gradient of a particle, 1/s.
+    pub(in crate::solver) fn note<const D: usize>(&mut self, p: usize, gradient: &[[f64; D]; D]) {
+        self.added[p] = (0..D).map(|i| gradient[i][i]).sum();
+    }
+
+    /// Sums up a value of each particle, by volume.
+    fn sum<const D: usize>(&mut self, chunk: &Chunk<D>, value: impl Fn(usize) -> f64) {
+        let half = chunk.column(Layout::<D>::HALF);
+        self.sums.clear();
+        for (p, &place) in self.places.iter().enumerate() {
+            let place = place as usize;
+            if place >= self.sums.len() {
+                self.sums.resize(place + 1, [0.0; 2]);
+            }
+            let volume = half[p].powi(D as i32);
+            self.sums[place][0] += volume * value(p);
+            self.sums[place][1] += volume;
+        }
+    }
+
+    /// The mean of the cell of a particle.
+    fn mean(&self, p: usize) -> f64 {
+        let [sum, volume] = self.sums[self.places[p] as usize];
+        sum / volume
+    }
+
+    /// Once all gradients are noted: what the mean adds to them.
+    pub(in crate::solver) fn average<const D: usize>(&mut self, chunk: &Chunk<D>) {
+        let rates = std::mem::take(&mut self.added);
+        self.sum(chunk, |p| rates[p]);
+        self.added = rates;
+        for p in 0..self.added.len() {
+            self.added[p] = (self.mean(p) - self.added[p]) / D as f64;
+        }
+    }
+
+    /// Once all have advanced: each has the mean pressure of the cell in which it was.
+    pub(in crate::solver) fn average_pressure<const D: usize>(&mut self, chunk: &mut Chunk<D>) {
+        let diagonal = |chunk: &Chunk<D>, p: usize| chunk.read::<D>(Layout::<D>::STRESS, p);
+        let mean = |stress: [f64; D]| stress.iter().sum::<f64>() / D as f64;
+        self.sum(chunk, |p| mean(diagonal(chunk, p)));
+        for p in 0..chunk.len() {
+            let stress = diagonal(chunk, p);
+            let change = self.mean(p) - mean(stress);
+            chunk.write(Layout::<D>::STRESS, p, &stress.map(|s| s + change));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A leaf of edge 4 m with particles of two sizes and two materials.
+    fn leaf(particles: &[([f64; 2], f64, u16)]) -> Chunk<2> {
+        let mut chunk = Chunk::new();
+        for (id, &(x, half, material)) in particles.iter().enumerate() {
+            let p = chunk.push_zeroed(id as u64, Tag { material, body: 0, level: 0 });
+            chunk.write(Layout::<2>::POSITION, p, &x);
+            chunk.write(Layout::<2>::HALF, p, &[half]);
+        }
+        chunk
+    }
+
+    /// Each cell keeps its rate of change of volume, which its particles share; materials do not mix.
+    #[test]
+    fn particles_of_a_cell_share_its_dilation() {
+        let chunk = leaf(&[
+            ([10.2, 20.2], 0.5, 0),
+            ([10.7, 20.9], 0.25, 0),
+            ([10.5, 20.5], 0.5, 1),
+            ([13.9, 23.9], 0.5, 0),
+        ]);
+        let mut mean = MeanDilation::default();
+        mean.begin(&chunk, &LeafCells::new(&([10.0, 20.0], [14.0, 24.0])));
+        for (p, rate) in [3.0, -2.0, 7.0, 5.0].into_iter().enumerate() {
+            mean.note(p, &[[rate, 9.0], [-4.0, 0.0]]);
+        }
+        mean.average(&chunk);
+        // (0.25 · 3 - 0.0625 · 2) / 0.3125 = 2
+        assert_eq!(mean.added, [(2.0 - 3.0) / 2.0, (2.0 + 2.0) / 2.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn points_belong_to_cells() {
+        let cells = LeafCells::new(&([1.0, 2.0, 3.0], [3.0, 4.0, 5.0]));
+        assert_eq!(cells.cell_of(&[1.0, 2.0, 3.0]), 0);
+        assert_eq!(cells.cell_of(&[1.6, 2.0, 3.0]), 1);
+        assert_eq!(cells.cell_of(&[1.0, 3.1, 4.9]), 2 * 4 + 3 * 16);
+    }
+}
