@@ -122,6 +122,8 @@ impl<const D: usize> Run<D> {
             leaves: &self.leaves,
             chunks: &self.chunks,
             leaf_fields: &self.leaf_fields,
+            maps: &[],
+            maxima: &[],
             origin: [ORIGIN; D],
             root_edge: ROOT_EDGE,
             brick: Brick { roots: [1; D] },

@@ -3,6 +3,7 @@
 #[path = "common/runs.rs"]
 mod runs;
 
+use agimp::io::hdf5_file::Reader;
 use runs::history::History;
 use runs::launch::{run, succeed};
 use runs::restart;
@@ -212,6 +213,28 @@ fn a_line_through_ground_shows_the_stress_of_its_depth() {
         assert!((cells[7] - vertical).abs() < 1e-6 * vertical.abs(), "{row}: {vertical}");
         assert!((cells[6] - 0.5 * vertical).abs() < 1e-6 * vertical.abs(), "{row}: {vertical}");
     }
+    // The leaves have the stress of their middle, and the volume that is filled.
+    let file =
+        Reader::open_alone(&directory.path().join("out/ground/ground_000000.tree.hdf")).expect("the tree");
+    let count = file.stored("VTKHDF/CellData/level").expect("levels").rows;
+    let read = |name: &str, count: u64| {
+        file.read_slab::<f64>(&format!("VTKHDF/CellData/{name}"), 0, count).expect("a field")
+    };
+    let points = file.read_slab::<f64>("VTKHDF/Points", 0, 4 * count).expect("corners");
+    let [fraction, pressure, greatest] =
+        ["volume_fraction", "pressure", "stress_1"].map(|name| read(name, count));
+    for (leaf, corners) in points.chunks_exact(12).enumerate() {
+        let [low, high] = [corners[1], corners[7]];
+        let filled = (1.5_f64.min(high) - low).max(0.0) / (high - low);
+        assert!((fraction[leaf] - filled).abs() < 1e-3, "leaf {leaf}: {}", fraction[leaf]);
+        let vertical = if filled > 0.0 { -1e4 * (1.5 - 0.5 * (low + high.min(1.5))) } else { 0.0 };
+        assert!(
+            (pressure[leaf] + 2.0 / 3.0 * vertical).abs() < 2.0,
+            "leaf {leaf}: {} for {vertical}",
+            pressure[leaf]
+        );
+        assert!((greatest[leaf] - 0.5 * vertical).abs() < 2.0, "leaf {leaf}: {}", greatest[leaf]);
+    }
 }
 
 /// A particle that is followed into finer leaves and out of them: it splits twice, its family is merged again, and the centre and the mass
@@ -236,4 +259,39 @@ fn a_track_goes_on_through_splits_and_merges() {
         assert!((column("velocity_middle_x")[row] - 10.0).abs() < 1e-12);
         assert_eq!(column("mass_middle")[row], 15.625, "row {row}");
     }
+}
+
+/// A block flies over a raster: each cell keeps the depth of what has been over it, exactly, and the speed; the rasters are the same on any
+/// ranks and across a restart, as ESRI grids and in the outputs.
+#[test]
+fn maps_keep_the_largest_depth_and_speed() {
+    let job = "version = 1\ndimension = 3\n[domain]\nmin = [10, 20, 30]\nsize = [2, 1, 1]\nroot_edge = 1\n[tree]\nbase_level = 1\n\
+        [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e4\npoisson = 0.2\n\
+        [[bodies]]\nname = 'b'\nmaterial = 'm'\nvelocity = [8, 0, 0]\nshape = { kind = 'box', min = [10.25, 20.25, 30.25], max = [10.5, 20.75, 30.75] }\n\
+        [[maps]]\nname = 'hazard'\ncell = 0.25\nmin = [10, 20]\nmax = [11, 21]\n\
+        [time]\nend = 0.05\ndt_max = 2e-3\n[history]\nevery_steps = 1\n[checkpoint]\nevery_steps = 10\nkeep = 9\n";
+    let mut first: Option<[String; 2]> = None;
+    restart::assert_same_on_any_ranks(job, "slide", |directory, _| {
+        let texts = ["depth", "speed"].map(|what| {
+            let path = directory.join(format!("out/slide/slide.map_hazard_{what}.asc"));
+            std::fs::read_to_string(path).expect("a map")
+        });
+        let header = "ncols 4\nnrows 4\nxllcorner 10.0\nyllcorner 20.0\ncellsize 0.25\nNODATA_value -9999\n";
+        let rows = |text: &str| -> Vec<Vec<f64>> {
+            let rows = text.strip_prefix(header).expect("header").lines();
+            rows.map(|row| row.split(' ').map(|cell| cell.parse().expect("number")).collect()).collect()
+        };
+        // It begins over the second cell and ends over the third and the fourth; half a metre of depth, along the middle rows.
+        let [depth, speed] = texts.each_ref().map(|text| rows(text));
+        for row in [0, 3] {
+            assert_eq!((&depth[row], &speed[row]), (&vec![-9999.0; 4], &vec![-9999.0; 4]), "row {row}");
+        }
+        for row in [1, 2] {
+            assert_eq!(depth[row][0], -9999.0);
+            assert!(depth[row][1..3].iter().all(|depth| (depth - 0.5).abs() < 1e-12), "{depth:?}");
+            assert!(depth[row][3] > 0.2 && depth[row][3] < 0.5, "{depth:?}");
+            assert!(speed[row][1..].iter().all(|speed| (speed - 8.0).abs() < 1e-12), "{speed:?}");
+        }
+        assert_eq!(*first.get_or_insert(texts.clone()), texts);
+    });
 }

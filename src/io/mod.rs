@@ -7,6 +7,7 @@ pub mod history;
 pub(crate) mod lines;
 pub mod picture;
 pub mod progress;
+pub mod raster;
 pub mod series;
 pub mod snapshot;
 pub mod telemetry;

@@ -12,7 +12,7 @@ pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
-use crate::probe::{Flux, Line, Probe, Track};
+use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::Quantity;
 use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
@@ -145,6 +145,8 @@ pub struct Problem<const D: usize> {
     pub fluxes: Vec<Flux>,
     /// Lines with tables of their own, a row of the history apart.
     pub lines: Vec<Line<D>>,
+    /// Rasters with the largest depths and speeds.
+    pub maps: Vec<Map>,
     /// Steps between lines of `telemetry.jsonl`.
     pub telemetry_every: u64,
     /// Evaluation at the end of the run.

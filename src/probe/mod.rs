@@ -5,13 +5,16 @@
 //! | this | probes: the particles whose centres lie in a shape |
 //! | `flux.rs` | fluxes: mass that has passed a plane or a face |
 //! | `line.rs` | lines: the material about points in a row |
+//! | `map.rs` | maps: largest depth and speed over a raster in plan |
 //! | `track.rs` | tracks: particles that are followed |
 mod flux;
 pub mod line;
+mod map;
 mod track;
 
 pub use flux::{Flux, Section};
 pub use line::Line;
+pub use map::{Map, Maxima};
 pub use track::{Track, Tracked};
 
 use crate::geometry::Shape;

@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::{Run, RunError, restart};
+use super::{Run, RunError, maps, restart};
 use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, View};
 use crate::job::Problem;
@@ -57,6 +57,9 @@ impl<const D: usize> Run<'_, D> {
         let view = View { leaf_fields: &fields, ..view };
         self.comm.agree(self.recorder.sync())?;
         self.outputs.write(self.comm, &view)?;
+        let maps =
+            if self.comm.rank() == 0 { maps::write(self.problem, &self.solver.maxima) } else { Ok(()) };
+        self.comm.agree(maps)?;
         if !is_due {
             self.outputs.give_back_number();
         }
@@ -118,6 +121,8 @@ fn view<'a, const D: usize>(
         leaves: solver.forest.leaves(),
         chunks: &solver.chunks,
         leaf_fields: &[],
+        maps: &problem.maps,
+        maxima: &solver.maxima,
         origin: problem.origin,
         root_edge: problem.root_edge,
         brick: problem.brick,

@@ -4,6 +4,7 @@ pub mod collapse;
 mod files;
 pub mod history;
 mod lines;
+mod maps;
 mod outcome;
 pub mod record;
 pub mod report;

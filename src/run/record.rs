@@ -207,6 +207,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let tracked = solver.read_tracks(&self.problem.tracks);
         let passed = solver.crossings.fluxes.passed(comm, &solver.chunks);
         let samples = solver.read_lines(&self.problem.lines);
+        solver.note_maps(&self.problem.maps);
         let faces = solver.face_forces();
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));

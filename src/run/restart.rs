@@ -18,7 +18,7 @@ use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
 use crate::load::Load;
 use crate::particle::Chunk;
-use crate::probe::Tracked;
+use crate::probe::{Map, Maxima, Tracked};
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
@@ -143,6 +143,7 @@ pub fn begin_measures<const D: usize>(problem: &Problem<D>, solver: &mut Solver<
     solver.crossings.fluxes = Fluxes::new(&problem.fluxes);
     solver.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
     solver.begin_tracks(&problem.tracks);
+    solver.maxima = problem.maps.iter().map(Map::nothing).collect();
 }
 
 /// Takes over what is booked of fluxes, on rank 0, and where tracks are. Those that the file lacks begin here.
@@ -418,6 +419,13 @@ fn restored<const D: usize>(
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
     restore_measures(comm.rank(), problem, &mut solver, &header.scalars);
+    for (map, maxima) in problem.maps.iter().zip(&mut solver.maxima) {
+        let [depth, speed] =
+            ["depth", "speed"].map(|what| snapshot::map_values(path, &map.name, what, map.len()));
+        if let (Some(depth), Some(speed)) = (depth, speed) {
+            *maxima = Maxima { depth, speed };
+        }
+    }
     Ok((solver, header.scalars))
 }
 

@@ -76,6 +76,7 @@ impl<const D: usize> Solver<D> {
             grid,
             crossings: Crossings::default(),
             tracked: Vec::new(),
+            maxima: Vec::new(),
             ledger: Ledger::default(),
             regrids: 0,
             regrid_timers: RegridTimers::default(),

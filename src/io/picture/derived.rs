@@ -2,6 +2,7 @@
 
 use super::{Tint, source};
 use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::snapshot::averages::{principal, third_invariant};
 use crate::io::snapshot::checked::Checked;
 use crate::io::snapshot::fields::{mean, von_mises};
 use crate::io::snapshot::{Header, PointField};
@@ -57,13 +58,13 @@ const RULES: &[Rule] = rules! {
         |r, out| out.extend(full(r[0]).map(|component| component / r[1][0]));
     "pressure" ["Pa"] 1 <- "stress": |r, out| out.push(-mean(&six(r[0])));
     "von_mises" ["Pa"] 1 <- "stress": |r, out| out.push(von_mises(&six(r[0])));
-    "stress_1" ["Pa"] 1 <- "stress": |r, out| out.push(principal(r[0])[0]);
-    "stress_2" ["Pa"] 1 <- "stress": |r, out| out.push(principal(r[0])[1]);
-    "stress_3" ["Pa"] 1 <- "stress": |r, out| out.push(principal(r[0])[2]);
-    "max_shear" ["Pa"] 1 <- "stress": |r, out| out.push(0.5 * (principal(r[0])[0] - principal(r[0])[2]));
+    "stress_1" ["Pa"] 1 <- "stress": |r, out| out.push(principal(&six(r[0]))[0]);
+    "stress_2" ["Pa"] 1 <- "stress": |r, out| out.push(principal(&six(r[0]))[1]);
+    "stress_3" ["Pa"] 1 <- "stress": |r, out| out.push(principal(&six(r[0]))[2]);
+    "max_shear" ["Pa"] 1 <- "stress": |r, out| out.push(0.5 * (principal(&six(r[0]))[0] - principal(&six(r[0]))[2]));
     "stress_i1" ["Pa"] 1 <- "stress": |r, out| out.push(3.0 * mean(&six(r[0])));
     "stress_j2" ["Pa²"] 1 <- "stress": |r, out| out.push(von_mises(&six(r[0])).powi(2) / 3.0);
-    "stress_j3" ["Pa³"] 1 <- "stress": |r, out| out.push(third_invariant(r[0]));
+    "stress_j3" ["Pa³"] 1 <- "stress": |r, out| out.push(third_invariant(&six(r[0])));
     "x" ["m"] 1 <- "VTKHDF/Points": |r, out| out.push(r[0][0]);
     "y" ["m"] 1 <- "VTKHDF/Points": |r, out| out.push(r[0][1]);
     "z" ["m"] 1 <- "VTKHDF/Points": |r, out| out.push(r[0][2]);
@@ -255,28 +256,6 @@ fn full(row: &[f64]) -> [f64; 6] {
 
 fn six(row: &[f64]) -> [f64; 6] {
     std::array::from_fn(|component| row.get(component).copied().unwrap_or(0.0))
-}
-
-/// Principal values, the greatest first, by the Lode angle θ: `m + 2 √(J2/3) cos(θ - 2πk/3)` with
-/// `cos 3θ = (3√3/2) J3 / J2^(3/2)`. Near-equal values are good to about 1e-8 of the greatest, enough for a picture.
-fn principal(row: &[f64]) -> [f64; 3] {
-    let stress = six(row);
-    let (mean, j2) = (mean(&stress), von_mises(&stress).powi(2) / 3.0);
-    if j2 == 0.0 {
-        return [mean; 3];
-    }
-    let cosine = 1.5 * 3.0_f64.sqrt() * third_invariant(row) / (j2 * j2.sqrt());
-    let angle = cosine.clamp(-1.0, 1.0).acos() / 3.0;
-    let third = std::f64::consts::TAU / 3.0;
-    [0.0, 1.0, -1.0].map(|k| (angle - k * third).cos().mul_add(2.0 * (j2 / 3.0).sqrt(), mean))
-}
-
-/// Determinant of the deviator.
-fn third_invariant(row: &[f64]) -> f64 {
-    let [xx, yy, zz, xy, yz, xz] = six(row);
-    let mean = (xx + yy + zz) / 3.0;
-    let [xx, yy, zz] = [xx - mean, yy - mean, zz - mean];
-    xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
 }
 
 #[cfg(test)]

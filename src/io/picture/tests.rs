@@ -33,6 +33,8 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         leaves: &[Octant { level: 0, coord: [0; 3] }],
         chunks,
         leaf_fields: &[],
+        maps: &[],
+        maxima: &[],
         origin: [0.0; 3],
         root_edge: 1.0,
         brick: Brick { roots: [1; 3] },

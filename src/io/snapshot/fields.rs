@@ -4,6 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::View;
+use super::averages::{self, principal};
+use crate::grid::leaf_geometry::leaf_box;
+use crate::kernel::BLOCK;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 
@@ -74,6 +77,20 @@ fields! {
     VonMises, "von_mises", "Pa", |view| scalars(view, |chunk, p| von_mises(&cauchy_stress(chunk, p)));
     /// Cauchy stress, Pa; components xx, yy, zz, xy, yz, xz as VTK orders them.
     Stress, "stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(cauchy_stress(chunk, p)));
+    /// Greatest principal Cauchy stress, Pa; tension is positive.
+    Stress1, "stress_1", "Pa", |view| scalars(view, |chunk, p| principal(&cauchy_stress(chunk, p))[0]);
+    /// Middle principal Cauchy stress, Pa; tension is positive.
+    Stress2, "stress_2", "Pa", |view| scalars(view, |chunk, p| principal(&cauchy_stress(chunk, p))[1]);
+    /// Least principal Cauchy stress, Pa; tension is positive.
+    Stress3, "stress_3", "Pa", |view| scalars(view, |chunk, p| principal(&cauchy_stress(chunk, p))[2]);
+    /// Cauchy stress, Pa, averaged by volume over the particles of the same cell; components as those of `stress`.
+    StressCell, "stress_cell", "Pa", |view| Values::Real(cell_stresses(view).concat(), 6);
+    /// Pressure of the Cauchy stress averaged over the cell, Pa; compression is positive.
+    PressureCell, "pressure_cell", "Pa",
+        |view| Values::Real(cell_stresses(view).iter().map(|stress| -mean(stress)).collect(), 0);
+    /// Von Mises equivalent of the Cauchy stress averaged over the cell, Pa.
+    VonMisesCell, "von_mises_cell", "Pa",
+        |view| Values::Real(cell_stresses(view).iter().map(von_mises).collect(), 0);
     /// Mass, kg (per metre of thickness in plane strain).
     Mass, "mass", "kg", |view| scalars(view, |chunk, p| chunk.column(Layout::<D>::MASS)[p]);
     /// Density, kg/m³.
@@ -148,6 +165,16 @@ fn scalars<const D: usize>(view: &View<D>, value: impl Fn(&Chunk<D>, usize) -> f
 fn of_tags<const D: usize>(view: &View<D>, get: fn(Tag) -> u16) -> Values {
     let tags = view.chunks.iter().flat_map(|chunk| chunk.tags());
     Values::Integer(tags.map(|&bits| i32::from(get(Tag::unpack(bits)))).collect())
+}
+
+/// Stress of the cell of each particle, in their order.
+fn cell_stresses<const D: usize>(view: &View<D>) -> Vec<[f64; 6]> {
+    let leaves = view.leaves.iter().zip(view.chunks);
+    let of_leaf = leaves.flat_map(|(leaf, chunk)| {
+        let (lower, upper) = leaf_box(leaf, view.root_edge);
+        averages::over_cells(&lower, (upper[0] - lower[0]) / BLOCK as f64, chunk)
+    });
+    of_leaf.collect()
 }
 
 /// Velocity with three components.

@@ -11,7 +11,9 @@ use partition::{Brick, Octant};
 
 use super::hdf5_file::{FileError, Reader, Writer};
 use crate::particle::chunk::Chunk;
+use crate::probe::{Map, Maxima};
 
+pub(crate) mod averages;
 pub(in crate::io) mod checked;
 pub mod commit;
 pub mod compare;
@@ -39,6 +41,10 @@ pub struct View<'a, const D: usize> {
     pub chunks: &'a [Chunk<D>],
     /// Extra values per leaf; the same names on all ranks.
     pub leaf_fields: &'a [(String, Vec<f64>)],
+    /// Rasters in plan.
+    pub maps: &'a [Map],
+    /// Their largest values so far, the same on all ranks.
+    pub maxima: &'a [Maxima],
     /// Lower corner of the domain, m.
     pub origin: [f64; D],
     /// Edge of a root octant, m.
@@ -116,6 +122,7 @@ pub fn start_write<const D: usize>(
         Header::make_group(file)?;
         let mut recorded = Recorded::new(comm, file);
         state::write_job(&mut recorded, comm, view)?;
+        state::write_maps(file, &mut recorded, comm, view)?;
         // The state first: what ParaView can read of it gets a second name there.
         if options.restart {
             state::write(file, &mut recorded, comm, view, leaves, particles)?;
@@ -186,6 +193,17 @@ pub fn job_text(path: &Path) -> Option<String> {
     }
     let text = Checked::new(None, &file, &header).read_all::<u8>(state::JOB, bytes, 0).ok()?;
     String::from_utf8(text).ok()
+}
+
+/// Not collective. The values of a map in a file, if it has as many.
+pub fn map_values(path: &Path, name: &str, what: &str, cells: usize) -> Option<Vec<f64>> {
+    let file = Reader::open_alone(path).ok()?;
+    let header = Header::read(&file).ok()?;
+    let dataset = state::map(name, what);
+    if !file.exists(&dataset) {
+        return None;
+    }
+    Checked::new(None, &file, &header).read_all(&dataset, cells as u64, 0).ok()
 }
 
 /// Bytes of the longest job file that is read back.

@@ -85,6 +85,42 @@ pub(super) fn write_job<const D: usize>(
     recorded.write(JOB, Rows::place(comm, text.len() as u64), 0, text)
 }
 
+/// The data set of the largest values of a map.
+pub(super) fn map(name: &str, what: &str) -> String {
+    format!("maps/{name}/{what}")
+}
+
+/// Collective. Writes the largest values of maps, all of them by rank 0.
+pub(super) fn write_maps<const D: usize>(
+    file: &Writer,
+    recorded: &mut Recorded,
+    comm: &Comm,
+    view: &View<D>,
+) -> Result<(), FileError> {
+    if view.maps.is_empty() {
+        return Ok(());
+    }
+    file.create_group("maps")?;
+    for (of, maxima) in view.maps.iter().zip(view.maxima) {
+        file.create_group(&format!("maps/{}", of.name))?;
+        let sets = [
+            ("depth", "m", "Largest depth so far", &maxima.depth),
+            ("speed", "m/s", "Largest speed so far", &maxima.speed),
+        ];
+        for (what, unit, meaning, values) in sets {
+            let mine: &[f64] = if comm.rank() == 0 { values } else { &[] };
+            recorded.write(&map(&of.name, what), Rows::place(comm, mine.len() as u64), 0, mine)?;
+            let [columns, rows] = of.size;
+            let meaning = format!(
+                "{meaning}, in {rows} rows of {columns} from south to north, cells of {:?} m.",
+                of.cell
+            );
+            file.set_texts(&map(&of.name, what), &[("units", unit), ("description", meaning.as_str())])?;
+        }
+    }
+    Ok(())
+}
+
 /// Collective. Writes tree and particles below the header's group.
 pub(super) fn write<const D: usize>(
     file: &Writer,

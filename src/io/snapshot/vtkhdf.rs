@@ -4,8 +4,9 @@
 use partition::Octant;
 use partition::comm::Comm;
 
+use super::averages::{LeafAverage, over_leaf, principal};
 use super::checked::{Recorded, Rows};
-use super::fields::{PointField, Values};
+use super::fields::{PointField, Values, mean, von_mises};
 use super::state::path;
 use super::{Options, View, sane};
 use crate::io::hdf5_file::{Element, FileError, Writer};
@@ -175,6 +176,65 @@ pub(super) fn write_leaves<const D: usize>(
     }
     for (name, meaning) in [("level", "Level of the leaf."), ("particles", "Particles in the leaf.")] {
         let texts = [("units", ""), ("description", meaning)];
+        file.set_texts(&format!("{GROUP}/CellData/{name}"), &texts)?;
+    }
+    write_averages(file, recorded, view, leaves)
+}
+
+/// Collective. Writes what fills the leaves, and its mean stress.
+fn write_averages<const D: usize>(
+    file: &Writer,
+    recorded: &mut Recorded,
+    view: &View<D>,
+    leaves: Rows,
+) -> Result<(), FileError> {
+    let edge = |leaf: &Octant<D>| view.root_edge / f64::from(1_u32 << leaf.level);
+    let all = view.leaves.iter().zip(view.chunks).map(|(leaf, chunk)| over_leaf(edge(leaf), chunk));
+    let all: Vec<LeafAverage> = all.collect();
+    let scalar = |value: fn(&LeafAverage) -> f64| Values::Real(all.iter().map(value).collect(), 0);
+    let stress = Values::Real(all.iter().flat_map(|leaf| leaf.stress).collect(), 6);
+    let sets = [
+        (
+            "volume_fraction",
+            "",
+            "Volume of the material over that of the leaf.",
+            scalar(|leaf| leaf.volume_fraction),
+        ),
+        ("stress", "Pa", "Mean Cauchy stress by volume: xx, yy, zz, xy, yz, xz; 0 without material.", stress),
+        (
+            "pressure",
+            "Pa",
+            "Pressure of the mean stress; compression is positive.",
+            scalar(|leaf| -mean(&leaf.stress)),
+        ),
+        (
+            "von_mises",
+            "Pa",
+            "Von Mises equivalent of the mean stress.",
+            scalar(|leaf| von_mises(&leaf.stress)),
+        ),
+        (
+            "stress_1",
+            "Pa",
+            "Greatest principal value of the mean stress.",
+            scalar(|leaf| principal(&leaf.stress)[0]),
+        ),
+        (
+            "stress_2",
+            "Pa",
+            "Middle principal value of the mean stress.",
+            scalar(|leaf| principal(&leaf.stress)[1]),
+        ),
+        (
+            "stress_3",
+            "Pa",
+            "Least principal value of the mean stress.",
+            scalar(|leaf| principal(&leaf.stress)[2]),
+        ),
+    ];
+    for (name, unit, meaning, values) in sets {
+        field(recorded, &format!("CellData/{name}"), leaves, &values)?;
+        let texts = [("units", unit), ("description", meaning)];
         file.set_texts(&format!("{GROUP}/CellData/{name}"), &texts)?;
     }
     Ok(())

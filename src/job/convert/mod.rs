@@ -9,7 +9,7 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
-//! | `probes` | probes, tracks, fluxes and lines |
+//! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
@@ -111,6 +111,7 @@ fn problem<const D: usize>(
     let tracks = probes::tracks(checks, file, &space, &root.key("tracks"));
     let fluxes = probes::fluxes(checks, file, &space, &root.key("fluxes"));
     let lines = probes::lines(checks, file, &space, &root.key("lines"));
+    let maps = probes::maps(checks, file, &space, &root.key("maps"));
     let output = output(checks, file, &name, &root.key("output"));
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
@@ -162,6 +163,7 @@ fn problem<const D: usize>(
         tracks: tracks?,
         fluxes: fluxes?,
         lines: lines?,
+        maps: maps?,
         telemetry_every: file.telemetry.every_steps,
         report,
     };

@@ -2,7 +2,10 @@
 use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
-use crate::probe::{Flux, Line, Probe, Section, Track};
+use crate::probe::{Flux, Line, Map, Probe, Section, Track};
+
+/// Most cells of a raster.
+const MOST_CELLS: f64 = 1e6;
 
 /// All probes, or faults.
 pub(super) fn probes<const D: usize>(
@@ -131,6 +134,58 @@ pub(super) fn lines<const D: usize>(
         }
     }
     (all.len() == file.lines.len()).then_some(all)
+}
+
+/// All maps, or faults.
+pub(super) fn maps<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Map>> {
+    let mut all = Vec::new();
+    for (i, written) in file.maps.iter().enumerate() {
+        let here = path.index(i);
+        let before = file.maps[..i].iter().map(|map| &*map.name);
+        checks.column_name(&written.name, before, &here.key("name"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        let mut corner = |given: &Option<Vec<f64>>, key: &'static str, usual: f64| {
+            let Some(given) = given else {
+                return Some(std::array::from_fn(|a| if a < D - 1 { usual * space.size[a] } else { 0.0 }));
+            };
+            if given.len() == D - 1 {
+                return Some(std::array::from_fn(
+                    |a| if a < D - 1 { given[a] - space.origin[a] } else { 0.0 },
+                ));
+            }
+            let message = format!("found {} coordinates; expected {} in a {D}D job", given.len(), D - 1);
+            checks.fault(&here.key(key), message);
+            None
+        };
+        let corners = (corner(&written.min, "min", 0.0), corner(&written.max, "max", 1.0));
+        let ((Some(lower), Some(upper)), Some(bodies)) = (corners, bodies) else { continue };
+        let (lower, upper): ([f64; 2], [f64; 2]) = (lower, upper);
+        // A whole number of cells may miss the corner by rounding.
+        let cells =
+            |a: usize| if a < D - 1 { ((upper[a] - lower[a]) / written.cell - 1e-9).ceil() } else { 1.0 };
+        let size = [cells(0), cells(1)];
+        if size[0] < 1.0 || size[1] < 1.0 {
+            checks.fault(
+                &here.key("max"),
+                "found a corner that is not above min; expected a larger one".into(),
+            );
+        } else if size[0] * size[1] > MOST_CELLS {
+            let message = format!(
+                "found a raster of {} x {} cells; expected at most {MOST_CELLS} cells, so a larger cell",
+                size[0], size[1]
+            );
+            checks.fault(&here.key("cell"), message);
+        } else {
+            let size = size.map(|cells| cells as usize);
+            all.push(Map { name: written.name.clone(), corner: lower, cell: written.cell, size, bodies });
+        }
+    }
+    (all.len() == file.maps.len()).then_some(all)
 }
 
 fn body_names(file: &JobFile) -> Vec<&str> {

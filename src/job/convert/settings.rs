@@ -200,6 +200,7 @@ pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     state.tracks.clear();
     state.fluxes.clear();
     state.lines.clear();
+    state.maps.clear();
     state.telemetry = file::Telemetry::default();
     state.report = None;
     state.time.end = 0.0;

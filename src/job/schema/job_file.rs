@@ -7,7 +7,7 @@ use super::common::yes;
 pub use super::common::{AxisName, Spin};
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
-pub use super::probes::{Flux, Line, Probe, Track};
+pub use super::probes::{Flux, Line, Map, Probe, Track};
 pub use super::stages::Stage;
 pub use super::stress::Stress;
 use crate::geometry::written::Shape;
@@ -98,6 +98,10 @@ pub struct JobFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 100))]
     pub lines: Vec<Line>,
+    /// Rasters in plan with the largest depth and speed of the run, ESRI ASCII grids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 20))]
+    pub maps: Vec<Map>,
     /// Measurements of the run itself, `telemetry.jsonl`.
     #[serde(default)]
     pub telemetry: Telemetry,

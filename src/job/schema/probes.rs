@@ -125,3 +125,28 @@ fn twenty_one() -> u32 {
 fn all_sampled() -> Vec<Sampled> {
     Sampled::ALL.to_vec()
 }
+
+/// A raster in plan, over all axes but the last, with the largest depth (m) and the largest speed of a particle (m/s) at the rows of the
+/// history so far: `JOB.map_NAME_depth.asc` and `JOB.map_NAME_speed.asc`, written with each output, and in files of particles as
+/// `maps/NAME/depth` and `maps/NAME/speed`. The depth is the volume of the material whose particles lie in a cell over the area of the cell.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Map {
+    /// Name, of letters, digits, `_` and `-`; part of the names of the files.
+    pub name: String,
+    /// Edge of a cell of the raster, m; at least that of the cells where the material is, or depths are of single particles.
+    #[schemars(range(min = 1e-9, max = 1e7))]
+    pub cell: f64,
+    /// Lower corner of the raster: as many coordinates as the job has dimensions less one, m; that of the domain by default.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 2), inner(range(min = -1e12, max = 1e12)))]
+    pub min: Option<Vec<f64>>,
+    /// Upper corner of the raster, m; that of the domain by default.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 2), inner(range(min = -1e12, max = 1e12)))]
+    pub max: Option<Vec<f64>>,
+    /// Names of the bodies that count; all by default.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 65_535))]
+    pub bodies: Option<Vec<String>>,
+}

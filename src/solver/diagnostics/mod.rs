@@ -1,6 +1,7 @@
 //! What is measured of a state.
 pub mod given_boxes;
 pub mod lines;
+pub mod maps;
 pub mod probes;
 pub mod totals;
 pub mod tracks;

@@ -19,7 +19,7 @@ use super::sorting::bins::BinMissing;
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
-use crate::probe::Tracked;
+use crate::probe::{Maxima, Tracked};
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush};
 use crate::solver::state::cost::Costs;
@@ -131,6 +131,8 @@ pub struct Solver<const D: usize> {
     pub crossings: Crossings,
     /// Particles that are followed.
     pub tracked: Vec<Tracked<D>>,
+    /// Largest values of maps so far; the same on all ranks.
+    pub maxima: Vec<Maxima>,
     /// Splits and merges of particles so far.
     pub ledger: Ledger,
     /// Changes of the tree since the start of this process.
