@@ -42,21 +42,25 @@ impl Canvas {
         }
     }
 
-    /// Writes a text with its upper left corner at `(x, y)`; dots are squares of `size` pixels.
+    /// Writes a text with the upper left corner of its capitals at `(x, y)`; they are `7 size` pixels high.
     pub(super) fn text(&mut self, x: i64, y: i64, size: i64, text: &str, colour: Rgb) {
-        for (place, character) in text.chars().enumerate() {
-            let left = x + place as i64 * size * (font::WIDTH as i64 + 1);
-            for (row, bits) in font::glyph(character).into_iter().enumerate() {
-                for column in (0..font::WIDTH).filter(|column| bits >> (font::WIDTH - 1 - column) & 1 == 1) {
-                    self.fill(left + column as i64 * size, y + row as i64 * size, size, size, colour);
-                }
-            }
-        }
+        font::draw(size, text, |column, row, coverage| self.blend(x + column, y + row, colour, coverage));
     }
 
     /// Pixels that a text is wide.
     pub(super) fn text_width(size: i64, text: &str) -> i64 {
-        text.chars().count() as i64 * size * (font::WIDTH as i64 + 1)
+        font::draw(size, text, |_, _, _| ())
+    }
+
+    /// Mixes a share of a colour into a pixel; outside nothing happens.
+    fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
+        if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
+            let at = 3 * (y as usize * self.width + x as usize);
+            for (pixel, value) in self.pixels[at..at + 3].iter_mut().zip(colour) {
+                *pixel =
+                    (f32::from(value) - f32::from(*pixel)).mul_add(share, f32::from(*pixel)).round() as u8;
+            }
+        }
     }
 
     /// Not collective. Writes the image as PNG, under a temporary name first.
