@@ -13,7 +13,7 @@ use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
 use crate::probe::{Flux, Line, Map, Probe, Track};
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, in_job};
 use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
@@ -177,7 +177,7 @@ impl<const D: usize> Problem<D> {
 
     /// A point in the coordinates of the job, m, with z = 0 in plane strain: where quantities are taken.
     pub fn place(&self, x: &[f64; D]) -> [f64; 3] {
-        std::array::from_fn(|a| if a < D { self.origin[a] + x[a] } else { 0.0 })
+        in_job(&self.origin, x)
     }
 
     /// Whether stages or the run end at an equilibrium.

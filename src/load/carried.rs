@@ -4,7 +4,7 @@
 //! numbers go with the particles, are shared among children and add up in merges, so that the whole force is that of the
 //! definition at all times.
 use super::Load;
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, in_job};
 
 /// A force that particles carry.
 #[derive(Clone, Debug)]
@@ -87,7 +87,7 @@ impl<const D: usize> Load<D> {
     /// Force (N) on a particle at `x` that carries these numbers in the columns of `carried`, which is of this load, at a time
     /// of its own, s.
     pub fn force(&self, carried: &Carried<D>, numbers: &[f64], x: &[f64; D], time: f64) -> [f64; D] {
-        let place = self.place(x);
+        let place = in_job(&self.origin, x);
         match &carried.force {
             CarriedForce::Traction(per_number) | CarriedForce::Point { force: per_number, .. } => {
                 per_number.each_ref().map(|component| component.at(&place, time) * numbers[0])

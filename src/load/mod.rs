@@ -13,7 +13,7 @@ mod carried;
 pub use carried::{Carried, CarriedForce, cofactor};
 
 use crate::geometry::Shape;
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, in_job};
 
 /// Acceleration of gravity, which may change in time.
 #[derive(Clone, Debug)]
@@ -34,6 +34,11 @@ impl<const D: usize> Gravity<D> {
     pub fn at(&self, time: f64) -> [f64; D] {
         std::array::from_fn(|axis| self.acceleration[axis].at(&[0.0; 3], time - self.start))
     }
+}
+
+/// Columns of what particles carry for some loads.
+pub fn columns<const D: usize>(loads: &[Load<D>]) -> usize {
+    loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
 }
 
 /// A load of a job.
@@ -85,20 +90,11 @@ impl<const D: usize> Load<D> {
         self.region.as_ref().is_none_or(|region| region.distance(x) <= 0.0)
     }
 
-    /// A point in the job's coordinates, m; z is 0 in plane strain.
-    fn place(&self, x: &[f64; D]) -> [f64; 3] {
-        let mut place = [0.0; 3];
-        for axis in 0..D {
-            place[axis] = self.origin[axis] + x[axis];
-        }
-        place
-    }
-
     /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
     /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
     /// the prescribed motion to second order.
     pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
-        let (place, middle) = (self.place(x), middle - self.start);
+        let (place, middle) = (in_job(&self.origin, x), middle - self.start);
         match &self.kind {
             Kind::Carried(_) => {}
             Kind::BodyForce(acceleration) => {

@@ -14,6 +14,12 @@ mod table;
 pub use expression::{Expression, ExpressionError};
 pub use table::{Table, TableError};
 
+/// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job, where quantities are taken; z is 0 in
+/// plane strain.
+pub fn in_job<const D: usize>(origin: &[f64; D], x: &[f64; D]) -> [f64; 3] {
+    std::array::from_fn(|a| if a < D { origin[a] + x[a] } else { 0.0 })
+}
+
 /// A scalar that may depend on place and time.
 #[derive(Clone, Debug)]
 pub enum Quantity {

@@ -16,7 +16,7 @@ use crate::io::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
 use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
-use crate::load::Load;
+use crate::load;
 use crate::particle::Chunk;
 use crate::probe::{Map, Maxima, Tracked};
 use crate::setup;
@@ -374,10 +374,8 @@ fn restored<const D: usize>(
     let limits = snapshot::Limits { materials: problem.materials.len(), bodies: problem.bodies.len() };
     let restored = snapshot::read::<D>(comm, path, Some(problem.digest), limits).map_err(words)?;
     let carried = restored.chunks.iter().map(Chunk::carried_columns).max().unwrap_or(0);
-    let loads: usize =
-        problem.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum();
     let follows = problem.output.displacement;
-    let expected = loads + if follows { D } else { 0 };
+    let expected = load::columns(&problem.loads) + if follows { D } else { 0 };
     if comm.any(carried != 0 && carried != expected) {
         let reason = "particles carry other loads than those of the job, or it follows displacements and the job does not ask for that \
                       field, or the other way round";

@@ -3,7 +3,7 @@ use crate::adaptivity::Adaptivity;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
-use crate::load::{Gravity, Load};
+use crate::load::{self, Gravity, Load};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -82,7 +82,7 @@ impl<const D: usize> Physics<D> {
 
     /// Columns of what particles carry for loads.
     pub fn load_columns(&self) -> usize {
-        self.loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
+        load::columns(&self.loads)
     }
 
     /// Gives a particle the history with which its material begins.

@@ -189,6 +189,11 @@ impl<const D: usize> GridPlan<D> {
         self.root_edge / f64::from(4u32 << level)
     }
 
+    /// Place of the node of a bit of a block, m from the lower corner of the domain.
+    pub fn node_place(&self, block: &Block<D>, bit: usize) -> [f64; D] {
+        node_coord(block.coord, bit as u32).map(|x| f64::from(x) * self.cell(block.level))
+    }
+
     /// Number of levels, the deepest included.
     pub fn levels(&self) -> usize {
         self.level_start.len() - 1

@@ -3,6 +3,7 @@
 //! Stresses of single particles differ from neighbour to neighbour where material flows; their mean by volume over a cell does not. Sums go
 //! over the particles of one leaf in their order, which is the same on any ranks.
 use super::fields::{mean, von_mises};
+use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::Chunk;
 use crate::particle::volume::{cauchy_stress, volume};
@@ -28,16 +29,9 @@ impl Sum {
     }
 }
 
-/// Cauchy stress of the cell of each particle of a leaf, by its lower corner and the edge of its cells, m.
-pub(super) fn over_cells<const D: usize>(lower: &[f64; D], cell: f64, chunk: &Chunk<D>) -> Vec<[f64; 6]> {
-    let cell_of = |p: usize| {
-        let x = chunk.position(p);
-        (0..D).rev().fold(0, |number, a| {
-            let at = ((x[a] - lower[a]) / cell) as usize;
-            number * BLOCK + at.min(BLOCK - 1)
-        })
-    };
-    let cells: Vec<usize> = (0..chunk.len()).map(cell_of).collect();
+/// Cauchy stress of the cell of each particle of a leaf with these cells.
+pub(super) fn over_cells<const D: usize>(cells: &LeafCells<D>, chunk: &Chunk<D>) -> Vec<[f64; 6]> {
+    let cells: Vec<usize> = (0..chunk.len()).map(|p| cells.cell_of(&chunk.position(p))).collect();
     let mut sums = vec![Sum::default(); BLOCK.pow(D as u32)];
     cells.iter().enumerate().for_each(|(p, &cell)| sums[cell].add(chunk, p));
     cells.iter().map(|&cell| sums[cell].mean()).collect()
@@ -102,7 +96,7 @@ mod tests {
             chunk.write(Layout::<2>::STRESS, p, &[-pressure, -pressure, -pressure, 3.0]);
             chunk.column_mut(Layout::<2>::HALF)[p] = 0.125;
         }
-        let cells = over_cells(&[1.0, 2.0], 0.5, &chunk);
+        let cells = over_cells(&LeafCells::new(&([1.0, 2.0], [3.0, 4.0])), &chunk);
         for (p, stress) in cells.iter().enumerate() {
             let pressure = if p < 4 { 10.0 } else { 20.0 };
             assert_eq!(*stress, [-pressure, -pressure, -pressure, 3.0, 0.0, 0.0], "{p}");

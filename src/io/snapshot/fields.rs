@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::View;
 use super::averages::{self, principal};
-use crate::grid::leaf_geometry::leaf_box;
-use crate::kernel::BLOCK;
+use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 
@@ -171,8 +170,7 @@ fn of_tags<const D: usize>(view: &View<D>, get: fn(Tag) -> u16) -> Values {
 fn cell_stresses<const D: usize>(view: &View<D>) -> Vec<[f64; 6]> {
     let leaves = view.leaves.iter().zip(view.chunks);
     let of_leaf = leaves.flat_map(|(leaf, chunk)| {
-        let (lower, upper) = leaf_box(leaf, view.root_edge);
-        averages::over_cells(&lower, (upper[0] - lower[0]) / BLOCK as f64, chunk)
+        averages::over_cells(&LeafCells::new(&leaf_box(leaf, view.root_edge)), chunk)
     });
     of_leaf.collect()
 }

@@ -6,7 +6,7 @@ use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;
-use crate::grid::mask::{block_nodes, node_of_bit};
+use crate::grid::mask::block_nodes;
 use crate::grid::plan::Block;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
@@ -67,8 +67,7 @@ fn apply_colliders<const D: usize>(
                 if real >> bit & 1 == 0 || mass <= 0.0 {
                     continue;
                 }
-                let local = node_of_bit::<D>(bit as u32);
-                let x = std::array::from_fn(|a| f64::from(BLOCK as u32 * block.coord[a] + local[a]) * cell);
+                let x = plan.node_place(block, bit);
                 if collider.distance(&x, &state.pose) > 0.0 {
                     continue;
                 }

@@ -7,6 +7,7 @@ use crate::adaptivity::resample::cell_fit::Resampling;
 use crate::adaptivity::{LeafMaxima, Watch};
 use crate::boundary::motion::Rate;
 use crate::grid::arenas::Arenas;
+use crate::grid::leaf_geometry::LeafCells;
 use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::g2p::{Fields, Gathered, Moments};
@@ -26,7 +27,8 @@ use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::carried::{add_ways, follow, followers, note_ways, positions};
 use crate::solver::step::contact::guard::Guard;
-use crate::solver::step::mean_dilation::{LeafCells, MeanDilation};
+use crate::solver::step::look::Look;
+use crate::solver::step::mean_dilation::MeanDilation;
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -285,23 +287,12 @@ impl<const D: usize> Sweep<'_, D> {
         chunk: &Chunk<D>,
         lists: Option<&LeafBins<D>>,
     ) {
-        let cut = cut_of(lists);
-        scratch.begin_cut(cut.len());
         let Scratch { kernel, arena, gathered, mean_dilation, .. } = scratch;
         mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
-        for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
-            self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
-            let nodes = Fields { velocity: &arena.rows, increment: None, moments: None };
-            g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
-            if let Some(whole) = bin.whole {
-                g2p::look(kernel, chunk, whole, &bin.frame, self.scheme, &nodes, |p, gathered| {
-                    mean_dilation.note(p, &gathered.gradient());
-                });
-            }
-        }
-        for (&p, gathered) in cut.iter().zip(&*gathered) {
-            mean_dilation.note(p as usize, &gathered.gradient());
-        }
+        let look = Look { plan: self.plan, fields: self.fields, arenas: self.arenas, scheme: self.scheme };
+        look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
+            mean_dilation.note(p, &gathered.gradient());
+        });
         mean_dilation.average(chunk);
     }
 

@@ -1,9 +1,8 @@
 //! Loads in a step: their effect on nodes, and what is booked of it.
 use rayon::prelude::*;
 
-use crate::grid::mask::{block_nodes, node_of_bit};
+use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::BLOCK;
 use crate::load::Load;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::LoadTotals;
@@ -30,14 +29,13 @@ fn apply<const D: usize>(
     let active = blocks.with_min_len(32).filter(|(_, (_, active))| **active);
     let pushed = active.map(|(index, ((rows, block), _))| {
         let mut pushes = Vec::new();
-        let (cell, real) = (plan.cell(block.level), block.real_nodes());
+        let real = block.real_nodes();
         for (bit, row) in rows.iter_mut().enumerate() {
             let mass = row.0[3];
             if real >> bit & 1 == 0 || mass <= 0.0 {
                 continue;
             }
-            let local = node_of_bit::<D>(bit as u32);
-            let x = std::array::from_fn(|a| f64::from(BLOCK as u32 * block.coord[a] + local[a]) * cell);
+            let x = plan.node_place(block, bit);
             let mut velocity: [f64; D] = std::array::from_fn(|a| row.0[a]);
             for &(number, load) in loads.iter().filter(|(_, load)| load.reaches(&x)) {
                 let before = velocity;

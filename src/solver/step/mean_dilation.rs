@@ -6,29 +6,9 @@
 //! al. 1996; for the material point method Coombs et al. 2018), and push with the same mean of their pressures,
 //! `τ + (p̄ - p) 1`, `p = Σ τ_ii / D`. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that of the
 //! strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of the leaf, so ranks have no part in it.
+use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-
-/// The cells of a leaf.
-pub(in crate::solver) struct LeafCells<const D: usize> {
-    lower: [f64; D],
-    cells_per_metre: f64,
-}
-
-impl<const D: usize> LeafCells<D> {
-    /// Of a leaf with these lower and upper corners, m.
-    pub(in crate::solver) fn new((lower, upper): &([f64; D], [f64; D])) -> Self {
-        Self { lower: *lower, cells_per_metre: BLOCK as f64 / (upper[0] - lower[0]) }
-    }
-
-    /// Number of the cell that holds a point of the leaf.
-    pub(in crate::solver) fn cell_of(&self, x: &[f64; D]) -> usize {
-        (0..D).rev().fold(0, |number, axis| {
-            let place = ((x[axis] - self.lower[axis]) * self.cells_per_metre) as usize;
-            number * BLOCK + place.min(BLOCK - 1)
-        })
-    }
-}
 
 /// What F-bar does in a leaf. A thread reuses its memory.
 #[derive(Default)]
@@ -135,13 +115,5 @@ mod tests {
         mean.average(&chunk);
         // (0.25 · 3 - 0.0625 · 2) / 0.3125 = 2
         assert_eq!(mean.added, [(2.0 - 3.0) / 2.0, (2.0 + 2.0) / 2.0, 0.0, 0.0]);
-    }
-
-    #[test]
-    fn points_belong_to_cells() {
-        let cells = LeafCells::new(&([1.0, 2.0, 3.0], [3.0, 4.0, 5.0]));
-        assert_eq!(cells.cell_of(&[1.0, 2.0, 3.0]), 0);
-        assert_eq!(cells.cell_of(&[1.6, 2.0, 3.0]), 1);
-        assert_eq!(cells.cell_of(&[1.0, 3.1, 4.9]), 2 * 4 + 3 * 16);
     }
 }

@@ -6,6 +6,7 @@
 //! | [`p2g`] | particles to nodes, over all bins |
 //! | [`node_update`] | velocities of nodes; conditions on faces |
 //! | [`g2p`] | nodes to particles, over all leaves |
+//! | `look` | what the particles of a leaf gather, without an advance |
 //! | `mean_dilation` | F-bar: dilation as the mean over cells |
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
@@ -21,6 +22,7 @@ pub mod exchange;
 mod flip_xpic;
 pub mod g2p;
 pub mod loads;
+mod look;
 mod mean_dilation;
 pub mod node_update;
 pub mod p2g;

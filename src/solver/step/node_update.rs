@@ -5,9 +5,10 @@ use crate::boundary::Contact;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
-use crate::grid::mask::{block_nodes, node_of_bit};
+use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::{BLOCK, Row};
+use crate::kernel::Row;
+use crate::quantity::in_job;
 use crate::solver::physics::Physics;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
@@ -124,18 +125,6 @@ impl<'a, const D: usize> Faces<'a, D> {
     pub fn without_absorption(contacts: &'a [[Contact; 2]; D]) -> Self {
         Self { contacts, absorbing: None, origin: [0.0; D], middle: 0.0, dt: 0.0 }
     }
-
-    /// A point in the job's coordinates, m; z is 0 in plane strain.
-    fn in_job(&self, x: &[f64; D]) -> [f64; 3] {
-        std::array::from_fn(|a| if a < D { self.origin[a] + x[a] } else { 0.0 })
-    }
-}
-
-/// Place of a node from the lower corner of the domain, and the edge of its cells, m.
-fn place<const D: usize>(plan: &GridPlan<D>, node: usize) -> ([f64; D], f64) {
-    let block = &plan.blocks[node / block_nodes(D)];
-    let (local, cell) = (node_of_bit::<D>((node % block_nodes(D)) as u32), plan.cell(block.level));
-    (std::array::from_fn(|a| f64::from(BLOCK as u32 * block.coord[a] + local[a]) * cell), cell)
 }
 
 /// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` gets face, node and what the node gives
@@ -158,9 +147,17 @@ pub fn apply_faces<const D: usize>(
                     let before = velocity;
                     match faces.absorbing.and_then(|absorbing| absorbing[axis][side].as_ref()) {
                         Some(face) => {
-                            let (x, cell) = place(plan, node as usize);
-                            let pressure = face.pressure.at(&faces.in_job(&x), faces.middle);
-                            face.apply(&mut velocity, axis, inward, pressure, faces.dt, cell);
+                            let block = &plan.blocks[node as usize / block_nodes(D)];
+                            let x = plan.node_place(block, node as usize % block_nodes(D));
+                            let pressure = face.pressure.at(&in_job(&faces.origin, &x), faces.middle);
+                            face.apply(
+                                &mut velocity,
+                                axis,
+                                inward,
+                                pressure,
+                                faces.dt,
+                                plan.cell(block.level),
+                            );
                         }
                         None => faces.contacts[axis][side].apply(&mut velocity, &normal),
                     }

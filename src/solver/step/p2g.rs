@@ -55,16 +55,8 @@ impl<const D: usize> Solver<D> {
         let scheme = self.physics.scheme();
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
         self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
-            let mut spreads = vec![[0.0; D]; chunk.len()];
-            for bin in BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()) {
-                if let Some(whole) = bin.whole {
-                    let constrained = bin.constrained;
-                    spread::of_particles(chunk, whole, &bin.frame, &scheme, constrained, |p, spread| {
-                        spreads[p] = spread;
-                    });
-                }
-                bin.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
-            }
+            let spreads =
+                spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme);
             for i in 0..D {
                 for k in 0..D {
                     let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
@@ -97,4 +89,22 @@ pub(super) fn scatter<const D: usize>(
     if !bin.parts.is_empty() {
         kernel.sub_boxes(bin.parts);
     }
+}
+
+/// Second moments D of the weights, m², of the particles of a leaf, which are sorted into these bins.
+pub(super) fn spreads<'a, const D: usize>(
+    bins: impl Iterator<Item = BinView<'a, D>>,
+    chunk: &Chunk<D>,
+    scheme: &Scheme,
+) -> Vec<[f64; D]> {
+    let mut spreads = vec![[0.0; D]; chunk.len()];
+    for bin in bins {
+        if let Some(whole) = bin.whole {
+            spread::of_particles(chunk, whole, &bin.frame, scheme, bin.constrained, |p, spread| {
+                spreads[p] = spread;
+            });
+        }
+        bin.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
+    }
+    spreads
 }

@@ -6,15 +6,16 @@ use crate::grid::NodeFields;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::plan::GridPlan;
 use crate::grid::sums::node_fields::VelocityArena;
-use crate::kernel::g2p::{self, Fields, Gathered, Moments};
-use crate::kernel::{Row, Transfer, spread};
+use crate::kernel::g2p::{self, Gathered};
+use crate::kernel::{Row, Transfer};
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::ContactGrid;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::p2g::scatter;
+use crate::solver::step::look::Look;
+use crate::solver::step::p2g::{scatter, spreads};
 
 /// Second moments D of the weights, m², of the particles in contact, leaf by leaf.
 type Spreads<const D: usize> = Vec<Vec<[f64; D]>>;
@@ -38,20 +39,7 @@ impl<const D: usize> Solver<D> {
         let (plan, lists, scheme) = (&self.grid.plan, &self.grid.lists, self.physics.scheme());
         let leaves = chunks.par_iter().enumerate().with_min_len(16);
         let spreads = leaves.map(|(leaf, chunk)| {
-            let mut spreads = vec![[0.0; D]; chunk.len()];
-            if chunk.is_empty() {
-                return spreads;
-            }
-            for bin in BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()) {
-                if let Some(whole) = bin.whole {
-                    let constrained = bin.constrained;
-                    spread::of_particles(chunk, whole, &bin.frame, &scheme, constrained, |p, spread| {
-                        spreads[p] = spread;
-                    });
-                }
-                bin.parts.iter().for_each(|part| spreads[part.particle as usize] = part.spread);
-            }
-            spreads
+            spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme)
         });
         spreads.collect()
     }
@@ -144,6 +132,7 @@ impl<const D: usize> Solver<D> {
         let scheme = self.physics.scheme();
         let (plan, lists, fields, arenas) =
             (&self.grid.plan, &self.grid.lists, &self.grid.fields, &self.grid.arenas);
+        let look = Look { plan, fields, arenas, scheme: &scheme };
         let times = &self.leaf_data.times;
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter().enumerate().with_min_len(8);
@@ -152,7 +141,7 @@ impl<const D: usize> Solver<D> {
                 if chunk.is_empty() {
                     return velocities;
                 }
-                let Scratch { kernel, arena, gathered, .. } = scratch;
+                let Scratch { kernel, arena, gathered } = scratch;
                 let mut take = |p: usize, gathered: &Gathered<D>| {
                     let (v, affine) = (gathered.velocity(), gathered.affine());
                     let (arm, spread) = (&touching[leaf][p].arm, &spreads[leaf][p]);
@@ -161,22 +150,7 @@ impl<const D: usize> Solver<D> {
                     });
                 };
                 times.time(leaf, || {
-                    let lists = lists.of_leaf(leaf);
-                    let cut: &[u32] = lists.map_or(&[], |bins| &bins.cut);
-                    gathered.clear();
-                    gathered.resize(cut.len(), Gathered::default());
-                    for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
-                        fields.load(plan, arenas, bin.number, &bin.window, arena);
-                        let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
-                        let nodes = Fields { velocity: &arena.rows, increment: None, moments };
-                        g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
-                        if let Some(whole) = bin.whole {
-                            g2p::look(kernel, chunk, whole, &bin.frame, &scheme, &nodes, |p, gathered| {
-                                take(p, &gathered);
-                            });
-                        }
-                    }
-                    cut.iter().zip(&*gathered).for_each(|(&p, gathered)| take(p as usize, gathered));
+                    look.at_leaf((kernel, arena, gathered), lists.of_leaf(leaf), leaf, chunk, &mut take);
                 });
                 velocities
             });
