@@ -4,20 +4,15 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+#[path = "../common.rs"]
+mod common;
 mod derive;
 mod headline;
 mod page;
 mod runs;
 
+use common::checked;
 use headline::Headline;
-
-/// The value, or the end of the program with the reason.
-fn checked<T, E: std::fmt::Display>(result: Result<T, E>, what: impl std::fmt::Display) -> T {
-    result.unwrap_or_else(|error| {
-        eprintln!("{what}: {error}");
-        std::process::exit(1)
-    })
-}
 
 /// A job that refines; the page quotes the text of the same name beside this file.
 struct Scene {

@@ -10,9 +10,12 @@ use agimp::io::snapshot::Header;
 use agimp::job::problem::CollapseLaw;
 use agimp::run::collapse::{Published, published};
 
+#[path = "../common.rs"]
+mod common;
 #[path = "../verification/plot.rs"]
 mod plot;
 
+use common::checked;
 use plot::{Chart, Series};
 
 const ASPECTS: [f64; 4] = [0.55, 0.9, 1.25, 2.75];
@@ -24,14 +27,6 @@ const FRONT_SHARE: f64 = 0.98;
 const ALLOWANCE: f64 = 0.1;
 /// Bins of the profile over the radius.
 const BINS_PER_RADIUS: f64 = 20.0;
-
-/// The value, or the end of the program with the reason.
-fn checked<T, E: std::fmt::Display>(result: Result<T, E>, what: impl std::fmt::Display) -> T {
-    result.unwrap_or_else(|error| {
-        eprintln!("{what}: {error}");
-        std::process::exit(1)
-    })
-}
 
 /// A deposit.
 struct Deposit {

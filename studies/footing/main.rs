@@ -5,9 +5,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+#[path = "../common.rs"]
+mod common;
 #[path = "../verification/plot.rs"]
 mod plot;
 
+use common::{checked, history};
 use plot::{Chart, Series};
 
 /// Half the width of the footing, m; its velocity, m/s; strength of the ground, Pa, as the job has them.
@@ -17,27 +20,11 @@ const STRENGTH: f64 = 1e4;
 /// Friction angle of the soil.
 const FRICTION: f64 = 20.0;
 
-/// The value, or the end of the program with the reason.
-fn checked<T, E: std::fmt::Display>(result: Result<T, E>, what: impl std::fmt::Display) -> T {
-    result.unwrap_or_else(|error| {
-        eprintln!("{what}: {error}");
-        std::process::exit(1)
-    })
-}
-
 /// Settlement, mm, and mean pressure over strength, row by row.
 fn curve(directory: &Path) -> Vec<[f64; 2]> {
-    let path = directory.join("strip_footing.history.csv");
-    let text = checked(std::fs::read_to_string(&path), path.display());
-    let mut lines = text.lines();
-    let heads: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| heads.iter().position(|head| head.starts_with(name)).unwrap_or_default();
-    let (time, force) = (column("time"), column("force_footing_y"));
-    let rows = lines.map(|line| {
-        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-        [1e3 * VELOCITY * cells[time], cells[force] / (HALF_WIDTH * STRENGTH)]
-    });
-    rows.collect()
+    let rows = history(&directory.join("strip_footing.history.csv"), ["time", "force_footing_y"]);
+    let scaled = |[time, force]: [f64; 2]| [1e3 * VELOCITY * time, force / (HALF_WIDTH * STRENGTH)];
+    rows.into_iter().map(scaled).collect()
 }
 
 /// Mean over the last tenth of the rows.

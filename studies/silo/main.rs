@@ -5,9 +5,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+#[path = "../common.rs"]
+mod common;
 #[path = "../verification/plot.rs"]
 mod plot;
 
+use common::{checked, history};
 use plot::{Chart, Series};
 
 /// Runs, the whole width of their slot in cells of 1/256 m, and the edge of their cells, mm.
@@ -28,14 +31,6 @@ const SLICE: f64 = 0.05;
 /// Beverloo's coefficient for slots, R. M. Nedderman, Statics and Kinematics of Granular Materials (1992).
 const SLOT: f64 = 1.03;
 
-/// The value, or the end of the program with the reason.
-fn checked<T, E: std::fmt::Display>(result: Result<T, E>, what: impl std::fmt::Display) -> T {
-    result.unwrap_or_else(|error| {
-        eprintln!("{what}: {error}");
-        std::process::exit(1)
-    })
-}
-
 /// A discharge: of the whole silo, the double of what the run has.
 struct Discharge {
     /// Width of the slot, m.
@@ -50,22 +45,14 @@ struct Discharge {
 
 impl Discharge {
     fn read(directory: &Path, cells: f64) -> Self {
-        let path = directory.join("silo.history.csv");
-        let text = checked(std::fs::read_to_string(&path), path.display());
-        let mut lines = text.lines();
-        let heads: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-        let column = |name: &str| heads.iter().position(|head| *head == name).unwrap_or_default();
-        let [time, mass, out, slot] =
-            ["time [s]", "mass [kg]", "passed_out [kg]", "passed_slot [kg]"].map(column);
-        let rows: Vec<Vec<f64>> = lines
-            .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
-            .collect();
-        let whole = rows[0][mass];
+        let names = ["time [s]", "mass [kg]", "passed_out [kg]", "passed_slot [kg]"];
+        let rows = history(&directory.join("silo.history.csv"), names);
+        let whole = rows[0][1];
         Self {
             width: cells / 256.0,
-            passed: rows.iter().map(|row| [row[time], 2.0 * row[slot]]).collect(),
+            passed: rows.iter().map(|[time, _, _, slot]| [*time, 2.0 * slot]).collect(),
             whole: 2.0 * whole,
-            is_exact: rows.iter().all(|row| row[mass] + row[out] == whole),
+            is_exact: rows.iter().all(|[_, mass, out, _]| mass + out == whole),
         }
     }
 

@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 mod band;
+#[path = "../common.rs"]
+mod common;
 #[path = "../verification/plot.rs"]
 mod plot;
 
 use band::Band;
+use common::{checked, history};
 use plot::{Chart, Series};
 
 /// Runs and what they are.
@@ -19,14 +22,6 @@ const COMPRESSIONS: [f64; 5] = [20.0, 30.0, 40.0, 50.0, 58.0];
 /// Compression over which loads are averaged, mm.
 const WINDOW: f64 = 1.5;
 
-/// The value, or the end of the program with the reason.
-fn checked<T, E: std::fmt::Display>(result: Result<T, E>, what: impl std::fmt::Display) -> T {
-    result.unwrap_or_else(|error| {
-        eprintln!("{what}: {error}");
-        std::process::exit(1)
-    })
-}
-
 /// Compression of the specimen, mm, after a time, s, as the job has it.
 fn compression(time: f64) -> f64 {
     1e3 * if time < 0.2 { 0.125 * time * time } else { 0.005 + 0.05 * (time - 0.2) }
@@ -34,18 +29,8 @@ fn compression(time: f64) -> f64 {
 
 /// Compression, mm, and load per metre, kN, row by row.
 fn curve(directory: &Path) -> Vec<[f64; 2]> {
-    let path = directory.join("specimen.history.csv");
-    let text = checked(std::fs::read_to_string(&path), path.display());
-    let mut lines = text.lines();
-    let heads: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| heads.iter().position(|head| head.starts_with(name)).unwrap_or_default();
-    let (time, load) = (column("time"), column("load_press_y"));
-    lines
-        .map(|line| {
-            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-            [compression(cells[time]), -1e-3 * cells[load]]
-        })
-        .collect()
+    let rows = history(&directory.join("specimen.history.csv"), ["time", "load_press_y"]);
+    rows.into_iter().map(|[time, load]| [compression(time), -1e-3 * load]).collect()
 }
 
 /// Mean load near a compression.
