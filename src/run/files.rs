@@ -2,7 +2,8 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::{Run, RunError, maps, restart};
+use super::measures::maps;
+use super::{Run, RunError, restart};
 use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, View};
 use crate::job::Problem;

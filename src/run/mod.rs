@@ -3,8 +3,7 @@ mod claim;
 pub mod collapse;
 mod files;
 pub mod history;
-mod lines;
-mod maps;
+mod measures;
 mod outcome;
 pub mod record;
 pub mod report;
@@ -74,7 +73,7 @@ impl<'a, const D: usize> Run<'a, D> {
             claim::spare_results(comm, problem)?;
         }
         let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
-        restart::begin_measures(problem, &mut solver);
+        measures::begin(problem, &mut solver);
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
         claim.take(comm, problem)?;

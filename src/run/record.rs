@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use partition::comm::{Comm, Traffic};
 
+use super::measures::lines;
 use super::report::{self, Report};
-use super::{Options, RunError, Summary, history, lines};
+use super::{Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;

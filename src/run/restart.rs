@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use partition::Forest;
 use partition::comm::Comm;
 
-use super::RunError;
+use super::{RunError, measures};
 use crate::adaptivity::resample::ids;
 use crate::boundary::motion::Rate;
-use crate::checksum::fnv1a;
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
@@ -18,7 +17,6 @@ use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};
 use crate::load;
 use crate::particle::Chunk;
-use crate::probe::{Map, Maxima, Tracked};
 use crate::setup;
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::migration::crossings::Crossings;
@@ -80,7 +78,7 @@ pub fn scalars<const D: usize>(
         .zip(&mut crossings.masses)
         .map(|(name, sum)| ((*name).into(), sum.words().to_vec()))
         .collect();
-    write_measures(comm, problem, solver, &mut reals, &mut counts, &mut exact);
+    measures::write(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
     write_exact_sums("face", &solver.face_sums, comm, &mut reals, &mut exact);
@@ -107,67 +105,6 @@ pub fn scalars<const D: usize>(
         }
     }
     Scalars { reals, counts, exact }
-}
-
-/// Name under which a file has something of a flux or a track.
-fn measure(kind: &str, name: &str, what: &str) -> String {
-    format!("{kind}_{what}{:016x}", fnv1a(name.bytes().map(u64::from)))
-}
-
-/// Collective. Appends what is booked of fluxes, and where tracks are.
-fn write_measures<const D: usize>(
-    comm: &Comm,
-    problem: &Problem<D>,
-    solver: &Solver<D>,
-    reals: &mut Vec<(String, f64)>,
-    counts: &mut Vec<(String, u64)>,
-    exact: &mut Vec<(String, Vec<i64>)>,
-) {
-    let mut sums = solver.crossings.fluxes.gather(comm);
-    let fluxes = problem.fluxes.iter().zip(&mut sums);
-    exact.extend(fluxes.map(|(flux, sum)| (measure("flux", &flux.name, ""), sum.words().to_vec())));
-    for (track, tracked) in problem.tracks.iter().zip(&solver.tracked) {
-        // Halves of an identifier are numbers that counts may be.
-        let halves = [("low_", tracked.id & HALF), ("high_", tracked.id >> 32)];
-        counts.extend(halves.map(|(half, id)| (measure("track", &track.name, half), id)));
-        let place = tracked.place.iter().enumerate();
-        reals.extend(place.map(|(a, &x)| (measure("track", &track.name, &format!("{a}_")), x)));
-    }
-}
-
-/// The lower half of an identifier.
-const HALF: u64 = 0xffff_ffff;
-
-/// Collective. Begins to count at fluxes, and to follow tracks.
-pub fn begin_measures<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>) {
-    solver.crossings.fluxes = Fluxes::new(&problem.fluxes);
-    solver.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
-    solver.begin_tracks(&problem.tracks);
-    solver.maxima = problem.maps.iter().map(Map::nothing).collect();
-}
-
-/// Takes over what is booked of fluxes, on rank 0, and where tracks are. Those that the file lacks begin here.
-fn restore_measures<const D: usize>(
-    rank: usize,
-    problem: &Problem<D>,
-    solver: &mut Solver<D>,
-    scalars: &Scalars,
-) {
-    begin_measures(problem, solver);
-    for (flux, sum) in problem.fluxes.iter().zip(&mut solver.crossings.fluxes.sums) {
-        let read = scalars.exact(&measure("flux", &flux.name, "")).and_then(ExactSum::from_words);
-        if let Some(read) = read {
-            *sum = if rank == 0 { read } else { ExactSum::new() };
-        }
-    }
-    for (track, tracked) in problem.tracks.iter().zip(&mut solver.tracked) {
-        let half = |half| scalars.count(&measure("track", &track.name, half));
-        let coordinate = |a: usize| scalars.real(&measure("track", &track.name, &format!("{a}_")));
-        let place: Option<Vec<f64>> = (0..D).map(coordinate).collect();
-        if let (Some(low), Some(high), Some(place)) = (half("low_"), half("high_"), place) {
-            *tracked = Tracked { id: low | high << 32, place: std::array::from_fn(|a| place[a]) };
-        }
-    }
 }
 
 /// Name of the time at which a stage began.
@@ -377,8 +314,7 @@ fn restored<const D: usize>(
     let follows = problem.output.displacement;
     let expected = load::columns(&problem.loads) + if follows { D } else { 0 };
     if comm.any(carried != 0 && carried != expected) {
-        let reason = "particles carry other loads than those of the job, or it follows displacements and the job does not ask for that \
-                      field, or the other way round";
+        let reason = "particles carry other loads than those of the job, or displacements that output.fields does not ask for";
         return Err(refused(reason));
     }
     if follows && restored.header.step > 0 && !comm.any(carried != 0) {
@@ -416,14 +352,7 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
-    restore_measures(comm.rank(), problem, &mut solver, &header.scalars);
-    for (map, maxima) in problem.maps.iter().zip(&mut solver.maxima) {
-        let [depth, speed] =
-            ["depth", "speed"].map(|what| snapshot::map_values(path, &map.name, what, map.len()));
-        if let (Some(depth), Some(speed)) = (depth, speed) {
-            *maxima = Maxima { depth, speed };
-        }
-    }
+    measures::restore(comm.rank(), problem, &mut solver, &header.scalars, path);
     Ok((solver, header.scalars))
 }
 

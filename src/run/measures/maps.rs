@@ -5,7 +5,10 @@ use crate::job::Problem;
 use crate::probe::Maxima;
 
 /// Not collective. Writes the largest depths and speeds so far.
-pub(super) fn write<const D: usize>(problem: &Problem<D>, maxima: &[Maxima]) -> Result<(), FileError> {
+pub(in crate::run) fn write<const D: usize>(
+    problem: &Problem<D>,
+    maxima: &[Maxima],
+) -> Result<(), FileError> {
     for (map, maxima) in problem.maps.iter().zip(maxima) {
         let origin = |axis: usize| if axis < D - 1 { problem.origin[axis] } else { 0.0 };
         let corner = std::array::from_fn(|axis| origin(axis) + map.corner[axis]);

@@ -9,12 +9,12 @@ use crate::probe::line::Sample;
 use crate::solver::Clock;
 
 /// The file of a line.
-pub(super) fn path<const D: usize>(problem: &Problem<D>, line: &Line<D>) -> PathBuf {
+pub(in crate::run) fn path<const D: usize>(problem: &Problem<D>, line: &Line<D>) -> PathBuf {
     problem.output.directory.join(format!("{}.line_{}.csv", problem.name, line.name))
 }
 
 /// Not collective. Opens the files of all lines, with the rows that are `kept`, and what is missing there.
-pub(super) fn open<const D: usize>(
+pub(in crate::run) fn open<const D: usize>(
     problem: &Problem<D>,
     kept: Option<Kept>,
 ) -> Result<Vec<(History, Vec<Gap>)>, FileError> {
@@ -34,7 +34,7 @@ pub(super) fn open<const D: usize>(
 }
 
 /// Not collective. Writes the rows of a step.
-pub(super) fn write<const D: usize>(
+pub(in crate::run) fn write<const D: usize>(
     files: &mut [History],
     problem: &Problem<D>,
     clock: Clock,
