@@ -1,5 +1,5 @@
 //! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as collider gives the same results on any
-//! ranks and across a restart; hostile files give a message.
+//! ranks and across a restart; a raster of heights is the same terrain from each format; hostile files give a message.
 #[path = "common/random.rs"]
 #[allow(dead_code, reason = "each test uses its part")]
 mod random;
@@ -7,13 +7,16 @@ mod random;
 mod runs;
 
 use agimp::geometry::Mesh;
-use agimp::geometry::mesh::read;
+use agimp::geometry::mesh::{HeightRaster, Placing, Terrain, read};
 use random::Random;
 use runs::history::History;
 use runs::launch::{Outcome, run, succeed, text};
 use runs::restart;
 use std::fmt::Write as _;
+use std::io::{Cursor, Write as _};
 use std::path::Path;
+use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+use tiff::tags::Tag;
 
 /// A cube of edge 1 with a corner at the origin.
 const FACES: [[usize; 4]; 6] =
@@ -157,6 +160,145 @@ fn a_changed_mesh_is_another_job() {
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
 }
 
+/// Heights of a hill with steps of 1/64 m, 9 x 6 of them 0.25 m apart, rows from north to south.
+fn hill() -> Vec<f32> {
+    let height = |at: u32| 16 + (at % 9) * 3 + (at / 9) * (5 - at / 9);
+    (0..54).map(|at| height(at) as f32 / 64.0).collect()
+}
+
+/// The hill in each format of a raster, by name of the file, with its south-western height at (0, 0).
+fn hills() -> Vec<(&'static str, Vec<u8>)> {
+    let rows: Vec<String> =
+        hill().chunks(9).map(|row| row.iter().map(f32::to_string).collect::<Vec<_>>().join(" ")).collect();
+    let text = format!(
+        "ncols 9\nnrows 6\nxllcenter 0\nyllcenter 0\ncellsize 0.25\nNODATA_value -9999\n{}\n",
+        rows.join("\n")
+    );
+    let mut image = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut image).expect("TIFF");
+    let mut writer = encoder.new_image::<Gray32Float>(9, 6).expect("image");
+    let tags = writer.encoder();
+    tags.write_tag(Tag::ModelPixelScaleTag, &[0.25, 0.25, 0.0][..]).expect("tag");
+    // The corner of the north-western pixel, half a cell from its centre.
+    tags.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, -0.125, 1.375, 0.0][..]).expect("tag");
+    tags.write_tag(Tag::GeoKeyDirectoryTag, &[1_u16, 1, 0, 2, 1024, 0, 1, 1, 1025, 0, 1, 1][..])
+        .expect("tag");
+    tags.write_tag(Tag::GdalNodata, "-9999").expect("tag");
+    writer.write_data(&hill()).expect("heights");
+    let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 9), }";
+    let mut array = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    array.extend(format!("{header:117}\n").into_bytes());
+    array.extend(hill().into_iter().flat_map(f32::to_le_bytes));
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in [("hill.npy", &array), ("other.npy", &vec![0; 9])] {
+        archive.start_file(name, zip::write::SimpleFileOptions::default()).expect("archive");
+        archive.write_all(bytes).expect("array");
+    }
+    let archive = archive.finish().expect("archive").into_inner();
+    vec![
+        ("hill.asc", text.into_bytes()),
+        ("hill.tif", image.into_inner()),
+        ("hill.npy", array),
+        ("hill.npz", archive),
+    ]
+}
+
+/// What the job has to say of the arrays.
+fn hill_keys(name: &str) -> &'static str {
+    match &name[5..] {
+        "npy" => ", cell = 0.25",
+        "npz" => ", cell = 0.25, array = 'hill'",
+        _ => "",
+    }
+}
+
+/// A layer of jelly slides on a hill: the same raster gives the same run from each format.
+#[test]
+fn a_raster_of_any_format_is_the_same_terrain() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let outcomes: Vec<Outcome> = hills()
+        .into_iter()
+        .map(|(name, bytes)| {
+            std::fs::write(directory.path().join(name), bytes).expect("raster");
+            let shape = |rest: &str| {
+                format!("kind = 'terrain', file = '{name}', base = -0.25{}{rest}", hill_keys(name))
+            };
+            let rest =
+                format!("[[colliders]]\nname = 'hill'\nshape = {{ {} }}\n[time]\nend = 0.02", shape(""));
+            outcome(directory.path(), &job(&format!("{{ {} }}", shape(", thickness = 0.3")), &rest))
+        })
+        .collect();
+    let state = |outcome: &Outcome| -> Vec<String> {
+        outcome.digest.lines().filter(|line| line.contains("state/")).map(str::to_owned).collect()
+    };
+    for other in &outcomes[1..] {
+        assert!(other.history == outcomes[0].history);
+        assert_eq!(state(other), state(&outcomes[0]));
+    }
+}
+
+/// Rasters with bytes flipped, cut, doubled and overwritten: a terrain, or an error; never a panic, and never slow.
+#[test]
+fn damaged_rasters_give_a_message() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let mut random = Random::new(2);
+    let mut next = |below: usize| random.below(below as u64) as usize;
+    let placing = Placing { cell: None, array: None };
+    let mut read_well = 0;
+    for (name, bytes) in hills() {
+        let path = directory.path().join(name);
+        let placing = match &name[5..] {
+            "npz" => Placing { cell: Some(0.25), array: Some("hill".into()) },
+            "npy" => Placing { cell: Some(0.25), array: None },
+            _ => placing.clone(),
+        };
+        for _ in 0..300 {
+            let damaged = damage(&bytes, &mut next);
+            std::fs::write(&path, &damaged).expect("raster");
+            match HeightRaster::read(&path, &placing) {
+                Ok(raster) => match Terrain::new(raster) {
+                    Ok(terrain) => read_well += usize::from(terrain.length() > 0.0),
+                    Err(error) => assert!(!error.is_empty()),
+                },
+                Err(error) => assert!(!error.to_string().is_empty()),
+            }
+        }
+    }
+    println!("{read_well} of 1200 are terrains all the same");
+}
+
+/// A cube that lacks a triangle is filled by winding number: the particles are those of a box.
+#[test]
+fn a_torn_cube_is_filled() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let mut torn = cubes().swap_remove(1).1;
+    torn.truncate(torn.len() - 50);
+    torn[80] = 11;
+    std::fs::write(directory.path().join("torn.stl"), torn).expect("mesh");
+    let rest = "[time]\nend = 0.01";
+    let reference =
+        outcome(directory.path(), &job("{ kind = 'box', min = [0.5, 0.5, 0], max = [1.5, 1.5, 1] }", rest));
+    let shape = "{ kind = 'mesh', solid = 'winding', file = 'torn.stl', origin = [0.5, 0.5, 0] }";
+    let found = outcome(directory.path(), &job(shape, rest));
+    assert!(found.history == reference.history);
+}
+
+/// Some bytes flipped, cut, overwritten or doubled.
+fn damage(bytes: &[u8], next: &mut impl FnMut(usize) -> usize) -> Vec<u8> {
+    let mut damaged = bytes.to_vec();
+    for _ in 0..=next(3) {
+        let at = next(damaged.len());
+        match next(5) {
+            0 => damaged[at] ^= 1 << next(8),
+            1 => damaged.truncate(at.max(1)),
+            2 => damaged[at] = b"0123456789-.e \n"[next(15)],
+            3 => damaged[at] = 0xff,
+            _ => damaged.extend_from_within(at..),
+        }
+    }
+    damaged
+}
+
 /// Each format with bytes flipped, cut, doubled and overwritten: a mesh, or an error; never a panic, and never slow.
 #[test]
 fn damaged_files_give_a_message() {
@@ -166,27 +308,21 @@ fn damaged_files_give_a_message() {
     let mut read_well = 0;
     for (name, bytes) in cubes() {
         for _ in 0..400 {
-            let mut damaged = bytes.clone();
-            for _ in 0..=next(3) {
-                let at = next(damaged.len());
-                match next(5) {
-                    0 => damaged[at] ^= 1 << next(8),
-                    1 => damaged.truncate(at.max(1)),
-                    2 => damaged[at] = b"0123456789-.e \n"[next(15)],
-                    3 => damaged[at] = 0xff,
-                    _ => damaged.extend_from_within(at..),
-                }
-            }
+            let damaged = damage(&bytes, &mut next);
             let path = directory.path().join(name);
             std::fs::write(&path, &damaged).expect("mesh");
             match read(&path) {
-                Ok(triangles) => match Mesh::new(triangles) {
-                    Ok(_) => read_well += 1,
-                    Err(error) => assert!(!error.to_string().is_empty()),
-                },
+                Ok(triangles) => {
+                    for made in [Mesh::new(triangles.clone()), Mesh::wound(triangles)] {
+                        match made {
+                            Ok(_) => read_well += 1,
+                            Err(error) => assert!(!error.to_string().is_empty()),
+                        }
+                    }
+                }
                 Err(error) => assert!(!error.to_string().is_empty()),
             }
         }
     }
-    println!("{read_well} of 2000 are solids all the same");
+    println!("{read_well} of 4000 are solids all the same");
 }

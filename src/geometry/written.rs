@@ -104,7 +104,7 @@ pub enum Shape {
         #[schemars(length(max = 10_000))]
         points: Vec<Vector>,
     },
-    /// A solid bounded by triangles, from a file; 3D only. The surface is closed, and its triangles face one way.
+    /// A solid bounded by triangles, from a file; 3D only.
     #[schemars(extend("x-dimension" = 3))]
     Mesh {
         /// File in STL (text or binary), OBJ or PLY (text or binary), by its ending; relative to the directory of the job file.
@@ -113,6 +113,9 @@ pub enum Shape {
         #[serde(default = "one")]
         #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
         scale: f64,
+        /// What is inside: `closed` by default.
+        #[serde(default)]
+        solid: Solid,
         /// Where the origin of the file lies, m; the origin of the job by default.
         #[serde(default)]
         origin: Option<Vector>,
@@ -120,8 +123,24 @@ pub enum Shape {
     /// Terrain: the solid below a surface of heights, from a raster; 3D only, z points up.
     #[schemars(extend("x-dimension" = 3))]
     Terrain {
-        /// ESRI ASCII grid (`.asc`), every cell with a height; relative to the directory of the job file.
+        /// ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`) or array of NumPy (`.npy`, `.npz`), rows from north to south, every cell with a height;
+        /// relative to the directory of the job file.
         file: String,
+        /// Distance of neighbouring heights, m: for arrays, which do not have it, or in place of that of the file; the south-western
+        /// height then stands at the origin of the raster's coordinates.
+        #[serde(default)]
+        #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
+        cell: Option<f64>,
+        /// Name of the array in a file with several (`.npz`).
+        #[serde(default)]
+        array: Option<String>,
+        /// How the surface runs between the heights: `triangles` by default.
+        #[serde(default)]
+        surface: Surface,
+        /// The solid is a layer on the terrain, this thick, m, measured upwards: a number, or the name of a raster with the same cells, with no
+        /// layer where it has no data. By default it is all that lies below the surface.
+        #[serde(default)]
+        thickness: Option<Thickness>,
         /// Where the origin of the raster's coordinates lies, m; the origin of the job by default.
         #[serde(default)]
         origin: Option<Vector>,
@@ -161,4 +180,36 @@ pub enum Shape {
         /// Shapes removed; at least one.
         remove: Vec<Shape>,
     },
+}
+
+/// What is inside of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Solid {
+    /// What the surface encloses: it is closed, its triangles face one way, and it does not cross itself.
+    #[default]
+    Closed,
+    /// What the surface winds around: holes are closed by cones over their rims, overlaps are filled, and triangles may face either way.
+    Winding,
+}
+
+/// How the surface of a terrain runs between the heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Surface {
+    /// Two triangles for each cell.
+    #[default]
+    Triangles,
+    /// A cubic surface through the heights, in triangles of a quarter of a cell.
+    Smooth,
+}
+
+/// Thickness of a layer.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Thickness {
+    /// The same everywhere, m.
+    Constant(#[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))] f64),
+    /// From a raster, m.
+    Raster(String),
 }

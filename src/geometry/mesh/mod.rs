@@ -3,12 +3,14 @@
 //! | file | what it does |
 //! |---|---|
 //! | `read` | STL, OBJ and PLY to triangles |
-//! | `terrain` | rasters of heights to triangles |
+//! | `terrain/` | rasters of heights to triangles |
 //! | `solid` | checks that triangles bound a solid |
+//! | `crossing` | triangles that cross each other |
+//! | `winding` | inside and outside by the generalised winding number |
 //! | this | signed distance and normal |
 //!
 //! The nearest point of the surface comes from the tree of `parry3d`, and the side from its angle-weighted normals (Baerentzen and Aanaes
-//! 2005), which is exact at edges and corners. A raster of distances stands before it: away from the surface a point takes the bound that
+//! 2005), which is exact at edges and corners, or, for what is not quite closed, from the winding number. A raster of distances stands before it: away from the surface a point takes the bound that
 //! its cell of the raster gives, so that what asks from afar does not search the tree.
 use std::sync::Arc;
 
@@ -20,13 +22,18 @@ use super::Aabb;
 use super::primitives::box_distance;
 use crate::checksum::fnv1a;
 
+mod crossing;
 mod read;
 mod solid;
 mod terrain;
+mod winding;
 
 pub use read::{ReadError, Triangles, read};
 pub use solid::NotSolid;
-pub use terrain::Terrain;
+pub use terrain::{Placing, Raster as HeightRaster, Terrain};
+
+use solid::Merged;
+use winding::Winding;
 
 /// Cells of the raster along the longest edge of the bounding box.
 const RASTER: usize = 48;
@@ -38,8 +45,30 @@ pub struct Mesh(Arc<Inner>);
 /// The triangles.
 struct Surface {
     surface: TriMesh,
-    /// Not closed, so that nothing is inside.
-    is_sheet: bool,
+    inside: Inside,
+}
+
+/// What says on which side of the surface a point is.
+enum Inside {
+    /// The normals of a closed surface.
+    Normals,
+    /// The winding number.
+    Winding(Winding),
+    /// Nothing is inside of a sheet.
+    Nothing,
+}
+
+/// What triangles are taken for.
+#[derive(Clone, Copy, PartialEq)]
+enum Filling {
+    /// The solid that they close.
+    Closed,
+    /// As above, and known not to cross: no search for crossings.
+    Terrain,
+    /// The solid that they close, or a sheet.
+    ClosedOrSheet,
+    /// The solid that they wind around, closed or not.
+    Winding,
 }
 
 struct Inner {
@@ -65,7 +94,15 @@ impl Mesh {
     /// # Errors
     /// They bound none.
     pub fn new(triangles: Triangles) -> Result<Self, NotSolid> {
-        Self::of(triangles, false)
+        Self::of(triangles, Filling::Closed)
+    }
+
+    /// The solid below a terrain: as [`Mesh::new`], without the search for crossings, which a surface of heights cannot have.
+    ///
+    /// # Errors
+    /// A height is at no place.
+    pub fn terrain(triangles: Triangles) -> Result<Self, NotSolid> {
+        Self::of(triangles, Filling::Terrain)
     }
 
     /// The solid that triangles bound, or, where they are not closed, the sheet that they are: all its distances are positive.
@@ -73,28 +110,55 @@ impl Mesh {
     /// # Errors
     /// There is no triangle with an area, or a vertex is at no place.
     pub fn solid_or_sheet(triangles: Triangles) -> Result<Self, NotSolid> {
-        Self::of(triangles, true)
+        Self::of(triangles, Filling::ClosedOrSheet)
     }
 
-    fn of(triangles: Triangles, may_be_sheet: bool) -> Result<Self, NotSolid> {
-        let Triangles { vertices, mut indices } = solid::merged(triangles)?;
+    /// The solid that triangles wind around: they may leave holes, cross each other and face both ways. Holes are closed by cones over
+    /// their rims, and what the surface winds around is inside.
+    ///
+    /// # Errors
+    /// There is no triangle with an area, a vertex is at no place, or nothing is inside.
+    pub fn wound(triangles: Triangles) -> Result<Self, NotSolid> {
+        Self::of(triangles, Filling::Winding)
+    }
+
+    fn of(triangles: Triangles, filling: Filling) -> Result<Self, NotSolid> {
+        let Merged { mut vertices, mut indices, numbers } = solid::merged(triangles)?;
+        let words = vertices.iter().flatten().map(|x| x.to_bits());
+        let words = words.chain(indices.iter().flatten().map(|&index| u64::from(index)));
+        let checksum = fnv1a(words.chain((filling == Filling::Winding).then_some(1)));
+        if filling == Filling::Winding {
+            solid::cap_holes(&mut vertices, &mut indices);
+        }
         let volume = match solid::check(&vertices, &indices) {
             Ok(volume) => Some(volume),
-            Err(NotSolid::Open { .. } | NotSolid::Turned(_) | NotSolid::Flat(_)) if may_be_sheet => None,
+            Err(NotSolid::Open { .. } | NotSolid::Turned(_) | NotSolid::Flat(_))
+                if filling == Filling::ClosedOrSheet =>
+            {
+                None
+            }
             Err(other) => return Err(other),
         };
         if volume.is_some_and(|volume| volume < 0.0) {
             indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
-        let words = vertices.iter().flatten().map(|x| x.to_bits());
-        let words = words.chain(indices.iter().flatten().map(|&index| u64::from(index)));
-        let checksum = fnv1a(words);
-        let vertices = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
-        let flags = if volume.is_some() { TriMeshFlags::ORIENTED } else { TriMeshFlags::empty() };
-        let surface = TriMesh::with_flags(vertices, indices, flags)
+        let inside = match (filling, volume) {
+            (Filling::Winding, _) => Inside::Winding(Winding::new(&vertices, &indices)),
+            (_, Some(_)) => Inside::Normals,
+            (_, None) => Inside::Nothing,
+        };
+        let places: Vec<Vector> = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
+        let flags = match inside {
+            Inside::Normals => TriMeshFlags::ORIENTED,
+            Inside::Winding(_) | Inside::Nothing => TriMeshFlags::empty(),
+        };
+        let surface = TriMesh::with_flags(places, indices.clone(), flags)
             .map_err(|error| NotSolid::Refused(error.to_string()))?;
-        let surface = Surface { surface, is_sheet: volume.is_none() };
+        if matches!(inside, Inside::Normals) && filling != Filling::Terrain {
+            crossing::check(&vertices, &indices, &numbers, surface.bvh())?;
+        }
+        let surface = Surface { surface, inside };
         let raster = Raster::new(&surface, &bounds);
         Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.unwrap_or(0.0).abs() })))
     }
@@ -150,11 +214,15 @@ impl Mesh {
 
 /// Signed distance and the nearest point of the surface.
 fn nearest(surface: &Surface, x: &[f64; 3]) -> (f64, [f64; 3]) {
-    let Surface { surface, is_sheet } = surface;
-    let projection = surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
+    let projection = surface.surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
     let point = [projection.point.x, projection.point.y, projection.point.z];
     let distance = (0..3).map(|a| (x[a] - point[a]) * (x[a] - point[a])).sum::<f64>().sqrt();
-    (if projection.is_inside && !is_sheet { -distance } else { distance }, point)
+    let is_inside = match &surface.inside {
+        Inside::Normals => projection.is_inside,
+        Inside::Winding(winding) => winding.is_inside(x),
+        Inside::Nothing => false,
+    };
+    (if is_inside { -distance } else { distance }, point)
 }
 
 impl Raster {
@@ -164,8 +232,8 @@ impl Raster {
         let lower = bounds.lower.map(|x| x - edge);
         let cells = size.map(|s| (s / edge).ceil() as usize + 2);
         let mut raster = Self { lower, edge, cells, distances: Vec::new() };
-        raster.distances =
-            (0..cells.iter().product()).map(|cell| nearest(surface, &raster.centre(cell)).0).collect();
+        let all = 0..cells.iter().product::<usize>();
+        raster.distances = all.map(|cell| nearest(surface, &raster.centre(cell)).0).collect();
         raster
     }
 
@@ -204,106 +272,4 @@ impl std::fmt::Debug for Mesh {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A ball of radius 1 about the origin by subdivision of an octahedron.
-    pub(super) fn ball(depth: u32) -> Triangles {
-        let mut vertices: Vec<[f64; 3]> = Vec::new();
-        let mut indices = Vec::new();
-        let n = 1_usize << depth;
-        let signs = [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]];
-        let signs = signs.into_iter().chain(signs.map(|s| s.map(|c: f64| -c)));
-        for sign in signs {
-            let point = |i: usize, j: usize| {
-                let p = [i as f64, j as f64, (n - i - j) as f64].map(|c| c / n as f64);
-                let length = p.iter().map(|c| c * c).sum::<f64>().sqrt();
-                std::array::from_fn(|a| sign[a] * p[a] / length)
-            };
-            let turns = sign[0] * sign[1] * sign[2] < 0.0;
-            let mut push = |a: [f64; 3], b, c| {
-                let first = vertices.len() as u32;
-                vertices.extend([a, b, c]);
-                indices.push(if turns {
-                    [first, first + 2, first + 1]
-                } else {
-                    [first, first + 1, first + 2]
-                });
-            };
-            for i in 0..n {
-                for j in 0..n - i {
-                    push(point(i, j), point(i + 1, j), point(i, j + 1));
-                    if i + j + 2 <= n {
-                        push(point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
-                    }
-                }
-            }
-        }
-        Triangles { vertices, indices }
-    }
-
-    pub(super) fn cube() -> Triangles {
-        let vertices = (0..8).map(|c| [f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)]).collect();
-        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let indices = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        Triangles { vertices, indices }
-    }
-
-    /// Points of a box about a solid, in no order.
-    fn points(reach: f64) -> impl Iterator<Item = [f64; 3]> {
-        let part = |i: u32, root: f64| (f64::from(i) * root).fract() * 2.0 - 1.0;
-        (1..4000).map(move |i| {
-            [part(i, 0.754_877_666), part(i, 0.569_840_291), part(i, 0.819_172_513)].map(|c| reach * c)
-        })
-    }
-
-    /// The distance of a cube is exact near its surface, edges and corners included, and a bound with the right sign elsewhere; the
-    /// normal is the gradient.
-    #[test]
-    fn a_cube_is_a_box() {
-        let mesh = Mesh::new(cube()).unwrap();
-        assert!((mesh.volume() - 1.0).abs() < 1e-15);
-        let exact = super::super::Shape::Box(Aabb::new([0.0; 3], [1.0; 3]));
-        let near = 2.0 / RASTER as f64;
-        for x in points(1.2).map(|x| x.map(|c| c + 0.5)) {
-            let (found, expected) = (mesh.distance(&x), exact.distance(&x));
-            assert!(
-                found * expected >= 0.0 && found.abs() <= expected.abs() + 1e-15,
-                "{x:?}: {found} {expected}"
-            );
-            if expected.abs() < near {
-                assert!((found - expected).abs() < 1e-14, "{x:?}: {found} {expected}");
-                let (normal, exact) = (mesh.gradient(&x), exact.gradient(&x));
-                let cos: f64 = (0..3).map(|a| normal[a] * exact[a]).sum();
-                // Along the planes that halve its edges there are two.
-                assert!(cos > 1.0 - 1e-9 || expected < 0.0, "{x:?}: {normal:?} {exact:?}");
-            }
-        }
-        assert_eq!(mesh.gradient(&[0.25, 0.5, 1.0]), [0.0, 0.0, 1.0]);
-    }
-
-    /// A ball of 8,192 triangles: as far off as its facets are, 2e-4 of the radius squared over the square of their edge.
-    #[test]
-    fn a_fine_ball_is_nearly_a_ball() {
-        let mesh = Mesh::new(ball(5)).unwrap();
-        let sagitta = 2.0 * (1.0 / 32.0_f64).powi(2);
-        for x in points(1.3) {
-            let expected = x.iter().map(|c| c * c).sum::<f64>().sqrt() - 1.0;
-            let found = mesh.distance(&x);
-            assert!(found.abs() <= expected.abs() + sagitta, "{x:?}: {found} {expected}");
-            assert!(found * expected > 0.0 || expected.abs() < sagitta, "{x:?}: {found} {expected}");
-            if expected.abs() < 0.04 {
-                assert!((found - expected).abs() < sagitta, "{x:?}: {found} {expected}");
-            }
-        }
-    }
-
-    /// Turned inside out it is the same solid.
-    #[test]
-    fn facing_inwards_is_turned() {
-        let mut inwards = cube();
-        inwards.indices.iter_mut().for_each(|triangle| triangle.swap(0, 1));
-        let mesh = Mesh::new(inwards).unwrap();
-        assert!(mesh.distance(&[0.5; 3]) < 0.0 && mesh.distance(&[1.5; 3]) > 0.0);
-    }
-}
+mod tests;

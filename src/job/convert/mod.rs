@@ -6,6 +6,7 @@
 //! | `checks` | what all need: faults with their places, the domain |
 //! | `settings` | faces, numerics, output, report |
 //! | `shapes` | shapes |
+//! | `terrain` | terrain |
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `loads` | loads and quantities |
@@ -41,6 +42,7 @@ pub(super) mod settings;
 mod shapes;
 mod stages;
 mod stress;
+mod terrain;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;

@@ -1,7 +1,7 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
 use super::checks::{Checks, Space};
-use crate::geometry::mesh::{self, NotSolid, Terrain, Triangles};
-use crate::geometry::written::{Shape as Written, Vector};
+use crate::geometry::mesh::{self, NotSolid, Triangles};
+use crate::geometry::written::{Shape as Written, Solid, Vector};
 use crate::geometry::{Aabb, Frustum, Mesh, Placement, Shape, rotation};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
@@ -73,29 +73,21 @@ impl Checks<'_> {
                 self.only(2, D, "polygon", "union of boxes", path)?;
                 self.polygon(points, space, &path.key("points"))
             }
-            Written::Mesh { file, scale, origin } => {
+            Written::Mesh { file, scale, solid, origin } => {
                 self.only(3, D, "mesh", "polygon", path)?;
                 let origin = self.origin_of_file(origin.as_ref(), space, path)?;
                 let triangles =
                     self.read(file, "a mesh in STL, OBJ or PLY", &path.key("file"), mesh::read)?;
-                self.solid(triangles, *scale, &origin, file, &path.key("file"))
+                let make = match solid {
+                    Solid::Winding => Mesh::wound,
+                    Solid::Closed if self.takes_sheets => Mesh::solid_or_sheet,
+                    Solid::Closed => Mesh::new,
+                };
+                self.solid(triangles, *scale, &origin, make, file, &path.key("file"))
             }
-            Written::Terrain { file, origin, base } => {
+            Written::Terrain { .. } => {
                 self.only(3, D, "terrain", "polygon", path)?;
-                let origin = self.origin_of_file(origin.as_ref(), space, path)?;
-                let terrain = self.read(file, "an ESRI ASCII grid", &path.key("file"), Terrain::read)?;
-                let [least, _] = terrain.range();
-                let base = base.unwrap_or(least - 0.1 * terrain.length());
-                if base >= least {
-                    let message = format!(
-                        "found {}; expected less than the least height, {}",
-                        written(base),
-                        written(least)
-                    );
-                    self.fault(&path.key("base"), message);
-                    return None;
-                }
-                self.solid(terrain.solid_above(base), 1.0, &origin, file, &path.key("file"))
+                self.terrain(shape, space, path)
             }
             Written::Rotated { shape, centre, axis, angle } => {
                 let inner = self.shape(shape, space, &path.key("shape"))?;
@@ -117,7 +109,7 @@ impl Checks<'_> {
     }
 
     /// Where the origin of a file lies, m from the lower corner of the domain.
-    fn origin_of_file<const D: usize>(
+    pub(super) fn origin_of_file<const D: usize>(
         &mut self,
         origin: Option<&Vector>,
         space: &Space<D>,
@@ -130,22 +122,19 @@ impl Checks<'_> {
     }
 
     /// The solid of the triangles of a file with its origin at a point, m from the lower corner of the domain.
-    fn solid<const D: usize>(
+    pub(super) fn solid<const D: usize>(
         &mut self,
         mut triangles: Triangles,
         scale: f64,
         origin: &[f64; D],
+        make: fn(Triangles) -> Result<Mesh, NotSolid>,
         file: &str,
         path: &Path,
     ) -> Option<Shape<D>> {
         for vertex in &mut triangles.vertices {
             *vertex = std::array::from_fn(|a| scale * vertex[a] + if a < D { origin[a] } else { 0.0 });
         }
-        let mesh = match self.takes_sheets {
-            true => Mesh::solid_or_sheet(triangles),
-            false => Mesh::new(triangles),
-        };
-        match mesh {
+        match make(triangles) {
             Ok(mesh) => {
                 self.note_file(mesh.checksum());
                 Some(Shape::Mesh(mesh))

@@ -1,0 +1,99 @@
+//! Values on a regular grid, from a file whose ending says what it is.
+use std::path::Path;
+
+use super::super::read::{MOST_BYTES, ReadError};
+use super::{MOST, esri, geotiff, npy};
+use crate::input_file;
+
+/// Values on a regular grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Raster {
+    /// Row by row from south to north, from west to east in each; not a number where there is none.
+    pub(super) values: Vec<f64>,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    /// Distance of neighbours, m.
+    pub(super) cell: f64,
+    /// Place of the south-western value in the raster's own coordinates, m.
+    pub(super) corner: [f64; 2],
+}
+
+/// What a job says of a raster beside its file.
+#[derive(Clone, Debug, Default)]
+pub struct Placing {
+    /// Distance of neighbours in place of that of the file, m: the south-western value then stands at the origin.
+    pub cell: Option<f64>,
+    /// Array of a file with several.
+    pub array: Option<String>,
+}
+
+/// Greatest magnitude of a value; what is larger stands for none.
+const GREATEST: f64 = 1e9;
+
+impl Raster {
+    /// Reads a raster: ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`), or array of NumPy (`.npy`, `.npz`).
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind, or damaged.
+    pub fn read(path: &Path, placing: &Placing) -> Result<Self, ReadError> {
+        let ending =
+            path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let bytes = input_file::read(path, MOST_BYTES)?;
+        let (kind, raster) = match ending.as_str() {
+            "tif" | "tiff" => ("GeoTIFF", geotiff::parse(&bytes, placing)),
+            "npy" => ("NumPy", npy::parse(&bytes, placing)),
+            "npz" => ("NumPy", npy::parse_archive(&bytes, placing)),
+            _ => ("ESRI ASCII grid", esri::parse(&String::from_utf8_lossy(&bytes), placing)),
+        };
+        raster.map_err(|reason| ReadError::Damaged { kind, reason })
+    }
+
+    /// A raster of values whose first row is the northernmost; `none` stands for no value.
+    pub(super) fn from_north(
+        values: &[f64],
+        [columns, rows]: [usize; 2],
+        none: Option<f64>,
+        placing: &Placing,
+        of_file: Option<(f64, [f64; 2])>,
+    ) -> Result<Self, String> {
+        let (cell, corner) = match (placing.cell, of_file) {
+            (Some(cell), _) => (cell, [0.0; 2]),
+            (None, Some(of_file)) => of_file,
+            (None, None) => {
+                return Err(
+                    "it does not say how far its heights are apart; give it in the job: cell, m".into()
+                );
+            }
+        };
+        if !(cell > 0.0 && cell < 1e9 && corner.iter().all(|c| c.abs() < 1e12)) {
+            return Err(format!("its cells of {cell} m from {corner:?} are at no place"));
+        }
+        let known = |value: f64| if Some(value) == none || value.abs() > GREATEST { f64::NAN } else { value };
+        let all = (0..rows).rev().flat_map(|row| &values[row * columns..][..columns]);
+        Ok(Self { values: all.map(|value| known(*value)).collect(), columns, rows, cell, corner })
+    }
+
+    /// How many cells have no value, and where the first is, in words.
+    pub(super) fn gaps(&self) -> Option<String> {
+        let count = self.values.iter().filter(|value| value.is_nan()).count();
+        let from_north = |at: usize| (self.rows - 1 - at / self.columns) * self.columns + at % self.columns;
+        let gaps = (0..self.values.len()).filter(|&at| self.values[at].is_nan());
+        let first = gaps.min_by_key(|&at| from_north(at))?;
+        let (row, column) = (from_north(first) / self.columns + 1, first % self.columns + 1);
+        let place = [first % self.columns, first / self.columns];
+        let [x, y] = [0, 1].map(|a| self.corner[a] + place[a] as f64 * self.cell);
+        Some(format!(
+            "{count} of {} cells have no height, the first in row {row}, column {column}, at {}; fill or cut what has none",
+            self.values.len(),
+            crate::text::place(&[x, y])
+        ))
+    }
+}
+
+/// Columns and rows that a raster may have, or why not.
+pub(super) fn checked_size([columns, rows]: [u64; 2]) -> Result<[usize; 2], String> {
+    if columns.min(rows) < 2 || columns.saturating_mul(rows) > MOST as u64 {
+        return Err(format!("it has {columns} x {rows} heights; 2 x 2 to {MOST} are possible"));
+    }
+    Ok([columns as usize, rows as usize])
+}
