@@ -149,6 +149,12 @@ pub enum Shape {
         #[schemars(range(min = -1e9, max = 1e9))]
         base: Option<f64>,
     },
+    /// Particles from a file, one by one, as a body of their own; not a part of other shapes.
+    Particles {
+        /// Comma-separated values (`.csv`), PLY (`.ply`), or an output or checkpoint of agimp (`.hdf`, `.h5`), of which the particles of the
+        /// body with this name are taken, or all if there is one body; relative to the directory of the job file.
+        file: String,
+    },
     /// A shape turned about a point.
     Rotated {
         /// The shape before the rotation.

@@ -5,6 +5,7 @@ pub mod frame;
 pub mod hdf5_file;
 pub mod history;
 pub(crate) mod lines;
+pub mod particles;
 pub mod picture;
 pub mod progress;
 pub mod raster;

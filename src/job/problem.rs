@@ -12,11 +12,13 @@ pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
+use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
 use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Cells along the edge of a leaf.
 pub const CELLS_PER_LEAF: u32 = 4;
@@ -190,8 +192,11 @@ impl<const D: usize> Problem<D> {
         (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
     }
 
-    /// Whether two bodies are there in one stage.
+    /// Whether two bodies with shapes of their own are there in one stage.
     pub fn are_together(&self, first: usize, second: usize) -> bool {
+        if [first, second].iter().any(|&body| self.bodies[body].given.is_some()) {
+            return false;
+        }
         let [first, second] = [first, second].map(|body| self.stages_of_body(body));
         first.start.max(second.start) < first.end.min(second.end)
     }
@@ -278,6 +283,8 @@ pub struct Body<const D: usize> {
     pub sampling: Sampling<D>,
     /// Stress at the start, if it does not begin without.
     pub stress: Option<InitialStress>,
+    /// Its particles, where the job gives them one by one; the shape then is a box about them.
+    pub given: Option<Arc<Given<D>>>,
 }
 
 /// A stage of the run: what it changes at its start, and when it ends.

@@ -68,8 +68,21 @@ pub fn under_stress(
     consolidation: Option<Consolidation>,
     plane: bool,
 ) -> Result<Stressed, NoState> {
+    under_stress_after(material, stress, consolidation, material.initial_history(), plane)
+}
+
+/// As [`under_stress`], for a material with a history.
+///
+/// # Errors
+/// See [`under_stress`].
+pub fn under_stress_after(
+    material: &dyn Material,
+    stress: &[f64; 6],
+    consolidation: Option<Consolidation>,
+    mut history: [f64; HISTORIES],
+    plane: bool,
+) -> Result<Stressed, NoState> {
     let (principal, directions) = principal(stress, plane);
-    let mut history = material.initial_history();
     let strain = material
         .strain_under(principal, consolidation, &mut history)
         .filter(|strain| strain.iter().all(|e| e.is_finite()))
@@ -101,6 +114,28 @@ pub fn under_stress(
         history: state.history.map(first),
         volume_ratio,
     })
+}
+
+/// The state of a material with an elastic left Cauchy-Green tensor (`xx, yy, zz, xy, xz, yz`), yielded where it has to.
+pub fn under_strain(
+    material: &dyn Material,
+    elastic: &[f64; 6],
+    history: [f64; HISTORIES],
+    plane: bool,
+) -> Stressed {
+    let mut state = State::new(elastic.map(Lanes::splat));
+    state.history = history.map(Lanes::splat);
+    material.update(&mut state, &Step { dt: LONG, ..Step::rest(plane) });
+    let first = |value: Lanes| value.to_array()[0];
+    let [xx, yy, zz, xy, xz, yz] = state.elastic.map(first);
+    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    let history = state.history.map(first);
+    Stressed {
+        elastic: [xx, yy, zz, xy, xz, yz],
+        stress: state.stress.map(first),
+        history,
+        volume_ratio: determinant.sqrt() * libm::exp(history[PLASTIC_VOLUME]),
+    }
 }
 
 /// Norm of a symmetric tensor.

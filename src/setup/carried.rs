@@ -101,7 +101,11 @@ fn surface_shares<const D: usize>(
     stage: usize,
 ) -> Vec<Share<D>> {
     let new: Vec<usize> = problem.bodies_of_stage(stage).collect();
-    let bodies: Vec<usize> = new.iter().copied().filter(|&body| carried.is_on(body)).collect();
+    let bodies: Vec<usize> = new
+        .iter()
+        .copied()
+        .filter(|&body| carried.is_on(body) && problem.bodies[body].given.is_none())
+        .collect();
     let shares = tree.leaves().par_iter().map(|leaf| {
         let mut shares = Vec::new();
         for &body in &bodies {

@@ -37,6 +37,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
         faces: problem.faces,
+        with_moments: with_moments(problem),
         absorbing: problem.absorbing.clone(),
         face_forces: problem.face_forces,
         colliders: problem.colliders.clone(),
@@ -53,6 +54,12 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
             growth: problem.time.growth,
         },
     }
+}
+
+/// Bodies from a file that says how their particles move.
+fn with_moments<const D: usize>(problem: &Problem<D>) -> Vec<u16> {
+    let moves = |body: &usize| problem.bodies[*body].given.as_ref().is_some_and(|given| given.has_velocity);
+    (0..problem.bodies.len()).filter(moves).map(|body| body as u16).collect()
 }
 
 /// Collective. A solver in the initial state of the job: tree, partition and numbered particles.
@@ -134,7 +141,9 @@ fn new_particles<const D: usize>(
             let tag = Tag::unpack(chunk.tags()[p]);
             let material = stages::material_of(problem, usize::from(tag.body), stage) as u16;
             chunk.tags_mut()[p] = Tag { material, ..tag }.pack();
-            physics.begin_history(chunk, p);
+            if problem.bodies[usize::from(tag.body)].given.is_none() {
+                physics.begin_history(chunk, p);
+            }
         }
     }
     let stressed = forest.leaves().par_iter().zip(&mut chunks);

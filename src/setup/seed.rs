@@ -2,7 +2,7 @@
 //!
 //! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per
 //! cell, anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its
-//! own points, on whichever rank it is, and no point is made twice. Particles lie at these points or, by the sampling of their body, near
+//! own points, on whichever rank it is, and no point is made twice. A body from a file has its particles. Particles lie at these points or, by the sampling of their body, near
 //! them, within the same leaf and body.
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
@@ -93,14 +93,24 @@ pub fn fill_leaf<const D: usize>(
     visit(problem, octant, problem.bodies_of_stage(stage), |index, points| {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
+        let given = body.given.as_ref().map(|given| (given, given.in_box(&problem.octant_box(octant))));
         let volume: f64 = [spacing; D].iter().product();
         let mass = problem.materials[body.material].density * volume;
         let tag = Tag { material: body.material as u16, body: index as u16, level: octant.level };
         let spin = velocity_gradient::<D>(body.angular_velocity);
         chunk.reserve_exact(chunk.len() + points.len());
-        for x in points {
+        for (number, x) in points.iter().enumerate() {
             let x = &place_near(problem, octant, index, x, spacing);
             let p = chunk.push_zeroed(0, tag);
+            if let Some((given, rows)) = &given {
+                let row = rows[number] as usize;
+                let all: Vec<f64> =
+                    (0..Layout::<D>::REALS).map(|column| given.chunk().read::<1>(column, row)[0]).collect();
+                chunk.write(0, p, &all);
+                if given.has_velocity {
+                    continue;
+                }
+            }
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
             for i in 0..D {
                 let turning: f64 = (0..D).map(|j| spin[i][j] * (x[j] - body.centre[j])).sum();
@@ -110,6 +120,9 @@ pub fn fill_leaf<const D: usize>(
                     let slope = slope(problem, &body.velocity[i], x, j, spacing);
                     set(Layout::<D>::AFFINE + D * i + j, spin[i][j] + slope);
                 }
+            }
+            if given.is_some() {
+                continue;
             }
             // The identity: xx, yy and zz come first in either dimension.
             for diagonal in 0..3 {
@@ -131,7 +144,7 @@ fn place_near<const D: usize>(
     spacing: f64,
 ) -> [f64; D] {
     let body = &problem.bodies[index];
-    if let Sampling::Lattice = body.sampling {
+    if matches!(body.sampling, Sampling::Lattice) || body.given.is_some() {
         return *x;
     }
     let cell = problem.octant_box(octant);
@@ -193,6 +206,9 @@ pub fn count_bodies<const D: usize>(
 
 /// Not collective. The number of lattice points in a box that a body has in leaves of a level if it fills the box.
 pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &Aabb<D>, level: u8) -> u64 {
+    if let Some(given) = &problem.bodies[body].given {
+        return given.in_box(cell).len() as u64;
+    }
     let spacing = spacing(problem, level, &problem.bodies[body]);
     let along = |a: usize| {
         first_at_or_after(cell.upper[a], spacing).saturating_sub(first_at_or_after(cell.lower[a], spacing))
@@ -250,6 +266,9 @@ pub fn greatest_speed<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> f
         let velocity = body.velocity.each_ref().map(|component| component.at(&problem.place(x), 0.0));
         velocity.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
+    if let Some(given) = body.given.as_ref().filter(|given| given.has_velocity) {
+        return given.greatest_speed();
+    }
     if !body.velocity.iter().any(Quantity::depends_on_place) {
         return speed(&[0.0; D]);
     }
@@ -296,8 +315,12 @@ fn visit<const D: usize>(
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
         points.clear();
-        lattice(&cell, spacing, &mut points);
-        if side == Side::Crosses {
+        if let Some(given) = &body.given {
+            points.extend(given.in_box(&cell).into_iter().map(|p| given.chunk().position(p as usize)));
+        } else {
+            lattice(&cell, spacing, &mut points);
+        }
+        if side == Side::Crosses && body.given.is_none() {
             points.retain(|x| body.shape.contains(x));
         }
         let together = |other: usize| other != index && problem.are_together(index, other);

@@ -90,7 +90,7 @@ fn colliders<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             let domain = Aabb::new([0.0; D], problem.size());
             let bounds = collider.shape.bounds().intersection(&domain);
             let common = body.shape.bounds().intersection(&bounds);
-            if boxes == 0 || common.is_empty() {
+            if boxes == 0 || common.is_empty() || body.given.is_some() {
                 continue;
             }
             if common_point([&body.shape, &collider.shape], common, slack, &mut boxes).is_some() {

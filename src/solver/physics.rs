@@ -25,6 +25,8 @@ pub struct Physics<const D: usize> {
     pub loads: Vec<Load<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
+    /// Bodies whose particles come with the affine state of APIC, from another run.
+    pub with_moments: Vec<u16>,
     /// What is beyond those that absorb waves.
     pub absorbing: AbsorbingFaces<D>,
     /// Whether the forces on these faces are summed up.

@@ -28,7 +28,7 @@ mod solid;
 mod terrain;
 mod winding;
 
-pub use read::{ReadError, Triangles, read};
+pub use read::{ReadError, Triangles, ply_columns, read};
 pub use solid::NotSolid;
 pub use terrain::{Placing, Raster as HeightRaster, Terrain};
 

@@ -3,7 +3,7 @@ use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, Property};
+use ply_rs_bw::ply::{DefaultElement, Payload, Property};
 
 use crate::input_file;
 
@@ -102,7 +102,8 @@ fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
     Ok(triangles)
 }
 
-fn ply(bytes: &[u8]) -> Result<Triangles, ReadError> {
+/// The elements of a PLY file by their names.
+fn ply_elements(bytes: &[u8]) -> Result<Payload<DefaultElement>, ReadError> {
     let damaged = |reason: String| ReadError::Damaged { kind: "PLY", reason };
     let parser = Parser::<DefaultElement>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
@@ -115,7 +116,30 @@ fn ply(bytes: &[u8]) -> Result<Triangles, ReadError> {
             bytes.len()
         )));
     }
-    let payload = parser.read_payload(&mut reader, &header).map_err(|error| damaged(error.to_string()))?;
+    parser.read_payload(&mut reader, &header).map_err(|error| damaged(error.to_string()))
+}
+
+/// The numbers of the vertices of a PLY file: name and values of each property that is a number.
+///
+/// # Errors
+/// It is damaged, or has no vertices.
+pub fn ply_columns(bytes: &[u8]) -> Result<Vec<(String, Vec<f64>)>, ReadError> {
+    let damaged = |reason: &str| ReadError::Damaged { kind: "PLY", reason: reason.into() };
+    let payload = ply_elements(bytes)?;
+    let vertices = payload.iter().find(|(key, _)| key.as_str() == "vertex").map(|(_, all)| all);
+    let vertices = vertices.filter(|all| !all.is_empty()).ok_or_else(|| damaged("it has no vertices"))?;
+    let numbers = vertices[0].iter().filter(|(_, value)| number(value).is_some());
+    let columns = numbers.map(|(name, _)| {
+        let values = vertices.iter().map(|vertex| property(vertex, name).and_then(number));
+        let values: Option<Vec<f64>> = values.collect();
+        Ok((name.to_string(), values.ok_or_else(|| damaged("a vertex lacks a number"))?))
+    });
+    columns.collect()
+}
+
+fn ply(bytes: &[u8]) -> Result<Triangles, ReadError> {
+    let damaged = |reason: String| ReadError::Damaged { kind: "PLY", reason };
+    let payload = ply_elements(bytes)?;
     let elements = |name: &str| payload.iter().find(|(key, _)| key.as_str() == name).map(|(_, all)| all);
     let missing = |what: &str| damaged(format!("it has no {what}"));
     let mut triangles = Triangles::default();

@@ -13,6 +13,7 @@
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
+//! | `particles` | particles from a file |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
@@ -24,6 +25,7 @@ use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
+use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::Gravity;
 use crate::material::parameters::OutOfRange;
@@ -37,6 +39,7 @@ mod checks;
 mod colliders;
 mod loads;
 mod overlap;
+mod particles;
 mod probes;
 pub(super) mod settings;
 mod shapes;
@@ -311,10 +314,11 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             checks.fault(&own, format!("found {value}; expected a number {range}"));
         }
     }
-    materials
-        .iter()
-        .map(|m| MaterialSetup { name: m.name.clone(), density: m.density, model: m.model.clone() })
-        .collect()
+    materials.iter().map(material_setup).collect()
+}
+
+fn material_setup(material: &file::Material) -> MaterialSetup {
+    MaterialSetup { name: material.name.clone(), density: material.density, model: material.model.clone() }
 }
 
 fn bodies<const D: usize>(
@@ -342,13 +346,13 @@ fn body<const D: usize>(
     checks: &mut Checks,
     body: &file::Body,
     materials: &FxHashMap<&str, usize>,
-    file: &JobFile,
+    file_of: &JobFile,
     space: &Space<D>,
     path: &Path,
 ) -> Option<Body<D>> {
     let material = materials.get(body.material.as_str()).copied();
     if material.is_none() {
-        let known = || file.materials.iter().map(|material| material.name.as_str());
+        let known = || file_of.materials.iter().map(|material| material.name.as_str());
         checks.unknown(&body.material, "material", known, &path.key("material"));
     }
     let velocity = match &body.velocity {
@@ -369,7 +373,22 @@ fn body<const D: usize>(
         }
     };
     let here = path.key("shape");
-    let shape: Shape<D> = checks.shape(&body.shape, space, &here)?;
+    let given = match &body.shape {
+        Written::Particles { file } => {
+            if body.stress.is_some() {
+                let message =
+                    "found a stress; expected none beside particles from a file, which has their stress";
+                checks.fault(&path.key("stress"), message.into());
+            }
+            let setup = material_setup(&file_of.materials[material?]);
+            Some(checks.particles(file, &body.name, &setup, space, &here.key("file"))?)
+        }
+        _ => None,
+    };
+    let shape: Shape<D> = match &given {
+        Some(given) => Shape::Box(given.bounds().intersection(&Aabb::new([0.0; D], space.size))),
+        None => checks.shape(&body.shape, space, &here)?,
+    };
     let bounds = shape.bounds();
     if bounds.is_empty() {
         checks.fault(&here, "found a shape without a point; expected one with a volume".into());
@@ -402,13 +421,14 @@ fn body<const D: usize>(
         material: material?,
         velocity: velocity?,
         angular_velocity: angular_velocity?,
-        stage: stages::of_body(checks, body, file, path),
+        stage: stages::of_body(checks, body, file_of, path),
         particles_per_cell: body.particles_per_cell,
         sampling: sampling(checks, body, path)?,
+        given,
         stress: match &body.stress {
             Some(written) => {
                 let here = path.key("stress");
-                Some(stress::stress::<D>(checks, written, file, &file.materials[material?], &here)?)
+                Some(stress::stress::<D>(checks, written, file_of, &file_of.materials[material?], &here)?)
             }
             None => None,
         },

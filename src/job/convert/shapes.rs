@@ -89,6 +89,11 @@ impl Checks<'_> {
                 self.only(3, D, "terrain", "polygon", path)?;
                 self.terrain(shape, space, path)
             }
+            Written::Particles { .. } => {
+                let message = "found \"particles\"; expected a shape with a surface: particles from a file are a body of their own";
+                self.fault(&path.key("kind"), message.into());
+                None
+            }
             Written::Rotated { shape, centre, axis, angle } => {
                 let inner = self.shape(shape, space, &path.key("shape"))?;
                 let pivot = self.point(centre, space, &path.key("centre"))?;

@@ -97,6 +97,7 @@ impl<const D: usize> GivenBoxes<D> {
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
             faces: [[Contact::Slip; 2]; D],
+            with_moments: Vec::new(),
             absorbing: std::array::from_fn(|_| [None, None]),
             face_forces: false,
             colliders: Vec::new(),

@@ -5,7 +5,7 @@ use crate::grid::arenas::ArenaMut;
 use crate::kernel::p2g::{self, MomentSums};
 use crate::kernel::{Scheme, Transfer, spread};
 use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, Place};
+use crate::particle::chunk::{Layout, Place, Tag};
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
@@ -38,7 +38,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
-    /// keep none. In each own leaf the first particles, as many as `done`, have theirs.
+    /// keep none. In each own leaf the first particles, as many as `done`, have theirs, and so have those of bodies that bring them.
     pub(in crate::solver) fn moments_from_affine(&mut self, done: &[usize]) -> Result<(), BinMissing> {
         match self.physics.transfer {
             Transfer::Apic => {}
@@ -54,14 +54,18 @@ impl<const D: usize> Solver<D> {
         self.sort_into_bins()?;
         let scheme = self.physics.scheme();
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
+        let with_moments = &self.physics.with_moments;
         self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
             let spreads =
                 spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme);
+            let tags: Vec<u64> = if with_moments.is_empty() { Vec::new() } else { chunk.tags().to_vec() };
+            let has =
+                |p: usize| tags.get(p).is_some_and(|tag| with_moments.contains(&Tag::unpack(*tag).body));
             for i in 0..D {
                 for k in 0..D {
                     let column = chunk.column_mut(Layout::<D>::AFFINE + D * i + k);
-                    let new = column.into_iter().zip(&spreads).skip(done[leaf]);
-                    new.for_each(|(value, spread)| *value *= spread[k]);
+                    let new = column.into_iter().zip(&spreads).enumerate().skip(done[leaf]);
+                    new.filter(|(p, _)| !has(*p)).for_each(|(_, (value, spread))| *value *= spread[k]);
                 }
             }
         });
