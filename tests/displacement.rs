@@ -1,4 +1,4 @@
-//! Displacements through the whole program: those of falling and of turning bodies by their closed forms.
+//! Displacements and total strains through the whole program, by closed forms: of falling and turning bodies, and of drawn metal.
 #[path = "common/runs.rs"]
 mod runs;
 
@@ -108,6 +108,49 @@ fn displacements_of_a_turning_body() {
     // Chords of 90° and of 36°.
     let ratio = 18.0_f64.to_radians().sin() / 45.0_f64.to_radians().sin();
     assert!((part / all - ratio).abs() < 0.02, "{part} of {all}");
+}
+
+/// Material that a grip draws out at a constant rate while it crosses level jumps has the logarithm of its length as total strain, though
+/// its stress has long been at its limit; a stage may count it anew.
+#[test]
+fn total_strain_of_drawn_metal_is_the_logarithm_of_its_length() {
+    let job = FALL
+        .replace("gravity = [0, -10]", "")
+        .replace("\"displacement\", \"velocity\"", "\"strain\", \"equivalent_strain\"")
+        .replace("every = 0.2", "every = 1.0")
+        .replace("min = [0.75, 3.25], max = [1.25, 3.75]", "min = [0.125, 2.25], max = [0.875, 3.5]")
+        .replace("model = \"neo_hookean\"", "model = \"von_mises\"\nyield_stress = 100")
+        + "[time]\nend = 1.0\n[adaptivity]\nevery_steps = 5\n[[adaptivity.criteria]]\nkind = 'region'\nlevel = 1\n\
+           shape = { kind = 'box', min = [0, 0], max = [2, 0.9] }\n\
+           [[loads]]\nname = 'draw'\nkind = 'velocity'\nx = '0.5 * x'\ny = '-0.5 * y'\n";
+    let strains = |directory: &Path, number: usize| {
+        let path = file(directory, "drawn", &format!("_{number:06}.hdf"));
+        let file = Reader::open_alone(&path).expect("output");
+        let particles = Header::read(&file).expect("header").particles;
+        ["strain", "equivalent_strain"].map(|name| -> Vec<f64> {
+            file.read_slab(&format!("VTKHDF/PointData/{name}"), 0, particles).expect(name)
+        })
+    };
+    restart::assert_same_on_any_ranks(&job, "drawn", |directory, _| {
+        let history = History::read(directory, "drawn");
+        let counts = history.column("particles");
+        assert!(counts.iter().any(|&count| count > counts[0]), "it splits");
+        let [strain, equivalent] = strains(directory, 1);
+        for (strain, equivalent) in strain.chunks(6).zip(equivalent) {
+            assert!((strain[0] - 0.5).abs() < 5e-3 && (strain[1] + 0.5).abs() < 5e-3, "{strain:?}");
+            assert!(strain[2] == 0.0 && strain[3].abs() < 2e-3 && strain[4..] == [0.0; 2], "{strain:?}");
+            assert!((equivalent - 1.0 / 3.0_f64.sqrt()).abs() < 1e-2, "{equivalent}");
+        }
+    });
+    let staged = format!(
+        "{job}[[stages]]\nname = 'a'\nduration = 0.6\n[[stages]]\nname = 'b'\nreset_displacement = true\n"
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("drawn.toml");
+    std::fs::write(&path, staged).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let [strain, _] = strains(directory.path(), 2);
+    assert!(strain.chunks(6).all(|strain| (strain[0] - 0.2).abs() < 5e-3), "{:?}", &strain[..6]);
 }
 
 /// A run that has not followed displacements cannot begin to on its way.

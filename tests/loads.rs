@@ -106,6 +106,38 @@ fn grips_stretch_a_bar() {
     assert!(history.last("work_right") > history.last("elastic_energy"));
 }
 
+/// Springs between the material and its places in the undeformed body, `-ω² (x - X)`: a block with a velocity v swings as a whole, through
+/// splits and merges at level jumps, by v/ω sin ωt. A load that is a function of X alone stays with its material. The same on any ranks and
+/// across a restart.
+#[test]
+fn forces_belong_to_places_of_the_undeformed_body() {
+    let loads = "[checkpoint]\nevery_steps = 50\nkeep = 9\n\
+                 [adaptivity]\nevery_steps = 10\n[[adaptivity.criteria]]\nkind = 'region'\nlevel = 2\nshape = { kind = 'box', min = [-1.0, -0.4], max = [-0.4, 0.4] }\n\
+                 [[loads]]\nname = 'springs'\nkind = 'body_force'\nacceleration = ['-400 * (x - X)', 0]\n\
+                 [[loads]]\nname = 'pair'\nkind = 'body_force'\nacceleration = [0, '0.1 * step(-0.4 - X) - 0.1 * step(X + 0.4)']\n";
+    let job = text("[0, 0]", 0.25, loads)
+        .replace("picture = false", "")
+        .replace(
+            "[[tree.regions]]\nlevel = 2\nshape = { kind = 'box', min = [-1.0, -0.4], max = [-0.4, 0.4] }\n",
+            "",
+        )
+        .replace("name = 'body'\nmaterial", "name = 'body'\nvelocity = [3, 0]\nmaterial");
+    restart::assert_same_on_any_ranks(&job, "body", |directory, _| {
+        let history = History::read(directory, "body");
+        let (time, mass) = (history.column("time"), history.last("mass"));
+        let splits = history.column("particles");
+        assert!(splits.iter().any(|&count| count != splits[0]), "no particle splits");
+        for (row, &t) in time.iter().enumerate() {
+            // Symplectic Euler has its velocities half a step ahead.
+            let exact = 3.0 * (20.0 * t).cos();
+            let found = history.column("momentum_x")[row] / mass;
+            assert!((found - exact).abs() < 0.04, "{found} at {t} s, exact {exact}");
+        }
+        // Half of the block is pushed up, half down, wherever it is.
+        assert!(history.last("momentum_y").abs() < 1e-9 * mass && history.last("work_pair") > 0.0);
+    });
+}
+
 #[test]
 fn same_results_on_any_ranks_and_across_restart() {
     let loads = "[checkpoint]\nevery_steps = 33\nkeep = 9\n[[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = ['8 * sin(20 * t) * (x + 1)', '-y']\n\
@@ -131,6 +163,13 @@ fn wrong_loads_are_refused_with_their_key() {
         ("kind = 'damping'\nrate = 1\nfrom = 2\nuntil = 1", "loads[0].until", "after from"),
         ("kind = 'dampin'\nrate = 1", "loads[0].kind", "did you mean \"damping\""),
         ("kind = 'damping'\nrat = 1", "loads[0].rat", "did you mean `rate`"),
+        ("kind = 'damping'\nrate = '1 + X'", "loads[0].rate", "places of the undeformed body"),
+        ("kind = 'velocity'\nx = 'X'", "loads[0].x", "places of the undeformed body"),
+        (
+            "kind = 'body_force'\nacceleration = ['Z', 0]",
+            "loads[0].acceleration[0]",
+            "X, Y and t in a 2D job",
+        ),
     ];
     for (load, key, words) in cases {
         let directory = tempfile::tempdir().expect("temporary directory");

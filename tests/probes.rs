@@ -130,6 +130,8 @@ fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
         [[bodies]]\nname = 'large'\nmaterial = 'rubber'\nvelocity = [2, 0]\nshape = { kind = 'box', min = [-2.875, 7], max = [-2.625, 7.5] }\n\
         [[fluxes]]\nname = 'gate'\npoint = [-2.2, 0]\nnormal = [3, 0]\n\
         [[fluxes]]\nname = 'back'\npoint = [-2.2, 0]\nnormal = [-1, 0]\n\
+        [[fluxes]]\nname = 'upper'\npoint = [-2.2, 0]\nnormal = [3, 0]\nmin = [-3, 7.63]\nmax = [-2, 8]\n\
+        [[fluxes]]\nname = 'lower'\npoint = [-2.2, 0]\nnormal = [3, 0]\nmin = [-3, 7]\nmax = [-2, 7.63]\n\
         [[fluxes]]\nname = 'out'\nface = 'x_max'\n\
         [[fluxes]]\nname = 'none'\nface = 'y_max'\n\
         [[probes]]\nname = 'beyond'\nshape = { kind = 'box', min = [-2.2, 0], max = [9, 9] }\nquantities = ['mass']\n\
@@ -143,12 +145,15 @@ fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
         let column = |name: &str| history.column(name);
         let (inside, gate, back) = (column("mass"), column("passed_gate"), column("passed_back"));
         let (out, beyond) = (column("passed_out"), column("mass_beyond"));
+        let (upper, lower) = (column("passed_upper"), column("passed_lower"));
         for row in 0..inside.len() {
             assert_eq!(inside[row] + out[row], 192.0, "row {row}");
             assert_eq!((gate[row], back[row]), (beyond[row] + out[row], -gate[row]), "row {row}");
+            assert_eq!(upper[row] + lower[row], gate[row], "row {row}: openings that make up the plane");
         }
         assert!(
             out.iter().any(|&mass| mass > 0.0 && mass < 64.0)
+                && [&upper, &lower].iter().all(|passed| passed.iter().any(|&mass| mass > 16.0))
                 && column("passed_none").iter().all(|&m| m == 0.0)
         );
         assert!(gate.iter().any(|&mass| mass > 0.0 && mass < 64.0), "{gate:?}");

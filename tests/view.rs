@@ -210,7 +210,7 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
         (&["empty.hdf.series"], "the index lists no outputs"),
         (&["out/half/half_000000.tree.hdf"], "is it a tree file?"),
         (&[output, "--fields", "stress"], "does not show stress; it shows "),
-        (&[output, "--fields", "presure"], "expected one of velocity, displacement"),
+        (&[output, "--fields", "presure"], "expected one of velocity, displacement, strain"),
         (&[output, "--bits", "40"], "40 is not in 4..=16"),
         (&[output, "--out", "no/such/place.html"], "cannot write"),
     ] {

@@ -15,7 +15,7 @@ use crate::material::parameters::Parameters;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
-use crate::solver::Equilibrium;
+use crate::solver::{Equilibrium, Followed};
 use partition::{Brick, Octant};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -406,8 +406,8 @@ pub struct OutputSetup {
     pub every: Option<f64>,
     /// Particle fields beside the position.
     pub fields: Vec<Field>,
-    /// Whether particles carry their displacement.
-    pub displacement: bool,
+    /// What particles carry of their motion.
+    pub followed: Followed,
     /// Whether each output file carries the complete state, so that a run can restart from it.
     pub restart: bool,
     /// Whether a picture of the last state is drawn.

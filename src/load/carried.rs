@@ -4,7 +4,7 @@
 //! numbers go with the particles, are shared among children and add up in merges, so that the whole force is that of the
 //! definition at all times.
 use super::Load;
-use crate::quantity::{Quantity, in_job};
+use crate::quantity::{Place, Quantity};
 
 /// A force that particles carry.
 #[derive(Clone, Debug)]
@@ -49,6 +49,16 @@ impl<const D: usize> CarriedForce<D> {
         }
     }
 
+    /// Whether it depends on places of the undeformed body.
+    pub fn names_undeformed(&self) -> bool {
+        match self {
+            Self::Traction(components) | Self::Point { force: components, .. } => {
+                components.iter().any(Quantity::names_undeformed)
+            }
+            Self::Pressure { pressure, .. } => pressure.names_undeformed(),
+        }
+    }
+
     /// Whether it acts on a surface.
     pub fn is_on_surface(&self) -> bool {
         !matches!(self, Self::Point { .. })
@@ -84,16 +94,16 @@ impl<const D: usize> Carried<D> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Force (N) on a particle at `x` that carries these numbers in the columns of `carried`, which is of this load, at a time
+    /// Force (N) on a particle at a place that carries these numbers in the columns of `carried`, which is of this load, at a time
     /// of its own, s.
-    pub fn force(&self, carried: &Carried<D>, numbers: &[f64], x: &[f64; D], time: f64) -> [f64; D] {
-        let place = in_job(&self.origin, x);
+    pub fn force(&self, carried: &Carried<D>, numbers: &[f64], place: &Place, time: f64) -> [f64; D] {
+        let place = *place;
         match &carried.force {
             CarriedForce::Traction(per_number) | CarriedForce::Point { force: per_number, .. } => {
-                per_number.each_ref().map(|component| component.at(&place, time) * numbers[0])
+                per_number.each_ref().map(|component| component.at(place, time) * numbers[0])
             }
             CarriedForce::Pressure { pressure, .. } => {
-                let pressure = pressure.at(&place, time);
+                let pressure = pressure.at(place, time);
                 std::array::from_fn(|axis| -pressure * numbers[axis])
             }
         }
@@ -170,10 +180,16 @@ mod tests {
                 && !carried.is_facing(&[2.0, 1.0])
                 && !carried.is_facing(&[0.0, -1.0])
         );
-        assert_eq!(pressure.force(carried, &[0.0, 2.0], &[0.5, 0.0], 2.0), [0.0, -42.0]);
+        assert_eq!(
+            pressure.force(carried, &[0.0, 2.0], &pressure.place(&[0.5, 0.0], &[0.0; 2]), 2.0),
+            [0.0, -42.0]
+        );
         let traction = load(CarriedForce::Traction([time, Quantity::Constant(3.0)]));
         let carried = traction.carried().unwrap();
         assert_eq!(carried.of_surface(&[3.0, 4.0]), [5.0]);
-        assert_eq!(traction.force(carried, &[5.0], &[0.5, 0.0], 2.0), [105.0, 15.0]);
+        assert_eq!(
+            traction.force(carried, &[5.0], &traction.place(&[0.5, 0.0], &[0.0; 2]), 2.0),
+            [105.0, 15.0]
+        );
     }
 }

@@ -13,7 +13,7 @@ mod carried;
 pub use carried::{Carried, CarriedForce, cofactor};
 
 use crate::geometry::Shape;
-use crate::quantity::{Quantity, in_job};
+use crate::quantity::{Place, Quantity, in_job};
 
 /// Acceleration of gravity, which may change in time.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ impl<const D: usize> Gravity<D> {
 
     /// Acceleration at a time (s), m/s².
     pub fn at(&self, time: f64) -> [f64; D] {
-        std::array::from_fn(|axis| self.acceleration[axis].at(&[0.0; 3], time - self.start))
+        std::array::from_fn(|axis| self.acceleration[axis].at([0.0; 3], time - self.start))
     }
 }
 
@@ -79,6 +79,43 @@ impl<const D: usize> Load<D> {
         if let Kind::Carried(carried) = &self.kind { Some(carried) } else { None }
     }
 
+    /// Whether particles get its force, and not nodes: what they carry, what depends on places of the undeformed body, and with scaled
+    /// masses all forces.
+    pub fn acts_on_particles(&self, are_masses_scaled: bool) -> bool {
+        match &self.kind {
+            Kind::Carried(_) => true,
+            Kind::BodyForce(acceleration) => {
+                are_masses_scaled || acceleration.iter().any(Quantity::names_undeformed)
+            }
+            Kind::Velocity(_) | Kind::Damping(_) => false,
+        }
+    }
+
+    /// Whether it depends on places of the undeformed body.
+    pub fn names_undeformed(&self) -> bool {
+        match &self.kind {
+            Kind::BodyForce(acceleration) => acceleration.iter().any(Quantity::names_undeformed),
+            Kind::Carried(carried) => carried.force.names_undeformed(),
+            Kind::Velocity(_) | Kind::Damping(_) => false,
+        }
+    }
+
+    /// The place in the job of a point `x` (m from the lower corner of the domain) that is displaced by `u`, m.
+    pub fn place(&self, x: &[f64; D], u: &[f64; D]) -> Place {
+        let undeformed = std::array::from_fn(|a| x[a] - u[a]);
+        Place { now: in_job(&self.origin, x), undeformed: in_job(&self.origin, &undeformed) }
+    }
+
+    /// Force per mass (m/s²) of a body force on a particle at a place and a time (s), where it is in its region; else nothing.
+    pub fn body_force(&self, x: &[f64; D], place: &Place, time: f64) -> Option<[f64; D]> {
+        match &self.kind {
+            Kind::BodyForce(acceleration) if self.reaches(x) => {
+                Some(acceleration.each_ref().map(|component| component.at(*place, time - self.start)))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether it acts in a step that begins at `time`, s.
     pub fn is_active(&self, time: f64) -> bool {
         let own = time - self.start;
@@ -99,18 +136,18 @@ impl<const D: usize> Load<D> {
             Kind::Carried(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
-                    velocity[axis] = dt.mul_add(acceleration[axis].at(&place, middle), velocity[axis]);
+                    velocity[axis] = dt.mul_add(acceleration[axis].at(place, middle), velocity[axis]);
                 }
             }
             Kind::Velocity(prescribed) => {
                 for axis in 0..D {
                     if let Some(value) = &prescribed[axis] {
-                        velocity[axis] = value.at(&place, middle);
+                        velocity[axis] = value.at(place, middle);
                     }
                 }
             }
             Kind::Damping(rate) => {
-                let kept = libm::exp(-rate.at(&place, middle) * dt);
+                let kept = libm::exp(-rate.at(place, middle) * dt);
                 velocity.iter_mut().for_each(|v| *v *= kept);
             }
         }

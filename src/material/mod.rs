@@ -26,7 +26,7 @@ mod law;
 pub mod laws;
 pub mod parameters;
 mod root;
-mod tensor;
+pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
 

@@ -4,6 +4,7 @@ mod column;
 pub mod given;
 pub mod lanes;
 mod layout;
+pub mod strain;
 pub mod volume;
 mod widest;
 

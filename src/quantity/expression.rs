@@ -1,18 +1,20 @@
-//! Expressions of place and time, such as `0.1 * sin(2 * pi * x) * exp(-t / 0.5)`.
+//! Expressions of place and time, such as `0.1 * sin(2 * pi * x) * exp(-t / 0.5)`; X, Y, Z are the place in the undeformed body.
 //!
 //! The crate `exmex` parses and evaluates; all functions are `libm`'s, so values do not depend on the machine. Two forms
 //! that parsers read differently are made plain here: `-x^2` is `-(x^2)` as on paper, and chains such as `a^b^c` or
 //! `a * -b` ask for parentheses.
 use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator};
 
+use super::Place;
+
 /// Variables of an expression, in the order in which values are given.
-const VARIABLES: [&str; 4] = ["x", "y", "z", "t"];
+const VARIABLES: [&str; 7] = ["x", "y", "z", "t", "X", "Y", "Z"];
 
 /// Names of functions and constants, for messages.
 const FUNCTIONS: &str = "sin, cos, tan, asin, acos, atan, atan2(y, x), sinh, cosh, tanh, exp, ln, log10, sqrt, abs, sign, \
      step, floor, ceil, min(a, b), max(a, b), pi";
 
-/// A scalar expression in x, y, z (m) and t (s).
+/// A scalar expression in x, y, z, X, Y, Z (m) and t (s).
 #[derive(Clone, Debug)]
 pub struct Expression {
     text: String,
@@ -60,8 +62,9 @@ impl Expression {
     }
 
     /// Value at a place (m) and a time (s). Not a number where the expression has none, as `ln(-1)`.
-    pub fn at(&self, x: &[f64; 3], t: f64) -> f64 {
-        let all = [x[0], x[1], x[2], t];
+    pub fn at(&self, place: &Place, t: f64) -> f64 {
+        let ([x, y, z], [at_x, at_y, at_z]) = (place.now, place.undeformed);
+        let all = [x, y, z, t, at_x, at_y, at_z];
         let mut values = [0.0; VARIABLES.len()];
         for (value, &variable) in values.iter_mut().zip(&self.used) {
             *value = all[variable];
@@ -69,14 +72,19 @@ impl Expression {
         self.parsed.eval(&values[..self.used.len()]).unwrap_or(f64::NAN)
     }
 
-    /// Whether it names x, y or z.
+    /// Whether it names a place.
     pub fn depends_on_place(&self) -> bool {
-        self.used.iter().any(|&variable| variable < 3)
+        self.used.iter().any(|&variable| variable != 3)
     }
 
-    /// Whether it names z.
+    /// Whether it names X, Y or Z.
+    pub fn names_undeformed(&self) -> bool {
+        self.used.iter().any(|&variable| variable > 3)
+    }
+
+    /// Whether it names z or Z.
     pub fn names_z(&self) -> bool {
-        self.used.contains(&2)
+        self.used.contains(&2) || self.used.contains(&6)
     }
 
     /// Whether it names t.
@@ -296,7 +304,9 @@ mod tests {
     use super::*;
 
     fn value(text: &str) -> f64 {
-        Expression::parse(text).unwrap_or_else(|error| panic!("{error}")).at(&[2.0, 3.0, 5.0], 0.25)
+        Expression::parse(text)
+            .unwrap_or_else(|error| panic!("{error}"))
+            .at(&Place::from([2.0, 3.0, 5.0]), 0.25)
     }
 
     #[test]
@@ -336,9 +346,12 @@ mod tests {
     fn functions_are_those_of_libm() {
         let expression = Expression::parse("exp(sin(x)) ^ t").unwrap();
         let expected = libm::pow(libm::exp(libm::sin(1.1)), 0.7);
-        assert_eq!(expression.at(&[1.1, 0.0, 0.0], 0.7).to_bits(), expected.to_bits());
+        assert_eq!(expression.at(&Place::from([1.1, 0.0, 0.0]), 0.7).to_bits(), expected.to_bits());
         assert!(expression.depends_on_place() && expression.depends_on_time());
         assert!(!Expression::parse("2 * t").unwrap().depends_on_place());
+        let both = Expression::parse("x - X + 10 * Z").unwrap();
+        assert!(both.depends_on_place() && both.names_undeformed() && both.names_z());
+        assert_eq!(both.at(&Place { now: [3.0; 3], undeformed: [1.0, 0.0, 2.0] }, 0.0), 22.0);
     }
 
     #[test]

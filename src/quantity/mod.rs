@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `expression.rs` | expressions in x, y, z, t, with `libm` behind their functions |
+//! | `expression.rs` | expressions in x, y, z, t, X, Y, Z, with `libm` behind their functions |
 //! | `record.rs` | tables over time from files of comma-separated values |
 //! | `table.rs` | tables over time, linear between rows |
 //!
@@ -13,6 +13,22 @@ mod table;
 
 pub use expression::{Expression, ExpressionError};
 pub use table::{Table, TableError};
+
+/// A place of material, m, in the coordinates of the job; z is 0 in plane strain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Where it is.
+    pub now: [f64; 3],
+    /// Where it was in the undeformed body: `now` less its displacement.
+    pub undeformed: [f64; 3],
+}
+
+impl From<[f64; 3]> for Place {
+    /// A place of material that has not moved, or of none.
+    fn from(now: [f64; 3]) -> Self {
+        Self { now, undeformed: now }
+    }
+}
 
 /// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job, where quantities are taken; z is 0 in
 /// plane strain.
@@ -32,18 +48,23 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Value at the place `x` (m, in the job's coordinates; z is 0 in plane strain) and the time `t` (s).
-    pub fn at(&self, x: &[f64; 3], t: f64) -> f64 {
+    /// Value at a place and the time `t` (s).
+    pub fn at(&self, place: impl Into<Place>, t: f64) -> f64 {
         match self {
             Self::Constant(value) => *value,
             Self::Table(table) => table.at(t),
-            Self::Expression(expression) => expression.at(x, t),
+            Self::Expression(expression) => expression.at(&place.into(), t),
         }
     }
 
     /// Whether the value differs from place to place.
     pub fn depends_on_place(&self) -> bool {
         matches!(self, Self::Expression(expression) if expression.depends_on_place())
+    }
+
+    /// Whether the value belongs to places of the undeformed body.
+    pub fn names_undeformed(&self) -> bool {
+        matches!(self, Self::Expression(expression) if expression.names_undeformed())
     }
 
     /// Whether the value changes in time.

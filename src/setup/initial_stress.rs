@@ -93,24 +93,24 @@ fn at<const D: usize>(
     let up = Up::new(&gravity);
     let pressures = match &initial.kind {
         StressKind::Components(components) => {
-            let stress = components.each_ref().map(|component| component.at(&place, 0.0));
+            let stress = components.each_ref().map(|component| component.at(place, 0.0));
             return under_stress(material, &stress, initial.consolidation, D == 2);
         }
         StressKind::Weight { ratio, surface, surcharge } => {
             let weight = gravity[up.axis].abs()
                 * match surface {
                     Some(surface) => {
-                        let depth = (surface.at(&place, 0.0) - place[up.axis]) * up.sign;
+                        let depth = (surface.at(place, 0.0) - place[up.axis]) * up.sign;
                         problem.materials[body.material].density * depth.max(0.0)
                     }
                     None => columns.at(problem, body.stage, up, x, interval).mass_above(x[up.axis] * up.sign),
                 };
-            let vertical = weight + surcharge.at(&place, 0.0);
-            [vertical, vertical * ratio.at(&place, 0.0)]
+            let vertical = weight + surcharge.at(place, 0.0);
+            [vertical, vertical * ratio.at(place, 0.0)]
         }
         StressKind::Depth { rows, surface } => {
             let depth = match surface {
-                Some(surface) => (surface.at(&place, 0.0) - place[up.axis]) * up.sign,
+                Some(surface) => (surface.at(place, 0.0) - place[up.axis]) * up.sign,
                 None => columns.at(problem, body.stage, up, x, interval).top() - x[up.axis] * up.sign,
             };
             interpolate(rows, depth)

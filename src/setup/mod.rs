@@ -47,7 +47,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         transfer: problem.transfer,
         boxes: problem.boxes,
         f_bar: problem.f_bar,
-        displacement: problem.output.displacement,
+        followed: problem.output.followed,
         control: StepControl {
             cfl: problem.time.cfl,
             dt_max: problem.time.dt_max,

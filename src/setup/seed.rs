@@ -115,7 +115,7 @@ pub fn fill_leaf<const D: usize>(
             for i in 0..D {
                 let turning: f64 = (0..D).map(|j| spin[i][j] * (x[j] - body.centre[j])).sum();
                 set(Layout::<D>::POSITION + i, x[i]);
-                set(Layout::<D>::VELOCITY + i, body.velocity[i].at(&problem.place(x), 0.0) + turning);
+                set(Layout::<D>::VELOCITY + i, body.velocity[i].at(problem.place(x), 0.0) + turning);
                 for j in 0..D {
                     let slope = slope(problem, &body.velocity[i], x, j, spacing);
                     set(Layout::<D>::AFFINE + D * i + j, spin[i][j] + slope);
@@ -257,13 +257,13 @@ fn slope<const D: usize>(
     let [mut low, mut high] = [*x; 2];
     low[axis] -= 0.5 * edge;
     high[axis] += 0.5 * edge;
-    (field.at(&problem.place(&high), 0.0) - field.at(&problem.place(&low), 0.0)) / edge
+    (field.at(problem.place(&high), 0.0) - field.at(problem.place(&low), 0.0)) / edge
 }
 
 /// Greatest speed of a body at the start without its rotation, m/s, at points of a raster.
 pub fn greatest_speed<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> f64 {
     let speed = |x: &[f64; D]| {
-        let velocity = body.velocity.each_ref().map(|component| component.at(&problem.place(x), 0.0));
+        let velocity = body.velocity.each_ref().map(|component| component.at(problem.place(x), 0.0));
         velocity.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
     if let Some(given) = body.given.as_ref().filter(|given| given.has_velocity) {

@@ -6,6 +6,7 @@ use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{self, Gravity, Load};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::strain;
 
 /// What is solved: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
@@ -45,10 +46,33 @@ pub struct Physics<const D: usize> {
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
-    /// Whether particles carry their displacement since they came.
-    pub displacement: bool,
+    /// What particles carry of their motion since they came.
+    pub followed: Followed,
     /// Choice of the time step.
     pub control: StepControl,
+}
+
+/// What particles carry of their motion since they came, in columns behind those of loads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Followed {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The displacement.
+    Displacement,
+    /// Total strain and displacement.
+    Strain,
+}
+
+impl Followed {
+    /// Columns of the total strain (see [`crate::particle::strain`]), then of the displacement.
+    pub fn columns<const D: usize>(self) -> [usize; 2] {
+        match self {
+            Self::Nothing => [0, 0],
+            Self::Displacement => [0, D],
+            Self::Strain => [strain::columns(D), D],
+        }
+    }
 }
 
 /// What a run asks of an equilibrium.
@@ -58,6 +82,9 @@ pub struct Equilibrium {
     pub speed: f64,
     /// Greatest root mean square of the unbalanced force per mass, m/s².
     pub acceleration: f64,
+    /// Mass scaling: level of the cells whose material moves with its own mass. On each finer level it moves with four times the mass, so
+    /// that all levels have the same longest step. `None`: all moves with its own.
+    pub own_mass_level: Option<u8>,
 }
 
 /// Limits on the time step.
@@ -77,9 +104,30 @@ impl<const D: usize> Physics<D> {
         self.stage_starts.len().saturating_sub(1)
     }
 
-    /// Columns of what particles carry: for loads, then their displacement if that is followed.
+    /// Columns of what particles carry: for loads, then of their motion.
     pub fn carried_columns(&self) -> usize {
-        self.load_columns() + if self.displacement { D } else { 0 }
+        self.load_columns() + self.followed.columns::<D>().iter().sum::<usize>()
+    }
+
+    /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A power of four.
+    pub(crate) fn mass_scale(&self, level: u8) -> Option<f64> {
+        let own = self.equilibrium?.own_mass_level?;
+        Some(4.0_f64.powi(i32::from(level) - i32::from(own)))
+    }
+
+    /// Whether material moves with other masses than its own.
+    pub(crate) fn has_scaled_masses(&self) -> bool {
+        self.mass_scale(0).is_some()
+    }
+
+    /// First column of the displacement that particles carry, if they do.
+    pub(crate) fn displacement_column(&self) -> Option<usize> {
+        (self.followed != Followed::Nothing).then(|| self.carried_columns() - D)
+    }
+
+    /// First column of the total strain that particles carry, if they do.
+    pub(crate) fn strain_column(&self) -> Option<usize> {
+        (self.followed == Followed::Strain).then(|| self.load_columns())
     }
 
     /// Columns of what particles carry for loads.

@@ -14,7 +14,7 @@ pub struct Change<const D: usize> {
     pub materials: Vec<u16>,
     /// Whether all particles are at rest.
     pub at_rest: bool,
-    /// Whether displacements are counted from here.
+    /// Whether displacements and total strains are counted from here.
     pub reset_displacement: bool,
     /// Particles that come, by own leaf.
     pub added: Vec<Chunk<D>>,

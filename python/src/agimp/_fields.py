@@ -20,6 +20,8 @@ KNOWN: dict[str, Field] = {
     "id": Field("", "identifier of the particle"),
     "material": Field("", "material"),
     "body": Field("", "body"),
+    "strain": Field("", "total logarithmic strain since the particle came"),
+    "equivalent_strain": Field("", "equivalent total strain"),
     "displacement": Field("m", "displacement since the particle came"),
     "particle_level": Field("", "tree level that the particle was made for"),
     "leaf_level": Field("", "level of the leaf that holds the particle"),

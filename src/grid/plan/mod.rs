@@ -209,10 +209,14 @@ impl<const D: usize> GridPlan<D> {
         self.leaf_start[leaf] as usize..self.leaf_start[leaf + 1] as usize
     }
 
+    /// Level of the finest bins of an own leaf.
+    pub fn finest_level(&self, leaf: usize) -> u8 {
+        self.bins[self.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max().unwrap_or(0)
+    }
+
     /// Edge of a cell of the finest bins of an own leaf, m.
     pub fn finest_cell(&self, leaf: usize) -> f64 {
-        let finest = self.bins[self.leaf_bins(leaf)].iter().map(|bin| bin.block.level).max();
-        self.cell(finest.unwrap_or(0))
+        self.cell(self.finest_level(leaf))
     }
 
     /// The block of cells of a bin.

@@ -7,6 +7,7 @@ use super::View;
 use super::averages::{self, principal};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 
 /// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit (empty for pure numbers), values of all
@@ -52,6 +53,10 @@ fields! {
     Velocity, "velocity", "m/s", |view| each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p)));
     /// Displacement since the particle came, m; followed only where a job asks for this field.
     Displacement, "displacement", "m", |view| each(view, 3, |chunk, p, out| out.extend(displacement(chunk, p)));
+    /// Total logarithmic strain, elastic and plastic, since the particle came; components as those of `stress`; followed only where a job asks for it.
+    Strain, "strain", "", |view| each(view, 6, |chunk, p, out| out.extend(total_strain(chunk, p)));
+    /// Equivalent total strain, √(2/3 e : e) of its deviator e; followed only where a job asks for it.
+    EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| strain::equivalent(&total_strain(chunk, p)));
     /// Magnitude of the velocity, m/s.
     Speed, "speed", "m/s", |view| scalars(view, speed);
     /// Identifier of the particle.
@@ -185,6 +190,18 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     let first = chunk.carried_columns().saturating_sub(D);
     let component = |axis: usize| chunk.carried(first + axis).get(p).copied().unwrap_or(0.0);
     std::array::from_fn(|axis| if axis < D { component(axis) } else { 0.0 })
+}
+
+/// Total logarithmic strain: the columns ahead of those of the displacement.
+fn total_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let columns = strain::columns(D);
+    match chunk.carried_columns().checked_sub(D + columns) {
+        None => [0.0; 6],
+        Some(first) => {
+            let e: Vec<f64> = (0..columns).map(|c| chunk.carried(first + c)[p]).collect();
+            strain::logarithmic(D, &e)
+        }
+    }
 }
 
 /// Magnitude of the velocity, m/s.

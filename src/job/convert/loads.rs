@@ -84,13 +84,13 @@ fn load<const D: usize>(
             let mut components: [Option<Quantity>; D] = std::array::from_fn(|_| None);
             for (axis, component) in components.iter_mut().enumerate() {
                 if let Some(written) = given[axis] {
-                    *component = Some(quantity::<D>(checks, written, &path.key(["x", "y", "z"][axis]))?);
+                    *component = Some(at_nodes::<D>(checks, written, &path.key(["x", "y", "z"][axis]))?);
                 }
             }
             Kind::Velocity(components)
         }
         LoadKind::Damping { rate } => {
-            let rate = quantity::<D>(checks, rate, &path.key("rate"))?;
+            let rate = at_nodes::<D>(checks, rate, &path.key("rate"))?;
             if let Quantity::Constant(value) = rate
                 && value < 0.0
             {
@@ -164,6 +164,21 @@ pub(super) fn vector<const D: usize>(
     all?.try_into().ok()
 }
 
+/// A quantity that nodes have, and so none of places of the undeformed body, or a fault.
+pub(super) fn at_nodes<const D: usize>(
+    checks: &mut Checks,
+    written: &WrittenQuantity,
+    path: &Path,
+) -> Option<Quantity> {
+    let quantity = quantity::<D>(checks, written, path)?;
+    if quantity.names_undeformed() {
+        let message = "found X, Y or Z, places of the undeformed body, in what acts at places of the domain; expected x, y, z and t";
+        checks.fault(path, message.into());
+        return None;
+    }
+    Some(quantity)
+}
+
 /// A quantity, or a fault.
 pub(super) fn quantity<const D: usize>(
     checks: &mut Checks,
@@ -174,7 +189,7 @@ pub(super) fn quantity<const D: usize>(
         WrittenQuantity::Number(value) => Ok(Quantity::Constant(*value)),
         WrittenQuantity::Expression(text) => match Expression::parse(text) {
             Ok(expression) if D == 2 && expression.names_z() => {
-                Err(format!("found z in \"{text}\"; expected x, y and t in a 2D job"))
+                Err(format!("found z in \"{text}\"; expected x, y, X, Y and t in a 2D job"))
             }
             Ok(expression) => Ok(Quantity::Expression(Box::new(expression))),
             Err(error) => Err(error.to_string()),

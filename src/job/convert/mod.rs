@@ -27,9 +27,10 @@ use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Sampling, Shape};
-use crate::load::Gravity;
+use crate::load::{Gravity, Load};
 use crate::material::parameters::OutOfRange;
 use crate::quantity::Quantity;
+use crate::solver::Followed;
 use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
@@ -117,7 +118,11 @@ fn problem<const D: usize>(
     let fluxes = probes::fluxes(checks, file, &space, &root.key("fluxes"));
     let lines = probes::lines(checks, file, &space, &root.key("lines"));
     let maps = probes::maps(checks, file, &space, &root.key("maps"));
-    let output = output(checks, file, &name, &root.key("output"));
+    let mut output = output(checks, file, &name, &root.key("output"));
+    let needs_places = loads.as_ref().is_some_and(|loads| loads.iter().any(Load::names_undeformed));
+    if needs_places && output.followed == Followed::Nothing {
+        output.followed = Followed::Displacement;
+    }
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
         None => None,

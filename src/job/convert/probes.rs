@@ -2,6 +2,7 @@
 use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
+use crate::job::schema::probes::Flux as Written;
 use crate::probe::{Flux, Line, Map, Probe, Section, Track};
 
 /// Most cells of a raster.
@@ -76,10 +77,21 @@ pub(super) fn fluxes<const D: usize>(
                 let normal = checks.direction::<D>(normal, &here.key("normal"));
                 let in_space =
                     |vector: [f64; D]| std::array::from_fn(|a| if a < D { vector[a] } else { 0.0 });
-                point.zip(normal).map(|(point, normal)| Section::Plane {
-                    point: in_space(point),
-                    normal: in_space(normal),
+                let opening = opening(checks, written, space, &here);
+                point.zip(normal).zip(opening).map(|((point, normal), opening)| {
+                    let (point, normal) = (in_space(point), in_space(normal));
+                    match opening {
+                        None => Section::Plane { point, normal },
+                        Some(bounds) => Section::Opening { point, normal, bounds: bounds.map(in_space) },
+                    }
                 })
+            }
+            (None, None, Some(_)) if written.min.is_some() || written.max.is_some() => {
+                let key = if written.min.is_some() { "min" } else { "max" };
+                let message =
+                    "found a box at a face of the domain; expected one at a plane, with point and normal";
+                checks.fault(&here.key(key), message.into());
+                None
             }
             (None, None, Some(face)) => {
                 let face = face as usize;
@@ -97,6 +109,36 @@ pub(super) fn fluxes<const D: usize>(
         all.extend(section.map(|section| Flux { name: written.name.clone(), section }));
     }
     (all.len() == file.fluxes.len()).then_some(all)
+}
+
+/// The box of an opening, if there is one, or a fault.
+fn opening<const D: usize>(
+    checks: &mut Checks,
+    written: &Written,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Option<[[f64; D]; 2]>> {
+    let (min, max) = match (&written.min, &written.max) {
+        (None, None) => return Some(None),
+        (Some(min), Some(max)) => (min, max),
+        (min, _) => {
+            let (found, other) = if min.is_some() { ("min", "max") } else { ("max", "min") };
+            let message = format!("found {found} without {other}; expected both corners of a box");
+            checks.fault(&path.key(found), message);
+            return None;
+        }
+    };
+    let min = checks.point::<D>(min, space, &path.key("min"))?;
+    let max = checks.point::<D>(max, space, &path.key("max"))?;
+    if let Some(axis) = (0..D).find(|&axis| min[axis] > max[axis]) {
+        let message = format!(
+            "found a box with its upper corner below its lower one along {}; expected max beyond min",
+            ["x", "y", "z"][axis]
+        );
+        checks.fault(&path.key("max"), message);
+        return None;
+    }
+    Some(Some([min, max]))
 }
 
 /// All lines, or faults.

@@ -1,12 +1,13 @@
 //! From the file's types to a checked problem: faces, numerics, output and report.
 use super::checks::{Checks, Space};
-use super::loads::quantity;
+use super::loads::at_nodes;
 use crate::boundary::Absorbing;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
+use crate::solver::Followed;
 use crate::text::{number, written};
 
 /// Most output files of one run.
@@ -52,7 +53,7 @@ pub(in crate::job) fn absorbing<const D: usize>(
     for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
         if let Some(file::Face::Absorbing { p_speed, s_speed, density, pressure }) = all[axis][side] {
             let key = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side];
-            let pressure = quantity::<D>(checks, pressure, &path.key(key).key("pressure"))?;
+            let pressure = at_nodes::<D>(checks, pressure, &path.key(key).key("pressure"))?;
             let face = Absorbing { p_speed: *p_speed, s_speed: *s_speed, density: *density, pressure };
             sides[axis][side] = Some(Box::new(face));
         }
@@ -153,7 +154,11 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         directory: directory.into(),
         every: output.every,
         fields: output.fields.clone(),
-        displacement: output.follows_displacement(),
+        followed: match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
+            true => Followed::Strain,
+            false if output.has_any(&[Field::Displacement]) => Followed::Displacement,
+            false => Followed::Nothing,
+        },
         restart: output.restart,
         picture: output.picture,
         picture_field: output.picture_field,

@@ -3,7 +3,7 @@ use super::checks::Checks;
 use super::settings;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
-use crate::job::problem::{InStages, Stage};
+use crate::job::problem::{Field, InStages, Stage};
 use crate::job::schema::job_file::{Body, Equilibrium as Written, JobFile};
 use crate::solver::Equilibrium;
 use crate::text::{excerpt, written as number};
@@ -15,7 +15,7 @@ pub(super) fn stages<const D: usize>(
     root: &Path,
 ) -> Option<Vec<Stage<D>>> {
     if file.stages.is_empty() {
-        return Some(vec![Stage::whole_run(file.equilibrium.as_ref().map(equilibrium))]);
+        return Some(vec![Stage::whole_run(equilibrium(file, file.equilibrium.as_ref()))]);
     }
     if file.equilibrium.is_some() {
         let message = "found [equilibrium] in a job with stages; expected it in the stages that end with it";
@@ -29,8 +29,12 @@ pub(super) fn stages<const D: usize>(
     all.into_iter().collect()
 }
 
-fn equilibrium(written: &Written) -> Equilibrium {
-    Equilibrium { speed: written.speed, acceleration: written.acceleration }
+fn equilibrium(file: &JobFile, written: Option<&Written>) -> Option<Equilibrium> {
+    written.map(|written| Equilibrium {
+        speed: written.speed,
+        acceleration: written.acceleration,
+        own_mass_level: written.mass_scaling.then_some(file.tree.base_level),
+    })
 }
 
 fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path: &Path) -> Option<Stage<D>> {
@@ -51,9 +55,9 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         let message = "found it in the first stage; expected it in a later one: bodies begin with the velocity that they say";
         checks.fault(&path.key("at_rest"), message.into());
     }
-    if written.reset_displacement && !file.output.follows_displacement() {
-        let message =
-            "found it where displacements are not followed; expected \"displacement\" among output.fields";
+    let shows = file.output.has_any(&[Field::Displacement, Field::Strain, Field::EquivalentStrain]);
+    if written.reset_displacement && !shows {
+        let message = "found it where displacements are not followed; expected \"displacement\" or \"strain\" among output.fields";
         checks.fault(&path.key("reset_displacement"), message.into());
     }
     let begins: f64 = file.stages[..index].iter().map(|stage| stage.duration.unwrap_or(0.0)).sum();
@@ -100,7 +104,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
     Some(Stage {
         name: written.name.clone(),
         duration: written.duration.unwrap_or(f64::INFINITY),
-        equilibrium: written.equilibrium.as_ref().map(equilibrium),
+        equilibrium: equilibrium(file, written.equilibrium.as_ref()),
         removed,
         materials,
         gravity,

@@ -343,6 +343,11 @@ pub struct Equilibrium {
     /// Bound on the root mean square of the unbalanced force per mass, m/s²; 1e-4 of gravity is small.
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub acceleration: f64,
+    /// Whether the material of fine cells moves with more mass than it has, fourfold for each level above `tree.base_level`, so that the
+    /// coarsest cells set the time step. Weight and all other forces are those of its own mass, so the equilibrium is the same; the way
+    /// to it is none of physics.
+    #[serde(default)]
+    pub mass_scaling: bool,
 }
 
 /// Choices of the method.

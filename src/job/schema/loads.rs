@@ -4,14 +4,14 @@ use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A quantity: a number; an expression in x, y, z (m) and t (s), such as "0.1 * sin(2 * pi * t)"; or a table over time,
+/// A quantity: a number; an expression in x, y, z (m) and t (s), of loads on material also in X, Y, Z (m), such as "0.1 * sin(2 * pi * t)"; or a table over time,
 /// [[time, value], …] or from a file { file = "record.csv" }, linear between its rows and constant outside.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
     /// The same everywhere and always.
     Number(#[schemars(range(min = -1e12, max = 1e12))] f64),
-    /// An expression in x, y, z (m) and t (s) with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
+    /// An expression in x, y, z (m), t (s) and, in loads on material, X, Y, Z (m; the place in the undeformed body), with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
     /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, floor, ceil, min, max.
     Expression(String),
     /// Rows [time (s), value] with increasing times.

@@ -32,9 +32,9 @@ pub struct Output {
 }
 
 impl Output {
-    /// Whether particles carry their displacement.
-    pub fn follows_displacement(&self) -> bool {
-        self.fields.contains(&Field::Displacement) || self.picture_field == Some(Field::Displacement)
+    /// Whether the output has one of these fields.
+    pub fn has_any(&self, fields: &[Field]) -> bool {
+        self.fields.iter().chain(&self.picture_field).any(|field| fields.contains(field))
     }
 }
 

@@ -67,6 +67,13 @@ pub struct Flux {
     /// Normal of the plane, any length: mass counts where it goes.
     #[serde(default)]
     pub normal: Option<Vector>,
+    /// Lower corner of a box, m: with `max`, only what crosses the plane within it counts, such as at a slot or a gate. Masses are then
+    /// summed up as particles cross; what splits or merges across the plane crosses nothing.
+    #[serde(default)]
+    pub min: Option<Vector>,
+    /// Upper corner of the box, m.
+    #[serde(default)]
+    pub max: Option<Vector>,
     /// A face of the domain, in the place of a plane.
     #[serde(default)]
     pub face: Option<FaceName>,

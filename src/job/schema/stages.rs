@@ -35,7 +35,7 @@ pub struct Stage {
     /// Whether all material is at rest at the start of the stage.
     #[serde(default)]
     pub at_rest: bool,
-    /// Whether the output field `displacement` is counted from the start of the stage.
+    /// Whether the output fields `displacement` and `strain` are counted from the start of the stage.
     #[serde(default)]
     pub reset_displacement: bool,
 }

@@ -15,7 +15,7 @@ use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
-use crate::solver::physics::{Physics, StepControl};
+use crate::solver::physics::{Followed, Physics, StepControl};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
 use crate::solver::step::node_update::update_velocity;
@@ -106,7 +106,7 @@ impl<const D: usize> GivenBoxes<D> {
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,
             f_bar: false,
-            displacement: false,
+            followed: Followed::Nothing,
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
         };
         let chunks = vec![Chunk::new(); forest.leaves().len()];

@@ -103,12 +103,14 @@ pub(in crate::solver) struct Crossed {
     pub deleted: Vec<Gone>,
     /// Those that left through outflow faces.
     pub left: Vec<Gone>,
+    /// Masses that passed openings, kg, with the number of the flux: negative against its normal.
+    pub passed: Vec<(u32, f64)>,
 }
 
 impl Crossed {
     /// Whether there are any.
     pub(crate) fn is_any(&self) -> bool {
-        self.put_back > 0 || !self.deleted.is_empty() || !self.left.is_empty()
+        self.put_back > 0 || !self.deleted.is_empty() || !self.left.is_empty() || !self.passed.is_empty()
     }
 }
 
@@ -133,6 +135,7 @@ impl Crossings {
         self.put_back += crossed.put_back;
         self.deleted += crossed.deleted.len() as u64;
         self.left += crossed.left.len() as u64;
+        self.fluxes.book_passed(&crossed.passed);
         for (sum, gone) in self.masses.iter_mut().zip([&crossed.deleted, &crossed.left]) {
             for gone in gone {
                 sum.add(gone.mass);
@@ -213,7 +216,7 @@ mod tests {
         let gone = Gone { mass: 0.5, place: [0.0; 3], face: (0, 0) };
         let mut crossings = Crossings::default();
         assert_eq!(crossings.to_string(), "");
-        crossings.book(&Crossed { put_back: 2, deleted: Vec::new(), left: vec![gone; 1200] });
+        crossings.book(&Crossed { put_back: 2, left: vec![gone; 1200], ..Crossed::default() });
         assert_eq!(
             crossings.to_string(),
             "particles at the faces of the domain: 1 200 left through outflow faces (600 kg), 2 were put back to the face that \

@@ -13,7 +13,7 @@ pub struct Fluxes {
     /// Where mass is counted.
     pub sections: Vec<Section>,
     /// Mass that has left the domain beyond each of them, less that beyond it at the start and what stages have added there since,
-    /// kg; this rank's part.
+    /// or that has crossed an opening, kg; this rank's part.
     pub sums: Vec<ExactSum>,
 }
 
@@ -28,13 +28,24 @@ impl Fluxes {
     pub(super) fn book(&mut self, gone: &Gone) {
         for (section, sum) in self.sections.iter().zip(&mut self.sums) {
             let is_beyond = match section {
-                Section::Plane { .. } => section.is_beyond(&gone.place),
+                Section::Plane { .. } | Section::Opening { .. } => section.is_beyond(&gone.place),
                 Section::Face { axis, side } => (*axis, *side) == gone.face,
             };
             if is_beyond {
                 sum.add(gone.mass);
             }
         }
+    }
+
+    /// Books masses (kg, with signs) that crossed openings, each with the number of the section.
+    pub(super) fn book_passed(&mut self, passed: &[(u32, f64)]) {
+        passed.iter().for_each(|&(number, mass)| self.sums[number as usize].add(mass));
+    }
+
+    /// Openings among the sections, with their numbers.
+    pub(in crate::solver) fn openings(&self) -> Vec<(u32, Section)> {
+        let numbered = (0..).zip(self.sections.iter().copied());
+        numbered.filter(|(_, section)| matches!(section, Section::Opening { .. })).collect()
     }
 
     /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 the material that is there is none that has passed: at

@@ -121,7 +121,7 @@ pub struct Solver<const D: usize> {
     /// The way to equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.
-    pub(super) motion: [ExactSum; 2],
+    pub(super) motion: [ExactSum; 3],
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,

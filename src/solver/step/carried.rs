@@ -1,4 +1,6 @@
-//! Forces that particles carry: tractions, pressures, point forces.
+//! Forces on particles: those that they carry (tractions, pressures, point forces), and body forces that belong to places of the undeformed
+//! body. With mass scaling gravity and all body forces are among them: they act on the mass that material has, not on that with which it
+//! moves.
 //!
 //! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the particle has the velocity
 //! `v + Δt f / m`, and its own again afterwards: the force takes the way of momentum through parts of boxes and constrained nodes,
@@ -6,9 +8,9 @@
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
-use crate::kernel::Select;
 use crate::load::{Carried, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::strain;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{CarriedTotals, ParticlePush};
 use crate::solver::state::phases::Phase;
@@ -24,60 +26,117 @@ fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> 
     numbers.iter().any(|&number| number != 0.0).then_some(numbers)
 }
 
-/// Pushes the particles of a leaf. Returns what pushed them, and the velocities that they had.
-fn push<const D: usize>(
-    chunk: &mut Chunk<D>,
-    loads: &[(usize, &Load<D>, &Carried<D>)],
+/// What pushes particles in a step.
+struct Pushing<'a, const D: usize> {
+    /// Loads that act on particles, with their numbers.
+    loads: Vec<(usize, &'a Load<D>)>,
+    /// First column of the displacement, if particles carry it.
+    displacement: Option<usize>,
+    /// Gravity, m/s², where masses are scaled; else nodes have it.
+    gravity: [f64; D],
+    /// Whether all particles are pushed, and not those alone that carry something.
+    all: bool,
     middle: f64,
     dt: f64,
-    pushes: &mut Vec<ParticlePush<D>>,
-) -> Velocities<D> {
-    let mut before = Vec::new();
-    for p in 0..chunk.len() {
-        let from = pushes.len();
-        for &(number, load, carried) in loads {
-            if let Some(numbers) = numbers(chunk, carried, p) {
-                let x = chunk.position(p);
-                let force = load.force(carried, &numbers, &x, middle - load.start);
-                pushes.push(ParticlePush { particle: p as u32, load: number as u32, force, way: x });
+}
+
+impl<const D: usize> Pushing<'_, D> {
+    /// Pushes the particles of a leaf, which move with `scale` times their mass. Returns the velocities that they had, and adds what pushed
+    /// them to `pushes`.
+    fn push(&self, chunk: &mut Chunk<D>, scale: f64, pushes: &mut Vec<ParticlePush<D>>) -> Velocities<D> {
+        let mut before = Vec::new();
+        for p in 0..chunk.len() {
+            let from = pushes.len();
+            let mass = chunk.column(Layout::<D>::MASS)[p];
+            for &(number, load) in &self.loads {
+                if let Some(force) = self.force(chunk, p, load, mass / scale) {
+                    let way = chunk.position(p);
+                    pushes.push(ParticlePush { particle: p as u32, load: number as u32, force, way });
+                }
+            }
+            if self.all || from < pushes.len() {
+                let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
+                before.push((p as u32, velocity));
+                let falling =
+                    std::array::from_fn(|a| (self.dt / scale).mul_add(self.gravity[a], velocity[a]));
+                let pushed = pushes[from..].iter().fold(falling, |velocity: [f64; D], push| {
+                    std::array::from_fn(|a| self.dt.mul_add(push.force[a] / mass, velocity[a]))
+                });
+                chunk.write(Layout::<D>::VELOCITY, p, &pushed);
             }
         }
-        if from < pushes.len() {
-            let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
-            before.push((p as u32, velocity));
-            let mass = chunk.column(Layout::<D>::MASS)[p];
-            let pushed = pushes[from..].iter().fold(velocity, |velocity, push| {
-                std::array::from_fn(|a| dt.mul_add(push.force[a] / mass, velocity[a]))
-            });
-            chunk.write(Layout::<D>::VELOCITY, p, &pushed);
+        before
+    }
+
+    /// Force of a load on a particle of this mass (kg), N, if it has any.
+    fn force(&self, chunk: &Chunk<D>, p: usize, load: &Load<D>, mass: f64) -> Option<[f64; D]> {
+        let x = chunk.position(p);
+        let place = || load.place(&x, &displacement(chunk, self.displacement, p));
+        match load.carried() {
+            Some(carried) => {
+                let numbers = numbers(chunk, carried, p)?;
+                Some(load.force(carried, &numbers, &place(), self.middle - load.start))
+            }
+            None => load.body_force(&x, &place(), self.middle).map(|per_mass| per_mass.map(|a| mass * a)),
         }
     }
-    before
+}
+
+/// Displacement of a particle, m; 0 where particles do not carry it.
+fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize) -> [f64; D] {
+    let component = |axis: usize| chunk.carried(first? + axis).get(p).copied();
+    std::array::from_fn(|axis| component(axis).unwrap_or(0.0))
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Gives particles the impulse of what they carry, for P2G. Returns the velocities that they had, by leaf, for
-    /// [`Solver::take_back_push`]; nothing without such loads.
+    /// Not collective. Gives particles the impulse of what acts on them, for P2G. Returns the velocities that they had, by leaf, for
+    /// [`Solver::take_back_push`]; nothing where nothing does.
     pub(in crate::solver) fn push_particles(&mut self, dt: f64) -> Vec<Velocities<D>> {
-        if self.physics.load_columns() == 0 {
+        let (physics, time) = (&self.physics, self.clock.time);
+        let scaled = physics.has_scaled_masses();
+        let loads = physics.loads.iter().enumerate();
+        let loads: Vec<_> = loads.filter(|(_, load)| load.acts_on_particles(scaled)).collect();
+        if loads.is_empty() && !scaled {
             return Vec::new();
         }
-        let time = self.clock.time;
-        let loads = self.physics.loads.iter().enumerate().filter(|(_, load)| load.is_active(time));
-        let loads: Vec<_> =
-            loads.filter_map(|(number, load)| Some((number, load, load.carried()?))).collect();
+        let middle = time + 0.5 * dt;
+        let pushing = Pushing {
+            all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
+            loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
+            displacement: physics.displacement_column(),
+            gravity: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
+            middle,
+            dt,
+        };
         self.pushes.resize_with(self.chunks.len(), Vec::new);
-        let leaves = self.chunks.par_iter_mut().zip(&mut self.pushes).with_min_len(32);
+        let plan = &self.grid.plan;
+        let leaves = self.chunks.par_iter_mut().zip(&mut self.pushes).enumerate().with_min_len(32);
         self.phases.time(Phase::Scatter, || {
-            let before = leaves.map(|(chunk, pushes)| {
+            let before = leaves.map(|(leaf, (chunk, pushes))| {
                 pushes.clear();
-                match chunk.carried_columns() {
-                    0 => Vec::new(),
-                    _ => push(chunk, &loads, time + 0.5 * dt, dt, pushes),
+                match pushing.all || chunk.carried_columns() > 0 {
+                    false => Vec::new(),
+                    true => {
+                        let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
+                        pushing.push(chunk, scale, pushes)
+                    }
                 }
             });
             before.collect()
         })
+    }
+
+    /// Not collective. Gives particles the masses with which they move, or back their own, where the stage asks for mass scaling. Factors
+    /// are powers of two, so no mass changes.
+    pub(in crate::solver) fn scale_masses(&mut self, change: fn(f64, f64) -> f64) {
+        if !self.physics.has_scaled_masses() {
+            return;
+        }
+        let (physics, plan) = (&self.physics, &self.grid.plan);
+        self.chunks.par_iter_mut().enumerate().with_min_len(32).for_each(|(leaf, chunk)| {
+            let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
+            chunk.column_mut(Layout::<D>::MASS).into_iter().for_each(|mass| *mass = change(*mass, scale));
+        });
     }
 
     /// Not collective. Particles have the velocities again that they had.
@@ -100,7 +159,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. What particles carry now of each load that they carry, and its force when it begins, or now if it has begun.
     pub fn carried_totals(&self) -> Vec<CarriedTotals> {
-        let mut all = Vec::new();
+        let (mut all, moved) = (Vec::new(), self.physics.displacement_column());
         for load in &self.physics.loads {
             let Some(carried) = load.carried() else { continue };
             let own = self.clock.time - load.start;
@@ -110,7 +169,8 @@ impl<const D: usize> Solver<D> {
                 for p in 0..chunk.len() {
                     let Some(numbers) = numbers(chunk, carried, p) else { continue };
                     count[0] += 1;
-                    let force = load.force(carried, &numbers, &chunk.position(p), time);
+                    let place = load.place(&chunk.position(p), &displacement(chunk, moved, p));
+                    let force = load.force(carried, &numbers, &place, time);
                     (0..D).for_each(|a| sums[a].add(force[a]));
                     sums[3].add(numbers.iter().map(|c| c * c).sum::<f64>().sqrt());
                 }
@@ -152,17 +212,19 @@ pub(super) fn add_ways<const D: usize>(chunk: &mut Chunk<D>, first: usize, start
     }
 }
 
-/// Those of some particles of a chunk that carry areas which follow the deformation.
-pub(super) fn followers<const D: usize>(
-    chunk: &Chunk<D>,
-    following: &[&Carried<D>],
-    select: Select,
-) -> Vec<u32> {
-    let carries = |p: usize| following.iter().any(|carried| numbers(chunk, carried, p).is_some());
-    match select {
-        Select::All => (0..chunk.len() as u32).filter(|&p| carries(p as usize)).collect(),
-        Select::List(list) => list.iter().copied().filter(|&p| carries(p as usize)).collect(),
-    }
+/// Total strains that particles carry from column `first` on follow a step with this velocity gradient (1/s).
+pub(super) fn strain<const D: usize>(
+    chunk: &mut Chunk<D>,
+    first: usize,
+    p: usize,
+    gradient: &[[f64; D]; D],
+    dt: f64,
+) {
+    let columns = strain::columns(D);
+    chunk.carry(first + columns);
+    let old: Vec<f64> = (0..columns).map(|c| chunk.carried(first + c)[p]).collect();
+    let new = strain::after_step(&old, gradient, dt);
+    new.into_iter().enumerate().for_each(|(c, value)| chunk.carried_mut(first + c)[p] = value);
 }
 
 /// Areas that a particle carries follow a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.

@@ -12,10 +12,11 @@ use crate::grid::sums::node_fields::{VelocityArena, load_rows};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::g2p::{Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
-use crate::kernel::{Row, Scheme, Select, arena_nodes, g2p};
+use crate::kernel::{Row, Scheme, arena_nodes, g2p};
 use crate::load::{Carried, Load};
 use crate::particle::Chunk;
-use crate::particle::chunk::Place;
+use crate::particle::chunk::{Layout, Place};
+use crate::probe::Section;
 use crate::solver::migration::depart::{Borders, Departed};
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::bins::OfLeaf;
@@ -25,7 +26,7 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{Near, ParticlePush};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{add_ways, follow, followers, note_ways, positions};
+use crate::solver::step::carried::{add_ways, follow, note_ways, positions, strain};
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
@@ -38,7 +39,7 @@ struct Scratch<const D: usize> {
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
     sort: leaf_bins::Scratch,
-    /// Velocity gradients of particles that carry areas.
+    /// Velocity gradients of particles, 1/s, where they are needed ahead of or after the advance.
     gradients: Vec<(u32, [[f64; D]; D])>,
     mean_dilation: MeanDilation,
 }
@@ -90,8 +91,11 @@ struct Sweep<'a, const D: usize> {
     following: &'a [&'a Carried<D>],
     /// Colliders that act on particles.
     guard: Option<Guard<'a, D>>,
-    /// First column of the displacements that particles carry, if they do.
+    /// First columns of displacements and total strains that particles carry, if they do.
     displacement: Option<usize>,
+    strain: Option<usize>,
+    /// Openings at which mass is counted, with their numbers.
+    openings: Vec<(u32, Section)>,
 }
 
 /// What is noted of the particles of a leaf.
@@ -132,7 +136,9 @@ impl<const D: usize> Solver<D> {
             places,
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt]),
-            displacement: self.physics.displacement.then(|| self.physics.load_columns()),
+            displacement: self.physics.displacement_column(),
+            strain: self.physics.strain_column(),
+            openings: self.crossings.fluxes.openings(),
         };
         let (chunks, lists, pushes, near) =
             (&mut self.chunks, &mut self.grid.lists, &mut self.pushes, &mut self.near);
@@ -197,18 +203,27 @@ impl<const D: usize> Sweep<'_, D> {
     ) -> Departed {
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
-        let start = self.displacement.map(|_| positions(chunk));
+        let follows = self.displacement.is_some() || !self.openings.is_empty();
+        let start = follows.then(|| positions(chunk));
         *signal = self.gather(scratch, leaf, chunk, bins.lists());
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
             scratch.leavers.look_again(chunk, &held);
         }
-        if let (Some(first), Some(start)) = (self.displacement, start) {
-            add_ways(chunk, first, &start);
+        let mut passed = Vec::new();
+        if let Some(start) = start {
+            self.note_passed(chunk, &start, &mut passed);
+            self.displacement.into_iter().for_each(|first| add_ways(chunk, first, &start));
         }
         note_ways(chunk, pushes);
-        for (p, gradient) in scratch.gradients.drain(..) {
-            follow(chunk, self.following, p as usize, &gradient, self.dt);
+        for (p, mut gradient) in scratch.gradients.drain(..) {
+            let p = p as usize;
+            follow(chunk, self.following, p, &gradient, self.dt);
+            if let Some(first) = self.strain {
+                let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
+                (0..D).for_each(|i| gradient[i][i] += added);
+                strain(chunk, first, p, &gradient, self.dt);
+            }
         }
         self.watch.after(chunk, self.dt, maxima);
         if signal.is_infinite()
@@ -217,11 +232,24 @@ impl<const D: usize> Sweep<'_, D> {
             return Departed { error: Some(error), ..Departed::default() };
         }
         let leavers = &scratch.leavers.found;
-        let departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
+        let mut departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
+        departed.crossed.passed = passed;
         if !is_empty {
             bins.presort(self.plan, leaf, chunk, self.widths, &mut scratch.sort);
         }
         departed
+    }
+
+    /// Notes the masses of a leaf that have passed openings on their ways from `start`.
+    fn note_passed(&self, chunk: &Chunk<D>, start: &[[f64; D]], passed: &mut Vec<(u32, f64)>) {
+        for (number, opening) in &self.openings {
+            for (p, start) in start.iter().enumerate() {
+                let sign = opening.passes(start, &chunk.position(p));
+                if sign != 0.0 {
+                    passed.push((*number, sign * chunk.column(Layout::<D>::MASS)[p]));
+                }
+            }
+        }
     }
 
     /// Advances the particles of a leaf, bin by bin, and notes those that leave it. Returns the greatest `c + |v|`, m/s.
@@ -236,8 +264,9 @@ impl<const D: usize> Sweep<'_, D> {
         if chunk.is_empty() {
             return 0.0;
         }
-        if self.scheme.f_bar {
-            self.average_dilation(scratch, leaf, chunk, lists);
+        scratch.gradients.clear();
+        if self.scheme.f_bar || self.needs_gradients(chunk) {
+            self.note_gradients(scratch, leaf, chunk, lists);
         }
         scratch.begin_cut(cut_of(lists).len());
         let mut fastest: f64 = 0.0;
@@ -256,7 +285,7 @@ impl<const D: usize> Sweep<'_, D> {
     /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
     /// [`Sweep::gather`].
     fn gather_bin(&self, scratch: &mut Scratch<D>, bin: &BinView<'_, D>, chunk: &mut Chunk<D>) -> f64 {
-        let Scratch { kernel, arena, increments, gathered, leavers, gradients, mean_dilation, .. } = scratch;
+        let Scratch { kernel, arena, increments, gathered, leavers, mean_dilation, .. } = scratch;
         let next = self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
         if let Some(rows) = self.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
@@ -266,12 +295,6 @@ impl<const D: usize> Sweep<'_, D> {
         let nodes = Fields { velocity: &arena.rows, increment, moments };
         g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
         let Some(whole) = bin.whole else { return 0.0 };
-        if self.has_followers(chunk) {
-            let list = followers(chunk, self.following, whole);
-            g2p::look(kernel, chunk, Select::List(&list), &bin.frame, self.scheme, &nodes, |p, gathered| {
-                gradients.push((p as u32, gathered.gradient()));
-            });
-        }
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
         let dilation = &mean_dilation.added[..];
@@ -279,34 +302,37 @@ impl<const D: usize> Sweep<'_, D> {
             .whole_boxes(whole, next)
     }
 
-    /// F-bar: what the mean rate of dilation of each cell adds to the velocity gradients of the particles in it.
-    fn average_dilation(
+    /// Notes the velocity gradients of the particles of a leaf; with F-bar also what the mean rate of dilation of each cell adds to them.
+    fn note_gradients(
         &self,
         scratch: &mut Scratch<D>,
         leaf: usize,
         chunk: &Chunk<D>,
         lists: Option<&LeafBins<D>>,
     ) {
-        let Scratch { kernel, arena, gathered, mean_dilation, .. } = scratch;
-        mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
+        let Scratch { kernel, arena, gathered, gradients, mean_dilation, .. } = scratch;
         let look = Look { plan: self.plan, fields: self.fields, arenas: self.arenas, scheme: self.scheme };
         look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
-            mean_dilation.note(p, &gathered.gradient());
+            gradients.push((p as u32, gathered.gradient()));
         });
-        mean_dilation.average(chunk);
+        if self.scheme.f_bar {
+            mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
+            gradients.iter().for_each(|(p, gradient)| mean_dilation.note(*p as usize, gradient));
+            mean_dilation.average(chunk);
+        }
+        if !self.needs_gradients(chunk) {
+            gradients.clear();
+        }
     }
 
-    /// Whether particles of a leaf may carry areas that follow the deformation.
-    fn has_followers(&self, chunk: &Chunk<D>) -> bool {
-        chunk.carried_columns() > 0 && !self.following.is_empty()
+    /// Whether particles of a leaf carry what follows the deformation: areas or total strains.
+    fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
+        self.strain.is_some() || (chunk.carried_columns() > 0 && !self.following.is_empty())
     }
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
-        let Scratch { kernel, gathered, leavers, gradients, mean_dilation, .. } = scratch;
-        if self.has_followers(chunk) {
-            gradients.extend(cut.iter().zip(&*gathered).map(|(&p, gathered)| (p, gathered.gradient())));
-        }
+        let Scratch { kernel, gathered, leavers, mean_dilation, .. } = scratch;
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
         let (scheme, dt, dilation) = (self.scheme, self.dt, &mean_dilation.added[..]);
         let update = g2p::Advance { scheme, dt, cell, dilation };

@@ -56,8 +56,9 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Loads change the velocities of real nodes. Returns what they gave, for [`Solver::book_loads`].
     pub(in crate::solver) fn apply_loads(&mut self, dt: f64) -> Vec<Push<D>> {
         let time = self.clock.time;
+        let scaled = self.physics.has_scaled_masses();
         let loads = self.physics.loads.iter().enumerate();
-        let active = loads.filter(|(_, load)| load.carried().is_none() && load.is_active(time));
+        let active = loads.filter(|(_, load)| !load.acts_on_particles(scaled) && load.is_active(time));
         let active: Vec<(usize, &Load<D>)> = active.collect();
         if active.is_empty() {
             return Vec::new();

@@ -24,7 +24,11 @@ impl<const D: usize> Solver<D> {
         dt: f64,
         rates: &[Rate<D>],
     ) -> (Vec<[ExactSum; SUMS]>, Result<(), BinMissing>) {
-        let gravity = self.physics.gravity.at(self.clock.time + 0.5 * dt);
+        // With mass scaling particles have brought their weight.
+        let gravity = match self.physics.has_scaled_masses() {
+            false => self.physics.gravity.at(self.clock.time + 0.5 * dt),
+            true => [0.0; D],
+        };
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
         let pushes = self.apply_loads(dt);
@@ -149,7 +153,7 @@ pub fn apply_faces<const D: usize>(
                         Some(face) => {
                             let block = &plan.blocks[node as usize / block_nodes(D)];
                             let x = plan.node_place(block, node as usize % block_nodes(D));
-                            let pressure = face.pressure.at(&in_job(&faces.origin, &x), faces.middle);
+                            let pressure = face.pressure.at(in_job(&faces.origin, &x), faces.middle);
                             face.apply(
                                 &mut velocity,
                                 axis,

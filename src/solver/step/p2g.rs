@@ -21,12 +21,15 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
-    /// ranks, with the forces f that particles carry; with FLIP and XPIC also `p_j` without forces.
+    /// ranks, with the forces f that act on particles; with FLIP and XPIC also `p_j` without forces. With mass scaling m is the mass with
+    /// which a particle moves.
     pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
+        self.scale_masses(|mass, scale| mass * scale);
         self.note_velocities();
         let before = self.push_particles(dt);
         self.nodes_from_particles(dt);
         self.take_back_push(&before);
+        self.scale_masses(|mass, scale| mass / scale);
     }
 
     /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes.

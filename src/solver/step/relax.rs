@@ -2,7 +2,7 @@
 //!
 //! While matter falls towards equilibrium its kinetic energy rises; where it has passed a peak, all velocities are set to 0, and the
 //! next fall begins from rest closer to it (Cundall 1976). The step from rest shows the unbalanced force, with the reactions of loads,
-//! colliders and faces: nodes then have the velocity `Δt f / m`. The energy is an exact sum over nodes, so the peaks do not depend on ranks.
+//! colliders and faces: nodes then have the velocity `Δt f / m`. After it all keeps 1/√2 of its velocity, so that stops add to no mode. The energy is an exact sum over nodes, so the peaks do not depend on ranks.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
@@ -13,32 +13,37 @@ use crate::solver::state::Solver;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Kinetic energy and mass of the real nodes that this rank counts, for [`Solver::relax`], in jobs that ask for
-    /// equilibrium.
+    /// Not collective. Sums over the real nodes that this rank counts, for [`Solver::relax`], in jobs that ask for equilibrium: kinetic
+    /// energy of the masses with which they move; masses of the material; and `½ s m v²` with mass scaling by s, so that after a step from
+    /// rest, `v = Δt f / m`, it is `½ Δt² f² s / m`, the force over the mass of the material.
     pub(in crate::solver) fn note_motion(&mut self) {
         if self.physics.equilibrium.is_none() {
             return;
         }
-        let (fields, plan) = (&self.grid.fields, &self.grid.plan);
+        let (fields, plan, physics) = (&self.grid.fields, &self.grid.plan, &self.physics);
         let nodes = block_nodes(D);
         let blocks = fields.rows.par_chunks(nodes).zip(&plan.blocks).zip(&fields.active);
-        let empty = || [ExactSum::new(), ExactSum::new()];
+        let empty = || [(); 3].map(|()| ExactSum::new());
         self.motion = self.phases.time(Phase::Nodes, || {
             let sums = blocks.with_min_len(32).filter(|(_, active)| **active).fold(
                 empty,
                 |mut sums, ((rows, block), _)| {
                     let counted = block.real_nodes() & block.owned;
+                    let scale = physics.mass_scale(block.level);
                     for (bit, row) in rows.iter().enumerate() {
                         let mass = row.0[3];
                         if counted >> bit & 1 == 1 && mass > 0.0 {
                             row.0[..D].iter().for_each(|v| sums[0].add(0.5 * mass * v * v));
-                            sums[1].add(mass);
+                            sums[1].add(mass / scale.unwrap_or(1.0));
+                            if let Some(scale) = scale {
+                                row.0[..D].iter().for_each(|v| sums[2].add(0.5 * scale * mass * v * v));
+                            }
                         }
                     }
                     sums
                 },
             );
-            let merge = |mut all: [ExactSum; 2], part: [ExactSum; 2]| {
+            let merge = |mut all: [ExactSum; 3], part: [ExactSum; 3]| {
                 all.iter_mut().zip(&part).for_each(|(all, part)| all.merge(part));
                 all
             };
@@ -52,17 +57,30 @@ impl<const D: usize> Solver<D> {
         let Some(asked) = self.physics.equilibrium else { return false };
         let (comm, motion) = (&self.comm, &mut self.motion);
         self.phases.time(Phase::Reduce, || ExactSum::sum_over_ranks(comm, motion));
-        let [kinetic, mass] = self.motion.each_ref().map(ExactSum::to_f64);
-        if self.relaxation.note(kinetic, mass, dt) {
+        let [kinetic, mass, scaled] = self.motion.each_ref().map(ExactSum::to_f64);
+        let pulled = if self.physics.has_scaled_masses() { scaled } else { kinetic };
+        let factor = self.relaxation.note([kinetic, pulled], mass, dt);
+        if factor == 0.0 {
             self.chunks.iter_mut().for_each(stop);
+        } else if factor != 1.0 {
+            self.chunks.par_iter_mut().for_each(|chunk| scale(chunk, factor));
         }
         self.relaxation.is_settled(&asked)
     }
 }
 
+/// Columns of velocities and their gradients.
+fn motion<const D: usize>() -> impl Iterator<Item = usize> {
+    let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
+    velocity.chain(Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D)
+}
+
 /// Sets all velocities and their gradients to 0.
 pub(in crate::solver) fn stop<const D: usize>(chunk: &mut Chunk<D>) {
-    let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
-    let affine = Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D;
-    velocity.chain(affine).for_each(|column| chunk.column_mut(column).fill(0.0));
+    motion::<D>().for_each(|column| chunk.column_mut(column).fill(0.0));
+}
+
+/// Multiplies all velocities and their gradients.
+fn scale<const D: usize>(chunk: &mut Chunk<D>, factor: f64) {
+    motion::<D>().for_each(|column| chunk.column_mut(column).into_iter().for_each(|v| *v *= factor));
 }

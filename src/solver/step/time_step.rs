@@ -6,13 +6,12 @@ use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
-use crate::solver::state::relaxation::RelaxPhase;
+use crate::solver::state::relaxation::{FROM_REST, RelaxPhase};
 
 impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
     ///
-    /// A step from rest moves a mode of frequency ω by `ω² Δt²` of its amplitude, twice as far as half a step of velocity would. With
-    /// `Δt/√2` stops are stable for all steps that are stable without.
+    /// A step from rest is shorter: see [`FROM_REST`].
     pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
         let mut dt = self.clock.bound.min(control.dt_max.unwrap_or(f64::INFINITY));
@@ -20,14 +19,14 @@ impl<const D: usize> Solver<D> {
             dt = dt.min(control.growth * self.clock.dt);
         }
         if self.relaxation.phase == RelaxPhase::Stopped {
-            dt *= std::f64::consts::FRAC_1_SQRT_2;
+            dt *= FROM_REST;
         }
         dt.min(limit)
     }
 
     /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
     /// the sum of wave speed and particle speed; nor may gravity take a particle at rest further than that part of a cell,
-    /// `g Δt² ≤ cfl h`. Colliders bound the step as well.
+    /// `g Δt² ≤ cfl h`. Colliders bound the step as well. With mass scaling by s, waves and falls are slower by √s.
     pub(in crate::solver) fn local_bound(&self) -> f64 {
         let plan = &self.grid.plan;
         // Scaled, so that no square overflows.
@@ -41,7 +40,8 @@ impl<const D: usize> Solver<D> {
             f64::INFINITY,
             |bound, (leaf, signal)| {
                 let length = self.physics.control.cfl * plan.finest_cell(leaf);
-                bound.min(length / signal).min((length / gravity).sqrt())
+                let slowed = self.physics.mass_scale(plan.finest_level(leaf)).map_or(1.0, f64::sqrt);
+                bound.min(slowed * length / signal).min(slowed * (length / gravity).sqrt())
             },
         );
         particles.min(self.collider_bound())

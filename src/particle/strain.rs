@@ -1,0 +1,105 @@
+//! Total strain of a particle, elastic and plastic, since it came.
+//!
+//! Particles carry `e = b - 1` with the total left Cauchy-Green tensor `b = F Fᵀ`, so that small strains keep their digits. A step with
+//! the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In plane strain no component out of the plane changes.
+use crate::material::tensor::eigen::decompose;
+use crate::simd::{Lanes, Vector};
+
+/// Components that particles carry: xx, yy, xy in plane strain, else xx, yy, zz, xy, xz, yz.
+pub const fn columns(dimension: usize) -> usize {
+    dimension * (dimension + 1) / 2
+}
+
+/// Rows and columns of the components.
+fn places(dimension: usize) -> &'static [(usize, usize)] {
+    match dimension {
+        2 => &[(0, 0), (1, 1), (0, 1)],
+        _ => &[(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)],
+    }
+}
+
+/// `e` after a step of `dt` (s) with this velocity gradient (1/s).
+pub fn after_step<const D: usize>(e: &[f64], gradient: &[[f64; D]; D], dt: f64) -> Vec<f64> {
+    let mut tensor = [[0.0; D]; D];
+    for (&(i, j), &value) in places(D).iter().zip(e) {
+        (tensor[i][j], tensor[j][i]) = (value, value);
+    }
+    // f (1 + e) fᵀ - 1 = e + g (1 + e) + ((1 + e) + g (1 + e)) gᵀ with g = f - 1.
+    let g = gradient.map(|row| row.map(|slope| dt * slope));
+    let one_plus = |i: usize, j: usize| tensor[i][j] + if i == j { 1.0 } else { 0.0 };
+    let pushed: [[f64; D]; D] =
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..D).map(|k| g[i][k] * one_plus(k, j)).sum()));
+    let new = |&(i, j): &(usize, usize)| {
+        let other: f64 = (0..D).map(|k| (one_plus(i, k) + pushed[i][k]) * g[j][k]).sum();
+        tensor[i][j] + pushed[i][j] + other
+    };
+    places(D).iter().map(new).collect()
+}
+
+/// Logarithmic (Hencky) strain `½ ln(1 + e)`, components xx, yy, zz, xy, yz, xz as VTK orders them.
+pub fn logarithmic(dimension: usize, e: &[f64]) -> [f64; 6] {
+    let mut b = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    let [xx, yy, zz, xy, xz, yz] = match dimension {
+        2 => [e[0], e[1], 0.0, e[2], 0.0, 0.0],
+        _ => std::array::from_fn(|c| e[c]),
+    };
+    (0..6).zip([xx, yy, zz, xy, xz, yz]).for_each(|(c, value)| b[c] += value);
+    let plane = dimension == 2;
+    let axes = decompose(&b.map(Lanes::splat), plane);
+    // By the vectors of b and with the digits of e: v · e v.
+    let strains = axes.vector.map(|vector| {
+        let [x, y, z] = vector.map(|component| component.to_array()[0]);
+        let stretch = xx * x * x + yy * y * y + zz * z * z + 2.0 * (xy * x * y + xz * x * z + yz * y * z);
+        Lanes::splat(0.5 * libm::log1p(stretch))
+    });
+    let [xx, yy, zz, xy, xz, yz] = axes.compose(&strains, plane).map(|component| component.to_array()[0]);
+    [xx, yy, zz, xy, yz, xz]
+}
+
+/// Equivalent strain `√(2/3 e : e)` of the deviator e of a strain in the order of [`logarithmic`].
+pub fn equivalent(strain: &[f64; 6]) -> f64 {
+    let mean = (strain[0] + strain[1] + strain[2]) / 3.0;
+    let diagonal: f64 = strain[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
+    let shear: f64 = strain[3..].iter().map(|s| s * s).sum();
+    (2.0 / 3.0 * (diagonal + 2.0 * shear)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bar that is drawn out at a constant rate, in 2D and 3D, while it turns: `ln` of its length.
+    #[test]
+    fn a_drawn_bar_has_the_logarithm_of_its_length() {
+        let steps = 20_000;
+        let (rate, dt) = (0.7, 1.0 / f64::from(steps));
+        let mut e = vec![0.0; 6];
+        let mut plane = vec![0.0; 3];
+        for _ in 0..steps {
+            e = after_step(&e, &[[rate, -0.2, 0.0], [0.2, -0.35, 0.0], [0.0, 0.0, -0.35]], dt);
+            plane = after_step(&plane, &[[rate, 0.0], [0.0, -rate]], dt);
+        }
+        let strain = logarithmic(2, &plane);
+        assert!((strain[0] - 0.7).abs() < 2e-5 && (strain[1] + 0.7).abs() < 2e-5, "{strain:?}");
+        assert!((equivalent(&strain) - 0.7 * 2.0 / 3.0_f64.sqrt()).abs() < 2e-5, "{strain:?}");
+        let strain = logarithmic(3, &e);
+        assert!((strain[2] + 0.35).abs() < 2e-5, "{strain:?}");
+        assert!((strain[..3].iter().sum::<f64>()).abs() < 5e-5, "no change of volume: {strain:?}");
+    }
+
+    /// Simple shear by an amount k: principal strains ± asinh(k / 2), exact in one step.
+    #[test]
+    fn simple_shear() {
+        let k = 1.5;
+        let strain = logarithmic(2, &after_step(&[0.0; 3], &[[0.0, k], [0.0, 0.0]], 1.0));
+        let radius = (0.25 * (strain[0] - strain[1]).powi(2) + strain[3] * strain[3]).sqrt();
+        assert!((radius - libm::asinh(0.5 * k)).abs() < 1e-14 && (strain[0] + strain[1]).abs() < 1e-14);
+    }
+
+    /// A strain of 1e-12 has all its digits.
+    #[test]
+    fn small_strains_keep_their_digits() {
+        let e = after_step(&[0.0; 6], &[[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], 1e-12);
+        assert!((logarithmic(3, &e)[0] / 1e-12 - 1.0).abs() < 1e-11);
+    }
+}
