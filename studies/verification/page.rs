@@ -2,19 +2,20 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use crate::lines::Lines;
 use crate::plot::Chart;
 
 /// Markdown text with tables, plots beside it, and the outcome of all checks.
 pub(crate) struct Page {
     path: PathBuf,
     body: String,
-    failed: usize,
+    lines: Lines,
 }
 
 impl Page {
     /// A page to be written to `path`; plots go to a folder beside it.
-    pub(crate) fn new(path: &Path) -> Self {
-        Self { path: path.to_path_buf(), body: String::new(), failed: 0 }
+    pub(crate) fn new(path: &Path, top: &Path) -> Self {
+        Self { path: path.to_path_buf(), body: String::new(), lines: Lines::new(top) }
     }
 
     fn plots(&self) -> PathBuf {
@@ -51,21 +52,28 @@ impl Page {
         let _ = writeln!(self.body, "![{title}]({folder}/{name}.svg)\n");
     }
 
-    /// Adds a line that says whether something holds.
-    pub(crate) fn check(&mut self, what: &str, found: f64, holds: bool) {
-        let verdict = if holds { "holds" } else { "**fails**" };
-        let line = format!("- {what}: {found:.3e}, {verdict}");
-        println!("{line}");
-        self.text(&line);
-        self.failed += usize::from(!holds);
+    /// Adds a line of the table of results.
+    pub(crate) fn line(&mut self, id: &str, ours: f64) {
+        self.lines.add(id, ours);
     }
 
-    /// Writes the page; returns the number of checks that failed.
-    pub(crate) fn finish(self) -> usize {
-        let head = "# Verification\n\n\
-                    Written by `studies/verification/run`, which runs every case below anew.\n\n";
-        checked_write(&self.path, &(head.to_string() + &self.body));
-        self.failed
+    /// The lines so far.
+    pub(crate) fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    /// Writes the page.
+    pub(crate) fn finish(&self) {
+        let (failures, _) = self.lines.failures();
+        let head = format!(
+            "# Verification\n\n\
+             Written by `studies/verification/run --full`, which runs every case below anew; `--quick` runs the small ones, `--only NAME` one. References and tolerances \
+             stand in [expected.toml](../studies/verification/expected.toml) and in [tables](../studies/verification/references/README.md) made by other codes.\n\n\
+             {failures} of {} lines fail.\n\n",
+            self.lines.count()
+        );
+        let sources = format!("\n## References\n\n{}", self.lines.sources());
+        checked_write(&self.path, &(head + &self.lines.table() + "\n" + &self.body + &sources));
     }
 }
 

@@ -104,7 +104,7 @@ where
 /// Runs all cases and writes their section.
 pub(crate) fn section(comm: &Comm, page: &mut Page) {
     page.text(
-        "## Free spin across level jumps\n\n\
+        "## 10 Free spin across level jumps\n\n\
          A square (plane strain) and a cube of edge 1 m (1000 kg/m3, E = 1 MPa, 10 rad/s) spin freely about a point \
          where regions of three levels meet, among them a jump of two levels. Cells of both: 1/4, 1/8 and 1/16 m. Momenta are summed over the real nodes after P2G, so what APIC \
          particles carry in their affine part is included; with the other transfers the angular momentum is that of \
@@ -178,7 +178,7 @@ pub(crate) fn section(comm: &Comm, page: &mut Page) {
         },
     );
     let drift = [0, 4, 5, 6].map(|i: usize| outcomes[i].drift).into_iter().fold(0.0, f64::max);
-    page.check("APIC: drift of linear and angular momentum, at most 1e-12", drift, drift <= 1e-12);
+    page.line("spin.drift", drift);
     let moved = outcomes.iter().map(|outcome| outcome.centre).fold(0.0, f64::max);
-    page.check("path of the centre of mass, at most 1e-10 m", moved, moved <= 1e-10);
+    page.line("spin.centre", moved);
 }

@@ -166,7 +166,7 @@ fn lumped_elements(length: f64, ratio: f64) -> f64 {
 /// Runs all cases and writes their section.
 pub(crate) fn section(comm: &Comm, page: &mut Page) {
     page.text(
-        "## Pressure waves across a level jump\n\n\
+        "## 9 Pressure waves across a level jump\n\n\
          A wave packet (Gaussian envelope, standard deviation 1.5 wave lengths, cut at 2.8 of them by a smooth window; \
          strain 1e-6) runs through an elastic bar (fixed corotated, nu = 0, c = 1) into a level jump. FLIP, 2 x 2 \
          particles per cell, Courant number 0.2 of the fine cells, cells of size H on the coarse side. R is the root of \
@@ -274,14 +274,10 @@ pub(crate) fn section(comm: &Comm, page: &mut Page) {
         },
     );
     let (two, four) = (found[&("1:2 into fine", 20)], found[&("1:4 into fine", 20)]);
-    page.check("R at 20 cells per wave length, 1:2, at most 1.5e-2", two, two <= 1.5e-2);
-    page.check("R at 20 cells per wave length, 1:4, at most 2e-2", four, four <= 2e-2);
+    page.line("wave.r.2", two);
+    page.line("wave.r.4", four);
     let fall = found[&("1:2 into fine", 10)] / two;
     let late = lateness[&("1:2 into fine", 20)].abs();
-    page.check(
-        "delay of the transmitted packet by the jump, share of its way, 1:2, 20 cells, at most 5e-3",
-        late,
-        late <= 5e-3,
-    );
-    page.check("fall of R from 10 to 20 cells per wave length, at least 3.3", fall, fall >= 3.3);
+    page.line("wave.late", late);
+    page.line("wave.fall", fall);
 }

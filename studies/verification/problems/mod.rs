@@ -1,0 +1,36 @@
+//! Problems that the binary solves from job files, one file each.
+use crate::page::Page;
+use crate::runs::Runs;
+
+pub(crate) mod bar;
+pub(crate) mod cantilever;
+pub(crate) mod column;
+pub(crate) mod dam_break;
+pub(crate) mod disks;
+pub(crate) mod drivers;
+pub(crate) mod footing;
+pub(crate) mod incline;
+pub(crate) mod manufactured;
+pub(crate) mod taylor;
+
+/// Runs a problem and writes its section.
+pub(crate) type Problem = fn(&Runs, &mut Page);
+
+/// All of them, in the order of the page.
+pub(crate) const ALL: [(&str, Problem); 10] = [
+    ("bar", bar::section),
+    ("manufactured", manufactured::section),
+    ("column", column::section),
+    ("cantilever", cantilever::section),
+    ("disks", disks::section),
+    ("taylor", taylor::section),
+    ("drivers", drivers::section),
+    ("dam_break", dam_break::section),
+    ("incline", incline::section),
+    ("footing", footing::section),
+];
+
+/// Order of convergence of errors from one number of cells to another.
+pub(crate) fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
+    (coarse.1 / fine.1).ln() / (fine.0 / coarse.0).ln()
+}

@@ -1,0 +1,131 @@
+//! Runs of the binary on job files, and what they leave.
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use agimp::io::hdf5_file::Reader;
+
+use crate::checked;
+
+/// How jobs are run.
+pub(crate) struct Runs {
+    /// The program.
+    pub agimp: PathBuf,
+    /// Top of the repository.
+    pub top: PathBuf,
+    /// Where the results go.
+    pub folder: PathBuf,
+    /// Ranks.
+    pub ranks: usize,
+    /// Which sizes are run.
+    pub effort: Effort,
+}
+
+/// Which sizes are run.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+pub(crate) enum Effort {
+    /// What takes seconds.
+    Quick,
+    /// All.
+    Full,
+}
+
+/// What a run has left.
+pub(crate) struct Results {
+    folder: PathBuf,
+    name: String,
+}
+
+impl Runs {
+    /// Whether all sizes are run.
+    pub(crate) fn is_full(&self) -> bool {
+        self.effort == Effort::Full
+    }
+
+    /// Runs a job of `jobs/` with settings `KEY=VALUE`; the results have a name of their own.
+    pub(crate) fn run(&self, job: &str, name: &str, settings: &[String]) -> Results {
+        let path = self.top.join("jobs").join(job).with_extension("toml");
+        let folder = self.folder.join(name);
+        let mut command = if self.ranks == 1 {
+            Command::new(&self.agimp)
+        } else {
+            let mut mpirun = Command::new("mpirun");
+            mpirun.args(["-n", &self.ranks.to_string()]).arg(&self.agimp);
+            mpirun
+        };
+        command.arg("run").arg(&path).args(["--overwrite", "--threads", "1", "--out"]).arg(&folder);
+        settings.iter().for_each(|setting| _ = command.args(["--set", setting]));
+        let output = checked(command.output());
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{command:?}\n{text}");
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Results { folder, name: stem }
+    }
+
+    /// A table of a reference: the columns of these names.
+    pub(crate) fn reference<const N: usize>(&self, file: &str, names: [&str; N]) -> Vec<[f64; N]> {
+        table(&self.top.join("studies/verification/references").join(file), names)
+    }
+}
+
+impl Results {
+    /// Columns of the history whose names begin so.
+    pub(crate) fn history<const N: usize>(&self, names: [&str; N]) -> Vec<[f64; N]> {
+        table(&self.folder.join(format!("{}.history.csv", self.name)), names)
+    }
+
+    /// Numbers of the outputs.
+    pub(crate) fn outputs(&self) -> usize {
+        (0..).take_while(|number| self.output(*number).exists()).count()
+    }
+
+    fn output(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{}_{number:06}.hdf", self.name))
+    }
+
+    /// A data set of an output, row by row, the particles in the order of their identifiers.
+    pub(crate) fn particles(&self, number: usize, field: &str, width: usize) -> Vec<Vec<f64>> {
+        let file = checked(Reader::open_alone(&self.output(number)));
+        let numbers = |dataset: &str| {
+            let rows = checked(file.stored(dataset)).rows;
+            let wide = checked(file.read_slab::<f64>(dataset, 0, rows));
+            (wide, rows as usize)
+        };
+        let (ids, count) = {
+            let rows = checked(file.stored("state/particles/id")).rows;
+            (checked(file.read_slab::<u64>("state/particles/id", 0, rows)), rows as usize)
+        };
+        let (values, _) = numbers(&format!("state/particles/{field}"));
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by_key(|&row| ids[row]);
+        order.into_iter().map(|row| values[row * width..][..width].to_vec()).collect()
+    }
+
+    /// Time of an output, s.
+    pub(crate) fn time(&self, number: usize) -> f64 {
+        let file = checked(Reader::open_alone(&self.output(number)));
+        checked(file.read_slab::<f64>("VTKHDF/FieldData/TimeValue", 0, 1))[0]
+    }
+}
+
+/// Columns of a table whose names begin so.
+fn table<const N: usize>(path: &Path, names: [&str; N]) -> Vec<[f64; N]> {
+    let mut reader = checked(csv::Reader::from_path(path));
+    let heads = checked(reader.headers()).clone();
+    let places = names.map(|name| {
+        let exact = heads.iter().position(|head| head == name);
+        let place = exact.or_else(|| heads.iter().position(|head| head.starts_with(name)));
+        place.unwrap_or_else(|| panic!("{}: no column {name}", path.display()))
+    });
+    let rows = reader.records().map(|row| {
+        let row = checked(row);
+        places.map(|place| row.get(place).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN))
+    });
+    rows.collect()
+}
+
+/// The value of a table of two columns between its rows.
+pub(crate) fn between(table: &[[f64; 2]], x: f64) -> f64 {
+    let after = table.iter().position(|row| row[0] > x).unwrap_or(table.len());
+    let (low, high) = (table[after.saturating_sub(1)], table[after.min(table.len() - 1)]);
+    if high[0] > low[0] { low[1] + (high[1] - low[1]) * (x - low[0]) / (high[0] - low[0]) } else { low[1] }
+}
