@@ -153,6 +153,50 @@ fn total_strain_of_drawn_metal_is_the_logarithm_of_its_length() {
     assert!(strain.chunks(6).all(|strain| (strain[0] - 0.2).abs() < 5e-3), "{:?}", &strain[..6]);
 }
 
+/// A layer that is drawn out to four times its length, over a level jump: neighbours drift two cells apart, and with `split_gap` never one.
+/// Mass is kept to the last bit. The same on any ranks and across a restart.
+#[test]
+fn drawn_layers_keep_no_gaps() {
+    let job = |gap: &str| {
+        FALL.replace("gravity = [0, -10]", "")
+            .replace("\"displacement\", \"velocity\"", "\"velocity\"")
+            .replace("every = 0.2", "every = 1.0")
+            .replace("size = [2, 4]", "size = [4, 1]")
+            .replace("[domain]", "[tree]\nbase_level = 1\n[domain]")
+            .replace("min = [0.75, 3.25], max = [1.25, 3.75]", "min = [0.25, 0], max = [0.75, 0.5]")
+            .replace("velocity = [0.25, 0]", "")
+            .replace("model = \"neo_hookean\"", "model = \"von_mises\"\nyield_stress = 100")
+            + "[time]\nend = 1.0\n[adaptivity]\nevery_steps = 5\n"
+            + gap
+            + "[[adaptivity.criteria]]\nkind = 'region'\nlevel = 2\nshape = { kind = 'box', min = [3, 0], max = [4, 1] }\n\
+               [[loads]]\nname = 'draw'\nkind = 'velocity'\nx = '1.3863 * x'\ny = '-1.3863 * y'\n"
+    };
+    // The widest stretch along x without a particle, in the cells of level 1 there.
+    let widest_gap = |directory: &Path| {
+        let path = file(directory, "drawn", "_000001.hdf");
+        let file = Reader::open_alone(&path).expect("output");
+        let particles = Header::read(&file).expect("header").particles;
+        let places: Vec<f64> = file.read_slab("VTKHDF/Points", 0, particles).expect("places");
+        let mut x: Vec<f64> = places.chunks(3).map(|x| x[0]).filter(|&x| x > 1.2 && x < 2.4).collect();
+        x.sort_by(f64::total_cmp);
+        assert!(x.last().expect("particles") - x[0] > 0.9);
+        x.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max) / 0.125
+    };
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("drawn.toml");
+    std::fs::write(&path, job("")).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let torn = widest_gap(directory.path());
+    assert!(torn > 1.5, "{torn} cells");
+    restart::assert_same_on_any_ranks(&job("split_gap = 1.0\n"), "drawn", |directory, _| {
+        let history = History::read(directory, "drawn");
+        let (mass, gap) = (history.column("mass"), widest_gap(directory));
+        println!("{gap} cells for {torn}, {} particles", history.last("particles"));
+        assert!(gap < 1.0, "{gap} cells");
+        assert!(mass.iter().all(|&m| m == mass[0]), "{mass:?}");
+    });
+}
+
 /// A run that has not followed displacements cannot begin to on its way.
 #[test]
 fn restarts_do_not_invent_displacements() {

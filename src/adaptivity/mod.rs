@@ -41,6 +41,8 @@ pub struct Adaptivity<const D: usize> {
     pub criteria: Vec<Criterion<D>>,
     /// Width of a box over that of an undeformed particle of its leaf's level above which particles split.
     pub split_stretch: Option<f64>,
+    /// Width of the space of a particle, in cells of its leaf, above which it becomes two: see [`resample::Gap`].
+    pub split_gap: Option<f64>,
     /// How different particles may be that merge; `None`: they never do.
     pub merge: Option<Limits>,
     /// Half width of an undeformed particle of level 0 by body, m.

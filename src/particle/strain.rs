@@ -2,6 +2,7 @@
 //!
 //! Particles carry `e = b - 1` with the total left Cauchy-Green tensor `b = F Fᵀ`, so that small strains keep their digits. A step with
 //! the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In plane strain no component out of the plane changes.
+use super::chunk::Chunk;
 use crate::material::tensor::eigen::decompose;
 use crate::simd::{Lanes, Vector};
 
@@ -10,16 +11,29 @@ pub const fn columns(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
-/// Rows and columns of the components.
-fn places(dimension: usize) -> &'static [(usize, usize)] {
+/// Rows and columns of the components that particles carry.
+pub const fn places(dimension: usize) -> &'static [(usize, usize)] {
     match dimension {
         2 => &[(0, 0), (1, 1), (0, 1)],
         _ => &[(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)],
     }
 }
 
+/// Components of `e`; in plane strain the last three are zero.
+pub type Components = [f64; 6];
+
+/// Components of a particle, which carries them from column `first` on.
+pub fn read<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> Components {
+    std::array::from_fn(|c| if c < columns(D) { chunk.carried(first + c)[p] } else { 0.0 })
+}
+
+/// Writes what [`read`] reads.
+pub fn write<const D: usize>(chunk: &mut Chunk<D>, first: usize, p: usize, e: &Components) {
+    (0..columns(D)).for_each(|c| chunk.carried_mut(first + c)[p] = e[c]);
+}
+
 /// `e` after a step of `dt` (s) with this velocity gradient (1/s).
-pub fn after_step<const D: usize>(e: &[f64], gradient: &[[f64; D]; D], dt: f64) -> Vec<f64> {
+pub fn after_step<const D: usize>(e: &Components, gradient: &[[f64; D]; D], dt: f64) -> Components {
     let mut tensor = [[0.0; D]; D];
     for (&(i, j), &value) in places(D).iter().zip(e) {
         (tensor[i][j], tensor[j][i]) = (value, value);
@@ -29,23 +43,30 @@ pub fn after_step<const D: usize>(e: &[f64], gradient: &[[f64; D]; D], dt: f64) 
     let one_plus = |i: usize, j: usize| tensor[i][j] + if i == j { 1.0 } else { 0.0 };
     let pushed: [[f64; D]; D] =
         std::array::from_fn(|i| std::array::from_fn(|j| (0..D).map(|k| g[i][k] * one_plus(k, j)).sum()));
-    let new = |&(i, j): &(usize, usize)| {
+    let mut new = [0.0; 6];
+    for (new, &(i, j)) in new.iter_mut().zip(places(D)) {
         let other: f64 = (0..D).map(|k| (one_plus(i, k) + pushed[i][k]) * g[j][k]).sum();
-        tensor[i][j] + pushed[i][j] + other
-    };
-    places(D).iter().map(new).collect()
+        *new = tensor[i][j] + pushed[i][j] + other;
+    }
+    new
+}
+
+/// `b = 1 + e`, components xx, yy, zz, xy, xz, yz.
+pub fn tensor(dimension: usize, e: &Components) -> [f64; 6] {
+    match dimension {
+        2 => [1.0 + e[0], 1.0 + e[1], 1.0, e[2], 0.0, 0.0],
+        _ => [1.0 + e[0], 1.0 + e[1], 1.0 + e[2], e[3], e[4], e[5]],
+    }
 }
 
 /// Logarithmic (Hencky) strain `½ ln(1 + e)`, components xx, yy, zz, xy, yz, xz as VTK orders them.
-pub fn logarithmic(dimension: usize, e: &[f64]) -> [f64; 6] {
-    let mut b = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+pub fn logarithmic(dimension: usize, e: &Components) -> [f64; 6] {
     let [xx, yy, zz, xy, xz, yz] = match dimension {
         2 => [e[0], e[1], 0.0, e[2], 0.0, 0.0],
         _ => std::array::from_fn(|c| e[c]),
     };
-    (0..6).zip([xx, yy, zz, xy, xz, yz]).for_each(|(c, value)| b[c] += value);
     let plane = dimension == 2;
-    let axes = decompose(&b.map(Lanes::splat), plane);
+    let axes = decompose(&tensor(dimension, e).map(Lanes::splat), plane);
     // By the vectors of b and with the digits of e: v · e v.
     let strains = axes.vector.map(|vector| {
         let [x, y, z] = vector.map(|component| component.to_array()[0]);
@@ -73,8 +94,7 @@ mod tests {
     fn a_drawn_bar_has_the_logarithm_of_its_length() {
         let steps = 20_000;
         let (rate, dt) = (0.7, 1.0 / f64::from(steps));
-        let mut e = vec![0.0; 6];
-        let mut plane = vec![0.0; 3];
+        let (mut e, mut plane) = ([0.0; 6], [0.0; 6]);
         for _ in 0..steps {
             e = after_step(&e, &[[rate, -0.2, 0.0], [0.2, -0.35, 0.0], [0.0, 0.0, -0.35]], dt);
             plane = after_step(&plane, &[[rate, 0.0], [0.0, -rate]], dt);
@@ -91,7 +111,7 @@ mod tests {
     #[test]
     fn simple_shear() {
         let k = 1.5;
-        let strain = logarithmic(2, &after_step(&[0.0; 3], &[[0.0, k], [0.0, 0.0]], 1.0));
+        let strain = logarithmic(2, &after_step(&[0.0; 6], &[[0.0, k], [0.0, 0.0]], 1.0));
         let radius = (0.25 * (strain[0] - strain[1]).powi(2) + strain[3] * strain[3]).sqrt();
         assert!((radius - libm::asinh(0.5 * k)).abs() < 1e-14 && (strain[0] + strain[1]).abs() < 1e-14);
     }

@@ -311,14 +311,14 @@ fn restored<const D: usize>(
     let limits = snapshot::Limits { materials: problem.materials.len(), bodies: problem.bodies.len() };
     let restored = snapshot::read::<D>(comm, path, Some(problem.digest), limits).map_err(words)?;
     let carried = restored.chunks.iter().map(Chunk::carried_columns).max().unwrap_or(0);
-    let followed = problem.output.followed.columns::<D>().iter().sum::<usize>();
-    let (follows, expected) = (followed > 0, load::columns(&problem.loads) + followed);
+    let expected = setup::physics(problem).carried_columns();
+    let follows = expected > load::columns(&problem.loads);
     if comm.any(carried != 0 && carried != expected) {
         let reason = "particles carry other loads than those of the job, or displacements or strains that output.fields does not ask for";
         return Err(refused(reason));
     }
     if follows && restored.header.step > 0 && !comm.any(carried != 0) {
-        let reason = "particles do not carry the displacements or strains that output.fields or a load asks for; a run follows them from its start";
+        let reason = "particles do not carry the displacements or strains that output.fields, a load or adaptivity.split_gap asks for; a run follows them from its start";
         return Err(refused(reason));
     }
     let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));

@@ -104,9 +104,22 @@ impl<const D: usize> Physics<D> {
         self.stage_starts.len().saturating_sub(1)
     }
 
-    /// Columns of what particles carry: for loads, then of their motion.
+    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of their motion.
     pub fn carried_columns(&self) -> usize {
-        self.load_columns() + self.followed.columns::<D>().iter().sum::<usize>()
+        self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
+    }
+
+    /// First column of what particles carry of their motion.
+    pub(crate) fn followed_column(&self) -> usize {
+        let gaps = self.adaptivity.as_ref().and_then(|adaptivity| adaptivity.split_gap);
+        self.load_columns() + if gaps.is_some() { strain::columns(D) } else { 0 }
+    }
+
+    /// First columns of tensors that follow the deformation, where particles carry them: stretch between neighbours, total strain.
+    pub(crate) fn tensor_columns(&self) -> Vec<usize> {
+        let (loads, followed) = (self.load_columns(), self.followed_column());
+        let gaps = (followed > loads).then_some(loads);
+        gaps.into_iter().chain((self.followed == Followed::Strain).then_some(followed)).collect()
     }
 
     /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A power of four.
@@ -123,11 +136,6 @@ impl<const D: usize> Physics<D> {
     /// First column of the displacement that particles carry, if they do.
     pub(crate) fn displacement_column(&self) -> Option<usize> {
         (self.followed != Followed::Nothing).then(|| self.carried_columns() - D)
-    }
-
-    /// First column of the total strain that particles carry, if they do.
-    pub(crate) fn strain_column(&self) -> Option<usize> {
-        (self.followed == Followed::Strain).then(|| self.load_columns())
     }
 
     /// Columns of what particles carry for loads.

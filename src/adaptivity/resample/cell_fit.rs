@@ -1,6 +1,6 @@
 //! Particles follow the size of the cells of their leaf.
 use super::merge_backoff::RetrySlot;
-use super::{Setting, ids, needs_split, split};
+use super::{Gap, Setting, drift, ids, needs_split, split};
 use crate::adaptivity::Adaptivity;
 use crate::kernel::{Scheme, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -27,6 +27,7 @@ pub struct Resampling<'a, const D: usize> {
     extent: [f64; D],
     nominal: &'a [f64],
     stretch: Option<f64>,
+    gap: Option<Gap>,
 }
 
 impl<'a, const D: usize> Resampling<'a, D> {
@@ -38,7 +39,9 @@ impl<'a, const D: usize> Resampling<'a, D> {
     ) -> Option<Self> {
         let adaptivity = adaptivity?;
         let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
-        Some(Self { scheme, extent, nominal, stretch })
+        // The stretch of neighbours' distances stands behind what particles carry for loads.
+        let gap = adaptivity.split_gap.map(|cells| Gap { cells, column: scheme.shares });
+        Some(Self { scheme, extent, nominal, stretch, gap })
     }
 
     fn setting(&self, level: u8) -> Setting<'a, D> {
@@ -54,6 +57,30 @@ impl<'a, const D: usize> Resampling<'a, D> {
     /// Stretch of boxes from which on particles split, if the job says so.
     pub fn stretch(&self) -> Option<f64> {
         self.stretch
+    }
+
+    /// Whether particles split where they drift apart.
+    pub fn closes_gaps(&self) -> bool {
+        self.gap.is_some()
+    }
+
+    /// Splits particles that have drifted apart, until none has. Their affine state comes from cells of level `from`.
+    fn close_gaps(&self, chunk: &mut Chunk<D>, level: u8, from: u8, done: &mut Splits) {
+        let Some(gap) = self.gap else { return };
+        let cell = self.scheme.root_cell / f64::from(1u32 << from);
+        let spread = |chunk: &Chunk<D>, p: usize| {
+            let half = chunk.column(Layout::<D>::HALF)[p];
+            chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
+        };
+        loop {
+            let energies = &mut done.energies;
+            let split =
+                drift::close_gaps(chunk, &self.setting(level), gap, spread, &mut |e| energies.push(e));
+            done.split += split;
+            if split == 0 {
+                return;
+            }
+        }
     }
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
@@ -81,6 +108,7 @@ impl<'a, const D: usize> Resampling<'a, D> {
             let wanted = needs_split(chunk, &self.setting(level), stretch);
             if wanted.which.is_empty() {
                 done.refused += wanted.refused;
+                self.close_gaps(chunk, level, from, &mut done);
                 return done;
             }
             self.split(chunk, &wanted.which, from, &mut done);

@@ -8,6 +8,7 @@ use crate::kernel::{BoxPolicy, Scheme, Select, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 pub mod cell_fit;
+mod drift;
 pub mod family;
 pub mod ids;
 pub mod ledger;
@@ -18,6 +19,7 @@ mod split;
 #[cfg(test)]
 mod tests;
 
+pub use drift::Gap;
 pub use merge::{Limits, Merged, merge};
 pub use split::{Split, split};
 
@@ -104,6 +106,15 @@ fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 /// The affine columns of particle `p` as a matrix.
 fn read_matrix<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
     std::array::from_fn(|i| chunk.read(Layout::<D>::AFFINE + D * i, p))
+}
+
+/// `(a - b', a + b')` with b' next to b, such that both are exact where `|b| <= |a|`; else rounded.
+fn opposite(a: f64, b: f64) -> (f64, f64) {
+    // Away from zero numbers are coarser. What the sum there has of b is a multiple of the spacing of numbers at a,
+    // so that taking it off again is exact.
+    let far = a + b.abs().copysign(a);
+    let near = a - (far - a);
+    if b.is_sign_negative() == a.is_sign_negative() { (near, far) } else { (far, near) }
 }
 
 /// Writes what [`read_matrix`] reads.

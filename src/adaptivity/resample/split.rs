@@ -1,5 +1,5 @@
 //! One particle becomes `2^D`.
-use super::{Setting, ids, read_matrix, write_matrix};
+use super::{Setting, ids, opposite, read_matrix, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -129,15 +129,6 @@ fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
     let offset = offset.min(0.5 * x).min(0.5 * (extent - x)).max(0.0);
     let (lower, upper) = opposite(x, offset);
     if upper < extent { (lower, upper) } else { (x, x) }
-}
-
-/// `(a - b', a + b')` with b' next to b, such that both are exact where `|b| <= |a|`; else rounded.
-fn opposite(a: f64, b: f64) -> (f64, f64) {
-    // Away from zero numbers are coarser. What the sum there has of b is a multiple of the spacing of numbers at a,
-    // so that taking it off again is exact.
-    let far = a + b.abs().copysign(a);
-    let near = a - (far - a);
-    if b.is_sign_negative() == a.is_sign_negative() { (near, far) } else { (far, near) }
 }
 
 #[cfg(test)]

@@ -194,13 +194,9 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
 
 /// Total logarithmic strain: the columns ahead of those of the displacement.
 fn total_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
-    let columns = strain::columns(D);
-    match chunk.carried_columns().checked_sub(D + columns) {
+    match chunk.carried_columns().checked_sub(D + strain::columns(D)) {
         None => [0.0; 6],
-        Some(first) => {
-            let e: Vec<f64> = (0..columns).map(|c| chunk.carried(first + c)[p]).collect();
-            strain::logarithmic(D, &e)
-        }
+        Some(first) => strain::logarithmic(D, &strain::read(chunk, first, p)),
     }
 }
 

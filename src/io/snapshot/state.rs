@@ -186,7 +186,7 @@ fn write_carried<const D: usize>(
     }
     recorded.write(&path("particles", CARRIED), particles, carried_components(columns), &values)?;
     let meaning = "For each load that particles carry, in their order: the area (m²) of a traction, the area vector of a pressure, the \
-                   share of a point force. Then, if the job follows them, the total left Cauchy-Green tensor less the unit tensor, and the displacement (m).";
+                   share of a point force. Then, if the job follows them, the left Cauchy-Green tensor less the unit tensor of the stretch between neighbours, the total left Cauchy-Green tensor less the unit tensor, and the displacement (m).";
     file.set_texts(&path("particles", CARRIED), &[("units", ""), ("description", meaning)])
 }
 

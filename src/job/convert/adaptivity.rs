@@ -51,6 +51,17 @@ pub(in crate::job) fn adaptivity<const D: usize>(
             );
         }
     }
+    let coarsest = context.bodies.iter().map(|body| 1.0 / body.particles_per_cell).fold(0.0, f64::max);
+    if let Some(gap) = written.split_gap
+        && gap < 1.5 * coarsest
+    {
+        let message = format!(
+            "found {}; expected at least {}, 1.5 times the distance of particles at the start",
+            number(gap),
+            number(1.5 * coarsest)
+        );
+        checks.fault(&path.key("split_gap"), message);
+    }
     let criteria: Vec<Option<Criterion<D>>> = (written.criteria.iter().enumerate())
         .map(|(i, criterion)| self::criterion(checks, criterion, context, &path.key("criteria").index(i)))
         .collect();
@@ -70,6 +81,7 @@ pub(in crate::job) fn adaptivity<const D: usize>(
         regions: regions.collect(),
         criteria: criteria.into_iter().collect::<Option<_>>()?,
         split_stretch: matches!(context.boxes, BoxPolicy::Volume { .. }).then_some(written.split_stretch),
+        split_gap: written.split_gap,
         merge: merge.enabled.then_some(limits),
         nominal: context.bodies.iter().map(|body| 0.5 * cell / body.particles_per_cell).collect(),
     })

@@ -24,6 +24,11 @@ pub struct Adaptivity {
     #[serde(default = "default_split")]
     #[schemars(range(max = 8.0), extend("exclusiveMinimum" = 1.0))]
     pub split_stretch: f64,
+    /// Distance of neighbours, in cells, above which particles become two each along the line on which they have drifted apart, so that thin
+    /// flow keeps no gaps; 1 is usual, without it none does. Material that is torn (its space has grown by half) is left alone.
+    #[serde(default)]
+    #[schemars(range(min = 0.25, max = 8.0))]
+    pub split_gap: Option<f64>,
     /// Merging of particles in leaves coarser than they were made for.
     #[serde(default)]
     pub merge: Merge,

@@ -60,7 +60,9 @@ impl<const D: usize> Solver<D> {
             self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.maxima).enumerate();
         let done = leaves.with_min_len(64).map(|(number, ((chunk, leaf), maxima))| {
             let too_wide = |stretch| resampling.may_exceed(maxima.width, leaf.level, stretch);
-            let is_wanted = looks[number].coarser || resampling.stretch().is_some_and(too_wide);
+            let is_wanted = looks[number].coarser
+                || resampling.closes_gaps()
+                || resampling.stretch().is_some_and(too_wide);
             let from = from.map_or(leaf.level, |from| from[number]);
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
         });

@@ -220,11 +220,9 @@ pub(super) fn strain<const D: usize>(
     gradient: &[[f64; D]; D],
     dt: f64,
 ) {
-    let columns = strain::columns(D);
-    chunk.carry(first + columns);
-    let old: Vec<f64> = (0..columns).map(|c| chunk.carried(first + c)[p]).collect();
-    let new = strain::after_step(&old, gradient, dt);
-    new.into_iter().enumerate().for_each(|(c, value)| chunk.carried_mut(first + c)[p] = value);
+    chunk.carry(first + strain::columns(D));
+    let e = strain::after_step(&strain::read(chunk, first, p), gradient, dt);
+    strain::write(chunk, first, p, &e);
 }
 
 /// Areas that a particle carries follow a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.

@@ -91,9 +91,10 @@ struct Sweep<'a, const D: usize> {
     following: &'a [&'a Carried<D>],
     /// Colliders that act on particles.
     guard: Option<Guard<'a, D>>,
-    /// First columns of displacements and total strains that particles carry, if they do.
+    /// First column of the displacements that particles carry, if they do.
     displacement: Option<usize>,
-    strain: Option<usize>,
+    /// First columns of tensors that follow the deformation.
+    tensors: Vec<usize>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
 }
@@ -137,7 +138,7 @@ impl<const D: usize> Solver<D> {
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt]),
             displacement: self.physics.displacement_column(),
-            strain: self.physics.strain_column(),
+            tensors: self.physics.tensor_columns(),
             openings: self.crossings.fluxes.openings(),
         };
         let (chunks, lists, pushes, near) =
@@ -219,11 +220,9 @@ impl<const D: usize> Sweep<'_, D> {
         for (p, mut gradient) in scratch.gradients.drain(..) {
             let p = p as usize;
             follow(chunk, self.following, p, &gradient, self.dt);
-            if let Some(first) = self.strain {
-                let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
-                (0..D).for_each(|i| gradient[i][i] += added);
-                strain(chunk, first, p, &gradient, self.dt);
-            }
+            let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
+            (0..D).for_each(|i| gradient[i][i] += added);
+            self.tensors.iter().for_each(|&first| strain(chunk, first, p, &gradient, self.dt));
         }
         self.watch.after(chunk, self.dt, maxima);
         if signal.is_infinite()
@@ -327,7 +326,7 @@ impl<const D: usize> Sweep<'_, D> {
 
     /// Whether particles of a leaf carry what follows the deformation: areas or total strains.
     fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
-        self.strain.is_some() || (chunk.carried_columns() > 0 && !self.following.is_empty())
+        !self.tensors.is_empty() || (chunk.carried_columns() > 0 && !self.following.is_empty())
     }
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].

@@ -104,8 +104,62 @@ fn assert_admissible<const D: usize>(chunk: &Chunk<D>, p: usize) {
     assert!(material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0] > 0.0);
 }
 
+/// Drawn out along some line to three times their width while they get thinner, particles become two, and these again two where the
+/// line is not yet filled.
+fn closing_gaps_conserves<const D: usize>(seed: u64) {
+    let materials = materials();
+    let scheme = Scheme { shares: 1, ..scheme(&materials, Transfer::Apic) };
+    let mut chunk = particles::<D>(seed, 0, 1, Some(0));
+    let columns = crate::particle::strain::columns(D);
+    chunk.carry(1 + columns);
+    let mut numbers = Numbers(seed);
+    for p in 0..chunk.len() {
+        let direction: [f64; D] = std::array::from_fn(|_| numbers.next());
+        let square: f64 = direction.iter().map(|n| n * n).sum();
+        let (along, across) = (9.0_f64, 9.0_f64.powf(-1.0 / (D - 1) as f64));
+        let places = crate::particle::strain::places(D);
+        for (c, &(i, j)) in places.iter().enumerate() {
+            let unit = if i == j { across - 1.0 } else { 0.0 };
+            chunk.carried_mut(1 + c)[p] = unit + (along - across) * direction[i] * direction[j] / square;
+        }
+        chunk.carried_mut(0)[p] = numbers.next();
+    }
+    let (before, carried) = (totals(&chunk), chunk.carried(0).iter().sum::<f64>());
+    let gap = Gap { cells: 1.0, column: 1 };
+    let (mut energy, mut passes) = (0.0, 0);
+    let setting = setting::<D>(&scheme, 0);
+    // The grid's second moment, which is always greater than that of the box.
+    let spread =
+        |chunk: &Chunk<D>, p: usize| [chunk.column(Layout::<D>::HALF)[p].powi(2) + CELL * CELL / 6.0; D];
+    let number = chunk.len();
+    while drift::close_gaps(&mut chunk, &setting, gap, spread, &mut |e| energy += e) > 0 {
+        passes += 1;
+    }
+    // Half a cell wide at rest, and three times as long.
+    assert_eq!((passes, chunk.len()), (1, 2 * number));
+    let after = totals(&chunk);
+    assert_conserved(&before, &after, 4e-14, 0);
+    assert!((after.kinetic - before.kinetic - energy).abs() <= 1e-13 * after.kinetic);
+    assert!((chunk.carried(0).iter().sum::<f64>() - carried).abs() <= 1e-13);
+    let mut ids = chunk.ids().to_vec();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), 2 * number);
+    // What has grown as well is torn, and stays.
+    (1..=columns).for_each(|c| {
+        chunk.carried_mut(c).iter_mut().for_each(|e| *e = if c <= D.min(2) { 99.0 } else { 0.0 })
+    });
+    assert_eq!(drift::close_gaps(&mut chunk, &setting, gap, spread, &mut |_| ()), 0);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn gaps_are_closed_without_loss(seed in 1u64..1_000_000) {
+        closing_gaps_conserves::<2>(seed);
+        closing_gaps_conserves::<3>(seed);
+    }
 
     #[test]
     fn splitting_conserves_in_both_dimensions(seed in any::<u64>()) {
