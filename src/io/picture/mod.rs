@@ -308,12 +308,29 @@ fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64) {
 /// Name and unit of a field beside the drawing; the row below it.
 fn heading(canvas: &mut Canvas, tint: &Tint) -> (i64, i64) {
     let x = canvas.width as i64 - 185;
-    let name: String = tint.name.replace('_', " ").chars().take(14).collect();
-    canvas.text(x, 110, 2, &name, INK);
+    let lines = lines(&tint.name.replace('_', " "), 175);
+    for (line, upwards) in lines.iter().zip((0..lines.len() as i64).rev()) {
+        canvas.text(x, 110 - 24 * upwards, 2, line, INK);
+    }
     if !tint.unit.is_empty() {
         canvas.text(x, 134, 2, &format!("[{}]", tint.unit), INK);
     }
     (x, 164)
+}
+
+/// A name in lines that are not wider than `width` pixels, broken between words; words that are wider stay whole.
+fn lines(name: &str, width: i64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in name.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if Canvas::text_width(2, &format!("{line} {word}")) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn colour_bar(canvas: &mut Canvas, tint: &Tint, [low, high]: [f64; 2]) {

@@ -93,3 +93,13 @@ fn numbers_are_short() {
 fn microseconds_are_no_zero_seconds() {
     assert_eq!(caption(1.25e-5, 120, 4000), "t = 12.5 µs   step 120   4 000 particles");
 }
+
+/// A long name of a field is broken between words, so that no picture cuts it off.
+#[test]
+fn long_names_stand_in_lines() {
+    assert_eq!(lines("speed", 175), ["speed"]);
+    assert_eq!(lines("equivalent strain", 175), ["equivalent strain"]);
+    let long = lines("equivalent plastic strain rate of a cell", 175);
+    assert!(long.len() > 1 && long.join(" ") == "equivalent plastic strain rate of a cell");
+    assert!(long.iter().all(|line| Canvas::text_width(2, line) <= 175), "{long:?}");
+}
