@@ -1,5 +1,7 @@
 //! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as collider gives the same results on any
 //! ranks and across a restart; a raster of heights is the same terrain from each format; hostile files give a message.
+#[path = "common/damage.rs"]
+mod damage;
 #[path = "common/random.rs"]
 #[allow(dead_code, reason = "each test uses its part")]
 mod random;
@@ -8,13 +10,13 @@ mod runs;
 
 use agimp::geometry::Mesh;
 use agimp::geometry::mesh::{HeightRaster, Placing, Terrain, read};
+use damage::damage;
 use random::Random;
 use runs::history::History;
 use runs::launch::{Outcome, run, succeed, text};
-use runs::restart;
+use runs::{outcome, restart};
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
-use std::path::Path;
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
 use tiff::tags::Tag;
 
@@ -83,13 +85,6 @@ fn job(shape: &str, rest: &str) -> String {
          y_max.kind = 'slip'\n[[materials]]\nname = 'jelly'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
          [[bodies]]\nname = 'block'\nmaterial = 'jelly'\nshape = {shape}\n{rest}\n"
     )
-}
-
-fn outcome(directory: &Path, job: &str) -> Outcome {
-    let path = directory.join("block.toml");
-    std::fs::write(&path, job).expect("job");
-    succeed(&mut run(directory, 1, 1, &path, &["--overwrite"]));
-    Outcome::read(directory, "block")
 }
 
 /// A cube of 0.9 m from each format gives the particles, and so the run, of a box of that size.
@@ -281,22 +276,6 @@ fn a_torn_cube_is_filled() {
     let shape = "{ kind = 'mesh', solid = 'winding', file = 'torn.stl', origin = [0.5, 0.5, 0] }";
     let found = outcome(directory.path(), &job(shape, rest));
     assert!(found.history == reference.history);
-}
-
-/// Some bytes flipped, cut, overwritten or doubled.
-fn damage(bytes: &[u8], next: &mut impl FnMut(usize) -> usize) -> Vec<u8> {
-    let mut damaged = bytes.to_vec();
-    for _ in 0..=next(3) {
-        let at = next(damaged.len());
-        match next(5) {
-            0 => damaged[at] ^= 1 << next(8),
-            1 => damaged.truncate(at.max(1)),
-            2 => damaged[at] = b"0123456789-.e \n"[next(15)],
-            3 => damaged[at] = 0xff,
-            _ => damaged.extend_from_within(at..),
-        }
-    }
-    damaged
 }
 
 /// Each format with bytes flipped, cut, doubled and overwritten: a mesh, or an error; never a panic, and never slow.

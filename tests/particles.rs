@@ -1,16 +1,18 @@
 //! Bodies whose particles come from a file: a lattice from a table is a box, also deformed and under stress; an output is a body with the same state;
 //! same results on any ranks and across a restart; damaged files give a message.
+#[path = "common/damage.rs"]
+mod damage;
 #[path = "common/random.rs"]
 #[allow(dead_code, reason = "each test uses its part")]
 mod random;
 #[path = "common/runs.rs"]
 mod runs;
 
+use damage::damage;
 use random::Random;
 use runs::launch::{Outcome, agimp, run, succeed, text};
-use runs::restart;
+use runs::{outcome, restart};
 use std::fmt::Write as _;
-use std::path::Path;
 
 /// A block that falls on its floor.
 fn job(shape: &str, rest: &str) -> String {
@@ -36,13 +38,6 @@ const CELLS: &str = "particles_per_cell = 4";
 
 fn state(outcome: &Outcome) -> Vec<&str> {
     outcome.digest.lines().filter(|line| line.contains("state/particles")).collect()
-}
-
-fn outcome(directory: &Path, job: &str) -> Outcome {
-    let path = directory.join("block.toml");
-    std::fs::write(&path, job).expect("job");
-    succeed(&mut run(directory, 1, 1, &path, &["--overwrite"]));
-    Outcome::read(directory, "block")
 }
 
 /// The particles of a box, with velocity and mass or volume from a table or from the job, give the run of the box.
@@ -167,18 +162,8 @@ fn damaged_files_give_a_message() {
         std::fs::write(&path, job(&format!("{{ kind = 'particles', file = '{name}' }}"), "[time]\nend = 1"))
             .expect("job");
         for round in 0..12 {
-            let mut damaged = bytes.clone();
             // The first of each is whole.
-            for _ in 0..if round == 0 { 0 } else { 1 + next(3) } {
-                let at = next(damaged.len());
-                match next(5) {
-                    0 => damaged[at] ^= 1 << next(8),
-                    1 => damaged.truncate(at.max(1)),
-                    2 => damaged[at] = b"0123456789-.e \n"[next(15)],
-                    3 => damaged[at] = 0xff,
-                    _ => damaged.extend_from_within(at..),
-                }
-            }
+            let damaged = if round == 0 { bytes.clone() } else { damage(&bytes, &mut next) };
             std::fs::write(directory.path().join(name), damaged).expect("file");
             let output = agimp(directory.path()).args(["check", "block.toml"]).output().expect("starts");
             let ends_well = output.status.success();

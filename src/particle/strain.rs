@@ -77,14 +77,6 @@ pub fn logarithmic(dimension: usize, e: &Components) -> [f64; 6] {
     [xx, yy, zz, xy, yz, xz]
 }
 
-/// Equivalent strain `√(2/3 e : e)` of the deviator e of a strain in the order of [`logarithmic`].
-pub fn equivalent(strain: &[f64; 6]) -> f64 {
-    let mean = (strain[0] + strain[1] + strain[2]) / 3.0;
-    let diagonal: f64 = strain[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
-    let shear: f64 = strain[3..].iter().map(|s| s * s).sum();
-    (2.0 / 3.0 * (diagonal + 2.0 * shear)).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,7 +93,6 @@ mod tests {
         }
         let strain = logarithmic(2, &plane);
         assert!((strain[0] - 0.7).abs() < 2e-5 && (strain[1] + 0.7).abs() < 2e-5, "{strain:?}");
-        assert!((equivalent(&strain) - 0.7 * 2.0 / 3.0_f64.sqrt()).abs() < 2e-5, "{strain:?}");
         let strain = logarithmic(3, &e);
         assert!((strain[2] + 0.35).abs() < 2e-5, "{strain:?}");
         assert!((strain[..3].iter().sum::<f64>()).abs() < 5e-5, "no change of volume: {strain:?}");

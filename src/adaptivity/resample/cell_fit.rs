@@ -67,15 +67,16 @@ impl<'a, const D: usize> Resampling<'a, D> {
     /// Splits particles that have drifted apart, until none has. Their affine state comes from cells of level `from`.
     fn close_gaps(&self, chunk: &mut Chunk<D>, level: u8, from: u8, done: &mut Splits) {
         let Some(gap) = self.gap else { return };
-        let cell = self.scheme.root_cell / f64::from(1u32 << from);
-        let spread = |chunk: &Chunk<D>, p: usize| {
-            let half = chunk.column(Layout::<D>::HALF)[p];
-            chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
-        };
+        let from = self.setting(from).cell();
         loop {
             let energies = &mut done.energies;
-            let split =
-                drift::close_gaps(chunk, &self.setting(level), gap, spread, &mut |e| energies.push(e));
+            let split = drift::close_gaps(
+                chunk,
+                &self.setting(level),
+                gap,
+                |chunk, p| spread(chunk, p, from),
+                &mut |e| energies.push(e),
+            );
             done.split += split;
             if split == 0 {
                 return;
@@ -85,14 +86,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
     pub fn split(&self, chunk: &mut Chunk<D>, which: &[u32], level: u8, done: &mut Splits) {
-        let cell = self.scheme.root_cell / f64::from(1u32 << level);
-        let spreads: Vec<[f64; D]> = which
-            .iter()
-            .map(|&p| {
-                let half = chunk.column(Layout::<D>::HALF)[p as usize];
-                chunk.position(p as usize).map(|x| spread_on_lattice(x, half, cell))
-            })
-            .collect();
+        let cell = self.setting(level).cell();
+        let spreads: Vec<[f64; D]> = which.iter().map(|&p| spread(chunk, p as usize, cell)).collect();
         let report = split(chunk, &self.setting(level), which, &spreads, &mut |e| done.energies.push(e));
         done.split += report.split;
         done.refused += report.refused;
@@ -125,6 +120,12 @@ impl<'a, const D: usize> Resampling<'a, D> {
     pub fn splits_in(&self, chunk: &Chunk<D>, p: usize, level: u8) -> bool {
         Tag::unpack(chunk.tags()[p]).level < level && ids::generation(chunk.ids()[p]) < ids::GENERATIONS
     }
+}
+
+/// Second moments of the weights of a particle on a lattice of cells of this edge (m), m².
+fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
+    let half = chunk.column(Layout::<D>::HALF)[p];
+    chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
 }
 
 /// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d

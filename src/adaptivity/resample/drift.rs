@@ -5,7 +5,7 @@
 //! ellipsoid with half axes l √λ. One whose longest axis is wider than some cells becomes two, half a half axis to each side, and each has
 //! half of that axis. Mass and momentum are kept as in [`super::split()`], and angular momentum since both take
 //! `B - C (o ⊗ o)` with the offset o. Space that has grown with them is left alone: grains that are apart (tension cut-off, spray) are no flow.
-use super::{Setting, ids, opposite, read_matrix, write_matrix};
+use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
 use crate::kernel::Transfer;
 use crate::material::tensor::eigen::{decompose, determinant};
 use crate::particle::chunk::{Chunk, Layout};
@@ -47,7 +47,7 @@ pub(super) fn close_gaps<const D: usize>(
     spread: impl Fn(&Chunk<D>, usize) -> [f64; D],
     book: &mut impl FnMut(f64),
 ) -> u64 {
-    let cell = setting.scheme.root_cell / f64::from(1u32 << setting.level.min(31));
+    let cell = setting.cell();
     if chunk.carried_columns() < gap.column + strain::columns(D) {
         return 0;
     }
@@ -99,18 +99,12 @@ fn part<const D: usize>(
     let [mass] = chunk.read(Layout::<D>::MASS, first);
     let [half] = chunk.read(Layout::<D>::HALF, first);
     let places: [(f64, f64); D] = std::array::from_fn(|a| {
-        // Half the way to a wall at most.
-        let room = (0.5 * x[a]).min(0.5 * (setting.extent[a] - x[a])).max(0.0);
-        let (low, high) = opposite(x[a], (0.5 * axis * direction[a]).clamp(-room, room));
-        if low.max(high) < setting.extent[a] { (low, high) } else { (x[a], x[a]) }
+        let (lower, upper) = sides(x[a], (0.5 * axis * direction[a]).abs(), setting.extent[a]);
+        if direction[a] < 0.0 { (upper, lower) } else { (lower, upper) }
     });
     let offset: [f64; D] = std::array::from_fn(|a| places[a].1 - x[a]);
     let mut kept = read_matrix(chunk, first);
-    let gradient = match setting.scheme.transfer {
-        Transfer::Apic => kept.map(|row| std::array::from_fn(|k| row[k] / spread[k])),
-        Transfer::Tpic => kept,
-        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
-    };
+    let gradient = gradient(setting.scheme.transfer, &kept, &spread);
     let affine =
         gradient.map(|row: [f64; D]| (0..D).fold(0.0, |sum, k| f64::mul_add(row[k], offset[k], sum)));
     if setting.scheme.transfer == Transfer::Apic {

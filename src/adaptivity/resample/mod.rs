@@ -4,7 +4,7 @@
 //! the chunk alone. After either, particles may lie in another leaf (children do where a box crosses a face), so the
 //! caller sorts them into leaves afterwards. What is conserved, and why, is derived in
 //! `docs/design/resampling.md`.
-use crate::kernel::{BoxPolicy, Scheme, Select, domain};
+use crate::kernel::{BoxPolicy, Scheme, Select, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 pub mod cell_fit;
@@ -40,6 +40,11 @@ pub struct Setting<'a, const D: usize> {
 }
 
 impl<const D: usize> Setting<'_, D> {
+    /// Edge of a cell of the leaf, m.
+    fn cell(&self) -> f64 {
+        self.scheme.root_cell / f64::from(1u32 << self.level.min(31))
+    }
+
     /// Half width of an undeformed particle of a level, m.
     fn nominal(&self, tag: Tag, level: u8) -> f64 {
         self.nominal[usize::from(tag.body)] / f64::from(1u32 << level.min(31))
@@ -49,7 +54,7 @@ impl<const D: usize> Setting<'_, D> {
     /// cell overlap those of their neighbours, so that there the part of the box counts that the particle's volume
     /// fills. Cut at the walls of the domain.
     fn territories(&self, chunk: &Chunk<D>, select: Select) -> Vec<[f64; D]> {
-        let cell = self.scheme.root_cell / f64::from(1u32 << self.level.min(31));
+        let cell = self.cell();
         let mut out = Vec::new();
         domain::full_half_widths(chunk, select, cell, &self.extent, self.scheme, &mut out);
         if self.scheme.boxes == BoxPolicy::Cell {
@@ -103,9 +108,26 @@ fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     (1..D).fold(edge, |volume, _| volume * edge)
 }
 
+/// Velocity gradient (1/s) that a transfer keeps in the affine matrix of a particle whose weights have these second moments, m².
+fn gradient<const D: usize>(transfer: Transfer, matrix: &[[f64; D]; D], spread: &[f64; D]) -> [[f64; D]; D] {
+    match transfer {
+        Transfer::Apic => matrix.map(|row| std::array::from_fn(|k| row[k] / spread[k])),
+        Transfer::Tpic => *matrix,
+        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
+    }
+}
+
 /// The affine columns of particle `p` as a matrix.
 fn read_matrix<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
     std::array::from_fn(|i| chunk.read(Layout::<D>::AFFINE + D * i, p))
+}
+
+/// Places at a distance of about `offset` on both sides of x within the domain, whose mean is x exactly.
+fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
+    // Half the way to a wall at most: a box is wider than that only within a millionth of a cell of the wall.
+    let offset = offset.min(0.5 * x).min(0.5 * (extent - x)).max(0.0);
+    let (lower, upper) = opposite(x, offset);
+    if upper < extent { (lower, upper) } else { (x, x) }
 }
 
 /// `(a - b', a + b')` with b' next to b, such that both are exact where `|b| <= |a|`; else rounded.

@@ -1,5 +1,5 @@
 //! One particle becomes `2^D`.
-use super::{Setting, ids, opposite, read_matrix, write_matrix};
+use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -74,19 +74,14 @@ fn divide<const D: usize>(
         std::array::from_fn(|axis| sides(x[axis], 0.5 * half[axis], setting.extent[axis]));
     let offset: [f64; D] = std::array::from_fn(|axis| places[axis].1 - x[axis]);
     let mut kept = read_matrix(chunk, first);
-    let gradient = match setting.scheme.transfer {
-        Transfer::Apic => {
-            let gradient = kept.map(|row| std::array::from_fn(|k| row[k] / spread[k]));
-            for i in 0..D {
-                for k in 0..D {
-                    kept[i][k] = f64::mul_add(-gradient[i][k], offset[k] * offset[k], kept[i][k]);
-                }
+    let gradient = gradient(setting.scheme.transfer, &kept, spread);
+    if setting.scheme.transfer == Transfer::Apic {
+        for i in 0..D {
+            for k in 0..D {
+                kept[i][k] = f64::mul_add(-gradient[i][k], offset[k] * offset[k], kept[i][k]);
             }
-            gradient
         }
-        Transfer::Tpic => kept,
-        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
-    };
+    }
 
     let mut energy = 0.0;
     // Children on opposite sides have opposite offsets, hence opposite affine velocities.
@@ -121,14 +116,6 @@ fn divide<const D: usize>(
         }
     }
     0.5 * mass * share * energy
-}
-
-/// Places at a distance of about `offset` on both sides of x within the domain, whose mean is x exactly.
-fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
-    // Half the way to a wall at most: a box is wider than that only within a millionth of a cell of the wall.
-    let offset = offset.min(0.5 * x).min(0.5 * (extent - x)).max(0.0);
-    let (lower, upper) = opposite(x, offset);
-    if upper < extent { (lower, upper) } else { (x, x) }
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ fields! {
     /// Total logarithmic strain, elastic and plastic, since the particle came; components as those of `stress`; followed only where a job asks for it.
     Strain, "strain", "", |view| each(view, 6, |chunk, p, out| out.extend(total_strain(chunk, p)));
     /// Equivalent total strain, √(2/3 e : e) of its deviator e; followed only where a job asks for it.
-    EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| strain::equivalent(&total_strain(chunk, p)));
+    EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| equivalent(&total_strain(chunk, p)));
     /// Magnitude of the velocity, m/s.
     Speed, "speed", "m/s", |view| scalars(view, speed);
     /// Identifier of the particle.
@@ -220,6 +220,11 @@ pub(crate) fn mean(stress: &[f64; 6]) -> f64 {
     (stress[0] + stress[1] + stress[2]) / 3.0
 }
 
+/// Equivalent strain √(2/3 e:e) with the deviator e.
+fn equivalent(strain: &[f64; 6]) -> f64 {
+    2.0 / 3.0 * von_mises(strain)
+}
+
 /// √(3/2 s:s) with the deviator s.
 pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
     let mean = mean(stress);
@@ -238,6 +243,13 @@ mod tests {
             assert_eq!(serde_json::to_string(&field).unwrap(), format!("\"{}\"", field.name()));
             assert_eq!(PointField::from_name(field.name()), Some(field));
         }
+    }
+
+    /// Pure shear of a plane that is drawn to e^0.7 of its length.
+    #[test]
+    fn strain_measures() {
+        let found = equivalent(&[0.7, -0.7, 0.0, 0.0, 0.0, 0.0]);
+        assert!((found - 0.7 * 2.0 / 3.0_f64.sqrt()).abs() < 1e-15, "{found}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
+use crate::job::schema::output::Output;
 use crate::solver::Followed;
 use crate::text::{number, written};
 
@@ -154,14 +155,19 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         directory: directory.into(),
         every: output.every,
         fields: output.fields.clone(),
-        followed: match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
-            true => Followed::Strain,
-            false if output.has_any(&[Field::Displacement]) => Followed::Displacement,
-            false => Followed::Nothing,
-        },
+        followed: followed(output),
         restart: output.restart,
         picture: output.picture,
         picture_field: output.picture_field,
+    }
+}
+
+/// What particles carry of their motion for the fields of the output.
+pub(super) fn followed(output: &Output) -> Followed {
+    match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
+        true => Followed::Strain,
+        false if output.has_any(&[Field::Displacement]) => Followed::Displacement,
+        false => Followed::Nothing,
     }
 }
 

@@ -25,7 +25,7 @@ pub struct Adaptivity {
     #[schemars(range(max = 8.0), extend("exclusiveMinimum" = 1.0))]
     pub split_stretch: f64,
     /// Distance of neighbours, in cells, above which particles become two each along the line on which they have drifted apart, so that thin
-    /// flow keeps no gaps; 1 is usual, without it none does. Material that is torn (its space has grown by half) is left alone.
+    /// flow keeps no gaps; 2 keeps those of a deposit below a cell. Without it no particle does. Material that is torn (its space has grown by half) is left alone.
     #[serde(default)]
     #[schemars(range(min = 0.25, max = 8.0))]
     pub split_gap: Option<f64>,

@@ -225,6 +225,12 @@ pub(super) fn strain<const D: usize>(
     strain::write(chunk, first, p, &e);
 }
 
+/// Whether any particle of a chunk carries areas that follow the deformation.
+pub(super) fn has_followers<const D: usize>(chunk: &Chunk<D>, following: &[&Carried<D>]) -> bool {
+    let carries = |p: usize| following.iter().any(|carried| numbers(chunk, carried, p).is_some());
+    !following.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
+}
+
 /// Areas that a particle carries follow a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
 pub(super) fn follow<const D: usize>(
     chunk: &mut Chunk<D>,

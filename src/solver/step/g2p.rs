@@ -26,7 +26,7 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{Near, ParticlePush};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{add_ways, follow, note_ways, positions, strain};
+use crate::solver::step::carried::{add_ways, follow, has_followers, note_ways, positions, strain};
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
@@ -264,8 +264,12 @@ impl<const D: usize> Sweep<'_, D> {
             return 0.0;
         }
         scratch.gradients.clear();
-        if self.scheme.f_bar || self.needs_gradients(chunk) {
+        let are_kept = self.needs_gradients(chunk);
+        if self.scheme.f_bar || are_kept {
             self.note_gradients(scratch, leaf, chunk, lists);
+        }
+        if !are_kept {
+            scratch.gradients.clear();
         }
         scratch.begin_cut(cut_of(lists).len());
         let mut fastest: f64 = 0.0;
@@ -319,14 +323,11 @@ impl<const D: usize> Sweep<'_, D> {
             gradients.iter().for_each(|(p, gradient)| mean_dilation.note(*p as usize, gradient));
             mean_dilation.average(chunk);
         }
-        if !self.needs_gradients(chunk) {
-            gradients.clear();
-        }
     }
 
     /// Whether particles of a leaf carry what follows the deformation: areas or total strains.
     fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
-        !self.tensors.is_empty() || (chunk.carried_columns() > 0 && !self.following.is_empty())
+        !self.tensors.is_empty() || has_followers(chunk, self.following)
     }
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
