@@ -1,11 +1,13 @@
 //! Boundary conditions on the velocities of real nodes, contact at particles, and what becomes of particles that leave.
 pub mod absorbing;
+pub mod bodies;
 pub mod collider;
 pub mod contact;
 pub mod motion;
 pub mod touching;
 
 pub use absorbing::Absorbing;
+pub use bodies::BodyContacts;
 pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
 pub use touching::{Touching, meets};

@@ -3,6 +3,7 @@
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
 use crate::adaptivity::{Adaptivity, least_level};
+use crate::boundary::BodyContacts;
 use crate::boundary::Collider;
 use crate::boundary::absorbing::AbsorbingFaces;
 pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
@@ -115,6 +116,8 @@ pub struct Problem<const D: usize> {
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
+    /// Contact between bodies that deform.
+    pub body_contacts: BodyContacts,
     /// Stages of the run, at least one.
     pub stages: Vec<Stage<D>>,
     /// Stages in which each load acts.

@@ -2,6 +2,7 @@
 pub mod chunk;
 mod column;
 pub mod given;
+pub mod group;
 pub mod lanes;
 mod layout;
 pub mod strain;

@@ -8,7 +8,7 @@ use crate::job::Problem;
 use crate::probe;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
-use crate::solver::state::bookings::{LoadTotals, Reaction};
+use crate::solver::state::bookings::{BodyTotals, LoadTotals, Reaction};
 use crate::solver::state::relaxation::Relaxation;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -40,7 +40,7 @@ const COLUMNS: [Column<'static>; 20] = [
 ];
 
 /// Names and units of the columns after the step. What a job has adds its own in this order: splits and merges of dynamic
-/// refinement; the way to equilibrium; the number of the stage, from 1; loads; probes; tracks;
+/// refinement; the way to equilibrium; the number of the stage, from 1; loads; contacts between bodies; probes; tracks;
 /// fluxes; faces of the domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
@@ -57,6 +57,11 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
     for load in &problem.loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
         columns.push((format!("work_{}", load.name), "J"));
+    }
+    for (name, two_sides) in &problem.body_contacts.names {
+        let force = AXES[..D].iter().filter(|_| *two_sides);
+        columns.extend(force.map(|axis| (format!("contact_{name}{axis}"), "N")));
+        columns.push((format!("contact_work_{name}"), "J"));
     }
     let probes = problem.probes.iter().map(|probe| (&probe.name, &probe.quantities));
     let tracks = problem.tracks.iter().map(|track| (&track.name, &track.quantities));
@@ -113,6 +118,12 @@ pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {
 }
 
 const AXES: [&str; 3] = ["_x", "_y", "_z"];
+
+/// The values of a row that are of a contact between bodies: force on the first of two sides, and work.
+pub fn body_values<const D: usize>(two_sides: bool, totals: &BodyTotals) -> Vec<f64> {
+    let force = totals.force[..D].iter().filter(|_| two_sides);
+    force.copied().chain([totals.work]).collect()
+}
 
 /// Components of a torque: only that about z in 2D.
 fn turning_axes<const D: usize>() -> std::ops::Range<usize> {

@@ -204,6 +204,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let loads = solver.load_totals();
+        let bodies = solver.body_totals();
         let readings = solver.read_probes(&self.problem.probes);
         let tracked = solver.read_tracks(&self.problem.tracks);
         let passed = solver.crossings.fluxes.passed(comm, &solver.chunks);
@@ -225,6 +226,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 values.push((solver.physics.stage() + 1) as f64);
             }
             loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
+            let contacts = self.problem.body_contacts.names.iter().zip(&bodies);
+            contacts
+                .for_each(|((_, sides), totals)| values.extend(history::body_values::<D>(*sides, totals)));
             let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
             let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
             for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {
@@ -245,6 +249,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         // Where the row of this step has been written already, there is nothing to forget.
         solver.forget_reactions();
         solver.load_sums.forget(3, clock.time);
+        solver.body_sums.forget(3, clock.time);
         solver.face_sums.forget(FACE_SUMS, clock.time);
         written
     }

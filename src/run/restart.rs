@@ -81,6 +81,7 @@ pub fn scalars<const D: usize>(
     measures::write(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
+    write_exact_sums("contact", &solver.body_sums, comm, &mut reals, &mut exact);
     write_exact_sums("face", &solver.face_sums, comm, &mut reals, &mut exact);
     if solver.physics.equilibrium.is_some() {
         let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.relaxation;
@@ -345,6 +346,8 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of a collider is missing"))?;
     restore_exact_sums("load", &mut solver.load_sums, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
+    restore_exact_sums("contact", &mut solver.body_sums, rank, scalars)
+        .ok_or_else(|| refused("the sums of a contact between bodies are missing"))?;
     // A run without them may have written the file: then they begin here.
     let _ = restore_exact_sums("face", &mut solver.face_sums, rank, scalars);
     restore_relaxation(&mut solver, scalars).ok_or_else(|| refused("the way to equilibrium is missing"))?;

@@ -41,6 +41,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         absorbing: problem.absorbing.clone(),
         face_forces: problem.face_forces,
         colliders: problem.colliders.clone(),
+        body_contacts: problem.body_contacts.clone(),
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
         equilibrium: None,

@@ -64,6 +64,7 @@ impl<const D: usize> Solver<D> {
             contacts: Contacts::new(&physics, clock.time),
             load_sums: ExactSums::new(physics.loads.len(), clock.time),
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
+            body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
             pushes: Vec::new(),
             near: Vec::new(),
             relaxation: Relaxation::default(),

@@ -1,11 +1,12 @@
 //! What is solved.
 use crate::adaptivity::Adaptivity;
 use crate::boundary::absorbing::AbsorbingFaces;
-use crate::boundary::{Collider, Contact, Leaving};
+use crate::boundary::{BodyContacts, Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{self, Gravity, Load};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::group::Group;
 use crate::particle::strain;
 
 /// What is solved: the same on every rank, constant over a stage of the run.
@@ -34,6 +35,8 @@ pub struct Physics<const D: usize> {
     pub face_forces: bool,
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
+    /// Contact between bodies that deform.
+    pub body_contacts: BodyContacts,
     /// Dynamic refinement; `None`: tree and particles keep their sizes.
     pub adaptivity: Option<Adaptivity<D>>,
     /// What happens to particles that leave the domain where no face is an outflow.
@@ -149,6 +152,12 @@ impl<const D: usize> Physics<D> {
         for (h, value) in self.materials[material].initial_history().into_iter().enumerate() {
             chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
         }
+    }
+
+    /// The particles of a velocity field; `None` where all share one.
+    pub(in crate::solver) fn group(&self, field: usize) -> Option<Group<'_>> {
+        let field_of_body = &self.body_contacts.field_of_body[..];
+        (!field_of_body.is_empty()).then_some(Group { field: field as u8, field_of_body })
     }
 
     /// What the kernels need to know.

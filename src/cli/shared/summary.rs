@@ -58,6 +58,15 @@ pub(in crate::cli) fn write<const D: usize>(
             writeln!(out, "  {:18} {}{stages}", excerpt(&collider.name, NAME), collider)?;
         }
     }
+    let contacts = &problem.body_contacts;
+    if !contacts.names.is_empty() {
+        writeln!(out, "contacts     {}, {} velocity fields", contacts.names.len(), contacts.fields())?;
+        for (number, (name, _)) in contacts.names.iter().enumerate() {
+            let law = contacts.pairs.iter().find(|pair| usize::from(pair.contact) == number);
+            let law = law.map_or("as others say".into(), |pair| pair.law.to_string());
+            writeln!(out, "  {:18} {law}", excerpt(name, NAME))?;
+        }
+    }
     if problem.stages.len() > 1 {
         writeln!(out, "stages       {}", problem.stages.len())?;
         for stage in &problem.stages {

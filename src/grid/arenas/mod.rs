@@ -179,6 +179,11 @@ impl<const D: usize> Arenas<D> {
         Some((next.bin as usize, next.window))
     }
 
+    /// The occupied bins, in order.
+    pub fn bins(&self) -> impl Iterator<Item = usize> {
+        self.occupied.iter().map(|arena| arena.bin as usize)
+    }
+
     /// Whether an occupied bin reaches a block.
     pub fn reach(&self, block: usize) -> bool {
         self.schedule.reach(block)

@@ -68,6 +68,20 @@ impl<const D: usize> NodeFields<D> {
         size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }
 
+    /// Not collective. Adds the mass of other material to that of these fields, which all hold velocities, and gives it the mean velocity.
+    pub fn add_material(&mut self, other: &Self) {
+        let nodes = block_nodes(D);
+        let blocks = other.rows.chunks(nodes).zip(self.rows.chunks_mut(nodes)).enumerate();
+        for (block, (from, to)) in blocks.filter(|(block, _)| other.active[*block]) {
+            for (to, from) in to.iter_mut().zip(from).filter(|(_, from)| from.0[3] > 0.0) {
+                let mass = to.0[3] + from.0[3];
+                let mean = |a: usize| to.0[3].mul_add(to.0[a], from.0[3] * from.0[a]) / mass;
+                *to = Row([mean(0), mean(1), mean(2), mass]);
+            }
+            (self.active[block], self.dirty[block]) = (true, true);
+        }
+    }
+
     /// Whether rows of a block may differ from zero.
     pub fn may_hold(&self, block: usize) -> bool {
         self.dirty[block]

@@ -11,7 +11,7 @@ use crate::quantity::record::{self, Column};
 use crate::quantity::{Expression, Quantity, Table};
 use crate::text::written as number;
 
-/// Most exact sums of colliders (six each), faces (one for each axis), fluxes and loads (four each) that a checkpoint's header has room for.
+/// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
 
 /// All loads, or faults.
@@ -28,7 +28,7 @@ pub(super) fn loads<const D: usize>(
         checks.fault(
             path,
             format!(
-                "found {} loads; expected at most {most} beside the colliders, face forces and fluxes of this job",
+                "found {} loads; expected at most {most} beside the colliders, contacts, face forces and fluxes of this job",
                 loads.len()
             ),
         );

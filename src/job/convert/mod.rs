@@ -9,6 +9,7 @@
 //! | `terrain` | terrain |
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
+//! | `contact` | contact between bodies |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `stages` | stages of the run |
@@ -18,6 +19,7 @@
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
 use self::colliders::colliders;
+use self::contact::body_contacts;
 use self::loads::{loads, vector};
 use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, QUOTED};
@@ -38,6 +40,7 @@ use rustc_hash::FxHashMap;
 mod adaptivity;
 mod checks;
 mod colliders;
+mod contact;
 mod loads;
 mod overlap;
 mod particles;
@@ -96,7 +99,8 @@ fn problem<const D: usize>(
         None => Some(Gravity::constant([0.0; D])),
     };
     let faces_with_sums = if file.history.face_forces { 2 * D } else { 0 };
-    let taken = 6 * file.colliders.len() + D * faces_with_sums + file.fluxes.len();
+    let body_contacts = body_contacts(checks, file, &root.key("contact"));
+    let taken = 6 * file.colliders.len() + D * faces_with_sums + file.fluxes.len() + 4 * file.contact.len();
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let stages = stages::stages(checks, file, &root);
     let load_stages =
@@ -147,6 +151,7 @@ fn problem<const D: usize>(
         absorbing: absorbing?,
         named_faces: faces.map(|pair| pair.map(|face| face.is_some())),
         colliders: colliders?,
+        body_contacts: body_contacts?,
         leaving: settings::leaving(file.boundaries.leaving.unwrap_or_default()),
         stages: stages?,
         load_stages,

@@ -5,6 +5,7 @@ pub use super::adaptivity::Adaptivity;
 pub use super::colliders::Collider;
 use super::common::yes;
 pub use super::common::{AxisName, Spin};
+pub use super::contact::BodyContact;
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 pub use super::probes::{Flux, Line, Map, Probe, Track};
@@ -61,6 +62,10 @@ pub struct JobFile {
     /// Rigid bodies that act on the material, in the order in which they act; the faces of the domain act last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub colliders: Vec<Collider>,
+    /// Contact between bodies that deform; all bodies stick where they touch by default.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 25))]
+    pub contact: Vec<BodyContact>,
     /// End of the run and time step.
     pub time: Time,
     /// The way to equilibrium; none by default. Jobs with stages have it there.

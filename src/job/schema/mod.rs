@@ -3,13 +3,14 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`loads`], [`output`], [`probes`], [`stages`], [`stress`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`stages`], [`stress`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
 pub mod adaptivity;
 pub mod colliders;
 pub mod common;
+pub mod contact;
 pub mod job_file;
 pub(super) mod json;
 pub mod loads;

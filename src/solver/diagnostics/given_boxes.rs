@@ -96,6 +96,7 @@ impl<const D: usize> GivenBoxes<D> {
             stage_starts: vec![0.0],
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
+            body_contacts: crate::boundary::BodyContacts::default(),
             faces: [[Contact::Slip; 2]; D],
             with_moments: Vec::new(),
             absorbing: std::array::from_fn(|_| [None, None]),
@@ -146,7 +147,7 @@ impl<const D: usize> GivenBoxes<D> {
     /// On the rank that has a box which fits no bin; all ranks complete the exchange.
     pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
         let solver = &mut self.solver;
-        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, &self.halves);
+        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, &self.halves, None);
         solver.nodes_from_particles(dt);
         sorted
     }

@@ -6,6 +6,7 @@ use partition::comm::Comm;
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
+use crate::grid::NodeFields;
 use crate::grid::mask::{bits, block_nodes};
 use crate::material::State;
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -59,10 +60,16 @@ impl<const D: usize> Solver<D> {
         self.nodes_from_particles(0.0);
         self.note_surface();
 
-        let (plan, fields) = (&self.grid.plan, &self.grid.fields);
-        let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
-        let each =
-            blocks.filter(|(index, _)| fields.active[*index]).fold(empty_sums, |mut sums, (index, block)| {
+        let plan = &self.grid.plan;
+        // Exact sums do not depend on how they are put together.
+        let together = |mut sums: Vec<ExactSum>, others: Vec<ExactSum>| {
+            sums.iter_mut().zip(&others).for_each(|(sum, other)| sum.merge(other));
+            sums
+        };
+        let of_field = |fields: &NodeFields<D>| {
+            let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
+            let active = blocks.filter(|(index, _)| fields.active[*index]);
+            let each = active.fold(empty_sums, |mut sums, (index, block)| {
                 for bit in bits(block.owned) {
                     let node = index * block_nodes(D) + bit as usize;
                     let row = fields.rows[node].0;
@@ -72,11 +79,9 @@ impl<const D: usize> Solver<D> {
                 }
                 sums
             });
-        // Exact sums do not depend on how they are put together.
-        let mut sums = each.reduce(empty_sums, |mut sums, others| {
-            sums.iter_mut().zip(&others).for_each(|(sum, other)| sum.merge(other));
-            sums
-        });
+            each.reduce(empty_sums, together)
+        };
+        let mut sums = self.grid.all_fields().map(of_field).fold(empty_sums(), together);
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         let of = |i: usize| sums[i].to_f64();
         sorted?;
@@ -115,16 +120,19 @@ impl<const D: usize> Solver<D> {
             return;
         }
         self.note_surface();
-        let (plan, fields) = (&self.grid.plan, &self.grid.fields);
+        let grid = &self.grid;
         let nodes = self.phases.time(Phase::Output, || {
-            let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
-            let active = blocks.filter(|(index, _)| fields.active[*index]);
-            let sums = active.fold(ExactSum::new, |mut sum, (index, block)| {
-                let rows = &fields.rows[index * block_nodes(D)..];
-                bits(block.owned).for_each(|bit| sum.add(rows[bit as usize].0[3]));
-                sum
-            });
-            sums.reduce(ExactSum::new, together)
+            let of_field = |fields: &NodeFields<D>| {
+                let blocks = grid.plan.blocks.par_iter().enumerate().with_min_len(64);
+                let active = blocks.filter(|(index, _)| fields.active[*index]);
+                let sums = active.fold(ExactSum::new, |mut sum, (index, block)| {
+                    let rows = &fields.rows[index * block_nodes(D)..];
+                    bits(block.owned).for_each(|bit| sum.add(rows[bit as usize].0[3]));
+                    sum
+                });
+                sums.reduce(ExactSum::new, together)
+            };
+            grid.all_fields().map(of_field).fold(ExactSum::new(), together)
         });
         self.weighed.iter_mut().for_each(|weighed| weighed.nodes = nodes.clone());
     }

@@ -13,19 +13,21 @@ impl<const D: usize> Solver<D> {
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
         let criteria = &adaptivity.criteria;
         let (mut beside_empty, mut masses) = (Vec::new(), Vec::new());
+        let together = self.grid.fields_together();
+        let fields = together.as_ref().unwrap_or(&self.grid.fields);
         let surroundings = &mut self.regrid_cache.surroundings;
         if adaptivity.needs().exposure {
             surroundings.update(&self.forest, &self.grid.plan);
             // A leaf cannot see it from its nodes where the empty one is coarser.
             beside_empty = surroundings.beside_empty(&self.forest, &self.comm, &self.chunks);
-            masses = MassRange::of_blocks(&self.grid.plan, &self.grid.fields);
+            masses = MassRange::of_blocks(&self.grid.plan, fields);
         }
         let state = RankState {
             leaves: self.forest.leaves(),
             chunks: &self.chunks,
             maxima: &self.leaf_data.maxima,
             plan: &self.grid.plan,
-            fields: &self.grid.fields,
+            fields,
             colliders: &self.physics.colliders,
             collider_states: &self.contacts.states,
             surroundings: &self.regrid_cache.surroundings,

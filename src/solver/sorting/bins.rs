@@ -7,6 +7,7 @@ use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::particle::Chunk;
+use crate::particle::group::{Group, Share};
 use crate::simd::Lanes;
 
 /// Particle lists of the bins of one rank.
@@ -16,6 +17,8 @@ pub struct BinLists<const D: usize> {
     leaves: Vec<Option<Box<LeafBins<D>>>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
+    /// Leaves with particles, where lists are those of a group; empty where they are of all particles.
+    has_members: Vec<bool>,
 }
 
 /// A part of a box falls outside the bins of its leaf.
@@ -51,10 +54,11 @@ impl<const D: usize> BinLists<D> {
         let first = plan.tree.first_own();
         let leaves = (0..own).map(|leaf| LeafBins::beside_finer(plan, first + leaf));
         let bounds = (0..own).map(|leaf| near_leaf(&plan.tree, first + leaf, plan.root_edge));
-        Self { leaves: leaves.collect(), sorted: vec![false; own], bounds: bounds.collect() }
+        let has_members = Vec::new();
+        Self { leaves: leaves.collect(), sorted: vec![false; own], bounds: bounds.collect(), has_members }
     }
 
-    /// Not collective. Sorts all particles.
+    /// Not collective. Sorts all particles, or those of a group.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan; the caller makes it collective.
@@ -63,7 +67,12 @@ impl<const D: usize> BinLists<D> {
         plan: &GridPlan<D>,
         chunks: &[Chunk<D>],
         widths: &impl BoxWidths<D>,
+        group: Option<&Group<'_>>,
     ) -> Result<(), BinMissing> {
+        if let Some(group) = group {
+            return self.sort_group(plan, chunks, widths, group);
+        }
+        self.has_members.clear();
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
         // All leaves, also after a failure: the others must not keep the lists of the step before.
         let sorted =
@@ -81,10 +90,49 @@ impl<const D: usize> BinLists<D> {
         sorted.reduce(|| Ok(()), Result::and)
     }
 
+    /// Sorts the particles of a group. Leaves that it shares with others have lists.
+    fn sort_group(
+        &mut self,
+        plan: &GridPlan<D>,
+        chunks: &[Chunk<D>],
+        widths: &impl BoxWidths<D>,
+        group: &Group<'_>,
+    ) -> Result<(), BinMissing> {
+        self.has_members.resize(chunks.len(), false);
+        let lists = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&mut self.has_members);
+        let leaves = lists.zip(&self.bounds).enumerate().with_min_len(8);
+        let sorted =
+            leaves.map_init(Scratch::default, |scratch, (leaf, (((bins, sorted), has_members), own))| {
+                let chunk = &chunks[leaf];
+                let share = group.share(chunk);
+                let sorting = Sorting { plan, widths, leaf, own };
+                *has_members = share != Share::None;
+                *sorted = *has_members
+                    && (share == Share::Some || may_need_lists(bins.as_deref(), chunk, &sorting));
+                if *sorted {
+                    let bins = bins.get_or_insert_with(|| Box::new(LeafBins::beside_others(plan, leaf)));
+                    *sorted = bins.sort_group(chunk, &sorting, scratch, group)?;
+                }
+                Ok(())
+            });
+        sorted.reduce(|| Ok(()), Result::and)
+    }
+
+    /// Whether an own leaf with particles has any that these lists are of.
+    pub fn has_members(&self, leaf: usize) -> bool {
+        self.has_members.get(leaf).copied().unwrap_or(true)
+    }
+
     /// The lists of each own leaf, for what advances its particles.
     pub(in crate::solver) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
-        let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds);
-        leaves.map(|((bins, &sorted), own)| OfLeaf { bins: bins.as_deref_mut(), sorted, own })
+        let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds).enumerate();
+        let has_members = &self.has_members;
+        leaves.map(|(leaf, ((bins, &sorted), own))| OfLeaf {
+            bins: bins.as_deref_mut(),
+            sorted,
+            own,
+            has_members: has_members.get(leaf).copied().unwrap_or(true),
+        })
     }
 
     /// Not collective. Gives every part the D of its whole box. `of_parts(bin, chunk, parts, each)` calls
@@ -122,7 +170,8 @@ impl<const D: usize> BinLists<D> {
         plan: &GridPlan<D>,
         chunks: &[Chunk<D>],
     ) -> impl Iterator<Item = (usize, Window<D>)> {
-        let leaves = chunks.iter().enumerate().filter(|(_, chunk)| !chunk.is_empty());
+        let leaves = chunks.iter().enumerate();
+        let leaves = leaves.filter(|(leaf, chunk)| !chunk.is_empty() && self.has_members(*leaf));
         leaves.flat_map(move |(leaf, _)| {
             let first = plan.leaf_bins(leaf).start;
             let bins = self.of_leaf(leaf);
@@ -153,6 +202,8 @@ pub(in crate::solver) struct OfLeaf<'a, const D: usize> {
     bins: Option<&'a mut LeafBins<D>>,
     sorted: bool,
     own: &'a NearLeaf<D>,
+    /// Whether any particle of the leaf is in them.
+    pub(in crate::solver) has_members: bool,
 }
 
 impl<const D: usize> OfLeaf<'_, D> {

@@ -16,6 +16,7 @@ use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;
 use crate::kernel::domain::softening_at;
 use crate::particle::chunk::{Chunk, Layout, Revision};
+use crate::particle::group::Group;
 use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
@@ -46,6 +47,8 @@ pub struct LeafBins<const D: usize> {
 
 /// In place of a bin: the box is in none as a whole.
 const CUT: u32 = u32::MAX;
+/// In place of a bin: the particle is in another group.
+const STRANGER: u32 = u32::MAX - 1;
 
 /// Memory that a thread reuses from leaf to leaf.
 #[derive(Debug, Default)]
@@ -107,11 +110,39 @@ impl<const D: usize> LeafBins<D> {
         if known == 0 {
             self.begin();
         }
-        let looked = self.look(chunk, known, sorting, scratch);
+        let looked = self.look(chunk, known, sorting, scratch, |_| true);
         debug_assert!(
             known == 0 || looked.is_err() || self.are_as_new(chunk, sorting),
             "particles have changed since they were sorted"
         );
+        self.close(chunk, sorting, looked)
+    }
+
+    /// As [`LeafBins::sort`] for the particles of a group alone.
+    pub(in crate::solver) fn sort_group(
+        &mut self,
+        chunk: &Chunk<D>,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
+        scratch: &mut Scratch,
+        group: &Group<'_>,
+    ) -> Result<bool, BinMissing> {
+        self.presorted = None;
+        self.begin();
+        let tags = chunk.tags();
+        let looked = self.look(chunk, 0, sorting, scratch, |p| group.has(tags[p as usize]));
+        let strangers = (0..chunk.len() as u32).filter(|&p| !group.has(tags[p as usize]));
+        self.outside_own_bin.extend(strangers.map(|p| (p, STRANGER)));
+        self.outside_own_bin.sort_unstable();
+        self.close(chunk, sorting, looked)
+    }
+
+    /// Makes the lists once it is known which particles are not whole in the leaf's own bin.
+    fn close(
+        &mut self,
+        chunk: &Chunk<D>,
+        sorting: &Sorting<'_, D, impl BoxWidths<D>>,
+        looked: Result<(), BinMissing>,
+    ) -> Result<bool, BinMissing> {
         let touches_all_nodes = chunk.len() >= touches_all_nodes(D);
         if touches_all_nodes && self.outside_own_bin.is_empty() {
             return Ok(false);
@@ -140,7 +171,7 @@ impl<const D: usize> LeafBins<D> {
         }
         self.begin();
         // An error is found again, and told, when it matters.
-        let looked = self.look(chunk, 0, sorting, scratch);
+        let looked = self.look(chunk, 0, sorting, scratch, |_| true);
         self.presorted = looked.ok().and_then(|()| Some((chunk.revision()?, chunk.len())));
     }
 
@@ -148,7 +179,7 @@ impl<const D: usize> LeafBins<D> {
     fn are_as_new(&self, chunk: &Chunk<D>, sorting: &Sorting<'_, D, impl BoxWidths<D>>) -> bool {
         let mut new = self.clone();
         new.begin();
-        let looked = new.look(chunk, 0, sorting, &mut Scratch::default());
+        let looked = new.look(chunk, 0, sorting, &mut Scratch::default(), |_| true);
         looked.is_ok() && new.outside_own_bin == self.outside_own_bin && new.cut == self.cut
     }
 
@@ -158,13 +189,14 @@ impl<const D: usize> LeafBins<D> {
         self.members.iter_mut().for_each(BinMembers::clear);
     }
 
-    /// Finds the bins of the particles from the one numbered `from` on.
+    /// Finds the bins of the particles from the one numbered `from` on, as far as they are members.
     fn look(
         &mut self,
         chunk: &Chunk<D>,
         from: usize,
         sorting: &Sorting<'_, D, impl BoxWidths<D>>,
         scratch: &mut Scratch,
+        is_member: impl Fn(u32) -> bool,
     ) -> Result<(), BinMissing> {
         let &Sorting { plan, widths, leaf, own } = sorting;
         if self.around.is_empty() {
@@ -193,6 +225,7 @@ impl<const D: usize> LeafBins<D> {
             }
             lanes
         });
+        scratch.undecided.retain(|&p| is_member(p));
         let mut sorted = Ok(());
         let limits = [own_cell, plan.cell(own.level + 1)].map(narrow_limit);
         for particles in scratch.undecided.chunks(LANES) {
@@ -232,7 +265,7 @@ impl<const D: usize> LeafBins<D> {
         for &(p, bin) in &self.outside_own_bin {
             self.members[0].whole.extend(next..p);
             next = p + 1;
-            if bin != CUT {
+            if bin != CUT && bin != STRANGER {
                 self.members[bin as usize].whole.push(p);
             }
         }

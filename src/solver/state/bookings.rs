@@ -82,7 +82,7 @@ impl<const D: usize> Contacts<D> {
 /// Components of the impulse on a face.
 pub const FACE_SUMS: usize = 3;
 
-/// Sums of a load: three components of the impulse since the last row (kg m/s), and the work since the start (J), of the nodes
+/// Sums of a load, and of a contact between bodies: three components of the impulse since the last row (kg m/s), and the work since the start (J), of the nodes
 /// that this rank counts.
 pub const LOAD_SUMS: usize = 4;
 
@@ -116,6 +116,16 @@ pub struct LoadTotals {
     /// Mean force on the material since the last row of the history, N; in plane strain per metre of thickness.
     pub force: [f64; 3],
     /// Work on the material since the start, J: impulse times the velocity with which the step moves the material.
+    pub work: f64,
+}
+
+/// Mean force and work of a contact between bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyTotals {
+    /// Mean force on its first side since the last row of the history, N; in plane strain per metre of thickness.
+    pub force: [f64; 3],
+    /// Work on the two sides since the start, J: impulse times the velocity with which the step moves one along the other. Friction takes
+    /// away, so it is below 0.
     pub work: f64,
 }
 

@@ -10,6 +10,7 @@ use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::{Row, spread};
 use crate::memory::Block;
 use crate::particle::Chunk;
+use crate::particle::group::Group;
 use crate::solver::migration::crossings::FaceRules;
 use crate::solver::migration::migrate::Migration;
 use crate::solver::physics::Physics;
@@ -28,9 +29,13 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) received: ReceivedSums<D>,
     pub(in crate::solver) migration: Migration<D>,
     pub(in crate::solver) lists: BinLists<D>,
+    /// Velocity fields of the bodies that move with another than the first; none where all move with one.
+    pub(in crate::solver) others: Vec<VelocityField<D>>,
     pub(in crate::solver) seam: Seam,
     /// For contact at particles; made when it is first needed.
-    pub(in crate::solver) contact: Option<Box<ContactGrid<D>>>,
+    pub(in crate::solver) contact: Option<Box<VelocityField<D>>>,
+    /// For contact between bodies; made when it is first needed.
+    pub(in crate::solver) between: Option<Box<BetweenBodies<D>>>,
     /// Bytes of the last exchange of sums.
     pub(in crate::solver) sum_bytes: u64,
 }
@@ -50,6 +55,7 @@ impl<const D: usize> Grid<D> {
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
         let neighbours = exchange.neighbours().to_vec();
+        let others = 1..physics.body_contacts.fields();
         Self {
             arenas: Arenas::default(),
             fields: NodeFields::new(&plan),
@@ -62,8 +68,10 @@ impl<const D: usize> Grid<D> {
                 physics.carried_columns(),
             ),
             lists: BinLists::new(&plan),
+            others: others.map(|_| VelocityField::new(&plan)).collect(),
             seam: exchange.seam(&plan),
             contact: None,
+            between: None,
             sum_bytes: 0,
             exchange,
             received,
@@ -77,14 +85,31 @@ impl<const D: usize> Grid<D> {
         self.increments = Increments::default();
         self.fields.rows = Block::default();
         self.fields.moments = Block::default();
+        self.others.clear();
         self.contact = None;
+        self.between = None;
     }
 
-    /// Exchanges what particles scatter into with that of the particles in contact with colliders.
-    pub(in crate::solver) fn swap(&mut self, other: &mut ContactGrid<D>) {
+    /// Exchanges the velocity field that particles scatter into and gather from with another.
+    pub(in crate::solver) fn swap(&mut self, other: &mut VelocityField<D>) {
         std::mem::swap(&mut self.arenas, &mut other.arenas);
         std::mem::swap(&mut self.fields, &mut other.fields);
         std::mem::swap(&mut self.lists, &mut other.lists);
+        std::mem::swap(&mut self.increments, &mut other.increments);
+    }
+
+    /// The node fields of all velocity fields.
+    pub(in crate::solver) fn all_fields(&self) -> impl Iterator<Item = &NodeFields<D>> {
+        std::iter::once(&self.fields).chain(self.others.iter().map(|other| &other.fields))
+    }
+
+    /// All material on one velocity field, where there are several: masses add up, velocities are those of its momentum.
+    pub(in crate::solver) fn fields_together(&self) -> Option<NodeFields<D>> {
+        let (first, rest) = self.others.split_first()?;
+        let mut together = self.fields.clone();
+        together.add_material(&first.fields);
+        rest.iter().for_each(|other| together.add_material(&other.fields));
+        Some(together)
     }
 
     /// What the particles scattered last.
@@ -92,7 +117,8 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any.
+    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any. With `group`: those of its
+    /// particles alone.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan; the caller makes it collective.
@@ -101,10 +127,11 @@ impl<const D: usize> Grid<D> {
         phases: &mut Phases,
         chunks: &[Chunk<D>],
         widths: &impl BoxWidths<D>,
+        group: Option<&Group<'_>>,
     ) -> Result<(), BinMissing> {
         let Self { plan, lists, arenas, seam, .. } = self;
         phases.time(Phase::Sort, || {
-            let sorted = lists.sort(plan, chunks, widths);
+            let sorted = lists.sort(plan, chunks, widths, group);
             lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
                 spread::of_parts(chunk, parts, &plan.frame(bin), plan.constrained(bin), each);
             });
@@ -165,14 +192,13 @@ impl<const D: usize> Grid<D> {
 
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
+        let contact = self.contact.as_deref().into_iter();
+        let between = self.between.iter().flat_map(|between| &between.geometry);
         self.plan.heap_bytes()
             + self.arenas.heap_bytes()
             + self.fields.heap_bytes()
             + self.increments.heap_bytes()
-            + self
-                .contact
-                .as_ref()
-                .map_or(0, |contact| contact.arenas.heap_bytes() + contact.fields.heap_bytes())
+            + self.others.iter().chain(contact).chain(between).map(VelocityField::heap_bytes).sum::<usize>()
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.
@@ -182,18 +208,36 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// What the particles in contact with colliders scatter into.
-pub(in crate::solver) struct ContactGrid<const D: usize> {
-    arenas: Arenas<D>,
+/// A velocity field beside the first: what its particles scatter into, and gather from.
+pub(in crate::solver) struct VelocityField<const D: usize> {
+    pub(in crate::solver) arenas: Arenas<D>,
     pub(in crate::solver) fields: NodeFields<D>,
-    lists: BinLists<D>,
+    pub(in crate::solver) lists: BinLists<D>,
+    pub(in crate::solver) increments: Increments,
 }
 
-impl<const D: usize> ContactGrid<D> {
+impl<const D: usize> VelocityField<D> {
     /// For a plan.
     pub(in crate::solver) fn new(plan: &GridPlan<D>) -> Self {
-        Self { arenas: Arenas::default(), fields: NodeFields::new(plan), lists: BinLists::new(plan) }
+        Self {
+            arenas: Arenas::default(),
+            fields: NodeFields::new(plan),
+            lists: BinLists::new(plan),
+            increments: Increments::default(),
+        }
     }
+
+    fn heap_bytes(&self) -> usize {
+        self.arenas.heap_bytes() + self.fields.heap_bytes() + self.increments.heap_bytes()
+    }
+}
+
+/// What contact between bodies needs to know of the nodes of one plan.
+pub(in crate::solver) struct BetweenBodies<const D: usize> {
+    /// Volumes of the basis functions of real nodes, m³ (in plane strain m²), by node.
+    pub(in crate::solver) volumes: Vec<f64>,
+    /// For each velocity field what its particles near those of others scatter: volumes and their gradients.
+    pub(in crate::solver) geometry: Vec<VelocityField<D>>,
 }
 
 /// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.

@@ -114,6 +114,8 @@ pub struct Solver<const D: usize> {
     pub load_sums: ExactSums<LOAD_SUMS>,
     /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none where nobody asks.
     pub face_sums: ExactSums<FACE_SUMS>,
+    /// What is booked of contact between bodies.
+    pub body_sums: ExactSums<LOAD_SUMS>,
     /// Forces that particles carried in the last step, by own leaf; empty without such loads.
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// Particles near colliders that act on particles, by own leaf; empty without such colliders.

@@ -80,7 +80,7 @@ impl<const D: usize> Solver<D> {
 
     /// S⁺: velocities of the nodes from those of the particles alone.
     fn scatter_velocities(&mut self) {
-        self.nodes_from_particles(0.0);
+        self.field_from_particles(0.0);
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, [0.0; D], 0.0));
     }

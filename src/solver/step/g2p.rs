@@ -19,11 +19,12 @@ use crate::particle::chunk::{Layout, Place};
 use crate::probe::Section;
 use crate::solver::migration::depart::{Borders, Departed};
 use crate::solver::sorting::bin_view::BinView;
-use crate::solver::sorting::bins::OfLeaf;
+use crate::solver::sorting::bins::{BinLists, OfLeaf};
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{Near, ParticlePush};
+use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::carried::{add_ways, follow, has_followers, note_ways, positions, strain};
@@ -77,10 +78,10 @@ struct Sweep<'a, const D: usize> {
     dt: f64,
     scheme: &'a Scheme<'a>,
     plan: &'a GridPlan<D>,
-    fields: &'a NodeFields<D>,
-    arenas: &'a Arenas<D>,
-    /// Changes of velocity (FLIP) or new velocities of particles (XPIC) on the nodes.
-    increments: Option<&'a [Row]>,
+    /// The velocity field of all particles; where there are others, of those of the first group.
+    first: Source<'a, D>,
+    /// The other velocity fields, with the lists of their particles.
+    others: Vec<(Source<'a, D>, &'a BinLists<D>)>,
     borders: &'a Borders<D>,
     resampling: Option<&'a Resampling<'a, D>>,
     widths: &'a Widths<'a, D>,
@@ -97,6 +98,29 @@ struct Sweep<'a, const D: usize> {
     tensors: Vec<usize>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
+}
+
+/// A velocity field from which particles gather.
+#[derive(Clone, Copy)]
+struct Source<'a, const D: usize> {
+    fields: &'a NodeFields<D>,
+    arenas: &'a Arenas<D>,
+    /// Changes of velocity (FLIP) or new velocities of particles (XPIC) on the nodes.
+    increments: Option<&'a [Row]>,
+}
+
+impl<'a, const D: usize> Source<'a, D> {
+    fn of(field: &'a VelocityField<D>, has_increments: bool) -> Self {
+        let VelocityField { fields, arenas, increments, .. } = field;
+        Self { fields, arenas, increments: has_increments.then_some(&*increments.rows) }
+    }
+}
+
+/// The particles of a leaf that gather from one velocity field.
+#[derive(Clone, Copy)]
+struct Members<'a, const D: usize> {
+    source: Source<'a, D>,
+    lists: Option<&'a LeafBins<D>>,
 }
 
 /// What is noted of the particles of a leaf.
@@ -123,14 +147,15 @@ impl<const D: usize> Solver<D> {
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
+        let has_increments = scheme.transfer.has_increments();
+        let Grid { plan, fields, arenas, increments, others, lists, migration, .. } = &mut self.grid;
         let sweep = Sweep {
             dt,
             scheme: &scheme,
-            plan: &self.grid.plan,
-            fields: &self.grid.fields,
-            arenas: &self.grid.arenas,
-            increments: scheme.transfer.has_increments().then_some(&*self.grid.increments.rows),
-            borders: &self.grid.migration.borders,
+            plan,
+            first: Source { fields, arenas, increments: has_increments.then_some(&*increments.rows) },
+            others: others.iter().map(|field| (Source::of(field, has_increments), &field.lists)).collect(),
+            borders: &migration.borders,
             resampling: resampling.as_ref(),
             widths: &widths,
             watch: watch.unwrap_or_default(),
@@ -141,8 +166,7 @@ impl<const D: usize> Solver<D> {
             tensors: self.physics.tensor_columns(),
             openings: self.crossings.fluxes.openings(),
         };
-        let (chunks, lists, pushes, near) =
-            (&mut self.chunks, &mut self.grid.lists, &mut self.pushes, &mut self.near);
+        let (chunks, pushes, near) = (&mut self.chunks, &mut self.pushes, &mut self.near);
         self.phases.time(Phase::Gather, || {
             let leaves =
                 chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).zip(pushes).zip(near);
@@ -158,7 +182,7 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// S: velocities of the nodes at all particles, leaf by leaf.
+    /// S: velocities of the nodes of the first field at its particles, leaf by leaf; 0 for those of others.
     pub(super) fn interpolate(&mut self) -> Vec<Vec<[f64; D]>> {
         let scheme = self.physics.scheme();
         let (plan, rows, lists) = (&self.grid.plan, &self.grid.fields.rows, &self.grid.lists);
@@ -166,11 +190,14 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter().enumerate();
             let all = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                let lists = lists.of_leaf(leaf);
+                let (has_members, lists) = (lists.has_members(leaf), lists.of_leaf(leaf));
                 let cut = cut_of(lists);
                 scratch.begin_cut(cut.len());
                 let Scratch { kernel, increments: arena, gathered, .. } = scratch;
                 let mut velocities = vec![[0.0; D]; chunk.len()];
+                if !has_members {
+                    return velocities;
+                }
                 for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
                     load_rows(plan, bin.number, &bin.window, rows, arena);
                     let nodes = Fields { velocity: arena, increment: None, moments: None };
@@ -206,7 +233,7 @@ impl<const D: usize> Sweep<'_, D> {
         self.watch.before(chunk, maxima);
         let follows = self.displacement.is_some() || !self.openings.is_empty();
         let start = follows.then(|| positions(chunk));
-        *signal = self.gather(scratch, leaf, chunk, bins.lists());
+        *signal = self.gather(scratch, leaf, chunk, &bins);
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
             scratch.leavers.look_again(chunk, &held);
@@ -233,7 +260,7 @@ impl<const D: usize> Sweep<'_, D> {
         let leavers = &scratch.leavers.found;
         let mut departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
         departed.crossed.passed = passed;
-        if !is_empty {
+        if !is_empty && self.others.is_empty() {
             bins.presort(self.plan, leaf, chunk, self.widths, &mut scratch.sort);
         }
         departed
@@ -251,13 +278,22 @@ impl<const D: usize> Sweep<'_, D> {
         }
     }
 
+    /// The velocity fields of the particles of a leaf, with their lists.
+    fn members<'b>(&'b self, leaf: usize, bins: &'b OfLeaf<'_, D>) -> impl Iterator<Item = Members<'b, D>> {
+        let first = bins.has_members.then(|| Members { source: self.first, lists: bins.lists() });
+        let others = self.others.iter().filter(move |(_, lists)| lists.has_members(leaf));
+        let others =
+            others.map(move |(source, lists)| Members { source: *source, lists: lists.of_leaf(leaf) });
+        first.into_iter().chain(others)
+    }
+
     /// Advances the particles of a leaf, bin by bin, and notes those that leave it. Returns the greatest `c + |v|`, m/s.
     fn gather(
         &self,
         scratch: &mut Scratch<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
-        lists: Option<&LeafBins<D>>,
+        bins: &OfLeaf<'_, D>,
     ) -> f64 {
         scratch.leavers.begin(self.borders.of_leaf(leaf));
         if chunk.is_empty() {
@@ -266,17 +302,20 @@ impl<const D: usize> Sweep<'_, D> {
         scratch.gradients.clear();
         let are_kept = self.needs_gradients(chunk);
         if self.scheme.f_bar || are_kept {
-            self.note_gradients(scratch, leaf, chunk, lists);
+            self.note_gradients(scratch, leaf, chunk, bins);
         }
         if !are_kept {
             scratch.gradients.clear();
         }
-        scratch.begin_cut(cut_of(lists).len());
         let mut fastest: f64 = 0.0;
-        for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
-            fastest = fastest.max(self.gather_bin(scratch, &bin, chunk));
+        for Members { source, lists } in self.members(leaf, bins) {
+            let cut = cut_of(lists);
+            scratch.begin_cut(cut.len());
+            for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
+                fastest = fastest.max(self.gather_bin(scratch, &source, &bin, chunk));
+            }
+            fastest = fastest.max(self.advance_cut(scratch, leaf, chunk, cut));
         }
-        let fastest = fastest.max(self.advance_cut(scratch, leaf, chunk, cut_of(lists)));
         if self.scheme.f_bar {
             scratch.mean_dilation.average_pressure(chunk);
         }
@@ -287,14 +326,20 @@ impl<const D: usize> Sweep<'_, D> {
 
     /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
     /// [`Sweep::gather`].
-    fn gather_bin(&self, scratch: &mut Scratch<D>, bin: &BinView<'_, D>, chunk: &mut Chunk<D>) -> f64 {
+    fn gather_bin(
+        &self,
+        scratch: &mut Scratch<D>,
+        source: &Source<'_, D>,
+        bin: &BinView<'_, D>,
+        chunk: &mut Chunk<D>,
+    ) -> f64 {
         let Scratch { kernel, arena, increments, gathered, leavers, mean_dilation, .. } = scratch;
-        let next = self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
-        if let Some(rows) = self.increments {
+        let next = source.fields.load(self.plan, source.arenas, bin.number, &bin.window, arena);
+        if let Some(rows) = source.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
         }
         let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
-        let increment = self.increments.map(|_| &increments[..]);
+        let increment = source.increments.map(|_| &increments[..]);
         let nodes = Fields { velocity: &arena.rows, increment, moments };
         g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
         let Some(whole) = bin.whole else { return 0.0 };
@@ -306,18 +351,14 @@ impl<const D: usize> Sweep<'_, D> {
     }
 
     /// Notes the velocity gradients of the particles of a leaf; with F-bar also what the mean rate of dilation of each cell adds to them.
-    fn note_gradients(
-        &self,
-        scratch: &mut Scratch<D>,
-        leaf: usize,
-        chunk: &Chunk<D>,
-        lists: Option<&LeafBins<D>>,
-    ) {
+    fn note_gradients(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
         let Scratch { kernel, arena, gathered, gradients, mean_dilation, .. } = scratch;
-        let look = Look { plan: self.plan, fields: self.fields, arenas: self.arenas, scheme: self.scheme };
-        look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
-            gradients.push((p as u32, gathered.gradient()));
-        });
+        for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {
+            let look = Look { plan: self.plan, fields, arenas, scheme: self.scheme };
+            look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
+                gradients.push((p as u32, gathered.gradient()));
+            });
+        }
         if self.scheme.f_bar {
             mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
             gradients.iter().for_each(|(p, gradient)| mean_dilation.note(*p as usize, gradient));

@@ -12,12 +12,14 @@
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders |
 //! | [`contact`] | contact of particles with colliders |
+//! | [`between`] | contact between bodies |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
 //! | [`carried`] | loads that particles carry: their impulse and work; areas follow the deformation |
+pub mod between;
 pub mod carried;
 pub mod colliders;
-pub mod contact;
+mod contact;
 pub mod exchange;
 mod flip_xpic;
 pub mod g2p;

@@ -16,8 +16,9 @@ use crate::solver::state::bookings::SUMS;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours where colliders act on particles. `v_j = p_j / m_j + Δt g` on real nodes, then loads, the conditions of
-    /// colliders in their order, and those of domain faces, which come last so that nothing is driven out of the domain. Returns impulse and
+    /// Collective over neighbours where colliders act on particles or bodies are in contact. `v_j = p_j / m_j + Δt g` on real nodes, then loads,
+    /// contact between bodies, the conditions of colliders in their order, and those of domain faces, which come last so that nothing is driven
+    /// out of the domain. Returns impulse and
     /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
@@ -29,18 +30,24 @@ impl<const D: usize> Solver<D> {
             false => self.physics.gravity.at(self.clock.time + 0.5 * dt),
             true => [0.0; D],
         };
-        let grid = &mut self.grid;
-        self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
-        let pushes = self.apply_loads(dt);
+        let mut pushes = Vec::new();
+        self.for_each_field(|solver, _| {
+            let grid = &mut solver.grid;
+            solver.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
+            pushes.push(solver.apply_loads(dt));
+        });
+        let mut held = self.press_bodies(dt);
         let mut impulses = self.no_impulses();
-        self.collide(rates, &mut impulses);
-        self.apply_faces(dt);
-        // What particles have between two steps needs no holding back.
-        let held = match dt > 0.0 && self.has_contact_at_particles() {
-            true => self.hold_particles(dt, rates, &mut impulses),
-            false => Ok(()),
-        };
-        self.book_loads(&pushes);
+        self.for_each_field(|solver, field| {
+            solver.collide(rates, &mut impulses);
+            solver.apply_faces(dt);
+            // What particles have between two steps needs no holding back.
+            if dt > 0.0 && solver.has_contact_at_particles() {
+                let of_field = solver.hold_particles(field, dt, rates, &mut impulses);
+                held = held.and(of_field);
+            }
+            solver.book_loads(&pushes[field]);
+        });
         self.note_motion();
         (impulses, held)
     }
@@ -74,8 +81,10 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the increments alike.
     pub(in crate::solver) fn prolong_velocities(&mut self) {
-        self.form_increments();
-        self.prolong();
+        self.for_each_field(|solver, _| {
+            solver.form_increments();
+            solver.prolong();
+        });
     }
 
     /// Not collective. Interpolates what the rows of real nodes hold on constrained nodes.

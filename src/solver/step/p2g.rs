@@ -11,13 +11,32 @@ use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
-    /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut.
+    /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut. Each velocity field has lists
+    /// of its own particles.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.
     pub(in crate::solver) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let widths = self.physics.widths(&self.grid.plan);
-        self.grid.sort(&mut self.phases, &self.chunks, &widths)
+        let mut sorted = Ok(());
+        self.for_each_field(|solver, field| {
+            let group = solver.physics.group(field);
+            let widths = solver.physics.widths(&solver.grid.plan);
+            let of_field = solver.grid.sort(&mut solver.phases, &solver.chunks, &widths, group.as_ref());
+            sorted = sorted.and(of_field);
+        });
+        sorted
+    }
+
+    /// Calls `work` with each velocity field in the place of the first, and its number.
+    pub(in crate::solver) fn for_each_field(&mut self, mut work: impl FnMut(&mut Self, usize)) {
+        work(self, 0);
+        let mut others = std::mem::take(&mut self.grid.others);
+        for (number, other) in others.iter_mut().enumerate() {
+            self.grid.swap(other);
+            work(self, number + 1);
+            self.grid.swap(other);
+        }
+        self.grid.others = others;
     }
 
     /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
@@ -25,15 +44,20 @@ impl<const D: usize> Solver<D> {
     /// which a particle moves.
     pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
         self.scale_masses(|mass, scale| mass * scale);
-        self.note_velocities();
+        self.for_each_field(|solver, _| solver.note_velocities());
         let before = self.push_particles(dt);
         self.nodes_from_particles(dt);
         self.take_back_push(&before);
         self.scale_masses(|mass, scale| mass / scale);
     }
 
-    /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes.
+    /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in each velocity field.
     pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
+        self.for_each_field(|solver, _| solver.field_from_particles(dt));
+    }
+
+    /// As [`Solver::nodes_from_particles`] in the first field.
+    pub(super) fn field_from_particles(&mut self, dt: f64) {
         let (chunks, times, scheme) = (&self.chunks, &self.leaf_data.times, self.physics.scheme());
         self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
             times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, dt, arena));
@@ -55,10 +79,18 @@ impl<const D: usize> Solver<D> {
             }
         }
         self.sort_into_bins()?;
+        self.for_each_field(|solver, _| solver.moments_of_field(done));
+        Ok(())
+    }
+
+    /// As [`Solver::moments_from_affine`] with APIC for the sorted particles of the first field.
+    fn moments_of_field(&mut self, done: &[usize]) {
         let scheme = self.physics.scheme();
         let (plan, lists) = (&self.grid.plan, &self.grid.lists);
         let with_moments = &self.physics.with_moments;
-        self.chunks.par_iter_mut().enumerate().for_each(|(leaf, chunk)| {
+        let chunks = self.chunks.par_iter_mut().enumerate().filter(|(leaf, _)| lists.has_members(*leaf));
+        chunks.for_each(|(leaf, chunk)| {
+            // Those of other fields keep theirs.
             let spreads =
                 spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme);
             let tags: Vec<u64> = if with_moments.is_empty() { Vec::new() } else { chunk.tags().to_vec() };
@@ -72,7 +104,6 @@ impl<const D: usize> Solver<D> {
                 }
             }
         });
-        Ok(())
     }
 }
 
@@ -98,13 +129,13 @@ pub(super) fn scatter<const D: usize>(
     }
 }
 
-/// Second moments D of the weights, m², of the particles of a leaf, which are sorted into these bins.
+/// Second moments D of the weights, m², of the particles of a leaf that are sorted into these bins; 1 for others.
 pub(super) fn spreads<'a, const D: usize>(
     bins: impl Iterator<Item = BinView<'a, D>>,
     chunk: &Chunk<D>,
     scheme: &Scheme,
 ) -> Vec<[f64; D]> {
-    let mut spreads = vec![[0.0; D]; chunk.len()];
+    let mut spreads = vec![[1.0; D]; chunk.len()];
     for bin in bins {
         if let Some(whole) = bin.whole {
             spread::of_particles(chunk, whole, &bin.frame, scheme, bin.constrained, |p, spread| {

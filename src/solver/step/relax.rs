@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
+use crate::grid::NodeFields;
 use crate::grid::mask::block_nodes;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
@@ -20,34 +21,37 @@ impl<const D: usize> Solver<D> {
         if self.physics.equilibrium.is_none() {
             return;
         }
-        let (fields, plan, physics) = (&self.grid.fields, &self.grid.plan, &self.physics);
+        let (grid, plan, physics) = (&self.grid, &self.grid.plan, &self.physics);
         let nodes = block_nodes(D);
-        let blocks = fields.rows.par_chunks(nodes).zip(&plan.blocks).zip(&fields.active);
         let empty = || [(); 3].map(|()| ExactSum::new());
+        let merge = |mut all: [ExactSum; 3], part: [ExactSum; 3]| {
+            all.iter_mut().zip(&part).for_each(|(all, part)| all.merge(part));
+            all
+        };
         self.motion = self.phases.time(Phase::Nodes, || {
-            let sums = blocks.with_min_len(32).filter(|(_, active)| **active).fold(
-                empty,
-                |mut sums, ((rows, block), _)| {
-                    let counted = block.real_nodes() & block.owned;
-                    let scale = physics.mass_scale(block.level);
-                    for (bit, row) in rows.iter().enumerate() {
-                        let mass = row.0[3];
-                        if counted >> bit & 1 == 1 && mass > 0.0 {
-                            row.0[..D].iter().for_each(|v| sums[0].add(0.5 * mass * v * v));
-                            sums[1].add(mass / scale.unwrap_or(1.0));
-                            if let Some(scale) = scale {
-                                row.0[..D].iter().for_each(|v| sums[2].add(0.5 * scale * mass * v * v));
+            let of_field = |fields: &NodeFields<D>| {
+                let blocks = fields.rows.par_chunks(nodes).zip(&plan.blocks).zip(&fields.active);
+                let sums = blocks.with_min_len(32).filter(|(_, active)| **active).fold(
+                    empty,
+                    |mut sums, ((rows, block), _)| {
+                        let counted = block.real_nodes() & block.owned;
+                        let scale = physics.mass_scale(block.level);
+                        for (bit, row) in rows.iter().enumerate() {
+                            let mass = row.0[3];
+                            if counted >> bit & 1 == 1 && mass > 0.0 {
+                                row.0[..D].iter().for_each(|v| sums[0].add(0.5 * mass * v * v));
+                                sums[1].add(mass / scale.unwrap_or(1.0));
+                                if let Some(scale) = scale {
+                                    row.0[..D].iter().for_each(|v| sums[2].add(0.5 * scale * mass * v * v));
+                                }
                             }
                         }
-                    }
-                    sums
-                },
-            );
-            let merge = |mut all: [ExactSum; 3], part: [ExactSum; 3]| {
-                all.iter_mut().zip(&part).for_each(|(all, part)| all.merge(part));
-                all
+                        sums
+                    },
+                );
+                sums.reduce(empty, merge)
             };
-            sums.reduce(empty, merge)
+            grid.all_fields().map(of_field).fold(empty(), merge)
         });
     }
 

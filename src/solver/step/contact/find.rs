@@ -20,19 +20,22 @@ const REACH: f64 = 0.25;
 const AHEAD: f64 = 2.0;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. The particles of each own leaf in reach of the colliders that act on particles, and in `near` those that may come to one in
-    /// this step.
-    pub(super) fn find_contacts(&mut self, dt: f64, rates: &[Rate<D>]) -> Vec<InContact<D>> {
+    /// Not collective. The particles of each own leaf in reach of the colliders that act on particles that move with the velocity field numbered
+    /// `field`, and in `near` those of all fields so far that may come to one in this step.
+    pub(super) fn find_contacts(&mut self, field: usize, dt: f64, rates: &[Rate<D>]) -> Vec<InContact<D>> {
         let colliders: Vec<_> =
             self.physics.colliders.iter().enumerate().zip(&self.contacts.states).zip(rates).collect();
         let scheme = self.physics.scheme();
+        let group = self.physics.group(field);
         let widths = self.physics.widths(&self.grid.plan);
         let (plan, extent) = (&self.grid.plan, self.grid.plan.extent());
         self.near.resize_with(self.chunks.len(), Vec::new);
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&mut self.near).enumerate();
         self.phases.time(Phase::Nodes, || {
             let found = leaves.with_min_len(16).map(|(leaf, ((chunk, octant), near))| {
-                near.clear();
+                if field == 0 {
+                    near.clear();
+                }
                 let mut found = InContact::default();
                 if chunk.is_empty() {
                     return found;
@@ -50,6 +53,9 @@ impl<const D: usize> Solver<D> {
                     }
                     let close: Vec<u32> = (0..chunk.len() as u32)
                         .filter(|&p| {
+                            if group.is_some_and(|group| !group.has(chunk.tags()[p as usize])) {
+                                return false;
+                            }
                             let distance = collider.distance(&chunk.position(p as usize), &state.pose);
                             if distance <= way && distance >= 0.0 {
                                 near.push(Near::new(number, p, chunk.position(p as usize)));

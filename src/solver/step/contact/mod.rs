@@ -29,7 +29,7 @@ use crate::particle::Chunk;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::grid::ContactGrid;
+use crate::solver::state::grid::VelocityField;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::colliders::Touch;
 
@@ -49,18 +49,19 @@ impl<const D: usize> Solver<D> {
         self.physics.colliders.iter().any(Collider::acts_on_particles)
     }
 
-    /// Collective. Gives the nodes the impulses that keep particles out of the colliders that act on particles, with the conditions of other
-    /// colliders and of faces. Adds what particles give to the colliders.
+    /// Collective. Gives the nodes of the velocity field numbered `field` the impulses that keep its particles out of the colliders that act
+    /// on particles, with the conditions of other colliders and of faces. Adds what particles give to the colliders.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.
     pub(super) fn hold_particles(
         &mut self,
+        field: usize,
         dt: f64,
         rates: &[Rate<D>],
         sums: &mut [[ExactSum; SUMS]],
     ) -> Result<(), BinMissing> {
-        let found = self.find_contacts(dt, rates);
+        let found = self.find_contacts(field, dt, rates);
         let (mut chunks, mut touching): (Vec<_>, Vec<_>) =
             found.into_iter().map(|leaf| (leaf.particles, leaf.touching)).unzip();
         let is_any = chunks.iter().any(|chunk: &Chunk<D>| !chunk.is_empty());
@@ -68,10 +69,10 @@ impl<const D: usize> Solver<D> {
             return Ok(());
         }
         let mut other =
-            self.grid.contact.take().unwrap_or_else(|| Box::new(ContactGrid::new(&self.grid.plan)));
+            self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
         let widths = self.physics.widths(&self.grid.plan);
         self.grid.swap(&mut other);
-        let sorted = self.grid.sort(&mut self.phases, &chunks, &widths);
+        let sorted = self.grid.sort(&mut self.phases, &chunks, &widths, None);
         let spreads = self.spreads_in_contact(&chunks);
         self.find_compliances(&mut other, &mut chunks, &spreads, &mut touching);
         for _ in 0..SWEEPS {

@@ -12,7 +12,7 @@ use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::state::Solver;
-use crate::solver::state::grid::ContactGrid;
+use crate::solver::state::grid::VelocityField;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::look::Look;
 use crate::solver::step::p2g::{scatter, spreads};
@@ -48,7 +48,7 @@ impl<const D: usize> Solver<D> {
     /// of the nodes.
     pub(super) fn find_compliances(
         &mut self,
-        other: &mut ContactGrid<D>,
+        other: &mut VelocityField<D>,
         chunks: &mut [Chunk<D>],
         spreads: &Spreads<D>,
         touching: &mut [Vec<Touching<D>>],
@@ -99,7 +99,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Adds the impulses on real nodes to the velocities of all particles' grid.
-    pub(super) fn add_impulses(&mut self, other: &mut ContactGrid<D>) {
+    pub(super) fn add_impulses(&mut self, other: &mut VelocityField<D>) {
         let (fields, plan) = (&mut self.grid.fields, &self.grid.plan);
         let rows = &mut other.fields.rows;
         self.phases.time(Phase::Nodes, || {
@@ -113,7 +113,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Has the real nodes around particles in contact take the velocities of all particles' grid.
-    pub(super) fn take_velocities(&mut self, other: &ContactGrid<D>) {
+    pub(super) fn take_velocities(&mut self, other: &VelocityField<D>) {
         let rows = &other.fields.rows;
         for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
             let [x, y, z, _] = rows[node].0;

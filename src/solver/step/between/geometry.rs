@@ -1,0 +1,140 @@
+//! Shares of volume and their gradients at the nodes where bodies meet.
+use rayon::prelude::*;
+
+use crate::grid::mask::{bits, block_nodes};
+use crate::grid::plan::GridPlan;
+use crate::grid::{NodeFields, Window};
+use crate::kernel::{ARENA_EDGE, BLOCK, Row};
+use crate::particle::Chunk;
+use crate::particle::chunk::Layout;
+use crate::particle::group::Group;
+use crate::particle::volume::{volume, volume_ratio};
+use crate::solver::sorting::bins::BinMissing;
+use crate::solver::state::Solver;
+use crate::solver::state::grid::{BetweenBodies, Grid, VelocityField};
+use crate::solver::step::p2g::scatter;
+
+impl<const D: usize> Grid<D> {
+    /// Per block, whether two velocity fields have mass at one of its real nodes.
+    pub(super) fn blocks_where_fields_meet(&self) -> Vec<bool> {
+        let nodes = block_nodes(D);
+        let all: Vec<&NodeFields<D>> = self.all_fields().collect();
+        let blocks = self.plan.blocks.par_iter().enumerate().with_min_len(64);
+        let meets = blocks.map(|(index, block)| {
+            let active = || all.iter().filter(|fields| fields.active[index]);
+            if active().count() < 2 {
+                return false;
+            }
+            let has_mass =
+                |fields: &NodeFields<D>, bit: u32| fields.rows[index * nodes + bit as usize].0[3] > 0.0;
+            bits(block.real_nodes()).any(|bit| active().filter(|fields| has_mass(fields, bit)).count() > 1)
+        });
+        meets.collect()
+    }
+}
+
+/// The blocks whose nodes hand sums to any of those marked, these among them.
+fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[bool]) -> Vec<bool> {
+    let mut all = meets.to_vec();
+    for fine in plan.links.iter().flat_map(|links| &links.fine) {
+        let parents = fine.parents.iter().filter_map(|&parent| all.get(parent as usize));
+        all[fine.block as usize] |= parents.into_iter().any(|&marked| marked);
+    }
+    all
+}
+
+/// Copies of the particles of a group that scatter volumes in place of masses, and gradients of volumes in place of the impulse of stress
+/// over 1 s.
+fn solids<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>) -> Chunk<D> {
+    let members: Vec<u32> =
+        (0..).zip(chunk.tags()).filter(|(_, tag)| group.has(**tag)).map(|(p, _)| p).collect();
+    let mut copy = chunk.gathered(&members);
+    for p in 0..copy.len() {
+        let (volume, ratio) = (volume(&copy, p), volume_ratio(&copy, p));
+        copy.write(Layout::<D>::MASS, p, &[volume]);
+        copy.write(Layout::<D>::VELOCITY, p, &[0.0; D]);
+        copy.write(Layout::<D>::AFFINE, p, &[0.0; 9][..D * D]);
+        let stress = [-ratio, -ratio, -ratio, 0.0, 0.0, 0.0];
+        copy.write(Layout::<D>::STRESS, p, &stress[..Layout::<D>::SYMMETRIC]);
+    }
+    copy
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at the real nodes of the blocks where fields meet.
+    pub(super) fn find_geometry(&mut self, meets: &[bool]) -> Result<(), BinMissing> {
+        let mut between = match self.grid.between.take() {
+            Some(between) => between,
+            None => Box::new(self.begin_between()),
+        };
+        let scattering = with_children(&self.grid.plan, meets);
+        let mut sorted = Ok(());
+        self.for_each_field(|solver, field| {
+            let near = solver.near_others(&scattering);
+            let Some(group) = solver.physics.group(field) else { return };
+            let chunks: Vec<Chunk<D>> = (solver.chunks.par_iter().zip(near).with_min_len(16))
+                .map(|(chunk, is_near)| if is_near { solids(chunk, &group) } else { Chunk::new() })
+                .collect();
+            let geometry = &mut between.geometry[field];
+            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
+            solver.grid.swap(geometry);
+            let of_field = solver.grid.sort(&mut solver.phases, &chunks, &widths, None);
+            solver.grid.scatter_and_sum(&mut solver.phases, &chunks, |scratch, bin, arena| {
+                scatter(scratch, bin, &chunks, &scheme, 1.0, arena);
+            });
+            solver.grid.swap(geometry);
+            sorted = sorted.and(of_field);
+        });
+        self.grid.between = Some(between);
+        sorted
+    }
+
+    /// Per own leaf, whether particles of the first velocity field scatter into any of these blocks.
+    fn near_others(&self, blocks: &[bool]) -> Vec<bool> {
+        let mut near = vec![false; self.chunks.len()];
+        for bin in self.grid.arenas.bins().map(|bin| &self.grid.plan.bins[bin]) {
+            near[bin.leaf as usize] |= bin.reached().any(|block| blocks[block]);
+        }
+        near
+    }
+
+    /// Collective over neighbours. Finds the volumes of the basis functions of real nodes: each cell of a leaf gives a share of its volume to each of its
+    /// corners, and constrained nodes hand theirs to their parents.
+    fn begin_between(&mut self) -> BetweenBodies<D> {
+        let fields = self.physics.body_contacts.fields();
+        let geometry = (0..fields).map(|_| VelocityField::new(&self.grid.plan)).collect();
+        let mut of_cells = VelocityField::new(&self.grid.plan);
+        self.grid.swap(&mut of_cells);
+        let plan = &self.grid.plan;
+        let own_bins = (0..self.chunks.len()).map(|leaf| (plan.leaf_bins(leaf).start, Window::FULL));
+        self.grid.arenas.occupy(plan, &self.grid.seam, own_bins);
+        // What bins tell of their members is not asked for.
+        let cells: Vec<f64> = (0..plan.levels()).map(|level| plan.cell(level as u8)).collect();
+        let levels: Vec<u8> = plan.bins.iter().map(|bin| bin.block.level).collect();
+        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+            arena.clear(&Window::FULL);
+            let share = (0..D).fold(1.0, |share, _| 0.5 * share * cells[usize::from(levels[bin.number])]);
+            for_each_corner::<D>(|node, cells| {
+                arena.rows[node] = Row([0.0, 0.0, 0.0, share * f64::from(cells)])
+            });
+        });
+        let volumes = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
+        self.grid.swap(&mut of_cells);
+        BetweenBodies { volumes, geometry }
+    }
+}
+
+/// Calls `each` with the nodes of an arena that are corners of cells of the leaf's block, and the number of these cells.
+fn for_each_corner<const D: usize>(mut each: impl FnMut(usize, u32)) {
+    let along = BLOCK + 1;
+    for corner in 0..along.pow(D as u32) {
+        let (mut node, mut cells, mut rest) = (0, 1, corner);
+        for axis in 0..D {
+            let k = rest % along;
+            rest /= along;
+            node += (k + 1) * ARENA_EDGE.pow(axis as u32);
+            cells *= if k == 0 || k == BLOCK { 1 } else { 2 };
+        }
+        each(node, cells);
+    }
+}

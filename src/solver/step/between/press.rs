@@ -1,0 +1,161 @@
+//! Impulses at the nodes where bodies meet.
+use rayon::prelude::*;
+
+use crate::boundary::BodyContacts;
+use crate::boundary::bodies::{Meeting, Pair, PairLaw};
+use crate::grid::mask::{bits, block_nodes};
+use crate::grid::{GridPlan, NodeFields};
+use crate::solver::state::Solver;
+use crate::solver::state::grid::BetweenBodies;
+use crate::solver::state::phases::Phase;
+
+/// Sweeps over the pairs of a node where more than two bodies meet; one is exact for two.
+const SWEEPS: usize = 8;
+
+/// What one node has got in one step.
+struct Pressed<const D: usize> {
+    node: usize,
+    /// New velocities, with the numbers of their fields.
+    velocities: Vec<(usize, [f64; D])>,
+    booked: Vec<Booked<D>>,
+}
+
+/// What a pair of bodies gives to the contact of the job that it belongs to; none for bodies that stick as one.
+struct Booked<const D: usize> {
+    contact: Option<u16>,
+    /// Impulse on the contact's first side, kg m/s.
+    impulse: [f64; D],
+    /// Work, J.
+    work: f64,
+}
+
+/// A body at a node.
+#[derive(Clone, Copy)]
+struct Body<const D: usize> {
+    field: usize,
+    mass: f64,
+    velocity: [f64; D],
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Presses the bodies at the real nodes of the blocks where fields meet, and books it from the nodes that this rank
+    /// counts.
+    pub(super) fn press(&mut self, meets: &[bool], dt: f64) {
+        let grid = &self.grid;
+        let press = Press {
+            plan: &grid.plan,
+            fields: grid.all_fields().collect(),
+            between: grid.between.as_deref(),
+            contacts: &self.physics.body_contacts,
+            dt,
+        };
+        let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {
+            let blocks = meets.par_iter().enumerate().filter(|(_, meets)| **meets);
+            blocks.flat_map_iter(|(block, _)| press.block(block)).collect()
+        });
+        let nodes = block_nodes(D);
+        for Pressed { node, velocities, booked } in pressed {
+            for (field, velocity) in velocities {
+                let fields = match field {
+                    0 => &mut self.grid.fields,
+                    field => &mut self.grid.others[field - 1].fields,
+                };
+                fields.rows[node].0[..D].copy_from_slice(&velocity);
+            }
+            if self.grid.plan.blocks[node / nodes].owned >> (node % nodes) & 1 == 1 {
+                for Booked { contact, impulse, work } in booked {
+                    let Some(contact) = contact else { continue };
+                    let sums = &mut self.body_sums.of[usize::from(contact)];
+                    sums.iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
+                    sums[3].add(work);
+                }
+            }
+        }
+    }
+}
+
+/// What pressing needs to know.
+struct Press<'a, const D: usize> {
+    plan: &'a GridPlan<D>,
+    /// Velocities and masses of each field.
+    fields: Vec<&'a NodeFields<D>>,
+    /// Where the surfaces are.
+    between: Option<&'a BetweenBodies<D>>,
+    contacts: &'a BodyContacts,
+    dt: f64,
+}
+
+impl<const D: usize> Press<'_, D> {
+    /// The nodes of a block where bodies meet.
+    fn block(&self, block: usize) -> Vec<Pressed<D>> {
+        let first = block * block_nodes(D);
+        let mut pressed = Vec::new();
+        for bit in bits(self.plan.blocks[block].real_nodes()) {
+            let node = first + bit as usize;
+            let fields = self.fields.iter().enumerate().filter(|(_, fields)| fields.active[block]);
+            let rows = fields.map(|(field, fields)| (field, fields.rows[node].0));
+            let bodies = rows.filter(|(_, row)| row[3] > 0.0).map(|(field, row)| Body {
+                field,
+                mass: row[3],
+                velocity: std::array::from_fn(|a| row[a]),
+            });
+            let mut bodies: Vec<Body<D>> = bodies.collect();
+            if bodies.len() > 1 {
+                let booked = self.node(node, &mut bodies);
+                if !booked.is_empty() {
+                    let velocities = bodies.iter().map(|body| (body.field, body.velocity)).collect();
+                    pressed.push(Pressed { node, velocities, booked });
+                }
+            }
+        }
+        pressed
+    }
+
+    /// Presses the bodies at a node, pair by pair. Returns what is to be booked.
+    fn node(&self, node: usize, bodies: &mut [Body<D>]) -> Vec<Booked<D>> {
+        let mut booked = Vec::new();
+        for _ in 0..if bodies.len() > 2 { SWEEPS } else { 1 } {
+            for a in 0..bodies.len() {
+                for b in a + 1..bodies.len() {
+                    let pair = self.contacts.pair([bodies[a].field, bodies[b].field]);
+                    let impulse = self.impulse(node, [bodies[a], bodies[b]], pair);
+                    let Some(impulse) = impulse.filter(|impulse| *impulse != [0.0; D]) else { continue };
+                    for k in 0..D {
+                        bodies[a].velocity[k] -= impulse[k] / bodies[a].mass;
+                        bodies[b].velocity[k] += impulse[k] / bodies[b].mass;
+                    }
+                    let after: [f64; D] =
+                        std::array::from_fn(|k| bodies[b].velocity[k] - bodies[a].velocity[k]);
+                    let work = (0..D).map(|k| impulse[k] * after[k]).sum();
+                    let is_turned = pair.is_some_and(|pair| pair.turned);
+                    let impulse = if is_turned { impulse } else { impulse.map(|j| -j) };
+                    booked.push(Booked { contact: pair.map(|pair| pair.contact), impulse, work });
+                }
+            }
+        }
+        booked
+    }
+
+    /// Impulse on the second of two bodies at a node, kg m/s. `None` where nothing says how they meet.
+    fn impulse(&self, node: usize, bodies: [Body<D>; 2], pair: Option<&Pair>) -> Option<[f64; D]> {
+        let [first, second] = bodies;
+        let relative = std::array::from_fn(|a| first.velocity[a] - second.velocity[a]);
+        let masses = [first.mass, second.mass];
+        let law = pair.map_or(PairLaw::Sticky, |pair| pair.law);
+        let plan = self.plan;
+        let cell = plan.cell(plan.blocks[node / block_nodes(D)].level);
+        if law == PairLaw::Sticky {
+            let anywhere = Meeting { normal: [0.0; D], gap: 0.0, area: 0.0 };
+            return Some(law.impulse(&relative, masses, &anywhere, cell, self.dt));
+        }
+        let between = self.between?;
+        let sums = bodies.map(|body| {
+            let row = between.geometry[body.field].fields.rows[node].0;
+            (std::array::from_fn(|a| row[a]), row[3])
+        });
+        let on = plan.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
+        let on_faces = on.map_or(0, |place| plan.face_nodes[place].1);
+        let meeting = Meeting::new(sums, between.volumes[node], cell, on_faces)?;
+        Some(law.impulse(&relative, masses, &meeting, cell, self.dt))
+    }
+}
