@@ -4,6 +4,7 @@ pub mod bodies;
 pub mod collider;
 pub mod contact;
 pub mod motion;
+pub mod rigid;
 pub mod touching;
 
 pub use absorbing::Absorbing;

@@ -173,6 +173,21 @@ impl Mesh {
         self.0.volume
     }
 
+    /// Corners of its triangles, m, those of holes that are closed included.
+    pub fn triangles(&self) -> impl Iterator<Item = [[f64; 3]; 3]> {
+        let surface = &self.0.surface.surface;
+        let place = |index: u32| surface.vertices()[index as usize];
+        surface
+            .indices()
+            .iter()
+            .map(move |corners| corners.map(|index| [place(index).x, place(index).y, place(index).z]))
+    }
+
+    /// Its vertices, m.
+    pub fn vertices(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.0.surface.surface.vertices().iter().map(|x| [x.x, x.y, x.z])
+    }
+
     /// Checksum of its vertices and triangles.
     pub fn checksum(&self) -> u64 {
         self.0.checksum
