@@ -5,6 +5,7 @@
 //! the material is what the material gives to the collider: its force and torque.
 use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, length};
+use super::rigid::turning::{self, UPRIGHT};
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
 
@@ -46,6 +47,8 @@ pub struct ColliderState<const D: usize> {
     pub pose: Pose<D>,
     /// Velocities; of a prescribed motion the mean ones of the step done last.
     pub rate: Rate<D>,
+    /// Angular momentum about the centre of mass of a body that turns about any axis, kg m²/s.
+    pub momentum: [f64; 3],
 }
 
 impl<const D: usize> Collider<D> {
@@ -56,7 +59,11 @@ impl<const D: usize> Collider<D> {
             Motion::Table(_) => Rate::REST,
             motion => motion.mean_rate(own, 0.0),
         };
-        self.state(self.motion.place(own), rate)
+        let state = self.state(self.motion.place(own), rate);
+        match self.free().and_then(|free| free.turning) {
+            Some(inertia) => ColliderState { momentum: inertia.momentum(&rate.turning, &UPRIGHT), ..state },
+            None => state,
+        }
     }
 
     /// Whether it acts on the material, and moves.
@@ -66,7 +73,7 @@ impl<const D: usize> Collider<D> {
 
     /// A state from its numbers: way of the reference point (m) with the angle (rad), and velocities.
     pub fn state(&self, place: ([f64; D], f64), rate: Rate<D>) -> ColliderState<D> {
-        ColliderState { pose: Pose::new(place.0, place.1, self.axis), rate }
+        ColliderState { pose: Pose::new(place.0, place.1, self.axis), rate, momentum: [0.0; 3] }
     }
 
     /// The free body, if it is one.
@@ -128,11 +135,16 @@ impl<const D: usize> Collider<D> {
 
     /// Velocity of the collider at a point `x` of it: `V + ω × (x - c)`, m/s.
     pub fn velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
-        if rate.spin == 0.0 {
+        let turns = rate.turning != [0.0; 3];
+        if rate.spin == 0.0 && !turns {
             return rate.velocity;
         }
         let centre = self.centre(pose);
         let arm: [f64; 3] = std::array::from_fn(|a| if a < D { x[a] - centre[a] } else { 0.0 });
+        if turns {
+            let cross = cross(rate.turning, arm);
+            return std::array::from_fn(|a| rate.velocity[a] + cross[a]);
+        }
         let cross = cross(self.axis, arm);
         std::array::from_fn(|a| rate.spin.mul_add(cross[a], rate.velocity[a]))
     }
@@ -148,6 +160,9 @@ impl<const D: usize> Collider<D> {
                     (0.5 * dt).mul_add(fall, state.rate.velocity[a])
                 }),
                 spin: state.rate.spin,
+                turning: free
+                    .turning
+                    .map_or([0.0; 3], |own| own.mean_spin(&state.momentum, &state.pose.orientation, dt)),
             },
             motion => motion.mean_rate(time - self.start, dt),
         }
@@ -183,6 +198,13 @@ impl<const D: usize> Collider<D> {
             rate.velocity[a] = dt.mul_add(gravity[a], rate.velocity[a]) + impulse[a] / free.mass;
             translation[a] = dt.mul_add(mean.velocity[a], translation[a]);
         }
+        if let Some(inertia) = &free.turning {
+            let turn = mean.turning.map(|w| dt * w);
+            let orientation = turning::advanced(&state.pose.orientation, &turn);
+            let momentum = std::array::from_fn(|a| state.momentum[a] + torque[a]);
+            rate.turning = inertia.spin(&momentum, &orientation);
+            return ColliderState { pose: Pose::oriented(translation, orientation), rate, momentum };
+        }
         let mut angle = state.pose.angle;
         if let Some(inertia) = free.inertia {
             let about = (0..3).fold(0.0, |sum, a| self.axis[a].mul_add(torque[a], sum));
@@ -197,7 +219,7 @@ impl<const D: usize> Collider<D> {
     pub fn greatest_speed(&self, state: &ColliderState<D>, extent: &[f64; D], time: f64) -> f64 {
         let (speed, spin) = match &self.motion {
             _ if !self.is_present() => (0.0, 0.0),
-            Motion::Free(_) => (length(&state.rate.velocity), state.rate.spin.abs()),
+            Motion::Free(_) => state.rate.speeds(),
             motion => motion.greatest_speeds(time - self.start),
         };
         if spin == 0.0 {
@@ -224,7 +246,10 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
             write!(f, "at particles, ")?;
         }
         let both = |speed: f64, spin: f64| format!("{}, {}", quantity(speed, "m/s"), quantity(spin, "rad/s"));
-        let speeds = |rate: &Rate<D>| both(length(&rate.velocity), rate.spin);
+        let speeds = |rate: &Rate<D>| {
+            let spin = if rate.spin == 0.0 { length(&rate.turning) } else { rate.spin };
+            both(length(&rate.velocity), spin)
+        };
         match &self.motion {
             Motion::Fixed => write!(f, "fixed"),
             Motion::Steady(rate) => write!(f, "steady with {}", speeds(rate)),
@@ -233,7 +258,8 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
                 write!(f, "by a table of {} rows, at most {}", knots.len(), both(speed, spin))
             }
             Motion::Free(free) => {
-                write!(f, "free, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))
+                let turns = if free.turning.is_some() { " about any axis" } else { "" };
+                write!(f, "free{turns}, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))
             }
         }
     }
@@ -267,7 +293,7 @@ mod tests {
     #[test]
     fn poses_move_distances_normals_and_velocities() {
         let spin = std::f64::consts::FRAC_PI_2;
-        let collider = disc(Motion::Steady(Rate { velocity: [0.0, 1.0], spin }));
+        let collider = disc(Motion::Steady(Rate::about_axis([0.0, 1.0], spin)));
         // Shifted by 1 m upwards and turned by 90 degrees: from x = 0.5 to 1, y = 1 to 2.
         let state = collider.state_at(1.0);
         let close = |a: [f64; 2], b: [f64; 2]| assert!(length(&[a[0] - b[0], a[1] - b[1]]) < 1e-15, "{a:?}");
@@ -284,7 +310,8 @@ mod tests {
             mass: 2.0,
             along: [true, true],
             inertia: Some(0.5),
-            start: Rate { velocity: [1.0, 3.0], spin: 0.0 },
+            turning: None,
+            start: Rate::about_axis([1.0, 3.0], 0.0),
         };
         let (collider, gravity) = (disc(Motion::Free(free)), [0.0, -10.0]);
         let (mut state, mut time) = (collider.state_at(0.0), 0.0);

@@ -1,4 +1,5 @@
 //! How colliders move: at rest, steadily, by a table, or freely under gravity and the forces on them.
+use super::rigid::turning::{Inertia, Quaternion, UPRIGHT, matrix};
 use crate::geometry::rotation;
 
 /// Where a collider is: shifted from its place in the job and turned about its reference point.
@@ -8,14 +9,21 @@ pub struct Pose<const D: usize> {
     pub translation: [f64; D],
     /// Angle about the collider's axis, rad.
     pub angle: f64,
-    /// The rotation by that angle, row by row: turned = R own.
+    /// Orientation of a body that turns about any axis.
+    pub orientation: Quaternion,
+    /// The rotation by angle or orientation, row by row: turned = R own.
     pub rotation: [[f64; D]; D],
 }
 
 impl<const D: usize> Pose<D> {
     /// The pose after a translation (m) and a rotation by an angle (rad) about a unit axis.
     pub fn new(translation: [f64; D], angle: f64, axis: [f64; 3]) -> Self {
-        Self { translation, angle, rotation: rotation(axis, angle) }
+        Self { translation, angle, orientation: UPRIGHT, rotation: rotation(axis, angle) }
+    }
+
+    /// The pose after a translation (m) of a body in this orientation.
+    pub fn oriented(translation: [f64; D], orientation: Quaternion) -> Self {
+        Self { translation, angle: 0.0, orientation, rotation: matrix(&orientation) }
     }
 }
 
@@ -26,11 +34,23 @@ pub struct Rate<const D: usize> {
     pub velocity: [f64; D],
     /// Angular velocity about the collider's axis, rad/s.
     pub spin: f64,
+    /// Angular velocity of a body that turns about any axis, rad/s.
+    pub turning: [f64; 3],
 }
 
 impl<const D: usize> Rate<D> {
     /// No motion.
-    pub const REST: Self = Self { velocity: [0.0; D], spin: 0.0 };
+    pub const REST: Self = Self { velocity: [0.0; D], spin: 0.0, turning: [0.0; 3] };
+
+    /// Velocity (m/s) and angular velocity about a fixed axis (rad/s).
+    pub fn about_axis(velocity: [f64; D], spin: f64) -> Self {
+        Self { velocity, spin, turning: [0.0; 3] }
+    }
+
+    /// The speed of the reference point (m/s) and the angular speed (rad/s).
+    pub fn speeds(&self) -> (f64, f64) {
+        (length(&self.velocity), self.spin.abs().max(length(&self.turning)))
+    }
 }
 
 /// One row of a table of motion.
@@ -53,6 +73,8 @@ pub struct Free<const D: usize> {
     pub along: [bool; D],
     /// Moment of inertia about the collider's axis through the reference point, kg m²; `None`: it does not turn.
     pub inertia: Option<f64>,
+    /// Inertia about the centre of mass, which is the reference point, of a body that turns about any axis.
+    pub turning: Option<Inertia>,
     /// Velocity and angular velocity at the start.
     pub start: Rate<D>,
 }
@@ -122,15 +144,14 @@ impl<const D: usize> Motion<D> {
     /// The greatest speed of the reference point (m/s) and the greatest angular speed (rad/s) from `time` on; of a
     /// free body those at the start.
     pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
-        let speeds = |rate: &Rate<D>| (length(&rate.velocity), rate.spin.abs());
         match self {
             Self::Fixed => (0.0, 0.0),
-            Self::Steady(rate) => speeds(rate),
-            Self::Free(free) => speeds(&free.start),
+            Self::Steady(rate) => rate.speeds(),
+            Self::Free(free) => free.start.speeds(),
             Self::Table(knots) => {
                 let ahead = knots.windows(2).filter(|pair| pair[1].time > time);
                 ahead
-                    .map(|pair| speeds(&slope(pair)))
+                    .map(|pair| slope(pair).speeds())
                     .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
             }
         }
@@ -140,14 +161,12 @@ impl<const D: usize> Motion<D> {
 /// Velocities between two rows.
 fn slope<const D: usize>(pair: &[Knot<D>]) -> Rate<D> {
     let span = pair[1].time - pair[0].time;
-    Rate {
-        velocity: std::array::from_fn(|k| (pair[1].translation[k] - pair[0].translation[k]) / span),
-        spin: (pair[1].angle - pair[0].angle) / span,
-    }
+    let velocity = std::array::from_fn(|k| (pair[1].translation[k] - pair[0].translation[k]) / span);
+    Rate::about_axis(velocity, (pair[1].angle - pair[0].angle) / span)
 }
 
 /// Euclidean length.
-pub(super) fn length(vector: &[f64]) -> f64 {
+pub(crate) fn length(vector: &[f64]) -> f64 {
     vector.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt()
 }
 
@@ -168,7 +187,7 @@ mod tests {
         assert_eq!(motion.place(3.0), ([3.0, 0.0], 1.0));
         assert_eq!(motion.place(9.0), ([2.0, 0.0], 1.0));
         assert_eq!(motion.mean_rate(0.0, 0.5), Rate::REST);
-        assert_eq!(motion.mean_rate(1.0, 0.5), Rate { velocity: [4.0, 0.0], spin: 1.0 });
+        assert_eq!(motion.mean_rate(1.0, 0.5), Rate::about_axis([4.0, 0.0], 1.0));
         assert_eq!(motion.greatest_speeds(0.0), (4.0, 1.0));
         assert_eq!(motion.greatest_speeds(2.0), (1.0, 0.0));
     }

@@ -84,9 +84,17 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
         turning_axes::<D>().for_each(|k| add("torque", if D == 2 { "" } else { AXES[k] }, "N m"));
         if collider.motion != Motion::Fixed {
             AXES[..D].iter().for_each(|axis| add("position", axis, "m"));
-            add("angle", "", "rad");
+            if collider.turns_freely() {
+                ["_w", "_x", "_y", "_z"].iter().for_each(|axis| add("orientation", axis, ""));
+            } else {
+                add("angle", "", "rad");
+            }
             AXES[..D].iter().for_each(|axis| add("velocity", axis, "m/s"));
-            add("spin", "", "rad/s");
+            if collider.turns_freely() {
+                AXES.iter().for_each(|axis| add("spin", axis, "rad/s"));
+            } else {
+                add("spin", "", "rad/s");
+            }
         }
     }
     columns
@@ -183,9 +191,14 @@ pub fn collider_values<const D: usize>(
     if collider.motion != Motion::Fixed {
         let centre = collider.centre(&state.pose);
         values.extend((0..D).map(|a| origin[a] + centre[a]));
-        values.push(state.pose.angle);
-        values.extend(state.rate.velocity);
-        values.push(state.rate.spin);
+        let (pose, rate) = (&state.pose, &state.rate);
+        if collider.turns_freely() {
+            values.extend(pose.orientation.into_iter().chain(rate.velocity).chain(rate.turning));
+        } else {
+            values.push(pose.angle);
+            values.extend(rate.velocity);
+            values.push(rate.spin);
+        }
     }
     values
 }

@@ -8,7 +8,6 @@ use partition::comm::Comm;
 
 use super::{RunError, measures};
 use crate::adaptivity::resample::ids;
-use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
@@ -100,8 +99,7 @@ pub fn scalars<const D: usize>(
     for (index, state) in solver.contacts.states.iter().enumerate() {
         // Prescribed motions follow from the time.
         if solver.physics.colliders[index].free().is_some() {
-            let values = state.pose.translation.into_iter().chain(state.rate.velocity);
-            let values = values.chain([state.pose.angle, state.rate.spin]);
+            let values = solver.physics.colliders[index].numbers(state).into_iter();
             reals.extend(values.enumerate().map(|(i, value)| (state_name(index, i), value)));
         }
     }
@@ -219,7 +217,7 @@ fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
     Some(())
 }
 
-/// Name of a number of the state of a free collider: translation, velocity, angle, angular velocity.
+/// Name of a number of the state of a free collider (see [`crate::boundary::Collider::numbers`]).
 fn state_name(collider: usize, number: usize) -> String {
     format!("collider_{collider}_state_{number}")
 }
@@ -229,12 +227,7 @@ fn restore_colliders<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) 
     let colliders = solver.physics.colliders.iter();
     for (index, collider) in colliders.enumerate().filter(|(_, collider)| collider.free().is_some()) {
         let number = |i: usize| scalars.real(&state_name(index, i));
-        let (mut translation, mut velocity) = ([0.0; D], [0.0; D]);
-        for a in 0..D {
-            (translation[a], velocity[a]) = (number(a)?, number(D + a)?);
-        }
-        let rate = Rate { velocity, spin: number(2 * D + 1)? };
-        solver.contacts.states[index] = collider.state((translation, number(2 * D)?), rate);
+        solver.contacts.states[index] = collider.from_numbers(number)?;
     }
     Some(())
 }

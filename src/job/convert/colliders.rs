@@ -1,6 +1,7 @@
 //! Colliders of the job file to those of the solver.
 use super::checks::{Checks, Space};
-use crate::boundary::motion::{Free, Knot, Motion, Rate};
+use super::free_bodies::free_body;
+use crate::boundary::motion::{Knot, Motion, Rate};
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::Aabb;
 use crate::geometry::written::Vector;
@@ -14,7 +15,8 @@ use crate::text::written;
 
 /// Most colliders of a job: what a checkpoint's header has room for.
 const MAX_COLLIDERS: usize = 16;
-const Z: [f64; 3] = [0.0, 0.0, 1.0];
+/// The axis of what turns in a plane.
+pub(super) const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// All colliders, or faults.
 pub(in crate::job) fn colliders<const D: usize>(
@@ -42,7 +44,9 @@ fn collider<const D: usize>(
     space: &Space<D>,
     path: &Path,
 ) -> Option<Collider<D>> {
-    let motion = motion::<D>(checks, written.motion.as_ref(), &path.key("motion"));
+    let is_free = matches!(written.motion, Some(Written::Free { .. }));
+    let here = path.key("motion");
+    let motion = if is_free { None } else { motion::<D>(checks, written.motion.as_ref(), &here) };
     let here = path.key("shape");
     let acts_on = match written.acts_on {
         None | Some(WrittenActsOn::Nodes) => ActsOn::Nodes,
@@ -62,11 +66,20 @@ fn collider<const D: usize>(
         checks.fault(&here, "found a shape without a point; expected one with a volume".into());
         return None;
     }
-    let reference = match &written.reference {
-        Some(point) => checks.point(point, space, &path.key("reference"))?,
-        None => centre(&bounds, space),
+    let mut reference = match &written.reference {
+        Some(point) => Some(checks.point(point, space, &path.key("reference"))?),
+        None => None,
     };
-    let (motion, axis) = motion?;
+    let (motion, axis) = match &written.motion {
+        Some(motion) if is_free => {
+            let paths = [&path.key("motion"), path];
+            let (free, axis, centre) = free_body(checks, motion, &shape, reference.as_ref(), paths)?;
+            reference = reference.or(centre);
+            (Motion::Free(free), axis)
+        }
+        _ => motion?,
+    };
+    let reference = reference.unwrap_or_else(|| centre(&bounds, space));
     let contact = match written.contact {
         None => Contact::default(),
         Some(WrittenContact::Sticky {}) => Contact::Sticky,
@@ -123,39 +136,28 @@ fn motion<const D: usize>(
                 }
             };
             if D == 2 {
-                return Some((Motion::Steady(Rate { velocity, spin: spin[2] }), Z));
+                return Some((Motion::Steady(Rate::about_axis(velocity, spin[2])), Z));
             }
             let speed = spin.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt();
             let axis = if speed > 0.0 { spin.map(|c| c / speed) } else { Z };
-            Some((Motion::Steady(Rate { velocity, spin: speed }), axis))
+            Some((Motion::Steady(Rate::about_axis(velocity, speed)), axis))
         }
         Some(Written::Table { axis, rows }) => {
             let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"));
             let rows = table(checks, rows, &path.key("rows"));
             Some((Motion::Table(rows?), axis?))
         }
-        Some(Written::Free { mass, velocity, along, inertia, axis, angular_velocity }) => {
-            let velocity = optional(checks, velocity.as_ref(), &path.key("velocity"));
-            if inertia.is_none() && *angular_velocity != 0.0 {
-                let message = "found an angular velocity; expected it only with inertia";
-                checks.fault(&path.key("angular_velocity"), message.into());
-            }
-            let along = allowed::<D>(checks, along.as_deref(), &path.key("along"))?;
-            let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"))?;
-            let velocity: [f64; D] = velocity?;
-            for a in (0..D).filter(|&a| !along[a] && velocity[a] != 0.0) {
-                let message =
-                    format!("found {}; expected 0 along an axis that is not in along", written(velocity[a]));
-                checks.fault(&path.key("velocity").index(a), message);
-            }
-            let start = Rate { velocity, spin: *angular_velocity };
-            Some((Motion::Free(Free { mass: *mass, along, inertia: *inertia, start }), axis))
-        }
+        // With the shape: see `free_body`.
+        Some(Written::Free { .. }) => None,
     }
 }
 
 /// A vector, or 0 where none is given.
-fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
+pub(super) fn optional<const D: usize>(
+    checks: &mut Checks,
+    vector: Option<&Vector>,
+    path: &Path,
+) -> Option<[f64; D]> {
     vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
 }
 
@@ -186,7 +188,7 @@ fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Opti
 }
 
 /// Which axes a list names.
-fn allowed<const D: usize>(
+pub(super) fn allowed<const D: usize>(
     checks: &mut Checks,
     along: Option<&[AxisName]>,
     path: &Path,

@@ -10,6 +10,7 @@
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `contact` | contact between bodies |
+//! | `free_bodies` | mass, inertia and start of free rigid bodies |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `stages` | stages of the run |
@@ -41,6 +42,7 @@ mod adaptivity;
 mod checks;
 mod colliders;
 mod contact;
+mod free_bodies;
 mod loads;
 mod overlap;
 mod particles;

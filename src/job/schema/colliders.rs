@@ -28,7 +28,7 @@ pub struct Collider {
     #[schemars(length(min = 1, max = 20))]
     pub stages: Option<Vec<String>>,
     /// Point about which it turns and to which its torque refers, m; by default the centre of its bounding box, cut by
-    /// the domain where it is unbounded.
+    /// the domain where it is unbounded, and of free bodies whose inertia follows from the shape the centre of mass.
     #[serde(default)]
     pub reference: Option<Vector>,
 }
@@ -92,9 +92,14 @@ pub enum Motion {
     /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
     /// touches within a cell of its surface. It does not feel the faces of the domain nor other colliders.
     Free {
-        /// Mass, kg; in 2D of one metre of thickness.
+        /// Mass, kg; in 2D of one metre of thickness. Either this or `density`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 1e24), extend("exclusiveMinimum" = 0.0))]
-        mass: f64,
+        mass: Option<f64>,
+        /// Density, kg/m³, from which mass and inertia follow with the shape.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+        density: Option<f64>,
         /// Velocity at the start, m/s; 0 by default.
         #[serde(default)]
         #[schemars(transform = velocity)]
@@ -102,20 +107,34 @@ pub enum Motion {
         /// Axes along which it may move; all by default.
         #[serde(default)]
         along: Option<Vec<AxisName>>,
-        /// Moment of inertia about the axis through the reference point, kg m²; in 2D of one metre of thickness. It
-        /// does not turn by default.
-        #[serde(default)]
-        #[schemars(range(max = 1e30), extend("exclusiveMinimum" = 0.0))]
-        inertia: Option<f64>,
-        /// Axis about which it turns, fixed, any length; 3D only, z by default.
+        /// Whether it turns; by default in 3D, and in 2D where `density` or `inertia` is given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        turns: Option<bool>,
+        /// A number: moment of inertia about a fixed axis through the reference point, kg m²; in 2D of one metre of thickness. Three
+        /// numbers, in 3D: principal moments about the centre of mass, with x, y and z as principal axes at the start, for a body that turns about any
+        /// axis. By default that of the shape, filled evenly.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inertia: Option<Inertia>,
+        /// Fixed axis about which it turns, any length; 3D only. Without it a body turns about any axis, or about z where `inertia` is a
+        /// number.
         #[serde(default)]
         #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
-        /// Angular velocity about the axis at the start, rad/s; 0 by default.
-        #[serde(default)]
-        #[schemars(range(min = -1e8, max = 1e8))]
-        angular_velocity: f64,
+        /// Angular velocity at the start, rad/s: a number about z or the fixed axis, or three components of a body that turns about any axis; 0 by
+        /// default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        angular_velocity: Option<Spin>,
     },
+}
+
+/// Inertia of a free body: a number, about a fixed axis, or three principal moments, kg m².
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Inertia {
+    /// About a fixed axis, kg m².
+    Axis(#[schemars(range(max = 1e30), extend("exclusiveMinimum" = 0.0))] f64),
+    /// Principal moments, kg m².
+    Principal(#[schemars(inner(range(min = 1e-30, max = 1e30)))] [f64; 3]),
 }
 
 /// A row of a table of motion.
