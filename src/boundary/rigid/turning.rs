@@ -55,27 +55,27 @@ impl Inertia {
     }
 
     /// A vector of space along the principal axes of a body in this orientation.
-    fn to_axes(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
+    fn along_axes(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
         let own = turned(&conjugate(orientation), v);
         std::array::from_fn(|k| (0..3).fold(0.0, |sum, i| self.axes[i][k].mul_add(own[i], sum)))
     }
 
     /// A vector along the principal axes as one of space.
-    fn to_space(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
+    fn in_space(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
         let own = std::array::from_fn(|i| (0..3).fold(0.0, |sum, k| self.axes[i][k].mul_add(v[k], sum)));
         turned(orientation, &own)
     }
 
     /// Angular velocity (rad/s) with an angular momentum (kg m²/s), both in space.
     pub fn spin(&self, momentum: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
-        let m = self.to_axes(momentum, orientation);
-        self.to_space(&std::array::from_fn(|k| m[k] / self.moments[k]), orientation)
+        let m = self.along_axes(momentum, orientation);
+        self.in_space(&std::array::from_fn(|k| m[k] / self.moments[k]), orientation)
     }
 
     /// Angular momentum (kg m²/s) with an angular velocity (rad/s), both in space.
     pub fn momentum(&self, spin: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
-        let w = self.to_axes(spin, orientation);
-        self.to_space(&std::array::from_fn(|k| w[k] * self.moments[k]), orientation)
+        let w = self.along_axes(spin, orientation);
+        self.in_space(&std::array::from_fn(|k| w[k] * self.moments[k]), orientation)
     }
 
     /// Mean angular velocity (rad/s) over a step of length `dt` (s) in which the angular momentum (kg m²/s) stays: the rotation over the
@@ -84,7 +84,7 @@ impl Inertia {
     /// Euler's equations are split into turning about one principal axis after the other, each exact, so that the angular momentum in space
     /// never changes (McLachlan 1993; Reich 1994); Suzuki's composition (1990) makes of it a symmetric method of fourth order.
     pub fn mean_spin(&self, momentum: &[f64; 3], orientation: &Quaternion, dt: f64) -> [f64; 3] {
-        let mut m = self.to_axes(momentum, orientation);
+        let mut m = self.along_axes(momentum, orientation);
         let spin = length(&std::array::from_fn::<f64, 3, _>(|k| m[k] / self.moments[k]));
         if spin == 0.0 || dt == 0.0 {
             return self.spin(momentum, orientation);
@@ -106,7 +106,7 @@ impl Inertia {
                 }
             }
         }
-        self.to_space(&rotation_vector(&turn).map(|c| c / dt), orientation)
+        self.in_space(&rotation_vector(&turn).map(|c| c / dt), orientation)
     }
 }
 
