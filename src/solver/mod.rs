@@ -38,6 +38,7 @@ use crate::particle::Chunk;
 use crate::solver::state::bookings::{Contacts, ExactSums};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::inside::KnownInside;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::{Phase, Phases, thread_time};
@@ -156,10 +157,12 @@ impl<const D: usize> Solver<D> {
         self.sent_before = self.traffic();
         // Fresh memory costs as much as the first scatter into it.
         let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.arenas), self.grid.sum_bytes);
+        let inside = KnownInside::of(&self.grid.plan, std::mem::take(&mut self.grid.inside_still));
         // The new one shall not stand beside all of the old one.
         self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
         (self.grid.arenas, self.grid.sum_bytes) = (arenas, sum_bytes);
+        self.grid.inside_still = inside.for_plan(&self.grid.plan);
     }
 
     /// The one reduction of a step: the bound on the next, and whether a rank failed or was asked to stop.

@@ -61,6 +61,8 @@ impl<const D: usize> Solver<D> {
         }
         self.crossings.fluxes.add_beyond(&self.chunks, -1.0);
         self.leaf_data.reset(self.chunks.len());
+        // Colliders may have come or gone.
+        self.grid.inside_still.clear();
         let reach = self.agreed_reach();
         self.rebuild_grid(reach);
         self.start_from(&had);

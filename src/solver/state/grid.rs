@@ -16,6 +16,7 @@ use crate::solver::migration::migrate::Migration;
 use crate::solver::physics::Physics;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::bins::{BinLists, BinMissing, BoxWidths};
+use crate::solver::state::inside::InsideStill;
 use crate::solver::state::phases::{Phase, Phases};
 
 /// Plan, arenas, fields and exchanges.
@@ -36,6 +37,8 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) contact: Option<Box<VelocityField<D>>>,
     /// For contact between bodies; made when it is first needed.
     pub(in crate::solver) between: Option<Box<BetweenBodies<D>>>,
+    /// Nodes inside colliders that never move, as far as they have been asked for.
+    pub(in crate::solver) inside_still: InsideStill<D>,
     /// Bytes of the last exchange of sums.
     pub(in crate::solver) sum_bytes: u64,
 }
@@ -72,6 +75,7 @@ impl<const D: usize> Grid<D> {
             seam: exchange.seam(&plan),
             contact: None,
             between: None,
+            inside_still: Vec::new(),
             sum_bytes: 0,
             exchange,
             received,
@@ -88,6 +92,7 @@ impl<const D: usize> Grid<D> {
         self.others.clear();
         self.contact = None;
         self.between = None;
+        self.inside_still = Vec::new();
     }
 
     /// Exchanges the velocity field that particles scatter into and gather from with another.

@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
+//! | `inside` | nodes inside colliders |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
 //! | [`leaf_data`] | what is noted of each leaf |
 //! | `regrid_cache` | what regrids remember |
@@ -33,6 +34,7 @@ use crate::solver::state::relaxation::Relaxation;
 pub mod bookings;
 pub mod cost;
 pub mod grid;
+pub(super) mod inside;
 pub(super) mod last_partition;
 pub mod leaf_data;
 pub mod phases;

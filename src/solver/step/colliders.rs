@@ -6,12 +6,13 @@ use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;
-use crate::grid::mask::block_nodes;
-use crate::grid::plan::Block;
+use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{ExactSums, Reaction, SUMS};
+use crate::solver::state::grid::Grid;
+use crate::solver::state::inside::{Inside, InsideStill, is_still};
 use crate::solver::state::phases::Phase;
 
 /// What one node or particle gives to a collider.
@@ -43,39 +44,49 @@ impl<const D: usize> Touch<D> {
 }
 
 /// Applies the colliders' conditions, in their order, to the real nodes inside them. Returns what the nodes that this
-/// rank counts give to the colliders, in the order of the nodes.
+/// rank counts give to the colliders, in the order of the nodes. `still` has what is known of colliders that never move.
 fn apply_colliders<const D: usize>(
     fields: &mut NodeFields<D>,
+    still: &mut InsideStill<D>,
     plan: &GridPlan<D>,
     colliders: &[Collider<D>],
     states: &[ColliderState<D>],
     rates: &[Rate<D>],
 ) -> Vec<Touch<D>> {
-    let nodes = block_nodes(D);
-    let blocks = fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).zip(&fields.active);
-    let touched = blocks.with_min_len(32).filter(|(_, active)| **active).map(|((rows, block), _)| {
+    still.resize_with(plan.blocks.len(), Vec::new);
+    let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active).zip(still);
+    let active = blocks.with_min_len(32).filter(|((_, active), _)| **active);
+    let touched = active.map(|(((rows, block), _), still)| {
         let mut touches = Vec::new();
-        let cell = plan.cell(block.level);
-        let nodes_box = nodes_box(block, cell);
+        still.resize_with(colliders.len(), || None);
         for (index, ((collider, state), rate)) in colliders.iter().zip(states).zip(rates).enumerate() {
-            if !collider.acts_on_nodes() || collider.distance_to_box(&nodes_box, &state.pose) > 0.0 {
+            if !collider.acts_on_nodes() {
                 continue;
             }
             let real = block.real_nodes();
-            for (bit, row) in rows.iter_mut().enumerate() {
+            let find = |nodes| Inside::find(plan, block, nodes, collider, &state.pose);
+            let moving;
+            let inside = match is_still(collider) {
+                true => &*still[index].get_or_insert_with(|| find(real)),
+                false => {
+                    moving = find(
+                        bits(real).filter(|&bit| rows[bit as usize].0[3] > 0.0).map(|bit| 1 << bit).sum(),
+                    );
+                    &moving
+                }
+            };
+            for (bit, normal) in bits(inside.nodes).zip(&inside.normals) {
+                let row = &mut rows[bit as usize];
                 let mass = row.0[3];
-                if real >> bit & 1 == 0 || mass <= 0.0 {
+                if mass <= 0.0 {
                     continue;
                 }
-                let x = plan.node_place(block, bit);
-                if collider.distance(&x, &state.pose) > 0.0 {
-                    continue;
-                }
+                let x = plan.node_place(block, bit as usize);
                 let surface = collider.velocity_at(&x, &state.pose, rate);
                 let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
                 let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
                 let free = relative;
-                collider.contact.apply(&mut relative, &collider.normal(&x, &state.pose));
+                collider.contact.apply(&mut relative, normal);
                 if relative == free {
                     continue;
                 }
@@ -91,15 +102,6 @@ fn apply_colliders<const D: usize>(
         touches
     });
     touched.collect::<Vec<_>>().into_iter().flatten().collect()
-}
-
-/// The box that a block's nodes span.
-fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
-    let edge = BLOCK as u32;
-    Aabb::new(
-        block.coord.map(|c| f64::from(edge * c) * cell),
-        block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
-    )
 }
 
 impl<const D: usize> Solver<D> {
@@ -124,7 +126,8 @@ impl<const D: usize> Solver<D> {
         }
         let (grid, states) = (&mut self.grid, &self.contacts.states);
         self.phases.time(Phase::Nodes, || {
-            for touch in apply_colliders(&mut grid.fields, &grid.plan, colliders, states, rates) {
+            let Grid { fields, inside_still, plan, .. } = grid;
+            for touch in apply_colliders(fields, inside_still, plan, colliders, states, rates) {
                 touch.book(colliders, states, sums);
             }
         });
