@@ -11,7 +11,7 @@
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders |
-//! | [`contact`] | contact of particles with colliders |
+//! | `contact` | contact of particles with colliders |
 //! | [`between`] | contact between bodies |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
