@@ -1,8 +1,8 @@
 //! Shares of volume and their gradients at the nodes where bodies meet.
 use rayon::prelude::*;
 
-use crate::grid::mask::{bits, block_nodes};
-use crate::grid::plan::GridPlan;
+use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
+use crate::grid::plan::{GridPlan, NO_BLOCK};
 use crate::grid::{NodeFields, Window};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row};
 use crate::particle::Chunk;
@@ -15,30 +15,33 @@ use crate::solver::state::grid::{BetweenBodies, Grid, VelocityField};
 use crate::solver::step::p2g::scatter;
 
 impl<const D: usize> Grid<D> {
-    /// Per block, whether two velocity fields have mass at one of its real nodes.
-    pub(super) fn blocks_where_fields_meet(&self) -> Vec<bool> {
+    /// Per block, its real nodes at which two velocity fields have mass.
+    pub(super) fn nodes_where_fields_meet(&self) -> Vec<u64> {
         let nodes = block_nodes(D);
         let all: Vec<&NodeFields<D>> = self.all_fields().collect();
         let blocks = self.plan.blocks.par_iter().enumerate().with_min_len(64);
         let meets = blocks.map(|(index, block)| {
             let active = || all.iter().filter(|fields| fields.active[index]);
             if active().count() < 2 {
-                return false;
+                return 0;
             }
             let has_mass =
                 |fields: &NodeFields<D>, bit: u32| fields.rows[index * nodes + bit as usize].0[3] > 0.0;
-            bits(block.real_nodes()).any(|bit| active().filter(|fields| has_mass(fields, bit)).count() > 1)
+            let meet = |bit: &u32| active().filter(|fields| has_mass(fields, *bit)).count() > 1;
+            bits(block.real_nodes()).filter(meet).fold(0, |nodes, bit| nodes | 1 << bit)
         });
         meets.collect()
     }
 }
 
-/// The blocks whose nodes hand sums to any of those marked, these among them.
-fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[bool]) -> Vec<bool> {
+/// These nodes, and the constrained nodes of blocks that may hand sums to any of them.
+fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[u64]) -> Vec<u64> {
     let mut all = meets.to_vec();
     for fine in plan.links.iter().flat_map(|links| &links.fine) {
         let parents = fine.parents.iter().filter_map(|&parent| all.get(parent as usize));
-        all[fine.block as usize] |= parents.into_iter().any(|&marked| marked);
+        if parents.into_iter().any(|&nodes| nodes != 0) {
+            all[fine.block as usize] |= plan.blocks[fine.block as usize].constrained;
+        }
     }
     all
 }
@@ -61,8 +64,8 @@ fn solids<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>) -> Chunk<D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at the real nodes of the blocks where fields meet.
-    pub(super) fn find_geometry(&mut self, meets: &[bool]) -> Result<(), BinMissing> {
+    /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at the real nodes where fields meet.
+    pub(super) fn find_geometry(&mut self, meets: &[u64]) -> Result<(), BinMissing> {
         let mut between = match self.grid.between.take() {
             Some(between) => between,
             None => Box::new(self.begin_between()),
@@ -89,11 +92,15 @@ impl<const D: usize> Solver<D> {
         sorted
     }
 
-    /// Per own leaf, whether particles of the first velocity field scatter into any of these blocks.
-    fn near_others(&self, blocks: &[bool]) -> Vec<bool> {
+    /// Per own leaf, whether particles of the first velocity field may scatter into any of these nodes, which are given block by block.
+    fn near_others(&self, nodes: &[u64]) -> Vec<bool> {
+        let overlaps: Vec<u64> =
+            (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
         let mut near = vec![false; self.chunks.len()];
         for bin in self.grid.arenas.bins().map(|bin| &self.grid.plan.bins[bin]) {
-            near[bin.leaf as usize] |= bin.reached().any(|block| blocks[block]);
+            let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
+            near[bin.leaf as usize] |=
+                around.into_iter().any(|(block, overlap)| nodes[*block as usize] & overlap != 0);
         }
         near
     }

@@ -28,8 +28,8 @@ impl<const D: usize> Solver<D> {
         if self.grid.others.is_empty() || dt <= 0.0 {
             return Ok(());
         }
-        let meets = self.phases.time(Phase::Nodes, || self.grid.blocks_where_fields_meet());
-        let is_any = meets.iter().any(|&meets| meets);
+        let meets = self.phases.time(Phase::Nodes, || self.grid.nodes_where_fields_meet());
+        let is_any = meets.iter().any(|&nodes| nodes != 0);
         if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
             return Ok(());
         }

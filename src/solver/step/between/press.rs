@@ -38,9 +38,9 @@ struct Body<const D: usize> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Presses the bodies at the real nodes of the blocks where fields meet, and books it from the nodes that this rank
-    /// counts.
-    pub(super) fn press(&mut self, meets: &[bool], dt: f64) {
+    /// Not collective. Presses the bodies at the real nodes where fields meet, given block by block, and books it from the nodes that
+    /// this rank counts.
+    pub(super) fn press(&mut self, meets: &[u64], dt: f64) {
         let grid = &self.grid;
         let press = Press {
             plan: &grid.plan,
@@ -50,8 +50,8 @@ impl<const D: usize> Solver<D> {
             dt,
         };
         let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {
-            let blocks = meets.par_iter().enumerate().filter(|(_, meets)| **meets);
-            blocks.flat_map_iter(|(block, _)| press.block(block)).collect()
+            let blocks = meets.par_iter().enumerate().filter(|(_, nodes)| **nodes != 0);
+            blocks.flat_map_iter(|(block, nodes)| press.block(block, *nodes)).collect()
         });
         let nodes = block_nodes(D);
         for Pressed { node, velocities, booked } in pressed {
@@ -86,11 +86,11 @@ struct Press<'a, const D: usize> {
 }
 
 impl<const D: usize> Press<'_, D> {
-    /// The nodes of a block where bodies meet.
-    fn block(&self, block: usize) -> Vec<Pressed<D>> {
+    /// These nodes of a block, where bodies meet.
+    fn block(&self, block: usize, nodes: u64) -> Vec<Pressed<D>> {
         let first = block * block_nodes(D);
         let mut pressed = Vec::new();
-        for bit in bits(self.plan.blocks[block].real_nodes()) {
+        for bit in bits(nodes) {
             let node = first + bit as usize;
             let fields = self.fields.iter().enumerate().filter(|(_, fields)| fields.active[block]);
             let rows = fields.map(|(field, fields)| (field, fields.rows[node].0));
