@@ -3,11 +3,11 @@
 #[path = "common/runs.rs"]
 mod runs;
 
-use runs::launch;
 use std::path::Path;
 
 use runs::history::History;
 use runs::launch::{Outcome, agimp, job, run, succeed};
+use runs::restart;
 
 /// Runs a 2D job on one rank: an elastic body of 1000 kg/m³ and what `rest` adds.
 fn elastic(young: f64, gravity: f64, body: &str, end: f64, rest: &str) -> History {
@@ -172,13 +172,7 @@ fn restart_gives_the_same(done: &Path, name: &str, whole: &Outcome) {
     let fall = history.last("velocity_cylinder_y");
     assert!(fall > -1.9 && fall < 1.0, "the cylinder is braked by sand: {fall} m/s");
     assert!(history.column("force_paddle_x").iter().any(|force| force.abs() > 1.0));
-    let files = launch::contents(&done.join("out").join(name));
-    let checkpoints: Vec<_> =
-        files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
-    assert!(checkpoints.len() > 3, "{:?}", files.keys());
-    let from = format!("out/{name}/{}", checkpoints[checkpoints.len() / 2]);
-    succeed(&mut run(done, 3, 1, &job(name), &["--quiet", "--restart", &from]));
-    whole.assert_same(&Outcome::read(done, name), &format!("restart from {from}"));
+    restart::assert_middle_gives(whole, done, &job(name), name);
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn history(job: &str) -> History {
 #[test]
 fn nothing_is_felt_before_a_gap_closes() {
     let slot = format!(
-        "{RUBBER}[gravity_]\n[domain]\nsize = [1.6, 1.6]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n{}{}{}\
+        "{RUBBER}[domain]\nsize = [1.6, 1.6]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n{}{}{}\
          [[contact]]\nfriction = 0.5\n\
          [[loads]]\nname = 'hold'\nkind = 'velocity'\nx = 0\ny = 0\nshape = {{ kind = 'box', min = [0, 0], max = [0.6, 1.6] }}\n\
          [[loads]]\nname = 'hold2'\nkind = 'velocity'\nx = 0\ny = 0\nshape = {{ kind = 'box', min = [1.03, 0], max = [1.6, 1.6] }}\n\
@@ -44,7 +44,6 @@ fn nothing_is_felt_before_a_gap_closes() {
         body("right", &cube([1.025, 0.2], [1.4, 1.0]), "[0, 0]"),
         body("block", &cube([0.6125, 0.9], [1.0125, 1.3]), "[0, 0]"),
     )
-    .replace("[gravity_]\n", "")
     .replace("dimension = 2\n", "dimension = 2\ngravity = [0, -10]\n");
     let history = history(&slot);
     for (t, v) in history.column("time").iter().zip(history.column("velocity_block_y")) {
@@ -92,7 +91,7 @@ fn equal_bars_exchange_their_velocities() {
     assert!((velocity + 0.1).abs() < 0.02 * 0.2, "{velocity}");
 }
 
-/// Two disks collide obliquely with friction 0.3, against finite elements (tests/README.md): both momenta stay, and the disks leave with velocity and
+/// Two disks collide obliquely with friction 0.3, against finite elements: both momenta stay, and the disks leave with velocity and
 /// spin of the reference.
 #[test]
 fn oblique_disks_leave_as_finite_elements_say() {

@@ -4,8 +4,8 @@
 mod runs;
 
 use runs::history::History;
-use runs::launch::{self, Outcome, job, run, succeed};
-use std::path::Path;
+use runs::launch::{Outcome, job, run, succeed};
+use runs::restart;
 
 /// The vector with these components in space, along the axes of the body in the job; and back.
 fn turned(q: [f64; 4], v: [f64; 3], back: bool) -> [f64; 3] {
@@ -79,7 +79,7 @@ fn blocks_tumble_with_the_same_bits_in_all_ways_and_across_restart() {
             Some(first) => first.assert_same(&result, &format!("{ranks} ranks x {threads} threads")),
             None => {
                 balances(&History::read(directory.path(), name));
-                restart_gives_the_same(directory.path(), name, &result);
+                restart::assert_middle_gives(&result, directory.path(), &job(name), name);
                 reference = Some(result);
             }
         }
@@ -123,15 +123,4 @@ fn balances(history: &History) {
         speed < 0.1 && spin < 0.5 && turned > 0.2 && (0.05..0.2).contains(&height),
         "{speed} {spin} {turned} {height}"
     );
-}
-
-/// Goes on from a checkpoint between two rows of the history, on other ranks.
-fn restart_gives_the_same(done: &Path, name: &str, whole: &Outcome) {
-    let files = launch::contents(&done.join("out").join(name));
-    let checkpoints: Vec<_> =
-        files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
-    assert!(checkpoints.len() > 3, "{:?}", files.keys());
-    let from = format!("out/{name}/{}", checkpoints[checkpoints.len() / 2]);
-    succeed(&mut run(done, 3, 1, &job(name), &["--quiet", "--restart", &from]));
-    whole.assert_same(&Outcome::read(done, name), &format!("restart from {from}"));
 }

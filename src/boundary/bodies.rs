@@ -16,7 +16,7 @@ use crate::text::{number, quantity};
 pub struct BodyContacts {
     /// Number of the velocity field of each body; empty where all move with one.
     pub field_of_body: Vec<u8>,
-    /// What holds between two fields, the first with the lower number; the others stick.
+    /// What holds between two fields, in the order of their numbers; the others stick.
     pub pairs: Vec<Pair>,
     /// Name of each contact of the job, and whether it is between two sides, so that its force has a direction.
     pub names: Vec<(String, bool)>,
@@ -75,7 +75,8 @@ impl BodyContacts {
 
     /// What holds between two fields, whose numbers ascend.
     pub fn pair(&self, fields: [usize; 2]) -> Option<&Pair> {
-        self.pairs.iter().find(|pair| pair.fields.map(usize::from) == fields)
+        let place = self.pairs.binary_search_by_key(&fields, |pair| pair.fields.map(usize::from));
+        place.ok().map(|place| &self.pairs[place])
     }
 }
 
@@ -157,8 +158,7 @@ impl PairLaw {
             }
         };
         let speed = length(&along);
-        let share = if mass * speed > dragged { dragged / (mass * speed) } else { 1.0 };
-        let share = if dragged > 0.0 { share } else { 0.0 };
+        let share = if dragged > 0.0 { (dragged / (mass * speed)).min(1.0) } else { 0.0 };
         std::array::from_fn(|a| pressed.mul_add(normal[a], mass * share * along[a]))
     }
 }

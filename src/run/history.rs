@@ -8,7 +8,7 @@ use crate::job::Problem;
 use crate::probe;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
-use crate::solver::state::bookings::{BodyTotals, LoadTotals, Reaction};
+use crate::solver::state::bookings::{ForceAndWork, Reaction};
 use crate::solver::state::relaxation::Relaxation;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -127,12 +127,6 @@ pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {
 
 const AXES: [&str; 3] = ["_x", "_y", "_z"];
 
-/// The values of a row that are of a contact between bodies: force on the first of two sides, and work.
-pub fn body_values<const D: usize>(two_sides: bool, totals: &BodyTotals) -> Vec<f64> {
-    let force = totals.force[..D].iter().filter(|_| two_sides);
-    force.copied().chain([totals.work]).collect()
-}
-
 /// Components of a torque: only that about z in 2D.
 fn turning_axes<const D: usize>() -> std::ops::Range<usize> {
     if D == 2 { 2..3 } else { 0..3 }
@@ -173,10 +167,10 @@ pub fn row(
     ]
 }
 
-/// The values of a row that are of one load.
-pub fn load_values<const D: usize>(totals: &LoadTotals) -> impl Iterator<Item = f64> {
-    let LoadTotals { force, work } = *totals;
-    force.into_iter().take(D).chain([work])
+/// The values of a row that are of one load or contact between bodies: the force, if it has one, and the work.
+pub fn force_and_work<const D: usize>(totals: &ForceAndWork, has_force: bool) -> impl Iterator<Item = f64> {
+    let ForceAndWork { force, work } = *totals;
+    force.into_iter().take(if has_force { D } else { 0 }).chain([work])
 }
 
 /// The values of a row that are of one collider. `origin` is the lower corner of the domain, m.

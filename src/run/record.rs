@@ -225,10 +225,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
             if self.problem.stages.len() > 1 {
                 values.push((solver.physics.stage() + 1) as f64);
             }
-            loads.iter().for_each(|load| values.extend(history::load_values::<D>(load)));
-            let contacts = self.problem.body_contacts.names.iter().zip(&bodies);
-            contacts
-                .for_each(|((_, sides), totals)| values.extend(history::body_values::<D>(*sides, totals)));
+            loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
+            for ((_, two_sides), totals) in self.problem.body_contacts.names.iter().zip(&bodies) {
+                values.extend(history::force_and_work::<D>(totals, *two_sides));
+            }
             let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
             let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
             for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {

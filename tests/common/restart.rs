@@ -17,18 +17,28 @@ pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnM
         let reference = reference.get_or_insert(result.clone());
         reference.assert_same(&result, &format!("{ranks} ranks"));
         if ranks == 2 {
-            assert_restart_gives(reference, directory.path(), &path, name);
+            let from = &checkpoints(directory.path(), name)[1];
+            assert_restart_gives(reference, directory.path(), &path, name, from);
         }
     }
 }
 
-/// Goes on from the second of the checkpoints in a directory, on three ranks: what is left is that of the run before.
-fn assert_restart_gives(reference: &Outcome, directory: &Path, job: &Path, name: &str) {
-    let files = contents(&directory.join("out").join(name));
-    let mut checkpoints: Vec<_> =
-        files.keys().filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect();
-    checkpoints.sort();
-    let from = format!("out/{name}/{}", checkpoints[1]);
+/// Goes on from the checkpoint in the middle of a run that has left more than three, on three ranks: what is left is that of the run before.
+pub(crate) fn assert_middle_gives(whole: &Outcome, directory: &Path, job: &Path, name: &str) {
+    let checkpoints = checkpoints(directory, name);
+    assert!(checkpoints.len() > 3, "{checkpoints:?}");
+    assert_restart_gives(whole, directory, job, name, &checkpoints[checkpoints.len() / 2]);
+}
+
+/// Names of the checkpoints that a run has left, in their order.
+fn checkpoints(directory: &Path, name: &str) -> Vec<String> {
+    let files = contents(&directory.join("out").join(name)).into_keys();
+    files.filter(|file| file.contains("checkpoint") && file.ends_with("hdf")).collect()
+}
+
+/// Goes on from a checkpoint in a directory, on three ranks: what is left is that of the run before.
+fn assert_restart_gives(reference: &Outcome, directory: &Path, job: &Path, name: &str, from: &str) {
+    let from = format!("out/{name}/{from}");
     succeed(&mut run(directory, 3, 1, job, &["--quiet", "--restart", &from]));
     reference.assert_same(&Outcome::read(directory, name), &format!("restart from {from}"));
 }

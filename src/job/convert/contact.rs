@@ -70,18 +70,17 @@ fn fields(laws: &BTreeMap<[u16; 2], Law>, bodies: usize, names: Vec<(String, boo
     if first_of_field.len() > MAX_FIELDS {
         return None;
     }
-    let mut pairs: Vec<Pair> = Vec::new();
+    // All bodies of two fields meet alike.
+    let mut pairs = BTreeMap::new();
     for (&[a, b], &(law, contact, turned)) in laws {
         let (f, g) = (field_of_body[usize::from(a)], field_of_body[usize::from(b)]);
         let fields = [f.min(g) as u8, f.max(g) as u8];
-        if !pairs.iter().any(|pair| pair.fields == fields) {
-            pairs.push(Pair { fields, law, contact, turned: turned != (f > g) });
-        }
+        pairs.entry(fields).or_insert(Pair { fields, law, contact, turned: turned != (f > g) });
     }
     let several = first_of_field.len() > 1;
     let field_of_body =
         if several { field_of_body.into_iter().map(|field| field as u8).collect() } else { Vec::new() };
-    Some(BodyContacts { field_of_body, pairs, names })
+    Some(BodyContacts { field_of_body, pairs: pairs.into_values().collect(), names })
 }
 
 /// Numbers of the bodies of each side.
@@ -120,7 +119,7 @@ fn sides(checks: &mut Checks, written: &BodyContact, bodies: &[&str], path: &Pat
 fn law(checks: &mut Checks, written: &BodyContact, path: &Path) -> Option<PairLaw> {
     let given =
         [("friction", written.friction), ("cohesion", written.cohesion), ("tension", written.tension)];
-    let kind = match written.kind {
+    let (name, law) = match written.kind {
         PairKind::Separating => {
             let [friction, cohesion, tension] = given.map(|(_, value)| value.unwrap_or(0.0));
             return Some(PairLaw::Separating { friction, cohesion, tension });
@@ -128,7 +127,6 @@ fn law(checks: &mut Checks, written: &BodyContact, path: &Path) -> Option<PairLa
         PairKind::Sticky => ("sticky", PairLaw::Sticky),
         PairKind::Slip => ("slip", PairLaw::Slip),
     };
-    let (name, law) = kind;
     let Some((key, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Some(law) };
     let message = format!("found {key} with kind = \"{name}\"; expected it with kind = \"separating\" only");
     checks.fault(&path.key(*key), message);

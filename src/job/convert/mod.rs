@@ -5,17 +5,14 @@
 //! |---|---|
 //! | `checks` | what all need: faults with their places, the domain |
 //! | `settings` | faces, numerics, output, report |
-//! | `shapes` | shapes |
-//! | `terrain` | terrain |
+//! | `shapes` | shapes, among them terrain, and particles from a file |
 //! | `adaptivity` | dynamic refinement |
 //! | `colliders` | colliders and their motion |
 //! | `contact` | contact between bodies |
-//! | `free_bodies` | mass, inertia and start of free rigid bodies |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
-//! | `particles` | particles from a file |
 //! | `overlap` | whether bodies overlap |
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
@@ -42,16 +39,13 @@ mod adaptivity;
 mod checks;
 mod colliders;
 mod contact;
-mod free_bodies;
 mod loads;
 mod overlap;
-mod particles;
 mod probes;
 pub(super) mod settings;
 mod shapes;
 mod stages;
 mod stress;
-mod terrain;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;

@@ -120,7 +120,7 @@ impl<const D: usize> BinLists<D> {
 
     /// Whether an own leaf with particles has any that these lists are of.
     pub fn has_members(&self, leaf: usize) -> bool {
-        self.has_members.get(leaf).copied().unwrap_or(true)
+        is_in(&self.has_members, leaf)
     }
 
     /// The lists of each own leaf, for what advances its particles.
@@ -131,7 +131,7 @@ impl<const D: usize> BinLists<D> {
             bins: bins.as_deref_mut(),
             sorted,
             own,
-            has_members: has_members.get(leaf).copied().unwrap_or(true),
+            has_members: is_in(has_members, leaf),
         })
     }
 
@@ -195,6 +195,11 @@ impl<const D: usize> BinLists<D> {
     pub fn of_leaf(&self, leaf: usize) -> Option<&LeafBins<D>> {
         self.leaves[leaf].as_deref().filter(|_| self.sorted[leaf])
     }
+}
+
+/// Whether an own leaf has members, from a list of all such leaves that is empty where all have.
+fn is_in(has_members: &[bool], leaf: usize) -> bool {
+    has_members.get(leaf).copied().unwrap_or(true)
 }
 
 /// The lists of one own leaf.

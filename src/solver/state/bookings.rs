@@ -110,23 +110,24 @@ pub struct CarriedTotals {
     pub force: [f64; 3],
 }
 
-/// Mean force and work of a load.
+/// Mean force and work of a load, or of a contact between bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LoadTotals {
-    /// Mean force on the material since the last row of the history, N; in plane strain per metre of thickness.
+pub struct ForceAndWork {
+    /// Mean force on the material, or on the first side of a contact, since the last row of the history, N; in plane strain per metre of
+    /// thickness.
     pub force: [f64; 3],
-    /// Work on the material since the start, J: impulse times the velocity with which the step moves the material.
+    /// Work on the material, or on both sides of a contact, since the start, J: impulse times the velocity with which the step moves the
+    /// material, or one side along the other. Friction takes away, so its work is below 0.
     pub work: f64,
 }
 
-/// Mean force and work of a contact between bodies.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BodyTotals {
-    /// Mean force on its first side since the last row of the history, N; in plane strain per metre of thickness.
-    pub force: [f64; 3],
-    /// Work on the two sides since the start, J: impulse times the velocity with which the step moves one along the other. Friction takes
-    /// away, so it is below 0.
-    pub work: f64,
+impl ExactSums<LOAD_SUMS> {
+    /// Collective. Mean force and work of each thing at a time, s.
+    pub(in crate::solver) fn force_and_work(&self, comm: &Comm, time: f64) -> Vec<ForceAndWork> {
+        let mean = |impulse: f64| self.mean(impulse, time);
+        let all = self.totals(comm).into_iter();
+        all.map(|[x, y, z, work]| ForceAndWork { force: [x, y, z].map(mean), work }).collect()
+    }
 }
 
 /// A particle that may come to the surface of a collider in a step.

@@ -5,7 +5,7 @@ use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
 use crate::load::Load;
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::LoadTotals;
+use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::phases::Phase;
 
 /// What a load gives to one node in one step.
@@ -81,9 +81,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Mean force and work of each load.
-    pub fn load_totals(&self) -> Vec<LoadTotals> {
-        let mean = |impulse: f64| self.load_sums.mean(impulse, self.clock.time);
-        let all = self.load_sums.totals(&self.comm).into_iter();
-        all.map(|[x, y, z, work]| LoadTotals { force: [x, y, z].map(mean), work }).collect()
+    pub fn load_totals(&self) -> Vec<ForceAndWork> {
+        self.load_sums.force_and_work(&self.comm, self.clock.time)
     }
 }

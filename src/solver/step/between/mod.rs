@@ -15,7 +15,7 @@ mod press;
 use crate::boundary::bodies::PairLaw;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::BodyTotals;
+use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
@@ -43,9 +43,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Mean force of each contact of the job on its first side since the last row of the history, and its work since the
     /// start.
-    pub fn body_totals(&self) -> Vec<BodyTotals> {
-        let mean = |impulse: f64| self.body_sums.mean(impulse, self.clock.time);
-        let all = self.body_sums.totals(&self.comm).into_iter();
-        all.map(|[x, y, z, work]| BodyTotals { force: [x, y, z].map(mean), work }).collect()
+    pub fn body_totals(&self) -> Vec<ForceAndWork> {
+        self.body_sums.force_and_work(&self.comm, self.clock.time)
     }
 }

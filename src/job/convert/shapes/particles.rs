@@ -2,7 +2,7 @@
 use std::path::Path as File;
 use std::sync::Arc;
 
-use super::checks::{Checks, Space};
+use super::super::checks::{Checks, Space};
 use crate::checksum::fnv1a;
 use crate::io::particles::{Table, table};
 use crate::io::snapshot;
@@ -24,7 +24,7 @@ const GRADIENT: [&str; 9] = ["f_xx", "f_xy", "f_xz", "f_yx", "f_yy", "f_yz", "f_
 
 impl Checks<'_> {
     /// The particles of a file, or a fault.
-    pub(super) fn particles<const D: usize>(
+    pub(in crate::job) fn particles<const D: usize>(
         &mut self,
         file: &str,
         body: &str,

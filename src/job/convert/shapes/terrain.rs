@@ -1,5 +1,5 @@
 //! Terrain of the job file to geometry.
-use super::checks::{Checks, Space};
+use super::super::checks::{Checks, Space};
 use crate::geometry::mesh::{HeightRaster, Placing, Terrain};
 use crate::geometry::written::{Shape as Written, Surface, Thickness};
 use crate::geometry::{Mesh, Shape};

@@ -1,4 +1,12 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
+//!
+//! | file | what it checks |
+//! |---|---|
+//! | `terrain` | terrain |
+//! | `particles` | particles from a file |
+mod particles;
+mod terrain;
+
 use super::checks::{Checks, Space};
 use crate::geometry::mesh::{self, NotSolid, Triangles};
 use crate::geometry::written::{Shape as Written, Solid, Vector};

@@ -1,6 +1,8 @@
 //! Free rigid bodies of the job file to those of the solver: mass and inertia, given or those of the shape.
-use super::checks::Checks;
-use super::colliders::{Z, allowed, optional};
+use std::cell::OnceCell;
+
+use super::super::checks::Checks;
+use super::{Z, allowed, optional};
 use crate::boundary::motion::{Free, Rate, length};
 use crate::boundary::rigid::turning;
 use crate::geometry::{Moments, Shape};
@@ -52,8 +54,10 @@ pub(super) fn free_body<const D: usize>(
         (true, None, _) if D == 2 => Turns::About(Z),
         (true, None, _) => Turns::Freely,
     };
-    let moments = shape.moments();
+    // To add up the cells of a boolean takes long, so only where they are asked for.
+    let found = OnceCell::new();
     let mut of_shape = |key: &'static str| {
+        let moments = *found.get_or_init(|| shape.moments());
         if moments.is_none() {
             let message = "found a shape without a volume, or without an end; expected `mass` and `inertia`, \
                            or `turns = false`, for such a body";

@@ -1,6 +1,8 @@
-//! Colliders of the job file to those of the solver.
+//! Colliders of the job file to those of the solver; `free_bodies.rs` has those that move by themselves.
+mod free_bodies;
+
+use self::free_bodies::free_body;
 use super::checks::{Checks, Space};
-use super::free_bodies::free_body;
 use crate::boundary::motion::{Knot, Motion, Rate};
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::Aabb;
@@ -16,7 +18,7 @@ use crate::text::written;
 /// Most colliders of a job: what a checkpoint's header has room for.
 const MAX_COLLIDERS: usize = 16;
 /// The axis of what turns in a plane.
-pub(super) const Z: [f64; 3] = [0.0, 0.0, 1.0];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// All colliders, or faults.
 pub(in crate::job) fn colliders<const D: usize>(
@@ -153,11 +155,7 @@ fn motion<const D: usize>(
 }
 
 /// A vector, or 0 where none is given.
-pub(super) fn optional<const D: usize>(
-    checks: &mut Checks,
-    vector: Option<&Vector>,
-    path: &Path,
-) -> Option<[f64; D]> {
+fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
     vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
 }
 
@@ -188,7 +186,7 @@ fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Opti
 }
 
 /// Which axes a list names.
-pub(super) fn allowed<const D: usize>(
+fn allowed<const D: usize>(
     checks: &mut Checks,
     along: Option<&[AxisName]>,
     path: &Path,
