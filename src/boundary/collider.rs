@@ -5,6 +5,7 @@
 //! the material is what the material gives to the collider: its force and torque.
 use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, length};
+use super::rigid::Meeting;
 use super::rigid::turning::{self, UPRIGHT};
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
@@ -81,6 +82,11 @@ impl<const D: usize> Collider<D> {
         if let Motion::Free(free) = &self.motion { Some(free) } else { None }
     }
 
+    /// What it does to other colliders, of a free body that is there and feels them.
+    pub fn meeting(&self) -> Option<Meeting> {
+        self.free().and_then(|free| free.meeting).filter(|_| self.is_present())
+    }
+
     /// Where the reference point is, m.
     pub fn centre(&self, pose: &Pose<D>) -> [f64; D] {
         std::array::from_fn(|a| self.reference[a] + pose.translation[a])
@@ -154,16 +160,19 @@ impl<const D: usize> Collider<D> {
     pub fn step_rate(&self, state: &ColliderState<D>, gravity: &[f64; D], time: f64, dt: f64) -> Rate<D> {
         match &self.motion {
             _ if !self.is_present() => Rate::REST,
-            Motion::Free(free) => Rate {
-                velocity: std::array::from_fn(|a| {
-                    let fall = if free.along[a] { gravity[a] } else { 0.0 };
-                    (0.5 * dt).mul_add(fall, state.rate.velocity[a])
-                }),
-                spin: state.rate.spin,
-                turning: free
-                    .turning
-                    .map_or([0.0; 3], |own| own.mean_spin(&state.momentum, &state.pose.orientation, dt)),
-            },
+            Motion::Free(free) => {
+                let driven = free.mean_rate(time - self.start, dt);
+                Rate {
+                    velocity: std::array::from_fn(|a| match free.along[a] {
+                        true => (0.5 * dt).mul_add(gravity[a], state.rate.velocity[a]),
+                        false => driven.velocity[a],
+                    }),
+                    spin: if free.turns() { state.rate.spin } else { driven.spin },
+                    turning: free
+                        .turning
+                        .map_or([0.0; 3], |own| own.mean_spin(&state.momentum, &state.pose.orientation, dt)),
+                }
+            }
             motion => motion.mean_rate(time - self.start, dt),
         }
     }
@@ -192,11 +201,11 @@ impl<const D: usize> Collider<D> {
         let Motion::Free(free) = &self.motion else {
             return self.state(self.motion.place(time - self.start), *mean);
         };
-        let mut rate = state.rate;
-        let mut translation = state.pose.translation;
+        let mut rate = *mean;
+        let (mut translation, mut angle) = free.place(time - self.start);
         for a in (0..D).filter(|&a| free.along[a]) {
-            rate.velocity[a] = dt.mul_add(gravity[a], rate.velocity[a]) + impulse[a] / free.mass;
-            translation[a] = dt.mul_add(mean.velocity[a], translation[a]);
+            rate.velocity[a] = dt.mul_add(gravity[a], state.rate.velocity[a]) + impulse[a] / free.mass;
+            translation[a] = dt.mul_add(mean.velocity[a], state.pose.translation[a]);
         }
         if let Some(inertia) = &free.turning {
             let turn = mean.turning.map(|w| dt * w);
@@ -205,11 +214,10 @@ impl<const D: usize> Collider<D> {
             rate.turning = inertia.spin(&momentum, &orientation);
             return ColliderState { pose: Pose::oriented(translation, orientation), rate, momentum };
         }
-        let mut angle = state.pose.angle;
         if let Some(inertia) = free.inertia {
             let about = (0..3).fold(0.0, |sum, a| self.axis[a].mul_add(torque[a], sum));
-            rate.spin += about / inertia;
-            angle = dt.mul_add(mean.spin, angle);
+            rate.spin = state.rate.spin + about / inertia;
+            angle = dt.mul_add(mean.spin, state.pose.angle);
         }
         self.state((translation, angle), rate)
     }
@@ -219,7 +227,10 @@ impl<const D: usize> Collider<D> {
     pub fn greatest_speed(&self, state: &ColliderState<D>, extent: &[f64; D], time: f64) -> f64 {
         let (speed, spin) = match &self.motion {
             _ if !self.is_present() => (0.0, 0.0),
-            Motion::Free(_) => state.rate.speeds(),
+            Motion::Free(free) => {
+                let (own, driven) = (state.rate.speeds(), free.greatest_speeds(time - self.start));
+                (own.0 + driven.0, own.1.max(driven.1))
+            }
             motion => motion.greatest_speeds(time - self.start),
         };
         if spin == 0.0 {
@@ -259,7 +270,12 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
             }
             Motion::Free(free) => {
                 let turns = if free.turning.is_some() { " about any axis" } else { "" };
-                write!(f, "free{turns}, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))
+                write!(f, "free{turns}, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))?;
+                if free.rows.is_empty() {
+                    return Ok(());
+                }
+                let (speed, spin) = free.greatest_speeds(f64::NEG_INFINITY);
+                write!(f, ", driven by a table of {} rows, at most {}", free.rows.len(), both(speed, spin))
             }
         }
     }
@@ -311,6 +327,8 @@ mod tests {
             along: [true, true],
             inertia: Some(0.5),
             turning: None,
+            meeting: None,
+            rows: Vec::new(),
             start: Rate::about_axis([1.0, 3.0], 0.0),
         };
         let (collider, gravity) = (disc(Motion::Free(free)), [0.0, -10.0]);

@@ -1,4 +1,5 @@
 //! How colliders move: at rest, steadily, by a table, or freely under gravity and the forces on them.
+use super::rigid::Meeting;
 use super::rigid::turning::{Inertia, Quaternion, UPRIGHT, matrix};
 use crate::geometry::rotation;
 
@@ -65,7 +66,7 @@ pub struct Knot<const D: usize> {
 }
 
 /// A rigid body that moves under gravity and the forces of the material.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Free<const D: usize> {
     /// Mass, kg; in plane strain of one metre of thickness.
     pub mass: f64,
@@ -75,8 +76,34 @@ pub struct Free<const D: usize> {
     pub inertia: Option<f64>,
     /// Inertia about the centre of mass, which is the reference point, of a body that turns about any axis.
     pub turning: Option<Inertia>,
+    /// What it does to faces of the domain and to other colliders; `None`: it does not feel them.
+    pub meeting: Option<Meeting>,
+    /// Table that it follows along the other axes, and in its rotation unless it turns; empty: it does neither.
+    pub rows: Vec<Knot<D>>,
     /// Velocity and angular velocity at the start.
     pub start: Rate<D>,
+}
+
+impl<const D: usize> Free<D> {
+    /// Whether it turns by itself.
+    pub fn turns(&self) -> bool {
+        self.inertia.is_some() || self.turning.is_some()
+    }
+
+    /// Where its table wants it at a time (s).
+    pub fn place(&self, time: f64) -> ([f64; D], f64) {
+        place(&self.rows, time)
+    }
+
+    /// The mean velocities that its table gives over a step.
+    pub fn mean_rate(&self, time: f64, dt: f64) -> Rate<D> {
+        mean_rate(&self.rows, time, dt)
+    }
+
+    /// The greatest speeds of its table from a time (s) on.
+    pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
+        greatest_speeds(&self.rows, time)
+    }
 }
 
 /// The motion of a collider.
@@ -98,19 +125,7 @@ impl<const D: usize> Motion<D> {
         match self {
             Self::Fixed | Self::Free(_) => ([0.0; D], 0.0),
             Self::Steady(rate) => (rate.velocity.map(|v| v * time), rate.spin * time),
-            Self::Table(knots) => {
-                let Some((first, last)) = knots.first().zip(knots.last()) else { return ([0.0; D], 0.0) };
-                if time <= first.time {
-                    return (first.translation, first.angle);
-                }
-                let next = knots.partition_point(|knot| knot.time < time);
-                let Some(to) = knots.get(next) else { return (last.translation, last.angle) };
-                let from = &knots[next - 1];
-                let part = (time - from.time) / (to.time - from.time);
-                let between = |a: f64, b: f64| part.mul_add(b - a, a);
-                let translation = std::array::from_fn(|k| between(from.translation[k], to.translation[k]));
-                (translation, between(from.angle, to.angle))
-            }
+            Self::Table(knots) => place(knots, time),
         }
     }
 
@@ -122,22 +137,7 @@ impl<const D: usize> Motion<D> {
             Self::Fixed => Rate::REST,
             Self::Steady(rate) => *rate,
             Self::Free(free) => free.start,
-            Self::Table(knots) => {
-                let end = time + dt;
-                let mut mean = Rate::REST;
-                for pair in knots.windows(2) {
-                    let overlap = end.min(pair[1].time) - time.max(pair[0].time);
-                    if overlap > 0.0 {
-                        let share = overlap / (end - time);
-                        let slope = slope(pair);
-                        for k in 0..D {
-                            mean.velocity[k] = share.mul_add(slope.velocity[k], mean.velocity[k]);
-                        }
-                        mean.spin = share.mul_add(slope.spin, mean.spin);
-                    }
-                }
-                mean
-            }
+            Self::Table(knots) => mean_rate(knots, time, dt),
         }
     }
 
@@ -148,14 +148,50 @@ impl<const D: usize> Motion<D> {
             Self::Fixed => (0.0, 0.0),
             Self::Steady(rate) => rate.speeds(),
             Self::Free(free) => free.start.speeds(),
-            Self::Table(knots) => {
-                let ahead = knots.windows(2).filter(|pair| pair[1].time > time);
-                ahead
-                    .map(|pair| slope(pair).speeds())
-                    .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
-            }
+            Self::Table(knots) => greatest_speeds(knots, time),
         }
     }
+}
+
+/// Translation and angle at a time (s) by a table.
+fn place<const D: usize>(knots: &[Knot<D>], time: f64) -> ([f64; D], f64) {
+    let Some((first, last)) = knots.first().zip(knots.last()) else { return ([0.0; D], 0.0) };
+    if time <= first.time {
+        return (first.translation, first.angle);
+    }
+    let next = knots.partition_point(|knot| knot.time < time);
+    let Some(to) = knots.get(next) else { return (last.translation, last.angle) };
+    let from = &knots[next - 1];
+    let part = (time - from.time) / (to.time - from.time);
+    let between = |a: f64, b: f64| part.mul_add(b - a, a);
+    let translation = std::array::from_fn(|k| between(from.translation[k], to.translation[k]));
+    (translation, between(from.angle, to.angle))
+}
+
+/// Mean velocities by a table over a step.
+fn mean_rate<const D: usize>(knots: &[Knot<D>], time: f64, dt: f64) -> Rate<D> {
+    let end = time + dt;
+    let mut mean = Rate::REST;
+    for pair in knots.windows(2) {
+        let overlap = end.min(pair[1].time) - time.max(pair[0].time);
+        if overlap > 0.0 {
+            let share = overlap / (end - time);
+            let slope = slope(pair);
+            for k in 0..D {
+                mean.velocity[k] = share.mul_add(slope.velocity[k], mean.velocity[k]);
+            }
+            mean.spin = share.mul_add(slope.spin, mean.spin);
+        }
+    }
+    mean
+}
+
+/// The greatest speeds of a table from a time (s) on.
+fn greatest_speeds<const D: usize>(knots: &[Knot<D>], time: f64) -> (f64, f64) {
+    let ahead = knots.windows(2).filter(|pair| pair[1].time > time);
+    ahead
+        .map(|pair| slope(pair).speeds())
+        .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
 }
 
 /// Velocities between two rows.

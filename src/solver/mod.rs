@@ -131,7 +131,8 @@ impl<const D: usize> Solver<D> {
 
     /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s. `docs/time-step.md` goes through it.
     fn advance(&mut self, to: f64, dt: f64) -> Result<Moved, StepError> {
-        let rates = self.collider_rates(dt);
+        let mut rates = self.collider_rates(dt);
+        let pushes = self.meet_bodies(&mut rates, dt);
         let sorted = self.sort_into_bins();
         self.particles_to_nodes(dt);
         let (mut impulses, held) = self.update_node_velocities(dt, &rates);
@@ -140,7 +141,7 @@ impl<const D: usize> Solver<D> {
         self.book_pushes(dt);
         self.book_met(&mut impulses);
         let moved = self.migrate_particles(departed);
-        self.move_colliders(&rates, impulses, to, dt);
+        self.move_colliders(&rates, &pushes, impulses, to, dt);
         // A rank that has failed serves its neighbours to the end of the step.
         sorted?;
         held?;

@@ -183,6 +183,11 @@ impl Mesh {
             .map(move |corners| corners.map(|index| [place(index).x, place(index).y, place(index).z]))
     }
 
+    /// Its vertices, m.
+    pub fn vertices(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.0.surface.surface.vertices().iter().map(|x| [x.x, x.y, x.z])
+    }
+
     /// Checksum of its vertices and triangles.
     pub fn checksum(&self) -> u64 {
         self.0.checksum

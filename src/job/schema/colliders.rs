@@ -90,7 +90,8 @@ pub enum Motion {
         rows: Vec<Row>,
     },
     /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
-    /// touches within a cell of its surface. It does not feel the faces of the domain nor other colliders.
+    /// touches within a cell of its surface. Unless `collides = false` it meets the faces of the
+    /// domain, other than `symmetric`, `outflow` and `absorbing` ones, and other colliders.
     Free {
         /// Mass, kg; in 2D of one metre of thickness. Either this or `density`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -124,6 +125,22 @@ pub enum Motion {
         /// default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         angular_velocity: Option<Spin>,
+        /// Whether it meets faces of the domain and other colliders; true by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        collides: Option<bool>,
+        /// Coefficient of friction there, of two free bodies the smaller one; 0.5 by default. That with material is in `contact`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 100.0))]
+        friction: Option<f64>,
+        /// Coefficient of restitution there, speed after over speed before a blow, of two free bodies the smaller one; 0 by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        restitution: Option<f64>,
+        /// Table of its motion along the axes that `along` leaves out, and of its rotation about `axis` where `turns = false`: rows as with
+        /// `kind = "table"`. A wheel that a vehicle drives is free along z alone. It is at rest there by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(length(max = 100_000))]
+        rows: Option<Vec<Row>>,
     },
 }
 

@@ -2,6 +2,7 @@
 use partition::comm::Comm;
 
 use crate::boundary::ColliderState;
+use crate::boundary::rigid::Features;
 use crate::exact_sum::ExactSum;
 use crate::solver::physics::Physics;
 
@@ -65,6 +66,8 @@ impl<const N: usize> ExactSums<N> {
 pub struct Contacts<const D: usize> {
     /// State of each collider; the same on all ranks.
     pub states: Vec<ColliderState<D>>,
+    /// Points of each that may touch another; none if no free body feels others.
+    pub features: Vec<Features<D>>,
     /// What is booked of them.
     pub sums: ExactSums<SUMS>,
 }
@@ -74,6 +77,7 @@ impl<const D: usize> Contacts<D> {
     pub(in crate::solver) fn new(physics: &Physics<D>, time: f64) -> Self {
         Self {
             states: physics.colliders.iter().map(|collider| collider.state_at(time)).collect(),
+            features: Features::of_all(&physics.colliders),
             sums: ExactSums::new(physics.colliders.len(), time),
         }
     }

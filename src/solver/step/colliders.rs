@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use crate::boundary::collider::cross;
 use crate::boundary::motion::Rate;
+use crate::boundary::rigid::{Push, Surroundings};
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;
@@ -112,6 +113,19 @@ impl<const D: usize> Solver<D> {
         all.map(|(collider, state)| collider.step_rate(state, &gravity, self.clock.time, dt)).collect()
     }
 
+    /// Contact of free bodies with faces of the domain and other colliders: changes their mean velocities over the next step. Returns
+    /// what each collider gets; the same on all ranks.
+    pub(in crate::solver) fn meet_bodies(&self, rates: &mut [Rate<D>], dt: f64) -> Vec<Push> {
+        let all = Surroundings {
+            colliders: &self.physics.colliders,
+            states: &self.contacts.states,
+            features: &self.contacts.features,
+            faces: &self.physics.faces,
+            extent: self.grid.plan.extent(),
+        };
+        all.touch(rates, dt)
+    }
+
     /// Nothing on any collider.
     pub(super) fn no_impulses(&self) -> Vec<[ExactSum; SUMS]> {
         vec![std::array::from_fn(|_| ExactSum::new()); self.physics.colliders.len()]
@@ -133,17 +147,24 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes gave to the
+    /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes and other bodies gave to the
     /// colliders in it. One more reduction if any is free.
     pub(in crate::solver) fn move_colliders(
         &mut self,
         rates: &[Rate<D>],
+        pushes: &[Push],
         step: Vec<[ExactSum; SUMS]>,
         to: f64,
         dt: f64,
     ) {
         for (sums, step) in self.contacts.sums.of.iter_mut().zip(&step) {
             sums.iter_mut().zip(step).for_each(|(sum, step)| sum.merge(step));
+        }
+        if self.comm.rank() == 0 {
+            for (sums, push) in self.contacts.sums.of.iter_mut().zip(pushes) {
+                let values = push.impulse.into_iter().chain(push.turn);
+                sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value));
+            }
         }
         let gravity = self.physics.gravity.at(to - 0.5 * dt);
         let mut impulses = vec![[0.0; SUMS]; step.len()];
@@ -153,9 +174,10 @@ impl<const D: usize> Solver<D> {
             impulses = self.phases.time(Phase::Reduce, || step.totals(comm));
         }
         let all = self.physics.colliders.iter().zip(&mut self.contacts.states);
-        for (((collider, state), rate), impulse) in all.zip(rates).zip(impulses) {
-            let [x, y, z, turn @ ..] = impulse;
-            let linear = std::array::from_fn(|a| [x, y, z][a]);
+        for ((((collider, state), rate), impulse), push) in all.zip(rates).zip(impulses).zip(pushes) {
+            let [x, y, z, a, b, c] = impulse;
+            let linear = std::array::from_fn(|k| [x, y, z][k] + push.impulse[k]);
+            let turn = std::array::from_fn(|k| [a, b, c][k] + push.turn[k]);
             *state = collider.advanced(state, rate, &gravity, [to, dt], linear, turn);
         }
     }

@@ -2,17 +2,20 @@
 use std::cell::OnceCell;
 
 use super::super::checks::Checks;
-use super::{Z, allowed, optional};
-use crate::boundary::motion::{Free, Rate, length};
-use crate::boundary::rigid::turning;
+use super::{Z, allowed, optional, table};
+use crate::boundary::motion::{Free, Knot, Rate, length};
+use crate::boundary::rigid::{Meeting, turning};
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{Inertia, Motion as Written};
+use crate::job::schema::colliders::{Inertia, Motion as Written, Row};
 use crate::job::schema::common::Spin;
 use crate::text::written;
 
 /// A free body, its axis, and the reference point if that follows from the shape.
 pub(super) type Body<const D: usize> = (Free<D>, [f64; 3], Option<[f64; D]>);
+
+/// Coefficient of friction between rigid bodies unless a job gives one.
+const FRICTION: f64 = 0.5;
 
 /// How a body turns.
 enum Turns {
@@ -29,7 +32,20 @@ pub(super) fn free_body<const D: usize>(
     reference: Option<&[f64; D]>,
     paths: [&Path; 2],
 ) -> Option<Body<D>> {
-    let Written::Free { mass, density, velocity, along, turns, inertia, axis, angular_velocity } = motion
+    let Written::Free {
+        mass,
+        density,
+        velocity,
+        along,
+        turns,
+        inertia,
+        axis,
+        angular_velocity,
+        collides,
+        friction,
+        restitution,
+        rows,
+    } = motion
     else {
         return None;
     };
@@ -53,6 +69,11 @@ pub(super) fn free_body<const D: usize>(
         (true, None, Some(Inertia::Axis(_))) => Turns::About(Z),
         (true, None, _) if D == 2 => Turns::About(Z),
         (true, None, _) => Turns::Freely,
+    };
+    let meeting = meeting(checks, *collides, [*friction, *restitution], path);
+    let rows = match rows {
+        Some(rows) => driven(checks, rows, &along, !matches!(how, Turns::Never), &path.key("rows"))?,
+        None => Vec::new(),
     };
     // To add up the cells of a boolean takes long, so only where they are asked for.
     let found = OnceCell::new();
@@ -80,7 +101,8 @@ pub(super) fn free_body<const D: usize>(
     };
     let spin = angular_velocity.as_ref();
     let here = path.key("angular_velocity");
-    let mut free = Free { mass, along, inertia: None, turning: None, start: Rate::about_axis(velocity, 0.0) };
+    let start = Rate::about_axis(velocity, 0.0);
+    let mut free = Free { mass, along, inertia: None, turning: None, meeting, rows, start };
     match how {
         Turns::Never => {
             let at_rest = match spin {
@@ -159,6 +181,53 @@ pub(super) fn free_body<const D: usize>(
             Some((free, Z, Some(moments.centre)))
         }
     }
+}
+
+/// What a body does to other colliders: friction and restitution, if it meets them.
+fn meeting(
+    checks: &mut Checks,
+    collides: Option<bool>,
+    [friction, restitution]: [Option<f64>; 2],
+    path: &Path,
+) -> Option<Meeting> {
+    if collides.unwrap_or(true) {
+        return Some(Meeting {
+            friction: friction.unwrap_or(FRICTION),
+            restitution: restitution.unwrap_or(0.0),
+        });
+    }
+    for (key, given) in [("friction", friction), ("restitution", restitution)] {
+        if given.is_some() {
+            let message = "found it for a body that meets no other; expected none, or `collides = true`";
+            checks.fault(&path.key(key), message.into());
+        }
+    }
+    None
+}
+
+/// The table of a body that is free along some axes only: each of its motions is along another one, or a rotation of what does not turn by itself.
+fn driven<const D: usize>(
+    checks: &mut Checks,
+    rows: &[Row],
+    along: &[bool; D],
+    turns: bool,
+    path: &Path,
+) -> Option<Vec<Knot<D>>> {
+    let table = table(checks, rows, path)?;
+    for (i, row) in table.iter().enumerate() {
+        for a in (0..D).filter(|&a| along[a] && row.translation[a] != 0.0) {
+            let message = format!(
+                "found {}; expected 0 along an axis on which the body is free: leave it out of `along`",
+                written(row.translation[a])
+            );
+            checks.fault(&path.index(i).key("translation").index(a), message);
+        }
+        if turns && row.angle != 0.0 {
+            let message = "found a rotation of a body that turns by itself; expected `turns = false`";
+            checks.fault(&path.index(i).key("rotation"), message.into());
+        }
+    }
+    Some(table)
 }
 
 /// Inertia about the centre of mass, `∫ (|r|² 1 - r rᵀ) ρ dV`, kg m²; in 2D of one metre of thickness and about z alone.
