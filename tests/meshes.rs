@@ -13,7 +13,7 @@ use agimp::geometry::mesh::{HeightRaster, Placing, Terrain, read};
 use damage::damage;
 use random::Random;
 use runs::history::History;
-use runs::launch::{Outcome, run, succeed, text};
+use runs::launch::{self, Outcome, run, succeed, text};
 use runs::{outcome, restart};
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -304,4 +304,38 @@ fn damaged_files_give_a_message() {
         }
     }
     println!("{read_well} of 4000 are solids all the same");
+}
+
+/// A foot whose lower face comes down by 80 mm in three meshes presses a block as one that moves down as a whole. Same results on 1 to 3 ranks and
+/// across a restart.
+#[test]
+fn a_foot_that_deforms_presses_as_one_that_moves() {
+    let name = "deforming_foot";
+    let text = std::fs::read_to_string(launch::job(name)).expect("job");
+    let frames = text.lines().find(|line| line.starts_with("frames")).expect("frames");
+    let rows =
+        "motion = { kind = 'table', rows = [{ time = 0 }, { time = 0.4, translation = [0, 0, -0.08] }] }";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let mesh = launch::job(name).with_file_name("frames").join("foot_0.obj");
+    let rigid = text.replace(frames, rows).replace("frames/foot_0.obj", &mesh.display().to_string());
+    let path = directory.path().join("rigid_foot.toml");
+    std::fs::write(&path, rigid).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let rigid = History::read(directory.path(), "rigid_foot");
+    let mut reference: Option<Outcome> = None;
+    for ranks in [1, 2, 3] {
+        succeed(&mut run(directory.path(), ranks, 1, &launch::job(name), &["--quiet", "--overwrite"]));
+        let result = Outcome::read(directory.path(), name);
+        match &reference {
+            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
+            None => {
+                let history = History::read(directory.path(), name);
+                let impulse = [&history, &rigid].map(|one| one.integral("force_foot_z", 0.0));
+                println!("impulse {:.1} and {:.1} kg m/s", impulse[0], impulse[1]);
+                assert!(impulse[1] > 1000.0 && (impulse[0] / impulse[1] - 1.0).abs() < 0.005, "{impulse:?}");
+                restart::assert_middle_gives(&result, directory.path(), &launch::job(name), name);
+                reference = Some(result);
+            }
+        }
+    }
 }

@@ -7,6 +7,7 @@ use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, length};
 use super::rigid::Meeting;
 use super::rigid::turning::{self, UPRIGHT};
+use crate::geometry::mesh::Deforming;
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
 
@@ -20,13 +21,15 @@ pub enum ActsOn {
     Particles,
 }
 
-/// A collider as the job describes it; it does not change in a run.
+/// A collider as the job describes it; in a run only the shape of one that deforms changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collider<const D: usize> {
     /// Name.
     pub name: String,
-    /// Where it is in the job.
+    /// Where it is in the job; of one that deforms as it is in the step.
     pub shape: Shape<D>,
+    /// How it deforms.
+    pub deforming: Option<Deforming>,
     /// The point that rotations leave in place and torques refer to, in the job, m.
     pub reference: [f64; D],
     /// Unit axis of rotations; z in 2D.
@@ -139,8 +142,25 @@ impl<const D: usize> Collider<D> {
         self.turned(&self.shape.gradient(&self.to_own(x, pose)), pose)
     }
 
-    /// Velocity of the collider at a point `x` of it: `V + ω × (x - c)`, m/s.
+    /// Goes to the shape that it has at a time (s), if it deforms.
+    pub fn deform(&mut self, time: f64) {
+        let Some(deforming) = self.deforming.as_mut().filter(|_| self.start.is_finite()) else { return };
+        if let Some(mesh) = deforming.advance(time - self.start) {
+            self.shape = Shape::Mesh(mesh);
+        }
+    }
+
+    /// Velocity of the collider at a point `x` of its surface: `V + ω × (x - c)`, and that of its deformation, m/s.
     pub fn velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
+        let rigid = self.rigid_velocity_at(x, pose, rate);
+        let (Some(deforming), Shape::Mesh(mesh)) = (&self.deforming, &self.shape) else { return rigid };
+        let own = self.to_own(x, pose);
+        let velocity = deforming.velocity(mesh, &std::array::from_fn(|a| if a < D { own[a] } else { 0.0 }));
+        let turned = self.turned(&std::array::from_fn(|a| velocity[a]), pose);
+        std::array::from_fn(|a| rigid[a] + turned[a])
+    }
+
+    fn rigid_velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
         let turns = rate.turning != [0.0; 3];
         if rate.spin == 0.0 && !turns {
             return rate.velocity;
@@ -233,6 +253,8 @@ impl<const D: usize> Collider<D> {
             }
             motion => motion.greatest_speeds(time - self.start),
         };
+        let deformation = self.deforming.as_ref().map_or(0.0, |own| own.greatest_speed(time - self.start));
+        let speed = speed + deformation;
         if spin == 0.0 {
             return speed;
         }
@@ -255,6 +277,10 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
         write!(f, "{}, ", self.contact)?;
         if self.acts_on == ActsOn::Particles {
             write!(f, "at particles, ")?;
+        }
+        if let Some(deforming) = &self.deforming {
+            let duration = quantity(deforming.duration(), "s");
+            write!(f, "deforming through {} meshes in {duration}, ", deforming.len())?;
         }
         let both = |speed: f64, spin: f64| format!("{}, {}", quantity(speed, "m/s"), quantity(spin, "rad/s"));
         let speeds = |rate: &Rate<D>| {
@@ -297,6 +323,7 @@ mod tests {
         Collider {
             name: "disc".into(),
             shape: Shape::Box(Aabb::new([1.0, 0.0], [2.0, 0.5])),
+            deforming: None,
             reference: [1.0, 0.0],
             axis: [0.0, 0.0, 1.0],
             contact: Contact::Sticky,

@@ -51,12 +51,13 @@ impl<const D: usize> Solver<D> {
     /// from a file `clock` is that of the file; for a new run it is the default.
     pub fn new(
         comm: &Comm,
-        physics: Physics<D>,
+        mut physics: Physics<D>,
         forest: Forest<D>,
         chunks: Vec<Chunk<D>>,
         clock: Clock,
     ) -> Self {
         let start = thread_time();
+        physics.deform_colliders(clock.time);
         let grid = Grid::build(comm, &forest, &physics, 0);
         let partitioned = LastPartition::at_start(start);
         let mut solver = Self {

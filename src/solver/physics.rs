@@ -107,6 +107,11 @@ impl<const D: usize> Physics<D> {
         self.stage_starts.len().saturating_sub(1)
     }
 
+    /// Gives colliders that deform the shape that they have at a time (s): that of a step is the one at its start.
+    pub(crate) fn deform_colliders(&mut self, time: f64) {
+        self.colliders.iter_mut().for_each(|collider| collider.deform(time));
+    }
+
     /// Columns of what particles carry: for loads, of the stretch between neighbours, then of their motion.
     pub fn carried_columns(&self) -> usize {
         self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()

@@ -34,6 +34,7 @@ impl<const D: usize> Solver<D> {
         self.comm.sum_u64(&mut added);
         self.ledger.next_root = self.next_root() + added[0];
         let before = std::mem::replace(&mut self.physics, physics);
+        self.physics.deform_colliders(self.clock.time);
         for (index, collider) in self.physics.colliders.iter().enumerate() {
             if collider.is_present() && !before.colliders[index].is_present() {
                 self.contacts.states[index] = collider.state_at(self.clock.time);

@@ -40,7 +40,15 @@ impl<const D: usize> Features<D> {
     pub fn of_all(colliders: &[Collider<D>]) -> Vec<Self> {
         let is_any =
             colliders.iter().any(|collider| collider.free().is_some_and(|free| free.meeting.is_some()));
-        if is_any { colliders.iter().map(|collider| Self::of(&collider.shape)).collect() } else { Vec::new() }
+        if is_any { colliders.iter().map(Self::of_collider).collect() } else { Vec::new() }
+    }
+
+    /// Of a collider; none of one that deforms, which others feel by its distance alone.
+    fn of_collider(collider: &Collider<D>) -> Self {
+        match collider.deforming {
+            Some(_) => Self { all: Vec::new(), centre: [0.0; 3], radius: f64::INFINITY },
+            None => Self::of(&collider.shape),
+        }
     }
 
     /// Of a shape.

@@ -72,6 +72,7 @@ fn collider<const D: usize>(shape: Shape<D>, motion: Motion<D>, reference: [f64;
     Collider {
         name: "body".into(),
         shape,
+        deforming: None,
         reference,
         axis: [0.0, 0.0, 1.0],
         contact: Contact::Sticky,

@@ -6,13 +6,14 @@
 //! | `terrain/` | rasters of heights to triangles |
 //! | `solid` | checks that triangles bound a solid |
 //! | `crossing` | triangles that cross each other |
+//! | `deforming` | surfaces through several meshes in time |
 //! | `winding` | inside and outside by the generalised winding number |
 //! | this | signed distance and normal |
 //!
 //! The nearest point of the surface comes from the tree of `parry3d`, and the side from its angle-weighted normals (Baerentzen and Aanaes
 //! 2005), which is exact at edges and corners, or, for what is not quite closed, from the winding number. A raster of distances stands before it: away from the surface a point takes the bound that
 //! its cell of the raster gives, so that what asks from afar does not search the tree.
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery;
@@ -23,11 +24,13 @@ use super::primitives::box_distance;
 use crate::checksum::fnv1a;
 
 mod crossing;
+mod deforming;
 mod read;
 mod solid;
 mod terrain;
 mod winding;
 
+pub use deforming::{Deforming, Mismatch};
 pub use read::{ReadError, Triangles, ply_columns, read};
 pub use solid::NotSolid;
 pub use terrain::{Placing, Raster as HeightRaster, Terrain};
@@ -74,7 +77,8 @@ enum Filling {
 struct Inner {
     surface: Surface,
     bounds: Aabb<3>,
-    raster: Raster,
+    /// Made where it is first asked for.
+    raster: OnceLock<Raster>,
     /// Checksum of vertices and triangles.
     checksum: u64,
     volume: f64,
@@ -159,8 +163,45 @@ impl Mesh {
             crossing::check(&vertices, &indices, &numbers, surface.bvh())?;
         }
         let surface = Surface { surface, inside };
-        let raster = Raster::new(&surface, &bounds);
+        let raster = OnceLock::new();
         Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.unwrap_or(0.0).abs() })))
+    }
+
+    /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a look at whether it crosses itself.
+    pub(super) fn moved(&self, vertices: Vec<[f64; 3]>) -> Self {
+        let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
+        let indices = self.0.surface.surface.indices().to_vec();
+        let (inside, flags) = match self.0.surface.inside {
+            Inside::Normals => (Inside::Normals, TriMeshFlags::ORIENTED),
+            Inside::Winding(_) => (Inside::Winding(Winding::new(&vertices, &indices)), TriMeshFlags::empty()),
+            Inside::Nothing => (Inside::Nothing, TriMeshFlags::empty()),
+        };
+        let places = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
+        // The same triangles were accepted where they came from.
+        let Ok(surface) = TriMesh::with_flags(places, indices, flags) else { return self.clone() };
+        let (surface, raster) = (Surface { surface, inside }, OnceLock::from(Raster::none(&bounds)));
+        Self(Arc::new(Inner { surface, bounds, raster, checksum: self.0.checksum, volume: self.0.volume }))
+    }
+
+    /// Corners of the triangle nearest to a point, and their shares in its nearest point.
+    fn nearest_triangle(&self, x: &[f64; 3]) -> ([u32; 3], [f64; 3]) {
+        let surface = &self.0.surface.surface;
+        let projection = surface.project_local_point(Vector::new(x[0], x[1], x[2]), false);
+        let corners = surface.indices()[projection.subshape as usize];
+        let [a, b, c] = corners.map(|corner| surface.vertices()[corner as usize]);
+        let (u, v, w) = (b - a, c - a, projection.point - a);
+        let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
+        let (wu, wv) = (w.dot(u), w.dot(v));
+        let area = uu * vv - uv * uv;
+        if area <= 0.0 {
+            return (corners, [1.0, 0.0, 0.0]);
+        }
+        let (second, third) = ((vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area);
+        (corners, [1.0 - second - third, second, third])
+    }
+
+    fn raster(&self) -> &Raster {
+        self.0.raster.get_or_init(|| Raster::new(&self.0.surface, &self.0.bounds))
     }
 
     /// Its bounding box, m.
@@ -196,11 +237,11 @@ impl Mesh {
     /// Signed distance of a point to the surface, m, negative inside: exact within some cells of the raster from the surface, elsewhere a
     /// bound, not larger in magnitude and with the right sign.
     pub fn distance(&self, x: &[f64; 3]) -> f64 {
-        if let Some(bound) = self.0.raster.bound(x) {
+        if let Some(bound) = self.raster().bound(x) {
             return bound;
         }
         let outside = box_distance(&self.0.bounds, x);
-        if outside > self.0.raster.edge {
+        if outside > self.raster().edge {
             return outside;
         }
         nearest(&self.0.surface, x).0
@@ -212,7 +253,7 @@ impl Mesh {
         let way: [f64; 3] = std::array::from_fn(|a| (x[a] - point[a]) * distance.signum());
         let length = way.iter().map(|c| c * c).sum::<f64>().sqrt();
         // On the surface the way has no direction.
-        if length > 1e-12 * self.0.raster.edge {
+        if length > 1e-12 * self.raster().edge {
             return way.map(|c| c / length);
         }
         self.face_normal(x)
@@ -243,13 +284,22 @@ fn nearest(surface: &Surface, x: &[f64; 3]) -> (f64, [f64; 3]) {
 impl Raster {
     fn new(surface: &Surface, bounds: &Aabb<3>) -> Self {
         let size: [f64; 3] = std::array::from_fn(|a| bounds.upper[a] - bounds.lower[a]);
-        let edge = size.iter().fold(0.0, |longest: f64, s| longest.max(*s)) / RASTER as f64;
+        let edge = Self::edge(bounds);
         let lower = bounds.lower.map(|x| x - edge);
         let cells = size.map(|s| (s / edge).ceil() as usize + 2);
         let mut raster = Self { lower, edge, cells, distances: Vec::new() };
         let all = 0..cells.iter().product::<usize>();
         raster.distances = all.map(|cell| nearest(surface, &raster.centre(cell)).0).collect();
         raster
+    }
+
+    /// A raster that bounds nothing.
+    fn none(bounds: &Aabb<3>) -> Self {
+        Self { lower: bounds.lower, edge: Self::edge(bounds), cells: [0; 3], distances: Vec::new() }
+    }
+
+    fn edge(bounds: &Aabb<3>) -> f64 {
+        (0..3).map(|a| bounds.upper[a] - bounds.lower[a]).fold(0.0, f64::max) / RASTER as f64
     }
 
     fn centre(&self, cell: usize) -> [f64; 3] {

@@ -96,3 +96,70 @@ fn facing_inwards_is_turned() {
     let mesh = Mesh::new(inwards).unwrap();
     assert!(mesh.distance(&[0.5; 3]) < 0.0 && mesh.distance(&[1.5; 3]) > 0.0);
 }
+
+/// A torus of radii 1 and 0.4 about z.
+fn torus(parts: [u32; 2]) -> Triangles {
+    let angle = |k: u32, n: u32| f64::from(k) * std::f64::consts::TAU / f64::from(n);
+    let [n, m] = parts;
+    let point = |i: u32, j: u32| {
+        let ((s, c), (t, d)) = (angle(i, n).sin_cos(), angle(j, m).sin_cos());
+        let arm = 0.4_f64.mul_add(d, 1.0);
+        [arm * c, arm * s, 0.4 * t]
+    };
+    let number = |i: u32, j: u32| (i % n) * m + j % m;
+    let vertices = (0..n * m).map(|k| point(k / m, k % m)).collect();
+    let quads = (0..n * m).map(|k| (k / m, k % m));
+    let indices = quads.flat_map(|(i, j)| {
+        let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    Triangles { vertices, indices: indices.collect() }
+}
+
+/// Distance of a point to a triangle by its plane and its three edges.
+fn to_triangle(x: &[f64; 3], corners: &[[f64; 3]; 3]) -> f64 {
+    let minus = |a: &[f64; 3], b: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|k| a[k] - b[k]) };
+    let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+    let cross = |a: &[f64; 3], b: &[f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
+    };
+    let [a, b, c] = corners;
+    let normal = cross(&minus(b, a), &minus(c, a));
+    let edges = [(a, b), (b, c), (c, a)];
+    let is_over = edges.iter().all(|(p, q)| dot(&cross(&normal, &minus(q, p)), &minus(x, p)) >= 0.0);
+    if is_over {
+        return dot(&normal, &minus(x, a)).abs() / dot(&normal, &normal).sqrt();
+    }
+    let to_edge = |(p, q): &(&[f64; 3], &[f64; 3])| {
+        let (way, along) = (minus(x, p), minus(q, p));
+        let t = (dot(&way, &along) / dot(&along, &along)).clamp(0.0, 1.0);
+        let off: [f64; 3] = std::array::from_fn(|k| way[k] - t * along[k]);
+        dot(&off, &off).sqrt()
+    };
+    edges.iter().map(to_edge).fold(f64::INFINITY, f64::min)
+}
+
+/// Within a raster cell of the surface the distance to a torus and to a bunny is that to the nearest of all triangles, to 1e-12 of the
+/// size; that to the torus of the closed form differs by the flatness of the triangles alone.
+#[test]
+fn distances_of_a_torus_and_a_bunny_are_those_of_the_nearest_triangle() {
+    let bunny = read(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/jobs/meshes/bunny.obj")));
+    for (name, triangles) in [("torus", torus([96, 48])), ("bunny", bunny.unwrap())] {
+        let mesh = Mesh::new(triangles).unwrap();
+        let (bounds, edge) = (mesh.bounds(), Raster::edge(&mesh.bounds()));
+        let (mut worst, mut of_form, mut count) = (0.0_f64, 0.0_f64, 0);
+        for (x, part) in mesh.vertices().step_by(13).zip(points(2.0)) {
+            let x: [f64; 3] = std::array::from_fn(|a| edge.mul_add(0.28 * part[a], x[a]));
+            let exact = mesh.triangles().map(|t| to_triangle(&x, &t)).fold(f64::INFINITY, f64::min);
+            worst = worst.max((mesh.distance(&x).abs() - exact).abs());
+            let form = (x[0].hypot(x[1]) - 1.0).hypot(x[2]) - 0.4;
+            of_form = of_form.max((mesh.distance(&x) - form).abs());
+            count += 1;
+        }
+        let size = bounds.upper[0] - bounds.lower[0];
+        println!("{name}: {count} points, {:.1e} of a raster cell; {of_form:.1e} off the form", worst / edge);
+        assert!(count > 100 && worst < 1e-12 * size, "{name} {worst}");
+        // Chords of 96 and 48 parts: 1.4 (1 - cos π/96) and 0.4 (1 - cos π/48).
+        assert!(name != "torus" || of_form < 1.4 * 5.4e-4 + 0.4 * 2.2e-3, "{of_form}");
+    }
+}

@@ -22,6 +22,9 @@ pub struct Collider {
     /// How it moves; not at all by default.
     #[serde(default)]
     pub motion: Option<Motion>,
+    /// Meshes that follow the one of `shape`, for what deforms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<Frames>,
     /// Names of the stages in which it is there; all by default. With them the times of its motion are counted from the start of the
     /// first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -31,6 +34,18 @@ pub struct Collider {
     /// the domain where it is unbounded, and of free bodies whose inertia follows from the shape the centre of mass.
     #[serde(default)]
     pub reference: Option<Vector>,
+}
+
+/// Meshes of a surface that deforms. Its vertices move on straight lines from one mesh to the next, and stay after the last one; `motion` comes on top.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Frames {
+    /// Time between two meshes, s.
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+    pub every: f64,
+    /// Names of the files, in the order of time, with the vertices and triangles of the mesh of `shape`, in the same order; `scale`, `origin` and `solid` are those of `shape`.
+    #[schemars(length(min = 1, max = 10_000))]
+    pub files: Vec<String>,
 }
 
 /// On what a collider acts.

@@ -74,7 +74,7 @@ impl<const D: usize> Inside<D> {
 
 /// Whether a collider never moves while a grid is in use.
 pub(in crate::solver) fn is_still<const D: usize>(collider: &Collider<D>) -> bool {
-    matches!(collider.motion, Motion::Fixed)
+    matches!(collider.motion, Motion::Fixed) && collider.deforming.is_none()
 }
 
 /// The box that a block's nodes span.

@@ -180,6 +180,7 @@ impl<const D: usize> Solver<D> {
             let turn = std::array::from_fn(|k| [a, b, c][k] + push.turn[k]);
             *state = collider.advanced(state, rate, &gravity, [to, dt], linear, turn);
         }
+        self.physics.deform_colliders(to);
     }
 
     /// Collective. Mean force and torque on each collider since the last row of the history, that is, the momentum

@@ -1,4 +1,11 @@
-//! Colliders of the job file to those of the solver; `free_bodies.rs` has those that move by themselves.
+//! Colliders of the job file to those of the solver.
+//!
+//! | file | what it converts |
+//! |---|---|
+//! | `free_bodies` | colliders that move by themselves |
+//! | `deforming` | meshes in time |
+//! | this | the others, and their motion |
+mod deforming;
 mod free_bodies;
 
 use self::free_bodies::free_body;
@@ -88,9 +95,16 @@ fn collider<const D: usize>(
         Some(WrittenContact::Slip {}) => Contact::Slip,
         Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },
     };
+    let deforming = match &written.frames {
+        Some(frames) => {
+            Some(deforming::deforming(checks, &shape, frames, (&written.shape, takes_sheets), space, path)?)
+        }
+        None => None,
+    };
     Some(Collider {
         name: written.name.clone(),
         shape,
+        deforming,
         reference,
         axis,
         contact,

@@ -81,17 +81,9 @@ impl Checks<'_> {
                 self.only(2, D, "polygon", "union of boxes", path)?;
                 self.polygon(points, space, &path.key("points"))
             }
-            Written::Mesh { file, scale, solid, origin } => {
+            Written::Mesh { file, .. } => {
                 self.only(3, D, "mesh", "polygon", path)?;
-                let origin = self.origin_of_file(origin.as_ref(), space, path)?;
-                let triangles =
-                    self.read(file, "a mesh in STL, OBJ or PLY", &path.key("file"), mesh::read)?;
-                let make = match solid {
-                    Solid::Winding => Mesh::wound,
-                    Solid::Closed if self.takes_sheets => Mesh::solid_or_sheet,
-                    Solid::Closed => Mesh::new,
-                };
-                self.solid(triangles, *scale, &origin, make, file, &path.key("file"))
+                self.mesh(shape, file, space, [path, &path.key("file")]).map(Shape::Mesh)
             }
             Written::Terrain { .. } => {
                 self.only(3, D, "terrain", "polygon", path)?;
@@ -121,6 +113,25 @@ impl Checks<'_> {
         }
     }
 
+    /// The mesh of a file, placed as a shape of kind `mesh` says, whose path and that of the file's name are given.
+    pub(super) fn mesh<const D: usize>(
+        &mut self,
+        shape: &Written,
+        file: &str,
+        space: &Space<D>,
+        [path, here]: [&Path; 2],
+    ) -> Option<Mesh> {
+        let Written::Mesh { scale, solid, origin, .. } = shape else { return None };
+        let origin = self.origin_of_file(origin.as_ref(), space, path)?;
+        let triangles = self.read(file, "a mesh in STL, OBJ or PLY", here, mesh::read)?;
+        let make = match solid {
+            Solid::Winding => Mesh::wound,
+            Solid::Closed if self.takes_sheets => Mesh::solid_or_sheet,
+            Solid::Closed => Mesh::new,
+        };
+        self.solid(triangles, *scale, &origin, make, file, here)
+    }
+
     /// Where the origin of a file lies, m from the lower corner of the domain.
     pub(super) fn origin_of_file<const D: usize>(
         &mut self,
@@ -143,14 +154,14 @@ impl Checks<'_> {
         make: fn(Triangles) -> Result<Mesh, NotSolid>,
         file: &str,
         path: &Path,
-    ) -> Option<Shape<D>> {
+    ) -> Option<Mesh> {
         for vertex in &mut triangles.vertices {
             *vertex = std::array::from_fn(|a| scale * vertex[a] + if a < D { origin[a] } else { 0.0 });
         }
         match make(triangles) {
             Ok(mesh) => {
                 self.note_file(mesh.checksum());
-                Some(Shape::Mesh(mesh))
+                Some(mesh)
             }
             Err(error) => {
                 let hint = if let NotSolid::Open { .. } = error { self.sheet_hint(path) } else { "" };

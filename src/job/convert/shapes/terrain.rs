@@ -62,7 +62,7 @@ impl Checks<'_> {
         };
         let ground = self.made_of(smooth(ground), file, &path.key("surface"))?;
         let mut solid = |terrain: &Terrain| {
-            self.solid(terrain.solid_above(base), 1.0, &origin, Mesh::terrain, file, &here)
+            self.solid(terrain.solid_above(base), 1.0, &origin, Mesh::terrain, file, &here).map(Shape::Mesh)
         };
         let below = solid(&ground)?;
         match top {
