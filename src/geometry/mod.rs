@@ -54,6 +54,11 @@ impl<const D: usize> Aabb<D> {
         0.5 * edges.iter().map(|e| e * e).sum::<f64>().sqrt()
     }
 
+    /// The box with all its faces farther out by a distance, m.
+    pub fn grown(&self, by: f64) -> Self {
+        Self { lower: self.lower.map(|c| c - by), upper: self.upper.map(|c| c + by) }
+    }
+
     /// The smallest box that holds both.
     pub fn hull(&self, other: &Self) -> Self {
         Self {

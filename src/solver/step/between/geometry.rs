@@ -1,6 +1,7 @@
 //! Shares of volume and their gradients at the nodes where bodies meet.
 use rayon::prelude::*;
 
+use crate::geometry::Aabb;
 use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
 use crate::grid::plan::{GridPlan, NO_BLOCK};
 use crate::grid::{NodeFields, Window};
@@ -8,7 +9,7 @@ use crate::kernel::{ARENA_EDGE, BLOCK, Row};
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::particle::group::Group;
-use crate::particle::volume::{volume, volume_ratio};
+use crate::particle::volume::{reference_volume, volume_ratio};
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::{BetweenBodies, Grid, VelocityField};
@@ -34,6 +35,9 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// Share of a length by which boxes that must hold something are larger.
+const MARGIN: f64 = 1e-9;
+
 /// These nodes, and the constrained nodes of blocks that may hand sums to any of them.
 fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[u64]) -> Vec<u64> {
     let mut all = meets.to_vec();
@@ -46,15 +50,31 @@ fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[u64]) -> Vec<u64> 
     all
 }
 
-/// Copies of the particles of a group that scatter volumes in place of masses, and gradients of volumes in place of the impulse of stress
+/// The box around these nodes of a block.
+fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) -> Aabb<D> {
+    let (cell, first) = (plan.cell(plan.blocks[block].level), plan.blocks[block].coord);
+    bits(nodes).fold(Aabb::EMPTY, |all, bit| {
+        let x = std::array::from_fn(|a| {
+            let along = bit as usize / BLOCK.pow(a as u32) % BLOCK;
+            (BLOCK as u32 * first[a] + along as u32) as f64 * cell
+        });
+        all.hull(&Aabb::new(x, x))
+    })
+}
+
+/// Copies of the particles of a group in a box that scatter volumes in place of masses, and gradients of volumes in place of the impulse of stress
 /// over 1 s.
-fn solids<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>) -> Chunk<D> {
-    let members: Vec<u32> =
-        (0..).zip(chunk.tags()).filter(|(_, tag)| group.has(**tag)).map(|(p, _)| p).collect();
+fn solids<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>, aabb: &Aabb<D>) -> Chunk<D> {
+    let is_near = |p: u32| {
+        let x = chunk.position(p as usize);
+        (0..D).all(|a| aabb.lower[a] <= x[a] && x[a] <= aabb.upper[a])
+    };
+    let of_group = (0..).zip(chunk.tags()).filter(|(_, tag)| group.has(**tag)).map(|(p, _)| p);
+    let members: Vec<u32> = of_group.filter(|&p| is_near(p)).collect();
     let mut copy = chunk.gathered(&members);
     for p in 0..copy.len() {
-        let (volume, ratio) = (volume(&copy, p), volume_ratio(&copy, p));
-        copy.write(Layout::<D>::MASS, p, &[volume]);
+        let ratio = volume_ratio(&copy, p);
+        copy.write(Layout::<D>::MASS, p, &[reference_volume(&copy, p) * ratio]);
         copy.write(Layout::<D>::VELOCITY, p, &[0.0; D]);
         copy.write(Layout::<D>::AFFINE, p, &[0.0; 9][..D * D]);
         let stress = [-ratio, -ratio, -ratio, 0.0, 0.0, 0.0];
@@ -75,11 +95,19 @@ impl<const D: usize> Solver<D> {
         self.for_each_field(|solver, field| {
             let near = solver.near_others(&scattering);
             let Some(group) = solver.physics.group(field) else { return };
-            let chunks: Vec<Chunk<D>> = (solver.chunks.par_iter().zip(near).with_min_len(16))
-                .map(|(chunk, is_near)| if is_near { solids(chunk, &group) } else { Chunk::new() })
+            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
+            let plan = &solver.grid.plan;
+            let chunks: Vec<Chunk<D>> = (solver.chunks.par_iter().zip(near).enumerate().with_min_len(16))
+                .map(|(leaf, (chunk, near))| {
+                    if near.is_empty() {
+                        return Chunk::new();
+                    }
+                    let cell = plan.finest_cell(leaf);
+                    let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
+                    solids(chunk, &group, &near.grown(half * (1.0 + MARGIN)))
+                })
                 .collect();
             let geometry = &mut between.geometry[field];
-            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
             solver.grid.swap(geometry);
             let of_field = solver.grid.sort(&mut solver.phases, &chunks, &widths, None);
             solver.grid.scatter_and_sum(&mut solver.phases, &chunks, |scratch, bin, arena| {
@@ -92,15 +120,24 @@ impl<const D: usize> Solver<D> {
         sorted
     }
 
-    /// Per own leaf, whether particles of the first velocity field may scatter into any of these nodes, which are given block by block.
-    fn near_others(&self, nodes: &[u64]) -> Vec<bool> {
+    /// Per own leaf, a box of the points whose hats in the bins of the first velocity field reach any of these nodes, which are given block by block; empty
+    /// where there is none.
+    fn near_others(&self, nodes: &[u64]) -> Vec<Aabb<D>> {
+        let plan = &self.grid.plan;
         let overlaps: Vec<u64> =
             (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
-        let mut near = vec![false; self.chunks.len()];
-        for bin in self.grid.arenas.bins().map(|bin| &self.grid.plan.bins[bin]) {
+        let mut near = vec![Aabb::EMPTY; self.chunks.len()];
+        for bin in self.grid.arenas.bins().map(|bin| &plan.bins[bin]) {
             let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
-            near[bin.leaf as usize] |=
-                around.into_iter().any(|(block, overlap)| nodes[*block as usize] & overlap != 0);
+            for (&block, overlap) in around {
+                let reached = nodes[block as usize] & overlap;
+                if reached != 0 {
+                    let box_of_nodes = box_of_nodes(plan, block as usize, reached);
+                    let reach = plan.cell(bin.block.level) * (1.0 + MARGIN);
+                    let all = &mut near[bin.leaf as usize];
+                    *all = all.hull(&box_of_nodes.grown(reach));
+                }
+            }
         }
         near
     }

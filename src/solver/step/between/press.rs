@@ -12,17 +12,17 @@ use crate::solver::state::phases::Phase;
 /// Sweeps over the pairs of a node where more than two bodies meet; one is exact for two.
 const SWEEPS: usize = 8;
 
-/// What one node has got in one step.
+/// What the nodes of one block have got in one step.
 struct Pressed<const D: usize> {
-    node: usize,
-    /// New velocities, with the numbers of their fields.
-    velocities: Vec<(usize, [f64; D])>,
+    /// New velocities, with the numbers of their nodes and fields.
+    velocities: Vec<(usize, usize, [f64; D])>,
+    /// Of the nodes that this rank counts.
     booked: Vec<Booked<D>>,
 }
 
-/// What a pair of bodies gives to the contact of the job that it belongs to; none for bodies that stick as one.
+/// What a pair of bodies gives to the contact of the job that it belongs to.
 struct Booked<const D: usize> {
-    contact: Option<u16>,
+    contact: u16,
     /// Impulse on the contact's first side, kg m/s.
     impulse: [f64; D],
     /// Work, J.
@@ -51,24 +51,20 @@ impl<const D: usize> Solver<D> {
         };
         let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {
             let blocks = meets.par_iter().enumerate().filter(|(_, nodes)| **nodes != 0);
-            blocks.flat_map_iter(|(block, nodes)| press.block(block, *nodes)).collect()
+            blocks.map(|(block, nodes)| press.block(block, *nodes)).collect()
         });
-        let nodes = block_nodes(D);
-        for Pressed { node, velocities, booked } in pressed {
-            for (field, velocity) in velocities {
+        for Pressed { velocities, booked } in pressed {
+            for (node, field, velocity) in velocities {
                 let fields = match field {
                     0 => &mut self.grid.fields,
                     field => &mut self.grid.others[field - 1].fields,
                 };
                 fields.rows[node].0[..D].copy_from_slice(&velocity);
             }
-            if self.grid.plan.blocks[node / nodes].owned >> (node % nodes) & 1 == 1 {
-                for Booked { contact, impulse, work } in booked {
-                    let Some(contact) = contact else { continue };
-                    let sums = &mut self.body_sums.of[usize::from(contact)];
-                    sums.iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
-                    sums[3].add(work);
-                }
+            for Booked { contact, impulse, work } in booked {
+                let sums = &mut self.body_sums.of[usize::from(contact)];
+                sums.iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
+                sums[3].add(work);
             }
         }
     }
@@ -87,33 +83,38 @@ struct Press<'a, const D: usize> {
 
 impl<const D: usize> Press<'_, D> {
     /// These nodes of a block, where bodies meet.
-    fn block(&self, block: usize, nodes: u64) -> Vec<Pressed<D>> {
+    fn block(&self, block: usize, nodes: u64) -> Pressed<D> {
         let first = block * block_nodes(D);
-        let mut pressed = Vec::new();
+        let mut pressed = Pressed { velocities: Vec::new(), booked: Vec::new() };
+        let mut bodies: Vec<Body<D>> = Vec::new();
         for bit in bits(nodes) {
             let node = first + bit as usize;
             let fields = self.fields.iter().enumerate().filter(|(_, fields)| fields.active[block]);
             let rows = fields.map(|(field, fields)| (field, fields.rows[node].0));
-            let bodies = rows.filter(|(_, row)| row[3] > 0.0).map(|(field, row)| Body {
+            bodies.clear();
+            bodies.extend(rows.filter(|(_, row)| row[3] > 0.0).map(|(field, row)| Body {
                 field,
                 mass: row[3],
                 velocity: std::array::from_fn(|a| row[a]),
-            });
-            let mut bodies: Vec<Body<D>> = bodies.collect();
-            if bodies.len() > 1 {
-                let booked = self.node(node, &mut bodies);
-                if !booked.is_empty() {
-                    let velocities = bodies.iter().map(|body| (body.field, body.velocity)).collect();
-                    pressed.push(Pressed { node, velocities, booked });
-                }
+            }));
+            let is_counted = self.plan.blocks[block].owned >> bit & 1 == 1;
+            if bodies.len() > 1 && self.node(node, &mut bodies, is_counted, &mut pressed.booked) {
+                let new = bodies.iter().map(|body| (node, body.field, body.velocity));
+                pressed.velocities.extend(new);
             }
         }
         pressed
     }
 
-    /// Presses the bodies at a node, pair by pair. Returns what is to be booked.
-    fn node(&self, node: usize, bodies: &mut [Body<D>]) -> Vec<Booked<D>> {
-        let mut booked = Vec::new();
+    /// Presses the bodies at a node, pair by pair. Adds what is to be booked if the node is counted. Returns whether any has another velocity.
+    fn node(
+        &self,
+        node: usize,
+        bodies: &mut [Body<D>],
+        is_counted: bool,
+        booked: &mut Vec<Booked<D>>,
+    ) -> bool {
+        let mut is_pressed = false;
         for _ in 0..if bodies.len() > 2 { SWEEPS } else { 1 } {
             for a in 0..bodies.len() {
                 for b in a + 1..bodies.len() {
@@ -124,16 +125,17 @@ impl<const D: usize> Press<'_, D> {
                         bodies[a].velocity[k] -= impulse[k] / bodies[a].mass;
                         bodies[b].velocity[k] += impulse[k] / bodies[b].mass;
                     }
+                    is_pressed = true;
+                    let Some(pair) = pair.filter(|_| is_counted) else { continue };
                     let after: [f64; D] =
                         std::array::from_fn(|k| bodies[b].velocity[k] - bodies[a].velocity[k]);
                     let work = (0..D).map(|k| impulse[k] * after[k]).sum();
-                    let is_turned = pair.is_some_and(|pair| pair.turned);
-                    let impulse = if is_turned { impulse } else { impulse.map(|j| -j) };
-                    booked.push(Booked { contact: pair.map(|pair| pair.contact), impulse, work });
+                    let impulse = if pair.turned { impulse } else { impulse.map(|j| -j) };
+                    booked.push(Booked { contact: pair.contact, impulse, work });
                 }
             }
         }
-        booked
+        is_pressed
     }
 
     /// Impulse on the second of two bodies at a node, kg m/s. `None` where nothing says how they meet.
