@@ -35,6 +35,7 @@ fn quick_problems_pass_and_do_not_depend_on_ranks() {
                 folder: directory.path().join(ranks.to_string()),
                 ranks,
                 effort: Effort::Quick,
+                set: Vec::new(),
             };
             let mut page = page::Page::new(&directory.path().join("page.md"), top);
             let quick = ["column", "cantilever", "disks", "drivers"];

@@ -79,6 +79,18 @@ impl Lines {
         &self.found
     }
 
+    /// Those from a number on, which becomes that of all.
+    pub(crate) fn since(&self, number: &mut usize) -> Vec<(String, f64)> {
+        let lines = self.found[*number..].to_vec();
+        *number = self.found.len();
+        lines
+    }
+
+    /// Adds lines that were measured by the same program.
+    pub(crate) fn put(&mut self, lines: Vec<(String, f64)>) {
+        self.found.extend(lines);
+    }
+
     /// How many there are.
     pub(crate) fn count(&self) -> usize {
         self.found.len()

@@ -10,12 +10,14 @@ pub(crate) struct Page {
     path: PathBuf,
     body: String,
     lines: Lines,
+    /// How many lines have been taken.
+    taken: usize,
 }
 
 impl Page {
     /// A page to be written to `path`; plots go to a folder beside it.
     pub(crate) fn new(path: &Path, top: &Path) -> Self {
-        Self { path: path.to_path_buf(), body: String::new(), lines: Lines::new(top) }
+        Self { path: path.to_path_buf(), body: String::new(), lines: Lines::new(top), taken: 0 }
     }
 
     fn plots(&self) -> PathBuf {
@@ -57,6 +59,17 @@ impl Page {
         self.lines.add(id, ours);
     }
 
+    /// Takes the text and the lines since the last call.
+    pub(crate) fn take(&mut self) -> (String, Vec<(String, f64)>) {
+        (std::mem::take(&mut self.body), self.lines.since(&mut self.taken))
+    }
+
+    /// Adds text and lines that were taken.
+    pub(crate) fn give(&mut self, (text, lines): (String, Vec<(String, f64)>)) {
+        self.body.push_str(&text);
+        self.lines.put(lines);
+    }
+
     /// The lines so far.
     pub(crate) fn lines(&self) -> &Lines {
         &self.lines
@@ -67,7 +80,7 @@ impl Page {
         let (failures, _) = self.lines.failures();
         let head = format!(
             "# Verification\n\n\
-             Written by `studies/verification/run --full`, which runs every case below anew; `--quick` runs the small ones, `--only NAME` one. References and tolerances \
+             Written by `studies/verification/run --full`, which runs every case below anew; `--quick` runs the small ones, `--only NAME` one, whose section it replaces. References and tolerances \
              stand in [expected.toml](../studies/verification/expected.toml) and in [tables](../studies/verification/references/README.md) made by other codes.\n\n\
              {failures} of {} lines fail.\n\n",
             self.lines.count()

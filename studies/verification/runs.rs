@@ -18,6 +18,8 @@ pub(crate) struct Runs {
     pub ranks: usize,
     /// Which sizes are run.
     pub effort: Effort,
+    /// Settings that all runs get beside their own.
+    pub set: Vec<String>,
 }
 
 /// Which sizes are run.
@@ -27,18 +29,22 @@ pub(crate) enum Effort {
     Quick,
     /// All.
     Full,
+    /// All, and columns of sand in space with half the cells.
+    Fine,
 }
 
 /// What a run has left.
 pub(crate) struct Results {
     folder: PathBuf,
     name: String,
+    /// Processor time of the run, s.
+    pub processor: f64,
 }
 
 impl Runs {
     /// Whether all sizes are run.
     pub(crate) fn is_full(&self) -> bool {
-        self.effort == Effort::Full
+        self.effort >= Effort::Full
     }
 
     /// Runs a job of `jobs/` with settings `KEY=VALUE`; the results have a name of their own.
@@ -53,12 +59,22 @@ impl Runs {
             mpirun
         };
         command.arg("run").arg(&path).args(["--overwrite", "--threads", "1", "--out"]).arg(&folder);
-        settings.iter().for_each(|setting| _ = command.args(["--set", setting]));
+        settings.iter().chain(&self.set).for_each(|setting| _ = command.args(["--set", setting]));
+        let before = ticks_of_children();
         let output = checked(command.output());
+        let processor = (ticks_of_children() - before) / TICKS;
         let text = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{command:?}\n{text}");
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Results { folder, name: stem }
+        Results { folder, name: stem, processor }
+    }
+
+    /// A column of words of a reference.
+    pub(crate) fn texts(&self, file: &str, name: &str) -> Vec<String> {
+        let path = self.top.join("studies/verification/references").join(file);
+        let mut reader = checked(csv::Reader::from_path(path));
+        let place = checked(reader.headers()).iter().position(|head| head == name).unwrap_or(0);
+        reader.records().map(|row| checked(row).get(place).unwrap_or_default().to_owned()).collect()
     }
 
     /// A table of a reference: the columns of these names.
@@ -105,6 +121,17 @@ impl Results {
         let file = checked(Reader::open_alone(&self.output(number)));
         checked(file.read_slab::<f64>("VTKHDF/FieldData/TimeValue", 0, 1))[0]
     }
+}
+
+/// Clock ticks per second in `/proc`; the same on all Linux systems.
+const TICKS: f64 = 100.0;
+
+/// Processor time of the children that have ended, in ticks; 0 where there is no `/proc`.
+fn ticks_of_children() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name of the program, in brackets, may contain spaces. User and system time of children are fields 16 and 17 of the file.
+    let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace().skip(13).take(2);
+    fields.filter_map(|field| field.parse::<f64>().ok()).sum()
 }
 
 /// Columns of a table whose names begin so.

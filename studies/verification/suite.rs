@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use agimp::checksum::fnv1a;
 use agimp::job::{AnyProblem, Problem, parse};
 use partition::comm::{Comm, World};
 
@@ -39,31 +40,70 @@ where
 /// A section of the page that is computed in this process.
 type Section = fn(&Comm, &mut page::Page);
 
+/// The page of the documentation.
+const PAGE: &str = "docs/verification.md";
+
 /// What is asked for.
 struct Arguments {
     effort: Effort,
     only: Vec<String>,
+    /// Settings `KEY=VALUE` that all runs get beside their own, for trials.
+    set: Vec<String>,
     page: PathBuf,
 }
 
 fn arguments() -> Arguments {
     let mut found =
-        Arguments { effort: Effort::Full, only: Vec::new(), page: PathBuf::from("docs/verification.md") };
+        Arguments { effort: Effort::Full, only: Vec::new(), set: Vec::new(), page: PathBuf::from(PAGE) };
     let mut all = std::env::args().skip(1);
     while let Some(argument) = all.next() {
         match argument.as_str() {
             "--quick" => found.effort = Effort::Quick,
             "--full" => found.effort = Effort::Full,
+            "--fine" => found.effort = Effort::Fine,
             "--only" => found.only.extend(all.next()),
+            "--set" => found.set.extend(all.next()),
             "--page" => found.page = all.next().unwrap_or_default().into(),
-            other => panic!("found {other}; expected --quick, --full, --only NAME or --page FILE"),
+            other => {
+                panic!(
+                    "found {other}; expected --quick, --full, --fine, --only NAME, --set KEY=VALUE or --page FILE"
+                )
+            }
         }
     }
     found
 }
 
+/// Sections that are measured, so that those of one problem can be measured anew: they belong to the page of one program.
+struct Store {
+    /// Where they are; `None` where the page is not to be written.
+    folder: Option<PathBuf>,
+}
+
+impl Store {
+    fn new(runs: &Runs) -> Self {
+        let program = checked(std::fs::read(&runs.agimp));
+        let words = program.chunks_exact(8).map(|word| u64::from_le_bytes(std::array::from_fn(|i| word[i])));
+        let folder = runs.top.join("target/verification").join(format!("{:016x}", fnv1a(words)));
+        let is_page = runs.effort == Effort::Full && runs.set.is_empty();
+        Self { folder: is_page.then_some(folder) }
+    }
+
+    fn put(&self, name: &str, section: (String, Vec<(String, f64)>)) {
+        if let Some(folder) = &self.folder {
+            checked(std::fs::create_dir_all(folder));
+            checked(std::fs::write(folder.join(name), checked(serde_json::to_string(&section))));
+        }
+    }
+
+    fn get(&self, name: &str) -> Option<(String, Vec<(String, f64)>)> {
+        let text = std::fs::read_to_string(self.folder.as_ref()?.join(name)).ok()?;
+        serde_json::from_str(&text).ok()
+    }
+}
+
 fn main() -> ExitCode {
-    let Arguments { effort, only, page: path } = arguments();
+    let Arguments { effort, only, set, page: path } = arguments();
     let world = checked(World::init());
     checked(rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global());
     let mut page = page::Page::new(&path, &checked(std::env::current_dir()));
@@ -76,24 +116,34 @@ fn main() -> ExitCode {
         folder: std::env::temp_dir().join(format!("agimp_verification_{}", std::process::id())),
         ranks: 1,
         effort,
+        set,
     };
     let sections: [(&str, Section); 3] =
         [("wave", wave::section), ("advect", advect::section), ("spin", spin::section)];
     let is_wanted = |name: &str| only.is_empty() || only.iter().any(|wanted| wanted == name);
+    let names = problems::ALL.iter().map(|(name, _)| *name).chain(sections.map(|(name, _)| name));
+    if let Some(other) = only.iter().find(|wanted| !names.clone().any(|name| name == *wanted)) {
+        panic!("found --only {other}; expected one of {}", names.collect::<Vec<_>>().join(", "));
+    }
+    let store = Store::new(&runs);
     for (name, problem) in problems::ALL.into_iter().filter(|(name, _)| is_wanted(name)) {
         let start = Instant::now();
         problem(&runs, &mut page);
         println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
+        store.put(name, page.take());
     }
     for (name, section) in sections.into_iter().filter(|(name, _)| is_wanted(name) && runs.is_full()) {
         let start = Instant::now();
         section(world.comm(), &mut page);
         println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
+        store.put(name, page.take());
     }
     let _ = std::fs::remove_dir_all(&runs.folder);
-    // A page without some of its lines would not be the page.
-    if only.is_empty() && runs.is_full() {
-        page.finish();
+    // A page without some of its sections would not be the page.
+    if let Some(all) = names.map(|name| store.get(name)).collect::<Option<Vec<_>>>() {
+        let mut whole = page::Page::new(&path, &runs.top);
+        all.into_iter().for_each(|section| whole.give(section));
+        whole.finish();
         println!("{} written", path.display());
     }
     let (failures, unknown) = page.lines().failures();

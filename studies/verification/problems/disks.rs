@@ -9,7 +9,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
          Two disks (radius 0.2 m, E = 1 kPa, nu = 0.3, 1000 kg/m3, plane strain) meet head-on along the diagonal with 0.1 m/s along each axis (Sulsky, \
          Chen and Schreyer 1994): [job](../jobs/verification/disks.toml). Exact: no momentum at any time, both are mirror images, the energy does not grow, \
          and they touch at 1.586 s. Through one grid they feel each other earlier, up to two cells apart. Rebound speeds by finite elements are \
-         kept apart for an independent comparison. Exercises momentum across cells, contact through the grid, and what each transfer keeps.\n",
+         kept apart for an independent comparison. Exercises momentum across cells, contact through the grid, and what each transfer keeps; processor times contain reading and writing of files.\n",
     );
     let mut rows = Vec::new();
     let mut series = Vec::new();
@@ -19,6 +19,10 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
             ("flip", "transfer=\"flip\"", 1),
             ("apic", "transfer=\"apic\"", 0),
             ("apic", "transfer=\"apic\"", 1),
+            ("tpic", "transfer=\"tpic\"", 0),
+            ("tpic", "transfer=\"tpic\"", 1),
+            ("xpic", "transfer=\"xpic\"", 0),
+            ("xpic", "transfer=\"xpic\"", 1),
         ]
     } else {
         &[("flip", "transfer=\"flip\"", 0), ("apic", "transfer=\"apic\"", 0)]
@@ -64,6 +68,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
             format!("{:.2} %", 100.0 * loss),
             format!("{touch:.3}"),
             format!("{rebound:.5}"),
+            format!("{:.1}", results.processor),
         ]);
         series.push(Series { name: id, points: energy.into_iter().step_by(5).collect(), marks: false });
     }
@@ -75,6 +80,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
             "energy lost",
             "first contact, s",
             "rebound speed along x, m/s",
+            "processor time, s",
         ],
         &rows,
     );

@@ -1,4 +1,4 @@
-//! Problem 14: a strip footing, and a thick cylinder.
+//! Problem 14: a strip footing, a thick cylinder, and a cone.
 use crate::page::Page;
 use crate::plot::{Chart, Series};
 use crate::runs::{Runs, between};
@@ -65,6 +65,37 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
                     marks: false,
                 },
                 Series { name: "ours".into(), points, marks: true },
+            ],
+        },
+    );
+    if runs.is_full() {
+        cone(runs, page);
+    }
+}
+
+fn cone(runs: &Runs, page: &mut Page) {
+    page.text(
+        "*Cone* ([job](../jobs/cone_penetration.toml)): a smooth cone of 30 mm and 60 degrees goes into clay (von Mises, G = 50 s), a quarter in space, cells of 5 mm at the cone, F-bar. Resistance over s, the mean from 64 to 112 mm of depth; cavity expansion with steady flow round the tip \
+         has 8.35 for this stiffness (Teh and Houlsby 1991).\n",
+    );
+    let results = runs.run("cone_penetration", "cone", &[]);
+    let rows = results.history(["time", "force_cone_z"]);
+    let area = std::f64::consts::PI * 0.015 * 0.015;
+    let curve: Vec<[f64; 2]> =
+        rows.iter().map(|row| [800.0 * row[0], 4.0 * row[1].abs() / area / 20e3]).collect();
+    let steady = curve.iter().filter(|row| (64.0..112.0).contains(&row[0]));
+    let (count, sum) = steady.fold((0.0, 0.0), |(count, sum), row| (count + 1.0, sum + row[1]));
+    page.line("cone", sum / count);
+    let limit = vec![[0.0, 8.35], [curve[curve.len() - 1][0], 8.35]];
+    page.plot(
+        "cone",
+        &Chart {
+            title: "Resistance of the cone over s",
+            labels: ["depth, mm", ""],
+            logarithmic: [false, false],
+            series: vec![
+                Series { name: "ours".into(), points: curve, marks: false },
+                Series { name: "Teh and Houlsby".into(), points: limit, marks: false },
             ],
         },
     );

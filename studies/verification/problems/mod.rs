@@ -4,7 +4,10 @@ use crate::runs::Runs;
 
 pub(crate) mod bar;
 pub(crate) mod cantilever;
+pub(crate) mod collapse;
 pub(crate) mod column;
+pub(crate) mod contact;
+pub(crate) mod cost;
 pub(crate) mod dam_break;
 pub(crate) mod disks;
 pub(crate) mod drivers;
@@ -17,17 +20,21 @@ pub(crate) mod taylor;
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 10] = [
+pub(crate) const ALL: [(&str, Problem); 14] = [
     ("bar", bar::section),
-    ("manufactured", manufactured::section),
+    ("manufactured", manufactured::square),
+    ("manufactured_3d", manufactured::cube),
     ("column", column::section),
     ("cantilever", cantilever::section),
     ("disks", disks::section),
+    ("collapse", collapse::section),
     ("taylor", taylor::section),
     ("drivers", drivers::section),
     ("dam_break", dam_break::section),
     ("incline", incline::section),
+    ("contact", contact::section),
     ("footing", footing::section),
+    ("cost", cost::section),
 ];
 
 /// Order of convergence of errors from one number of cells to another.
