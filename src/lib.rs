@@ -18,6 +18,7 @@ pub mod memory;
 pub mod particle;
 pub mod probe;
 pub mod quantity;
+pub mod report;
 pub mod run;
 pub mod setup;
 pub mod simd;

@@ -20,6 +20,21 @@ pub fn quantity(value: f64, unit: &str) -> String {
 /// A quantity with this number of significant digits, without zeros at the end, and a metric prefix where people put one
 /// before the unit.
 pub fn quantity_to(value: f64, unit: &str, digits: usize) -> String {
+    let (power, prefix) = prefix(value, unit, digits);
+    // Dividing by a whole power is exact to one rounding, multiplying by its inverse is not.
+    let scaled = if power < 0 { value * 10_f64.powi(-power) } else { value / 10_f64.powi(power) };
+    let number = number(scaled, digits);
+    if unit.is_empty() { number } else { format!("{number} {prefix}{unit}") }
+}
+
+/// The unit with its prefix in which numbers up to `greatest` are short, and by what they are divided: `(1e3, "kJ")`.
+pub fn scale(greatest: f64, unit: &str) -> (f64, String) {
+    let (power, prefix) = prefix(greatest, unit, DIGITS);
+    (10_f64.powi(power), format!("{prefix}{unit}"))
+}
+
+/// The power of ten and the prefix that people put before the unit of a value.
+fn prefix(value: f64, unit: &str, digits: usize) -> (i32, &'static str) {
     let (least, greatest) = match unit {
         // No kiloseconds; hours and days are for `clock`.
         "s" => (-9, 0),
@@ -31,11 +46,12 @@ pub fn quantity_to(value: f64, unit: &str, digits: usize) -> String {
     let wanted = decimal_exponent(value, digits).div_euclid(3) * 3;
     let usable =
         |&(power, _): &(i32, &str)| (least..=greatest).contains(&power) && power <= wanted.max(least);
-    let (power, prefix) = PREFIXES.into_iter().rfind(|entry| usable(entry)).unwrap_or((0, ""));
-    // Dividing by a whole power is exact to one rounding, multiplying by its inverse is not.
-    let scaled = if power < 0 { value * 10_f64.powi(-power) } else { value / 10_f64.powi(power) };
-    let number = number(scaled, digits);
-    if unit.is_empty() { number } else { format!("{number} {prefix}{unit}") }
+    PREFIXES.into_iter().rfind(|entry| usable(entry)).unwrap_or((0, ""))
+}
+
+/// Text in which HTML sees nothing of its own.
+pub fn html(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A number with this many significant digits, without zeros at the end.
@@ -205,6 +221,19 @@ mod tests {
         for (value, unit, expected) in cases {
             assert_eq!(quantity(value, unit), expected);
         }
+    }
+
+    #[test]
+    fn titles_do_not_become_markup() {
+        assert_eq!(html("<b>\"a\" & b</b>"), "&lt;b&gt;&quot;a&quot; &amp; b&lt;/b&gt;");
+    }
+
+    #[test]
+    fn scales_are_those_of_the_greatest_value() {
+        assert_eq!(scale(0.25, "s"), (1e-3, "ms".into()));
+        assert_eq!(scale(3.1e5, "J"), (1e3, "kJ".into()));
+        assert_eq!(scale(3.1e5, "kg m/s"), (1.0, "kg m/s".into()));
+        assert_eq!(scale(0.0, "Pa"), (1.0, "Pa".into()));
     }
 
     #[test]

@@ -103,8 +103,13 @@ fn run<const D: usize>(
     machine: machine::Machine,
 ) -> Result<Option<Figures>, RunError> {
     let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
-    let options =
-        Options { restart: None, overwrite: true, speaks: false, threads: rayon::current_num_threads() };
+    let options = Options {
+        restart: None,
+        overwrite: true,
+        speaks: false,
+        threads: rayon::current_num_threads(),
+        warnings: Vec::new(),
+    };
     let mut recorder = Recorder::open(comm, problem, &options, &mut solver, None)?;
     let warm_up = job.warm_up.next_multiple_of(extent.steps);
     let (mut busy, mut start) = (busy_seconds(), std::time::Instant::now());

@@ -15,7 +15,7 @@ mod shared;
 mod sweep;
 pub mod weights;
 
-use self::files::{diff, digest, info, plot, view};
+use self::files::{diff, digest, info, plot, report, view};
 pub use self::shared::message::unusable;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
@@ -44,6 +44,8 @@ pub enum Command {
     Info(info::Arguments),
     /// Draw the particles of an output file as PNG.
     Plot(plot::Arguments),
+    /// Write an HTML page of a run: pictures, curves, numbers, where the time went, the job.
+    Report(report::Arguments),
     /// Write an HTML page that shows particles and tree in a browser: turn, zoom, play, cut, read values.
     View(view::Arguments),
     /// Print a number that is equal for equal states, whatever the ranks that wrote the files.
@@ -124,6 +126,7 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::New(arguments) => new::execute(&arguments),
         Command::Info(arguments) => info::execute(&arguments),
         Command::Plot(arguments) => plot::execute(&arguments),
+        Command::Report(arguments) => report::execute(&arguments),
         Command::View(arguments) => view::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),
         Command::Diff(arguments) => diff::execute(&arguments),

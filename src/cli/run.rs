@@ -12,6 +12,7 @@ use super::shared::settings::Changes;
 use crate::io::cause::tell_size_limits;
 use crate::job::problem::AnyProblem;
 use crate::job::{Problem, Settings};
+use crate::report::{self, Results};
 use crate::run::stop::StopRequest;
 use crate::run::{self, Options, Outcome, RunError, Summary, restart};
 use crate::setup::estimate::steps;
@@ -69,6 +70,10 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     ranks::same_command(comm, &arguments.words(&settings))?;
     let problem = ranks::load(comm, &arguments.job, &settings)?;
     let threads = together(comm, start_threads(comm, arguments.threads))?;
+    let warned = match &problem {
+        AnyProblem::Two(problem) => warned(comm, problem, arguments.restart.is_none()),
+        AnyProblem::Three(problem) => warned(comm, problem, arguments.restart.is_none()),
+    };
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from.to_str() {
             Some("latest") => restart::From::Latest,
@@ -77,35 +82,46 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         overwrite: arguments.overwrite,
         speaks: comm.rank() == 0 && !arguments.quiet,
         threads,
+        warnings: together(comm, warned)?,
     };
-    let warned = match &problem {
-        AnyProblem::Two(problem) => warned(comm, problem, arguments.restart.is_none()),
-        AnyProblem::Three(problem) => warned(comm, problem, arguments.restart.is_none()),
-    };
-    together(comm, warned)?;
     let outcome = match &problem {
         AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
-    together(comm, conclude(outcome, options.speaks))
+    let page = match (&outcome, comm.rank()) {
+        (Ok(Outcome::Finished(_)), 0) if problem.output().report => Some(page(&problem)),
+        _ => None,
+    };
+    together(comm, conclude(outcome, page, options.speaks))
 }
 
-/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew.
-fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Result<(), Failure> {
+/// Writes the page of a finished run. All results are on disk by now, so a failure is only a message.
+fn page(problem: &AnyProblem) -> Result<PathBuf, String> {
+    let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
+    let path = results.path("report.html");
+    report::write(&results, &report::Options::default(), &path).map_err(|error| error.to_string())?;
+    Ok(path)
+}
+
+/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew. Returns the warnings.
+fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Result<Vec<String>, Failure> {
     let (_, steps) = steps(problem).map_err(|error| Failure::Usage(error.to_string()))?;
-    if comm.rank() == 0 && is_new {
-        warn_of(&warnings(problem, steps));
-    }
-    Ok(())
+    let found = if comm.rank() == 0 && is_new { warnings(problem, steps) } else { Vec::new() };
+    warn_of(&found);
+    Ok(found)
 }
 
 /// Reports how a finished run ended; anything else is a failure.
-fn conclude(outcome: Result<Outcome, RunError>, speaks: bool) -> Result<(), Failure> {
+fn conclude(
+    outcome: Result<Outcome, RunError>,
+    page: Option<Result<PathBuf, String>>,
+    speaks: bool,
+) -> Result<(), Failure> {
     match outcome {
         Ok(Outcome::Finished(summary)) => {
             if speaks {
                 // The run is complete and its results are on disk, whether somebody listens or not.
-                let _ = print(&mut std::io::stdout().lock(), &summary);
+                let _ = print(&mut std::io::stdout().lock(), &summary, page.as_ref());
             }
             Ok(())
         }
@@ -116,12 +132,21 @@ fn conclude(outcome: Result<Outcome, RunError>, speaks: bool) -> Result<(), Fail
 }
 
 /// What the user wants to know when the run is over.
-fn print(out: &mut impl Write, summary: &Summary) -> std::io::Result<()> {
+fn print(
+    out: &mut impl Write,
+    summary: &Summary,
+    page: Option<&Result<PathBuf, String>>,
+) -> std::io::Result<()> {
     writeln!(out, "outputs  {} (open in ParaView)", summary.series.display())?;
     match &summary.picture {
         Ok(Some(path)) => writeln!(out, "picture  {}", path.display())?,
         Ok(None) => {}
         Err(reason) => writeln!(out, "no picture: {reason}")?,
+    }
+    match page {
+        Some(Ok(path)) => writeln!(out, "report   {} (open in a browser)", path.display())?,
+        Some(Err(reason)) => writeln!(out, "no report: {reason}")?,
+        None => {}
     }
     if let Some(collapse) = &summary.collapse {
         writeln!(out, "{collapse}")?;

@@ -1,6 +1,7 @@
 //! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, scalar histories,
-//! telemetry, progress and pictures.
+//! telemetry, progress, charts and pictures.
 pub mod cause;
+pub(crate) mod chart;
 pub mod frame;
 pub mod hdf5_file;
 pub mod history;

@@ -49,6 +49,22 @@ impl AnyProblem {
             Self::Three(problem) => problem.time.end,
         }
     }
+
+    /// Name of the job.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Two(problem) => &problem.name,
+            Self::Three(problem) => &problem.name,
+        }
+    }
+
+    /// What the run writes, and where.
+    pub fn output(&self) -> &OutputSetup {
+        match self {
+            Self::Two(problem) => &problem.output,
+            Self::Three(problem) => &problem.output,
+        }
+    }
 }
 
 impl TryFrom<AnyProblem> for Problem<2> {
@@ -417,6 +433,8 @@ pub struct OutputSetup {
     pub picture: bool,
     /// Field that colours it; `None`: what suits the materials.
     pub picture_field: Option<Field>,
+    /// Whether the run ends with a page for a browser.
+    pub report: bool,
 }
 
 /// When checkpoints are written, beside the end of the run.

@@ -111,6 +111,20 @@ fn lock(path: &Path) -> Result<Held, Refusal> {
     }
 }
 
+/// Who holds a lock file, if a process does now. A file that a crash has left is held by nobody.
+pub fn holder(path: &Path) -> Option<String> {
+    let file = OpenOptions::new().read(true).custom_flags(libc::O_NOFOLLOW).open(path).ok()?;
+    match file.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            // What cannot be read is left out.
+            let _ = file.take(200).read_to_string(&mut holder);
+            Some(holder.trim().escape_debug().to_string())
+        }
+        _ => None,
+    }
+}
+
 fn cannot_lock(error: &std::io::Error) -> bool {
     error.kind() == ErrorKind::Unsupported
         || matches!(error.raw_os_error(), Some(libc::ENOSYS | libc::ENOLCK | libc::EOPNOTSUPP))
@@ -169,7 +183,9 @@ mod tests {
         assert!(told.starts_with(&format!("process {} on host ", std::process::id())), "{told}");
         let refusal = lock(&path).unwrap_err().to_string();
         assert!(refusal.contains("another run writes here (process "), "{refusal}");
+        assert!(holder(&path).is_some_and(|who| who.starts_with("process ")));
         drop(held);
+        assert_eq!(holder(&path), None);
         assert!(!path.exists());
         drop(lock(&path).unwrap());
     }

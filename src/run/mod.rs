@@ -1,5 +1,5 @@
 //! A whole run: from a checked job to its last file.
-mod claim;
+pub mod claim;
 pub mod collapse;
 mod files;
 pub mod history;

@@ -19,6 +19,8 @@ pub struct Options {
     pub speaks: bool,
     /// Threads of this rank.
     pub threads: usize,
+    /// What the user has been warned of before the run, for its report.
+    pub warnings: Vec<String>,
 }
 
 /// How a run ended.

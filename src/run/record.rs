@@ -86,7 +86,12 @@ impl<'a, const D: usize> Recorder<'a, D> {
             progress: Progress::new(options.speaks, time, problem.time.end),
             last_row,
             last_values: Vec::new(),
-            report: Report { ranks: comm.size(), threads: options.threads, ..Report::default() },
+            report: Report {
+                ranks: comm.size(),
+                threads: options.threads,
+                warnings: options.warnings.clone(),
+                ..Report::default()
+            },
             began: Instant::now(),
             since: Instant::now(),
             since_step: step,

@@ -63,19 +63,22 @@ impl Canvas {
         }
     }
 
+    /// The image as PNG.
+    pub(super) fn png(&self) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.pixels)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
     /// Not collective. Writes the image as PNG, under a temporary name first.
     pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
-        let save = || -> std::io::Result<()> {
-            // In memory first, as a buffered writer hides the error of its last piece.
-            let mut bytes = Vec::new();
-            let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
-            encoder.set_color(png::ColorType::Rgb);
-            encoder.set_depth(png::BitDepth::Eight);
-            let mut writer = encoder.write_header()?;
-            writer.write_image_data(&self.pixels)?;
-            writer.finish()?;
-            write_whole(path, &bytes)
-        };
-        save().map_err(|source| FileError::System { path: path.into(), action: "write the picture", source })
+        // In memory first, as a buffered writer hides the error of its last piece.
+        let saved = self.png().and_then(|bytes| write_whole(path, &bytes));
+        saved.map_err(|source| FileError::System { path: path.into(), action: "write the picture", source })
     }
 }

@@ -3,7 +3,7 @@
 //! Each rank draws its own particles into an image with depth; the nearest of all ranks is kept for
 //! each pixel, so a picture does not depend on the number of ranks.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use partition::comm::Comm;
 
@@ -35,12 +35,23 @@ pub struct Settings {
     pub title: String,
     /// Values of the first and the last colour; `None`: as found, without the outermost half percents.
     pub range: Option<[f64; 2]>,
+    /// Lower and upper corner of what it shows, m; `None`: the particles with some room.
+    pub frame: Option<[[f64; 3]; 2]>,
+}
+
+/// What a series of pictures shares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Values of the first and the last colour.
+    pub range: [f64; 2],
+    /// Lower and upper corner of what they show, m.
+    pub frame: [[f64; 3]; 2],
 }
 
 impl Settings {
     /// A picture of usual size.
     pub fn new(title: &str) -> Self {
-        Self { width: 1280, height: 800, title: title.into(), range: None }
+        Self { width: 1280, height: 800, title: title.into(), range: None, frame: None }
     }
 }
 
@@ -114,6 +125,40 @@ pub fn draw<const D: usize>(
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
 pub fn draw_file(from: &Path, name: &str, settings: &Settings, path: &Path) -> Result<(), FileError> {
+    drawing(from, name)?.0.compose(settings).save(path)
+}
+
+/// Not collective. As [`draw_file`], but returns the bytes of the PNG, and the time of the file, s.
+///
+/// # Errors
+/// The file cannot be read or does not offer the quantity.
+pub fn png_of_file(from: &Path, name: &str, settings: &Settings) -> Result<(Vec<u8>, f64), FileError> {
+    let (drawing, time) = drawing(from, name)?;
+    let refused = |error: std::io::Error| FileError::Refused { path: from.into(), reason: error.to_string() };
+    Ok((drawing.compose(settings).png().map_err(refused)?, time))
+}
+
+/// Not collective. A frame and a range of colours for all of these files.
+///
+/// # Errors
+/// One cannot be read or does not offer the quantity.
+pub fn survey(files: &[PathBuf], name: &str) -> Result<Look, FileError> {
+    let mut all: Option<Look> = None;
+    for file in files {
+        let (drawing, _) = drawing(file, name)?;
+        let (Bounds { low, high }, [from, to]) = (drawing.frame(), drawing.range(None));
+        let seen = all.get_or_insert(Look { range: [from, to], frame: [low, high] });
+        seen.range = [seen.range[0].min(from), seen.range[1].max(to)];
+        for axis in 0..3 {
+            seen.frame[0][axis] = seen.frame[0][axis].min(low[axis]);
+            seen.frame[1][axis] = seen.frame[1][axis].max(high[axis]);
+        }
+    }
+    Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]] }))
+}
+
+/// What a file shows of a quantity, and its time, s.
+fn drawing(from: &Path, name: &str) -> Result<(Drawing<'static>, f64), FileError> {
     let file = Reader::open_alone(from)?;
     let header = Header::read(&file)?;
     let n = header.particles;
@@ -131,7 +176,7 @@ pub fn draw_file(from: &Path, name: &str, settings: &Settings, path: &Path) -> R
         .collect();
     let caption = caption(header.time, header.step, n);
     let flat = header.dimension == 2;
-    Drawing { comm: None, flat, domain, splats, tint, caption }.compose(settings).save(path)
+    Ok((Drawing { comm: None, flat, domain, splats, tint, caption }, header.time))
 }
 
 /// One number per particle: scalars as they are, of vectors the magnitude.
@@ -196,12 +241,13 @@ impl Drawing<'_> {
     }
 
     /// Collective on a shared drawing. The values between which the colours run.
-    fn range(&self, settings: &Settings, classes: bool) -> [f64; 2] {
+    fn range(&self, given: Option<[f64; 2]>) -> [f64; 2] {
         const BINS: usize = 1000;
+        let classes = self.tint.classes;
         let values = || self.splats.iter().map(|splat| splat.value).filter(|value| value.is_finite());
         let low = self.min(values().fold(f64::INFINITY, f64::min));
         let high = self.max(values().fold(f64::NEG_INFINITY, f64::max));
-        if let Some(range) = settings.range {
+        if let Some(range) = given {
             return range;
         }
         if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) || classes {
@@ -225,8 +271,8 @@ impl Drawing<'_> {
     /// Collective on a shared drawing. The picture; whole on rank 0.
     fn compose(mut self, settings: &Settings) -> Canvas {
         let classes = self.tint.classes;
-        let frame = self.frame();
-        let [low, high] = self.range(settings, classes);
+        let frame = settings.frame.map_or_else(|| self.frame(), |[low, high]| Bounds { low, high });
+        let [low, high] = self.range(settings.range);
         let (width, height) = (settings.width as f64, settings.height as f64);
         let [left, right, top, bottom] = MARGINS;
         let left = if self.flat { left + 60.0 } else { left };

@@ -159,6 +159,7 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         restart: output.restart,
         picture: output.picture,
         picture_field: output.picture_field,
+        report: output.report,
     }
 }
 

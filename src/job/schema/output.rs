@@ -29,6 +29,9 @@ pub struct Output {
     /// Field that colours the picture; by default the plastic strain if a material has it, else the speed.
     #[serde(default)]
     pub picture_field: Option<Field>,
+    /// Whether the run ends with a page for a browser, `JOB.report.html`, as `agimp report` writes it.
+    #[serde(default)]
+    pub report: bool,
 }
 
 impl Output {
@@ -47,6 +50,7 @@ impl Default for Output {
             restart: true,
             picture: true,
             picture_field: None,
+            report: false,
         }
     }
 }

@@ -1,0 +1,157 @@
+//! The files of a run.
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::io::hdf5_file::Reader;
+use crate::io::snapshot::directory::{listed, series_path};
+use crate::io::snapshot::{self, Header};
+use crate::run::claim;
+use crate::run::report::{self, Report};
+
+/// The results of a run in a directory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Results {
+    /// Directory of all its files.
+    pub directory: PathBuf,
+    /// Name of the job.
+    pub name: String,
+}
+
+/// Why a directory does not say which run is meant.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unclear {
+    /// No run has left anything there.
+    #[error("{}: found no history of a run (NAME.history.csv); expected the directory of the results of a run", .0.display())]
+    Nothing(PathBuf),
+    /// Several runs have.
+    #[error("{}: found the results of {}; choose one with --name", .0.display(), .1.join(", "))]
+    Several(PathBuf, Vec<String>),
+}
+
+/// How far a run has come.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// It has written its report.
+    Finished,
+    /// It has its lock; who it is.
+    Running(String),
+    /// Neither.
+    Ended,
+}
+
+/// Ending of the file that each run begins with.
+const HISTORY: &str = ".history.csv";
+
+impl Results {
+    /// The results in a directory, of the job of this name if one is given.
+    ///
+    /// # Errors
+    /// There are none, or those of several jobs.
+    pub fn in_directory(directory: &Path, name: Option<&str>) -> Result<Self, Unclear> {
+        let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+        let mut names: Vec<String> = entries
+            .filter_map(|entry| Some(entry.file_name().to_str()?.strip_suffix(HISTORY)?.to_owned()))
+            .filter(|found| name.is_none_or(|name| name == found))
+            .collect();
+        names.sort_unstable();
+        match names.len() {
+            0 => Err(Unclear::Nothing(directory.into())),
+            1 => Ok(Self { directory: directory.into(), name: names.remove(0) }),
+            _ => Err(Unclear::Several(directory.into(), names)),
+        }
+    }
+
+    /// The file with this ending.
+    pub fn path(&self, ending: &str) -> PathBuf {
+        self.directory.join(format!("{}.{ending}", self.name))
+    }
+
+    /// Outputs in order of time.
+    pub(super) fn outputs(&self) -> Vec<PathBuf> {
+        let entries = listed(&series_path(&self.directory, &self.name)).unwrap_or_default();
+        entries
+            .into_iter()
+            .map(|entry| self.directory.join(entry.name))
+            .filter(|path| path.is_file())
+            .collect()
+    }
+
+    /// What the last output says about itself.
+    pub(super) fn header(&self) -> Option<Header> {
+        Header::read(&Reader::open_alone(self.outputs().last()?).ok()?).ok()
+    }
+
+    /// Text of the job, as the last output has it.
+    pub(super) fn job_text(&self) -> Option<String> {
+        snapshot::job_text(self.outputs().last()?)
+    }
+
+    /// What the run says of itself, if it has finished.
+    pub(super) fn report(&self) -> Option<Report> {
+        serde_json::from_slice(&std::fs::read(report::path(&self.directory, &self.name)).ok()?).ok()
+    }
+
+    pub(super) fn state(&self) -> State {
+        match claim::holder(&self.path("lock")) {
+            _ if self.report().is_some() => State::Finished,
+            Some(holder) => State::Running(holder),
+            None => State::Ended,
+        }
+    }
+
+    /// Files of the run by kind: name or pattern, number, bytes.
+    pub(super) fn files(&self) -> Vec<(String, u64, u64)> {
+        let mut kinds: BTreeMap<String, (u64, u64)> = BTreeMap::new();
+        for entry in std::fs::read_dir(&self.directory).into_iter().flatten().flatten() {
+            let (name, size) = (entry.file_name(), entry.metadata().map_or(0, |data| data.len()));
+            let Some(name) = name.to_str() else { continue };
+            let rest = name.strip_prefix(&*self.name).filter(|rest| rest.starts_with(['.', '_']));
+            let Some(rest) = rest.filter(|rest| !rest.ends_with(".part")) else { continue };
+            // A number of a series, which an ending follows, becomes a star.
+            let digits = |part: &str| part.len() >= 6 && part.bytes().all(|byte| byte.is_ascii_digit());
+            let parts: Vec<&str> = rest.split_inclusive(['.', '_']).collect();
+            let pattern: String = parts
+                .iter()
+                .map(|part| match part.strip_suffix('.') {
+                    Some(number) if digits(number) => "*.",
+                    _ => part,
+                })
+                .collect();
+            let kind = kinds.entry(format!("{}{pattern}", self.name)).or_default();
+            *kind = (kind.0 + 1, kind.1 + size);
+        }
+        kinds.into_iter().map(|(name, (number, size))| (name, number, size)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_directory_says_whose_results_it_holds() {
+        let directory = tempfile::tempdir().unwrap();
+        let here = directory.path();
+        assert!(matches!(Results::in_directory(here, None), Err(Unclear::Nothing(_))));
+        std::fs::write(here.join("a.history.csv"), "").unwrap();
+        assert_eq!(Results::in_directory(here, None).unwrap().name, "a");
+        std::fs::write(here.join("b.c.history.csv"), "").unwrap();
+        let names = vec!["a".to_owned(), "b.c".to_owned()];
+        assert_eq!(Results::in_directory(here, None), Err(Unclear::Several(here.into(), names)));
+        assert_eq!(Results::in_directory(here, Some("b.c")).unwrap().name, "b.c");
+        assert_eq!(Results::in_directory(here, Some("a")).unwrap().state(), State::Ended);
+    }
+
+    #[test]
+    fn files_of_a_series_are_one_kind() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in
+            ["a_000000.hdf", "a_000001.hdf", "a_000000.tree.hdf", "a.history.csv", "ab.png", "a_1.txt.part"]
+        {
+            std::fs::write(directory.path().join(name), "12").unwrap();
+        }
+        let files = Results { directory: directory.path().into(), name: "a".into() }.files();
+        let expected = [("a.history.csv", 1, 2), ("a_*.hdf", 2, 4), ("a_*.tree.hdf", 1, 2)];
+        assert_eq!(files, expected.map(|(name, number, size)| (name.to_owned(), number, size)));
+    }
+}
