@@ -221,6 +221,33 @@ fn new_without_a_name_lists_the_templates() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean \"elastic_cubes\"?"));
 }
 
+/// Each template of a job in the plane is written, checked and does a step as it is; the schema lies beside it, where editors look.
+#[test]
+fn templates_run_as_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let list = printed(&agimp(here, &["new", "--list"]));
+    let names: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() >= 14, "{names:?}");
+    let mut runs = 0;
+    for name in names {
+        let file = format!("my_{name}.toml");
+        assert_eq!(agimp(here, &["new", "--template", name, &file]).status.code(), Some(0), "{name}");
+        let text = std::fs::read_to_string(here.join(&file)).unwrap();
+        assert!(text.starts_with("#:schema ./agimp.schema.json\n"), "{name}");
+        // Those in space take longer; tests of the documentation run them shortened.
+        if text.contains("dimension = 2") {
+            let output =
+                agimp(here, &["run", &file, "--end", "1e-9", "--quiet", "--set", "output.picture=false"]);
+            assert_eq!(output.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+            runs += 1;
+        }
+    }
+    assert!(runs >= 10, "{runs}");
+    let schema = std::fs::read_to_string(here.join("agimp.schema.json")).unwrap();
+    assert_eq!(schema.trim_end(), printed(&agimp(here, &["schema"])).trim_end());
+}
+
 /// As in `agimp schema | head -1`.
 #[test]
 fn who_stops_reading_ends_the_program_quietly() {

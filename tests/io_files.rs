@@ -702,9 +702,9 @@ fn a_picture_is_the_same_on_any_ranks() {
             let path = |d: usize| directory.join(format!("{d}_{}.png", comm.size()));
             let settings = Settings::new("made up");
             let solid = Run::<3>::example(share(comm, 40, 0b10), 20);
-            draw(comm, &solid.view(), PointField::Speed, &settings, &path(3)).expect("drawn");
+            draw(comm, &solid.view(), PointField::Speed, &settings, Vec::new(), &path(3)).expect("drawn");
             let plane = Run::<2>::example(share(comm, 40, 0b10), 20);
-            draw(comm, &plane.view(), PointField::Speed, &settings, &path(2)).expect("drawn");
+            draw(comm, &plane.view(), PointField::Speed, &settings, Vec::new(), &path(2)).expect("drawn");
         },
         |directory| {
             for d in [2, 3] {

@@ -15,7 +15,7 @@ mod shared;
 mod sweep;
 pub mod weights;
 
-use self::files::{diff, digest, info, plot, report, view};
+use self::files::{diff, digest, export, info, movie, plot, report, view};
 pub use self::shared::message::unusable;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
@@ -44,6 +44,10 @@ pub enum Command {
     Info(info::Arguments),
     /// Draw the particles of an output file as PNG.
     Plot(plot::Arguments),
+    /// Draw the outputs of a run as a movie.
+    Movie(movie::Arguments),
+    /// Write the particles of outputs for other programs: PLY, CSV, VTP.
+    Export(export::Arguments),
     /// Write an HTML page of a run: pictures, curves, numbers, where the time went, the job.
     Report(report::Arguments),
     /// Write an HTML page that shows particles and tree in a browser: turn, zoom, play, cut, read values.
@@ -126,6 +130,8 @@ pub fn execute(command: Command) -> Result<(), Failure> {
         Command::New(arguments) => new::execute(&arguments),
         Command::Info(arguments) => info::execute(&arguments),
         Command::Plot(arguments) => plot::execute(&arguments),
+        Command::Movie(arguments) => movie::execute(&arguments),
+        Command::Export(arguments) => export::execute(&arguments),
         Command::Report(arguments) => report::execute(&arguments),
         Command::View(arguments) => view::execute(&arguments),
         Command::Digest(arguments) => digest::execute(&arguments),

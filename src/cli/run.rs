@@ -1,7 +1,7 @@
 //! `agimp run`: runs a job, alone or on the ranks of `mpirun`.
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use partition::comm::{Comm, World, is_launched};
 
@@ -89,17 +89,18 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
     let page = match (&outcome, comm.rank()) {
-        (Ok(Outcome::Finished(_)), 0) if problem.output().report => Some(page(&problem)),
+        (Ok(Outcome::Finished(_)), 0) if problem.output().report => Some(page(&problem, &arguments.job)),
         _ => None,
     };
     together(comm, conclude(outcome, page, options.speaks))
 }
 
 /// Writes the page of a finished run. All results are on disk by now, so a failure is only a message.
-fn page(problem: &AnyProblem) -> Result<PathBuf, String> {
+fn page(problem: &AnyProblem, job: &Path) -> Result<PathBuf, String> {
     let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
     let path = results.path("report.html");
-    report::write(&results, &report::Options::default(), &path).map_err(|error| error.to_string())?;
+    let options = report::Options { job: Some(job.to_path_buf()), ..report::Options::default() };
+    report::write(&results, &options, &path).map_err(|error| error.to_string())?;
     Ok(path)
 }
 

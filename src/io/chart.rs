@@ -48,7 +48,7 @@ impl Chart {
         let mut text = String::new();
         let draw = |text: &mut String| {
             let area = SVGBackend::with_string(text, size).into_drawing_area();
-            self.draw(&area, f64::from(size.1) / 300.0)?;
+            self.draw(&area, f64::from(size.1) / 240.0)?;
             area.present()?;
             Ok::<(), Failure>(())
         };
@@ -114,7 +114,7 @@ impl Chart {
 fn span(values: impl Iterator<Item = f64>, from_zero: bool, margin: f64) -> Range<f64> {
     let start = if from_zero { (0.0, 0.0) } else { (f64::INFINITY, f64::NEG_INFINITY) };
     let (least, most) = values.fold(start, |(least, most): (f64, f64), x| (least.min(x), most.max(x)));
-    if !(least <= most) {
+    if least > most {
         return 0.0..1.0;
     }
     // A constant stands in the middle.

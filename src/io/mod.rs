@@ -2,10 +2,12 @@
 //! telemetry, progress, charts and pictures.
 pub mod cause;
 pub(crate) mod chart;
+pub mod export;
 pub mod frame;
 pub mod hdf5_file;
 pub mod history;
 pub(crate) mod lines;
+pub mod movie;
 pub mod particles;
 pub mod picture;
 pub mod progress;

@@ -11,7 +11,7 @@
 //!
 //! Runs that go on, and runs that have ended by a fault, are shown as far as they have come.
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -20,6 +20,8 @@ use crate::io::chart::{COLOURS, Chart};
 use crate::io::hdf5_file::FileError;
 use crate::io::lines::write_whole;
 use crate::io::picture;
+use crate::io::snapshot::Header;
+use crate::run::scene;
 use crate::text::{bytes, count, html, number, quantity, quantity_to, scale, wall_time};
 
 mod cost;
@@ -46,11 +48,13 @@ pub struct Options {
     pub colour: Option<String>,
     /// Most pictures: times from the first output to the last.
     pub pictures: usize,
+    /// Job file of the run, beside which the meshes of its colliders lie; `None`: where the run's name leads.
+    pub job: Option<PathBuf>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { colour: None, pictures: 4 }
+        Self { colour: None, pictures: 4, job: None }
     }
 }
 
@@ -174,7 +178,10 @@ fn facts(body: &mut String, run: &Run<'_>) {
         };
         facts.push(("leaves", format!("{} <small>{levels}</small>", count(leaves))));
         facts.push(("wall time", wall_time(run.cost.wall)));
-        facts.push(("speed", format!("{} <small>particle steps/s</small>", number(run.cost.speed(), 3))));
+        facts.push((
+            "speed",
+            format!("{} <small>million particle steps/s</small>", number(run.cost.speed() / 1e6, 3)),
+        ));
         let threads =
             if record.threads == 1 { "1 thread".into() } else { format!("{} threads", record.threads) };
         let ranks = if record.ranks == 1 { "1 rank".into() } else { format!("{} ranks", record.ranks) };
@@ -227,14 +234,18 @@ fn pictures(body: &mut String, run: &Run<'_>, options: &Options) -> Result<(), F
         (0..wanted).map(|i| last - last * (wanted - 1 - i) / wanted.max(2).saturating_sub(1)).collect();
     chosen.dedup();
     let files: Vec<_> = chosen.into_iter().map(|number| outputs[number].clone()).collect();
+    let job = scene::job_of(&outputs[last], options.job.as_deref()).ok();
+    let solids = |header: &Header| job.as_ref().map_or_else(Vec::new, |job| scene::solids_of(job, header));
+    let mut settings = picture::Settings::new("");
+    [settings.width, settings.height] = PICTURE;
+    let survey = |colour: &str| picture::survey(&files, colour, &settings, &solids);
     let (colour, look) = match &options.colour {
-        Some(colour) => (colour.as_str(), picture::survey(&files, colour)?),
+        Some(colour) => (colour.as_str(), survey(colour)?),
         None => {
-            let plastic =
-                picture::survey(&files, "plastic_strain").ok().filter(|look| look.range[1] > look.range[0]);
+            let plastic = survey("plastic_strain").ok().filter(|look| look.range[1] > look.range[0]);
             match plastic {
                 Some(look) => ("plastic_strain", look),
-                None => ("speed", picture::survey(&files, "speed")?),
+                None => ("speed", survey("speed")?),
             }
         }
     };
@@ -244,11 +255,9 @@ fn pictures(body: &mut String, run: &Run<'_>, options: &Options) -> Result<(), F
         "<p>Coloured by {}, all with one range.</p>\n<div class=\"grid\">\n",
         html(&colour.replace('_', " "))
     );
+    (settings.range, settings.frame) = (Some(look.range), Some(look.frame));
     for file in &files {
-        let mut settings = picture::Settings::new("");
-        [settings.width, settings.height] = PICTURE;
-        (settings.range, settings.frame) = (Some(look.range), Some(look.frame));
-        let (png, time) = picture::png_of_file(file, colour, &settings)?;
+        let (png, time) = picture::png_of_file(file, colour, &settings, &solids)?;
         let (data, time) = (BASE64.encode(png), quantity(time, "s"));
         let name = html(&file.file_name().unwrap_or_default().to_string_lossy());
         let _ = writeln!(

@@ -102,7 +102,9 @@ pub(super) fn panels(history: &History) -> Vec<Panel> {
             ("gravitational_energy", Some(first)) => *first,
             _ => 0.0,
         };
-        let points = times.iter().copied().zip(column.values.iter().map(|value| value - start)).collect();
+        // No step has been done at the start.
+        let value = |value: &f64| if column.name == "dt" && *value == 0.0 { f64::NAN } else { value - start };
+        let points = times.iter().copied().zip(column.values.iter().map(value)).collect();
         match panels.iter_mut().find(|panel| panel.title == title && panel.unit == column.unit) {
             Some(panel) => panel.curves.push((name, points)),
             None => {
@@ -117,6 +119,8 @@ pub(super) fn panels(history: &History) -> Vec<Panel> {
         panel.curves.push(("sum".into(), sums));
     }
     panels.retain(Panel::changes);
+    // A component that is 0 all the time only takes the room of others.
+    panels.iter_mut().for_each(|panel| panel.curves.retain(|(_, points)| points.iter().any(|p| p.1 != 0.0)));
     panels.extend(over_ways(history));
     panels
 }
@@ -231,7 +235,7 @@ mod tests {
             columns: vec![
                 column("time", "s", [0.0, 1.0, 2.0]),
                 column("kinetic_energy", "J", [0.0, 1.0, 2.0]),
-                column("gravitational_energy", "J", [100.0, 99.0, 98.0]),
+                column("gravitational_energy", "J", [100.0, 99.5, 99.0]),
                 column("mass", "kg", [5.0, 5.0, 5.0]),
                 column("force_punch_y", "N", [0.0, 3.0, 4.0]),
                 column("position_punch_x", "m", [1.0, 1.0, 1.0]),
@@ -244,7 +248,7 @@ mod tests {
             titles,
             ["Energy", "Force on punch", "Position of punch", "Force on punch along y over its way"]
         );
-        assert_eq!(panels[0].curves[2], ("sum".into(), vec![(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)]));
+        assert_eq!(panels[0].curves[2], ("sum".into(), vec![(0.0, 0.0), (1.0, 0.5), (2.0, 1.0)]));
         assert_eq!(panels[3].curves[0].1, [(-0.5, 3.0), (-1.0, 4.0)]);
     }
 }

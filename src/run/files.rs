@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::measures::maps;
-use super::{Run, RunError, restart};
+use super::{Run, RunError, restart, scene};
 use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, View};
 use crate::job::Problem;
@@ -41,7 +41,9 @@ impl<const D: usize> Run<'_, D> {
         let path = problem.output.directory.join(format!("{}.png", problem.name));
         let scalars = Scalars::default();
         let view = view(problem, &self.solver, &self.names, &scalars);
-        picture::draw(self.comm, &view, field, &picture::Settings::new(title), &path)
+        let solids =
+            scene::solids(&self.solver.physics.colliders, &self.solver.contacts.states, problem.origin);
+        picture::draw(self.comm, &view, field, &picture::Settings::new(title), solids, &path)
             .map_err(|error| error.to_string())?;
         Ok(Some(path))
     }

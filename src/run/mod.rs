@@ -8,6 +8,7 @@ mod outcome;
 pub mod record;
 pub mod report;
 pub mod restart;
+pub mod scene;
 pub mod schedule;
 pub mod stop;
 

@@ -8,6 +8,7 @@ use partition::comm::Comm;
 
 use super::{RunError, measures};
 use crate::adaptivity::resample::ids;
+use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::progress::warn;
@@ -112,7 +113,7 @@ fn stage_start(stage: usize) -> String {
 }
 
 /// Times at which stages began. `None` if the file lacks one, or no run of the job writes them.
-fn stage_starts<const D: usize>(problem: &Problem<D>, header: &Header) -> Option<Vec<f64>> {
+pub(super) fn stage_starts<const D: usize>(problem: &Problem<D>, header: &Header) -> Option<Vec<f64>> {
     let count = usize::try_from(header.scalars.count(STAGES)?).ok()?;
     if !(1..=problem.stages.len()).contains(&count) {
         return None;
@@ -222,12 +223,21 @@ fn state_name(collider: usize, number: usize) -> String {
     format!("collider_{collider}_state_{number}")
 }
 
+/// The state of a free collider in a file. `None` if it is not free, or the file lacks a number.
+pub(super) fn collider_state<const D: usize>(
+    index: usize,
+    collider: &Collider<D>,
+    scalars: &Scalars,
+) -> Option<ColliderState<D>> {
+    collider.free()?;
+    collider.from_numbers(|i| scalars.real(&state_name(index, i)))
+}
+
 /// Puts the free colliders back where the file has them. `None` if the file lacks a number.
 fn restore_colliders<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     let colliders = solver.physics.colliders.iter();
     for (index, collider) in colliders.enumerate().filter(|(_, collider)| collider.free().is_some()) {
-        let number = |i: usize| scalars.real(&state_name(index, i));
-        solver.contacts.states[index] = collider.from_numbers(number)?;
+        solver.contacts.states[index] = collider_state(index, collider, scalars)?;
     }
     Some(())
 }

@@ -3,12 +3,66 @@
 //! | file | what it does |
 //! |---|---|
 //! | `info.rs` | says what is in a file |
-//! | `plot.rs`, `view.rs` | draws particles: as PNG, as a page for a browser |
+//! | `plot.rs`, `movie.rs`, `view.rs` | draws particles: as PNG, as a movie, as a page for a browser |
+//! | `export.rs` | writes particles for other programs |
 //! | `report.rs` | writes a run on one page |
 //! | `digest.rs`, `diff.rs` | compares states: by a number, in detail |
 pub(super) mod diff;
 pub(super) mod digest;
+pub(super) mod export;
 pub(super) mod info;
+pub(super) mod movie;
 pub(super) mod plot;
 pub(super) mod report;
 pub(super) mod view;
+
+use std::path::{Path, PathBuf};
+
+use crate::io::snapshot::PointField;
+
+/// A field by its name.
+fn field(name: &str) -> Result<PointField, String> {
+    PointField::from_name(name).ok_or_else(|| {
+        let names: Vec<&str> = PointField::ALL.into_iter().map(PointField::name).collect();
+        format!("expected one of {}", names.join(", "))
+    })
+}
+
+/// What a pattern such as `out/a/*.hdf` gives, without the trees, whose outputs are there as well.
+fn without_trees(files: &[PathBuf]) -> Vec<PathBuf> {
+    let is_tree = |file: &&PathBuf| file.to_string_lossy().ends_with(".tree.hdf");
+    if files.iter().all(|file| is_tree(&file)) {
+        return files.to_vec();
+    }
+    files.iter().filter(|file| !is_tree(file)).cloned().collect()
+}
+
+/// With the ending `html`, `a/b.hdf.series` and `a/b.hdf` have their page in `a/b.html`.
+fn beside(file: &Path, ending: &str) -> PathBuf {
+    let output = if file.extension().is_some_and(|ending| ending == "series") {
+        file.with_extension("")
+    } else {
+        file.to_path_buf()
+    };
+    output.with_extension(ending)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_may_take_trees_along() {
+        let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+        let all = paths(&["a_000000.hdf", "a_000000.tree.hdf", "a_000001.hdf"]);
+        assert_eq!(without_trees(&all), paths(&["a_000000.hdf", "a_000001.hdf"]));
+        // A tree alone is refused by its name.
+        assert_eq!(without_trees(&all[1..2]), all[1..2]);
+    }
+
+    #[test]
+    fn page_lies_beside_the_file() {
+        assert_eq!(beside(Path::new("out/a/a.hdf.series"), "html"), Path::new("out/a/a.html"));
+        assert_eq!(beside(Path::new("out/a/a_000001.hdf"), "html"), Path::new("out/a/a_000001.html"));
+    }
+}

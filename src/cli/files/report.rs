@@ -31,7 +31,11 @@ pub struct Arguments {
 /// No results are found, an output cannot be read, or the page cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let results = results(&arguments.run, arguments.name.as_deref())?;
-    let options = Options { colour: arguments.colour.clone(), pictures: usize::from(arguments.pictures) };
+    let options = Options {
+        colour: arguments.colour.clone(),
+        pictures: usize::from(arguments.pictures),
+        job: Some(arguments.run.clone()).filter(|run| run.is_file()),
+    };
     let out = arguments.out.clone().unwrap_or_else(|| results.path("report.html"));
     let size = report::write(&results, &options, &out).map_err(|error| Failure::Usage(error.to_string()))?;
     writeln!(std::io::stdout(), "{} ({}; open in a browser)", out.display(), bytes(size as f64))?;

@@ -2,11 +2,13 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `looks` | options of pictures and movies |
 //! | `message` | failures in words, once whatever the number of ranks |
 //! | `quote` | the lines of a job around a fault |
 //! | `settings` | `--set`, `--out` and `--end` |
 //! | `summary` | the size and the cost of a job |
 //! | `ranks` | one command and one job on all ranks |
+pub(super) mod looks;
 pub(super) mod message;
 mod quote;
 pub(super) mod ranks;

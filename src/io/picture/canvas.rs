@@ -20,6 +20,11 @@ impl Canvas {
         Self { width, height, pixels: colour.repeat(width * height) }
     }
 
+    /// Red, green and blue of each pixel, row by row.
+    pub(super) fn into_pixels(self) -> Vec<u8> {
+        self.pixels
+    }
+
     /// Colours a pixel; outside nothing happens.
     pub(super) fn set(&mut self, x: i64, y: i64, colour: Rgb) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
@@ -53,7 +58,7 @@ impl Canvas {
     }
 
     /// Mixes a share of a colour into a pixel; outside nothing happens.
-    fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
+    pub(super) fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
             for (pixel, value) in self.pixels[at..at + 3].iter_mut().zip(colour) {

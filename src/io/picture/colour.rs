@@ -3,9 +3,78 @@
 /// Red, green, blue.
 pub(super) type Rgb = [u8; 3];
 
-/// Dark violet over green to yellow: even steps of lightness, readable in grey and by the colour-blind.
-const SEQUENCE: [Rgb; 6] =
-    [[68, 1, 84], [65, 68, 135], [42, 120, 142], [34, 168, 132], [122, 209, 81], [253, 231, 37]];
+/// A colour map for amounts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Map {
+    /// Dark violet over green to yellow: even steps of lightness, readable in grey and by the colour-blind.
+    #[default]
+    Viridis,
+    /// Black over red to light yellow; the same holds.
+    Magma,
+    /// Blue over grey to red, for what has two sides (Moreland 2009).
+    Coolwarm,
+    /// Dark to light grey.
+    Grey,
+}
+
+impl Map {
+    /// All maps with their names.
+    pub const ALL: [(&'static str, Self); 4] = [
+        ("viridis", Self::Viridis),
+        ("magma", Self::Magma),
+        ("coolwarm", Self::Coolwarm),
+        ("grey", Self::Grey),
+    ];
+
+    /// Even steps from the first to the last colour.
+    fn steps(self) -> &'static [Rgb] {
+        match self {
+            Self::Viridis => &[
+                [68, 1, 84],
+                [72, 40, 120],
+                [62, 73, 137],
+                [49, 104, 142],
+                [38, 130, 142],
+                [31, 158, 137],
+                [53, 183, 121],
+                [109, 205, 89],
+                [180, 222, 44],
+                [253, 231, 37],
+            ],
+            Self::Magma => &[
+                [0, 0, 4],
+                [28, 16, 68],
+                [79, 18, 123],
+                [129, 37, 129],
+                [181, 54, 122],
+                [229, 80, 100],
+                [251, 135, 97],
+                [254, 194, 135],
+                [252, 253, 191],
+            ],
+            Self::Coolwarm => &[
+                [59, 76, 192],
+                [98, 130, 234],
+                [141, 176, 254],
+                [184, 208, 249],
+                [221, 221, 221],
+                [245, 196, 173],
+                [244, 154, 123],
+                [222, 96, 77],
+                [180, 4, 38],
+            ],
+            Self::Grey => &[[40, 40, 40], [235, 235, 235]],
+        }
+    }
+
+    /// Colour of a value between 0 and 1.
+    pub(super) fn colour(self, value: f64) -> Rgb {
+        let steps = self.steps();
+        let place = value.clamp(0.0, 1.0) * (steps.len() - 1) as f64;
+        let low = (place as usize).min(steps.len() - 2);
+        mixed(steps[low], steps[low + 1], place - low as f64)
+    }
+}
 
 /// Colours that distinguish small whole numbers.
 const CLASSES: [Rgb; 8] = [
@@ -19,17 +88,6 @@ const CLASSES: [Rgb; 8] = [
     [120, 120, 120],
 ];
 
-/// Colour of a value between 0 and 1.
-pub(super) fn sequential(value: f64) -> Rgb {
-    let place = value.clamp(0.0, 1.0) * (SEQUENCE.len() - 1) as f64;
-    let low = (place as usize).min(SEQUENCE.len() - 2);
-    let part = place - low as f64;
-    std::array::from_fn(|i| {
-        let (a, b) = (f64::from(SEQUENCE[low][i]), f64::from(SEQUENCE[low + 1][i]));
-        (a + part * (b - a)).round() as u8
-    })
-}
-
 /// Colour of a whole number.
 pub(super) fn class(number: usize) -> Rgb {
     CLASSES[number % CLASSES.len()]
@@ -38,4 +96,59 @@ pub(super) fn class(number: usize) -> Rgb {
 /// A colour made lighter or darker.
 pub(super) fn scaled(colour: Rgb, factor: f64) -> Rgb {
     colour.map(|channel| (f64::from(channel) * factor).clamp(0.0, 255.0) as u8)
+}
+
+/// A share of the second colour in the first.
+pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
+    std::array::from_fn(|i| {
+        let (a, b) = (f64::from(first[i]), f64::from(second[i]));
+        (a + share * (b - a)).round() as u8
+    })
+}
+
+/// What is not data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Paper {
+    pub paper: Rgb,
+    pub ink: Rgb,
+    pub floor: Rgb,
+    pub floor_line: Rgb,
+    pub solid: Rgb,
+    pub tree: Rgb,
+}
+
+/// Of light and of dark pictures.
+pub(super) const LIGHT: Paper = Paper {
+    paper: [250, 250, 248],
+    ink: [40, 40, 44],
+    floor: [232, 232, 228],
+    floor_line: [200, 200, 196],
+    solid: [186, 190, 198],
+    tree: [110, 110, 116],
+};
+pub(super) const DARK: Paper = Paper {
+    paper: [20, 22, 26],
+    ink: [228, 228, 226],
+    floor: [38, 41, 47],
+    floor_line: [66, 70, 78],
+    solid: [120, 126, 138],
+    tree: [150, 152, 158],
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_even_in_lightness_but_for_the_one_with_two_sides() {
+        let lightness = |c: Rgb| 0.299 * f64::from(c[0]) + 0.587 * f64::from(c[1]) + 0.114 * f64::from(c[2]);
+        for (name, map) in Map::ALL {
+            let steps: Vec<f64> = (0..=20).map(|i| lightness(map.colour(f64::from(i) / 20.0))).collect();
+            let middle = steps[10];
+            match map {
+                Map::Coolwarm => assert!(middle > steps[0] && middle > steps[20], "{name}"),
+                _ => assert!(steps.is_sorted(), "{name}: {steps:?}"),
+            }
+        }
+    }
 }

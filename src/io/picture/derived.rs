@@ -92,7 +92,12 @@ impl<'f> Source<'f> {
     /// # Errors
     /// The file offers no such quantity, or cannot be read.
     pub(super) fn quantity(&self, name: &str) -> Result<(Tint, Vec<f64>), FileError> {
-        let tint = Tint { name: name.to_owned(), unit: self.unit(name).to_owned(), classes: is_class(name) };
+        let tint = Tint {
+            name: name.to_owned(),
+            unit: self.unit(name).to_owned(),
+            classes: is_class(name),
+            names: Vec::new(),
+        };
         if !name.contains('/') && self.components(name).is_some() {
             let table = self.table(name)?;
             let values = match table.components {

@@ -1,3 +1,5 @@
+use super::colour::LIGHT;
+use super::scales::{lines, short};
 use super::*;
 use crate::io::snapshot::Scalars;
 use crate::particle::chunk::Chunk;
@@ -53,8 +55,9 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         .map(|(p, value)| Splat { position: chunk.position(p), radius: 0.0125, value })
         .collect();
     let domain = domain(&[0.0; 3], 1.0, &[1; 3]);
-    Drawing { comm: None, flat: false, domain, splats, tint: Tint::of(field), caption: caption(0.0, 0, 1) }
-        .compose(&Settings::new("pile"))
+    let (tint, caption) = (Tint::of(field, &[], &[]), caption(0.0, 0, 1));
+    Drawing { flat: false, domain, splats, tint, caption, solids: Vec::new(), leaves: Vec::new() }
+        .compose(None, &Settings::new("pile"))
 }
 
 #[test]
@@ -73,7 +76,7 @@ fn a_pile_covers_the_middle_and_is_lit_from_one_side() {
     let left: u32 = (0..100).map(|i| lightness(middle - 150 + i, row)).sum();
     let right: u32 = (0..100).map(|i| lightness(middle + 50 + i, row)).sum();
     assert!(left > right, "{left} {right}");
-    assert_ne!(canvas.pixel(middle, row), PAPER);
+    assert_ne!(canvas.pixel(middle, row), LIGHT.paper);
 }
 
 #[test]

@@ -1,0 +1,119 @@
+//! How pictures look: options of all subcommands that draw.
+use std::path::{Path, PathBuf};
+
+use super::message::warn_of;
+use crate::io::picture::{self, Clip, Direction, Map, Settings, Solid};
+use crate::io::snapshot::Header;
+use crate::job::AnyProblem;
+use crate::run::scene;
+
+/// Options of subcommands that draw particles.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Looks {
+    /// Quantity that gives the colours: a field of the file or what follows from it, such as speed, pressure,
+    /// stress_xy, stress_1 (greatest principal stress) or max_shear. An unknown name lists what there is.
+    #[arg(long, alias = "color", default_value = "leaf_level")]
+    pub(in crate::cli) colour: String,
+    /// Value of the first colour; without it, as found.
+    #[arg(long, requires = "to", allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// Value of the last colour.
+    #[arg(long, requires = "from", allow_negative_numbers = true)]
+    to: Option<f64>,
+    /// Colours: viridis, magma, coolwarm (for what has two sides) or grey.
+    #[arg(long, default_value = "viridis", value_parser = map)]
+    map: Map,
+    /// Dark paper.
+    #[arg(long)]
+    dark: bool,
+    /// From where to look in 3D: iso, front, side, top, or a direction such as 1,-1,0.5.
+    #[arg(long, default_value = "iso", value_parser = str::parse::<Direction>, allow_hyphen_values = true)]
+    view: Direction,
+    /// How much larger than what fits.
+    #[arg(long, default_value_t = 1.0, value_parser = zoom)]
+    zoom: f64,
+    /// Place in the middle, m, such as 0.5,0,0.2.
+    #[arg(long, value_parser = picture::place, allow_hyphen_values = true)]
+    focus: Option<[f64; 3]>,
+    /// What stays, such as x<0.5 or z>1; the rest is cut away.
+    #[arg(long, value_parser = str::parse::<Clip>)]
+    clip: Option<Clip>,
+    /// Mirror at the lower face of the domain across these axes, for models of a half or a quarter: x, y, xy.
+    #[arg(long, value_name = "AXES", default_value = "", value_parser = axes)]
+    mirror: Axes,
+    /// Draw the leaves of the tree: in 2D, at the clip, or at the floor.
+    #[arg(long)]
+    tree: bool,
+    /// Leave colliders out.
+    #[arg(long)]
+    bare: bool,
+    /// Job file of the run, where the meshes of its colliders are not found by its name.
+    #[arg(long)]
+    job: Option<PathBuf>,
+    /// Pixels across.
+    #[arg(long, default_value_t = 1280, value_parser = clap::value_parser!(u32).range(400..=16384))]
+    width: u32,
+    /// Pixels down.
+    #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u32).range(300..=16384))]
+    height: u32,
+}
+
+/// Axes by number.
+#[derive(Clone, Copy, Debug)]
+struct Axes([bool; 3]);
+
+fn axes(text: &str) -> Result<Axes, String> {
+    match text.chars().find(|c| !"xyz".contains(*c)) {
+        Some(_) => Err("expected axes such as x, y or xy".into()),
+        None => Ok(Axes(["x", "y", "z"].map(|axis| text.contains(axis)))),
+    }
+}
+
+fn map(text: &str) -> Result<Map, String> {
+    let found = Map::ALL.iter().find(|(name, _)| *name == text).map(|(_, map)| *map);
+    found.ok_or_else(|| format!("expected one of {}", Map::ALL.map(|(name, _)| name).join(", ")))
+}
+
+fn zoom(text: &str) -> Result<f64, String> {
+    let zoom = text.parse().ok().filter(|zoom: &f64| (0.01..=1000.0).contains(zoom));
+    zoom.ok_or_else(|| "expected a number from 0.01 to 1000".into())
+}
+
+impl Looks {
+    /// Settings of a picture with this title.
+    pub(in crate::cli) fn settings(&self, title: &str) -> Settings {
+        Settings {
+            width: self.width as usize,
+            height: self.height as usize,
+            range: self.from.zip(self.to).map(|(from, to)| [from, to]),
+            map: self.map,
+            dark: self.dark,
+            view: self.view,
+            zoom: self.zoom,
+            focus: self.focus,
+            clip: self.clip,
+            mirror: self.mirror.0,
+            tree: self.tree,
+            ..Settings::new(title)
+        }
+    }
+
+    /// The job whose colliders are drawn with its outputs; a warning where they cannot be.
+    pub(in crate::cli) fn job(&self, output: &Path) -> Option<AnyProblem> {
+        if self.bare {
+            return None;
+        }
+        let job = scene::job_of(output, self.job.as_deref());
+        if let Err(reason) = &job {
+            warn_of(&[format!(
+                "colliders are not drawn: {reason}; name the job file with --job, or leave them out with --bare"
+            )]);
+        }
+        job.ok()
+    }
+}
+
+/// The colliders of a job, if there is one.
+pub(in crate::cli) fn solids(job: Option<&AnyProblem>) -> impl Fn(&Header) -> Vec<Solid> + '_ {
+    move |header| job.map_or_else(Vec::new, |job| scene::solids_of(job, header))
+}

@@ -1,0 +1,109 @@
+//! What can be chosen of a picture.
+use super::Direction;
+use super::camera::numbers;
+use super::colour::{DARK, LIGHT, Map, Paper};
+
+/// How a picture looks.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// First line.
+    pub title: String,
+    /// Values of the first and the last colour; `None`: as found, without the outermost half percents.
+    pub range: Option<[f64; 2]>,
+    /// Lower and upper corner of what it shows, m; `None`: the particles with some room.
+    pub frame: Option<[[f64; 3]; 2]>,
+    /// From where it looks; plane pictures look along z.
+    pub view: Direction,
+    /// How much larger than what fits.
+    pub zoom: f64,
+    /// Place in the middle, m.
+    pub focus: Option<[f64; 3]>,
+    /// Colours of amounts.
+    pub map: Map,
+    /// Whether the paper is dark.
+    pub dark: bool,
+    /// What is left out.
+    pub clip: Option<Clip>,
+    /// Axes whose lower face of the domain is a plane of symmetry, at which all is mirrored.
+    pub mirror: [bool; 3],
+    /// Whether leaves of the tree are drawn: in the plane, at the clip, or at the floor.
+    pub tree: bool,
+}
+
+/// A cut across an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clip {
+    /// The axis.
+    pub axis: usize,
+    /// Where it is, m.
+    pub at: f64,
+    /// Whether what lies above it goes; else what lies below.
+    pub above: bool,
+}
+
+impl std::str::FromStr for Clip {
+    type Err = String;
+
+    /// `x<0.5` keeps what lies below 0.5 m, `z>1` what lies above 1 m.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected what stays, such as x<0.5 or z>1".to_owned();
+        let place = text.find(['<', '>']).ok_or_else(expected)?;
+        let (name, at) = (text[..place].trim(), text[place + 1..].trim());
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name).ok_or_else(expected)?;
+        let at = at.parse().ok().filter(|at: &f64| at.is_finite()).ok_or_else(expected)?;
+        Ok(Self { axis, at, above: text.as_bytes()[place] == b'<' })
+    }
+}
+
+impl Clip {
+    pub(super) fn keeps(&self, place: f64) -> bool {
+        if self.above { place <= self.at } else { place >= self.at }
+    }
+}
+
+/// A place in space, from two or three numbers separated by commas.
+///
+/// # Errors
+/// What was expected.
+pub fn place(text: &str) -> Result<[f64; 3], String> {
+    let two = || numbers::<2>(text).map(|[x, y]| [x, y, 0.0]);
+    numbers::<3>(text).or_else(two).ok_or_else(|| "expected a place in m, such as 0.5,0,0.2".into())
+}
+
+/// What a series of pictures shares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Values of the first and the last colour.
+    pub range: [f64; 2],
+    /// Lower and upper corner of what they show, m.
+    pub frame: [[f64; 3]; 2],
+}
+
+impl Settings {
+    /// A picture of usual size.
+    pub fn new(title: &str) -> Self {
+        Self {
+            width: 1280,
+            height: 800,
+            title: title.into(),
+            range: None,
+            frame: None,
+            view: Direction::Iso,
+            zoom: 1.0,
+            focus: None,
+            map: Map::Viridis,
+            dark: false,
+            clip: None,
+            mirror: [false; 3],
+            tree: false,
+        }
+    }
+
+    pub(super) fn paper(&self) -> &'static Paper {
+        if self.dark { &DARK } else { &LIGHT }
+    }
+}

@@ -1,0 +1,121 @@
+//! What pictures show beside the particles: colliders where they are.
+use std::path::{Path, PathBuf};
+
+use super::restart;
+use crate::boundary::{Collider, ColliderState};
+use crate::geometry::{Aabb, Shape};
+use crate::io::picture::Solid;
+use crate::io::snapshot::{self, Header};
+use crate::job::{self, AnyProblem, Problem};
+use crate::setup::stages;
+
+/// The colliders that are there, in these states. `origin` is the lower corner of the domain, m.
+pub fn solids<const D: usize>(
+    colliders: &[Collider<D>],
+    states: &[ColliderState<D>],
+    origin: [f64; D],
+) -> Vec<Solid> {
+    let present = colliders.iter().zip(states).filter(|(collider, _)| collider.is_present());
+    present.map(|(collider, state)| solid(collider.clone(), *state, origin)).collect()
+}
+
+fn solid<const D: usize>(collider: Collider<D>, state: ColliderState<D>, origin: [f64; D]) -> Solid {
+    let pose = state.pose;
+    let to_space = |y: [f64; D]| -> [f64; 3] {
+        let x = collider.to_space(&y, &pose);
+        std::array::from_fn(|axis| if axis < D { x[axis] + origin[axis] } else { 0.0 })
+    };
+    let bounds = bounds(&collider.shape.bounds(), to_space);
+    let corner = |corner: [f64; 3]| to_space(std::array::from_fn(|axis| corner[axis]));
+    let triangles = own_triangles(&collider.shape).into_iter().map(|three| three.map(corner)).collect();
+    let distance = Box::new(move |x: &[f64; 3]| {
+        collider.distance(&std::array::from_fn(|axis| x[axis] - origin[axis]), &pose)
+    });
+    Solid { distance, triangles, bounds }
+}
+
+/// Box round a box that is moved; infinite where it has no end.
+fn bounds<const D: usize>(own: &Aabb<D>, to_space: impl Fn([f64; D]) -> [f64; 3]) -> [[f64; 3]; 2] {
+    let mut round = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for number in 0..1 << D {
+        let corner = to_space(std::array::from_fn(|axis| {
+            if number >> axis & 1 == 0 { own.lower[axis] } else { own.upper[axis] }
+        }));
+        for axis in 0..3 {
+            if !corner[axis].is_finite() {
+                (round[0][axis], round[1][axis]) = (f64::NEG_INFINITY, f64::INFINITY);
+            } else {
+                round[0][axis] = round[0][axis].min(corner[axis]);
+                round[1][axis] = round[1][axis].max(corner[axis]);
+            }
+        }
+    }
+    round
+}
+
+/// Triangles of a mesh, also of one that the job has turned.
+fn own_triangles<const D: usize>(shape: &Shape<D>) -> Vec<[[f64; 3]; 3]> {
+    match shape {
+        Shape::Mesh(mesh) => mesh.triangles().collect(),
+        Shape::Rotated(inner, placement) => {
+            let turned = |corner: [f64; 3]| {
+                let x = placement.to_space(&std::array::from_fn(|axis| corner[axis]));
+                std::array::from_fn(|axis| if axis < D { x[axis] } else { 0.0 })
+            };
+            own_triangles(inner).into_iter().map(|three| three.map(turned)).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Not collective. The colliders of a job at the time of an output of it.
+pub fn solids_of(problem: &AnyProblem, header: &Header) -> Vec<Solid> {
+    match problem {
+        AnyProblem::Two(problem) => at(problem, header),
+        AnyProblem::Three(problem) => at(problem, header),
+    }
+}
+
+fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Vec<Solid> {
+    let starts = restart::stage_starts(problem, header).unwrap_or_else(|| vec![0.0]);
+    let mut colliders = stages::physics(problem, &starts).colliders;
+    colliders.iter_mut().for_each(|collider| collider.deform(header.time));
+    let state = |(number, collider): (usize, &Collider<D>)| {
+        restart::collider_state(number, collider, &header.scalars)
+            .unwrap_or_else(|| collider.state_at(header.time))
+    };
+    let states: Vec<_> = colliders.iter().enumerate().map(state).collect();
+    solids(&colliders, &states, problem.origin)
+}
+
+/// Not collective. The job of the run that wrote an output, from the text in it. Files that it names (meshes, records) lie
+/// beside the job file: `job`, or one of the job's name here, in `jobs/`, or above the output.
+///
+/// # Errors
+/// The output holds no job, or the job names files that are not found; why, in words.
+pub fn job_of(output: &Path, job: Option<&Path>) -> Result<AnyProblem, String> {
+    let text = snapshot::job_text(output).ok_or("the output holds no job")?;
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let name = stem.split(".checkpoint").next().unwrap_or(&stem);
+    let name = match name.rsplit_once('_') {
+        Some((name, number)) if number.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => name,
+    };
+    let file = format!("{name}.toml");
+    let mut places = vec![PathBuf::from(&file), Path::new("jobs").join(&file)];
+    places.extend(output.ancestors().skip(1).map(|above| above.join(&file)));
+    let places = job.map_or(places, |job| vec![job.to_path_buf()]);
+    let mut reason = String::new();
+    for place in places {
+        match job::parse(&text, &place) {
+            Ok(problem) => return Ok(problem),
+            Err(faults) if reason.is_empty() => {
+                reason = faults
+                    .first()
+                    .map_or_else(String::new, |fault| format!("{}: {}", fault.key, fault.message));
+            }
+            Err(_) => {}
+        }
+    }
+    Err(reason)
+}

@@ -1,0 +1,243 @@
+//! `agimp plot`, `movie` and `export`: what the files hold is what is seen, and what other programs read.
+use std::path::Path;
+use std::process::{Command, Output};
+
+use agimp::io::frame::Frame;
+use agimp::io::snapshot::PointField;
+
+/// A block of rubber at rest below a plate that comes down on it.
+const JOB: &str = r#"
+version = 1
+dimension = 2
+[domain]
+size = [1, 1]
+root_edge = 0.25
+[boundaries]
+y_min = { kind = "sticky" }
+[[materials]]
+name = "rubber"
+density = 1000
+model = "neo_hookean"
+young = 1e5
+poisson = 0.3
+[[bodies]]
+name = "block"
+material = "rubber"
+shape = { kind = "box", min = [0.25, 0.0], max = [0.75, 0.25] }
+[[colliders]]
+name = "plate"
+shape = { kind = "box", min = [0.3, 0.3], max = [0.7, 0.4] }
+motion = { kind = "steady", velocity = [0, -5] }
+contact = { kind = "slip" }
+[time]
+end = 0.02
+[output]
+every = 0.005
+picture = false
+"#;
+
+/// Colours of the first material, and of colliders, on light paper.
+const RUBBER: [u8; 3] = [94, 110, 160];
+const PLATE: [u8; 3] = [186, 190, 198];
+
+fn agimp(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().expect("starts")
+}
+
+fn told(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()
+}
+
+/// A directory with a run of the job.
+fn run() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    std::fs::write(directory.path().join("press.toml"), JOB).expect("written");
+    succeed(directory.path(), &["run", "--quiet", "press.toml"]);
+    directory
+}
+
+fn succeed(directory: &Path, arguments: &[&str]) -> String {
+    let output = agimp(directory, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", told(&output));
+    told(&output)
+}
+
+/// An image that is read back: width and pixels.
+fn image(path: &Path) -> (usize, Vec<[u8; 3]>) {
+    let file = std::fs::File::open(path).expect("a picture");
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("PNG");
+    let mut bytes = vec![0; reader.output_buffer_size()];
+    let info = reader.next_frame(&mut bytes).expect("a frame");
+    (info.width as usize, bytes.chunks_exact(3).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect())
+}
+
+/// Pixels of a colour, and the lowest and the highest row of them.
+fn seen((width, pixels): &(usize, Vec<[u8; 3]>), colour: [u8; 3]) -> (usize, usize, usize) {
+    // Without the legend.
+    let rows: Vec<usize> = (0..pixels.len())
+        .filter(|at| at % width < width - 190 && pixels[*at] == colour)
+        .map(|at| at / width)
+        .collect();
+    (rows.len(), rows.iter().copied().min().unwrap_or(0), rows.iter().copied().max().unwrap_or(0))
+}
+
+#[test]
+fn colliders_are_drawn_where_they_are_at_the_time_of_the_file() {
+    let directory = run();
+    let here = directory.path();
+    let plot = |number: usize, options: &[&str]| {
+        let file = format!("out/press/press_{number:06}.hdf");
+        succeed(here, &[&["plot", &file, "--colour", "material", "--out", "picture.png"], options].concat());
+        image(&here.join("picture.png"))
+    };
+    let first = plot(0, &[]);
+    let (plate, top, bottom) = seen(&first, PLATE);
+    let (rubber, above, below) = seen(&first, RUBBER);
+    // 0.4 m by 0.1 m and 0.5 m by 0.25 m.
+    let ratio = plate as f64 / rubber as f64;
+    assert!((ratio / (0.04 / 0.125) - 1.0).abs() < 0.1, "{ratio}");
+    assert!(top < bottom && bottom < above && above < below, "the plate is above the block");
+    // After 10 ms it has gone down by 0.05 m and is on the block; particles are drawn over it.
+    let later = plot(2, &[]);
+    let ((_, _, lower), (_, top_of_block, _)) = (seen(&later, PLATE), seen(&later, RUBBER));
+    assert!(
+        above - bottom > 40 && lower.abs_diff(top_of_block) < 12,
+        "{bottom} {above}, {lower} {top_of_block}"
+    );
+    assert_eq!(seen(&plot(0, &["--bare"]), PLATE).0, 0);
+    // A job that is not found is no reason not to draw; only meshes are missed.
+    std::fs::remove_file(here.join("press.toml")).expect("removed");
+    assert!(seen(&plot(0, &[]), PLATE).0 > 1000, "the output holds the job");
+}
+
+#[test]
+fn looks_can_be_chosen() {
+    let directory = run();
+    let here = directory.path();
+    let plot = |options: &[&str]| {
+        let words = ["plot", "out/press/press_000000.hdf", "--colour", "material", "--out", "picture.png"];
+        succeed(here, &[&words, options].concat());
+        image(&here.join("picture.png"))
+    };
+    let usual = seen(&plot(&[]), RUBBER).0 as f64;
+    let near = |pixels: usize, share: f64| {
+        assert!((pixels as f64 / usual / share - 1.0).abs() < 0.1, "{pixels} of {usual}: {share}")
+    };
+    near(seen(&plot(&["--clip", "x<0.5"]), RUBBER).0, 0.5);
+    near(seen(&plot(&["--clip", "y>0.2"]), RUBBER).0, 0.25); // two of eight rows
+    near(seen(&plot(&["--zoom", "0.5"]), RUBBER).0, 0.25);
+    // Behind the lower face across x lies the mirror image; the domain is twice as wide, so all is smaller.
+    let (width, pixels) = plot(&["--mirror", "x"]);
+    let columns: Vec<usize> = (0..pixels.len())
+        .filter(|at| pixels[*at] == RUBBER)
+        .map(|at| at % width)
+        .filter(|x| *x < width - 190)
+        .collect();
+    let (low, high) = (columns.iter().min().expect("some"), columns.iter().max().expect("some"));
+    let middle = (low + high) / 2;
+    assert!(!columns.contains(&middle) && columns.iter().any(|x| *x > middle), "two blocks and a gap");
+    assert_eq!(plot(&["--dark"]).1[0], [20, 22, 26]);
+    assert_ne!(plot(&["--tree"]).1, plot(&[]).1);
+    for (options, message) in [
+        (&["--view", "left"][..], "expected iso, front, side, top or a direction"),
+        (&["--map", "jet"], "expected one of viridis, magma, coolwarm, grey"),
+        (&["--clip", "w<1"], "expected what stays, such as x<0.5"),
+        (&["--zoom", "0"], "expected a number from 0.01 to 1000"),
+        (&["--focus", "1"], "expected a place in m"),
+        (&["--mirror", "a"], "expected axes such as x, y or xy"),
+    ] {
+        let output = agimp(here, &[&["plot", "out/press/press_000000.hdf"], options].concat());
+        assert_eq!(output.status.code(), Some(2), "{options:?}: {}", told(&output));
+        assert!(told(&output).contains(message), "{options:?}: {}", told(&output));
+    }
+}
+
+#[test]
+fn a_movie_has_a_frame_for_each_output() {
+    let directory = run();
+    let here = directory.path();
+    let words = succeed(
+        here,
+        &["movie", "out/press/press.hdf.series", "--colour", "speed", "--width", "640", "--height", "400"],
+    );
+    assert!(words.contains("press.movie.png (5 frames"), "{words}");
+    let file = std::fs::File::open(here.join("out/press/press.movie.png")).expect("a movie");
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("PNG");
+    assert_eq!(reader.info().animation_control.expect("an animation").num_frames, 5);
+    let mut bytes = vec![0; reader.output_buffer_size()];
+    let mut frames = 0;
+    while reader.next_frame(&mut bytes).is_ok() {
+        frames += 1;
+    }
+    assert_eq!(frames, 5);
+    succeed(
+        here,
+        &["movie", "out/press/press.hdf.series", "--width", "400", "--height", "300", "--out", "press.gif"],
+    );
+    let gif = std::fs::read(here.join("press.gif")).expect("a movie");
+    assert!(gif.starts_with(b"GIF89a"));
+    let output = agimp(here, &["movie", "out/press/press.hdf.series", "--out", "press.avi"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(told(&output).contains("expected .png, .gif, .mp4 or .webm"), "{}", told(&output));
+}
+
+#[test]
+fn exported_particles_are_those_of_the_file() {
+    let directory = run();
+    let here = directory.path();
+    let file = here.join("out/press/press_000004.hdf");
+    let frame = Frame::read(&file, &[PointField::Velocity], true).expect("an output");
+    let n = frame.positions.len();
+    for format in ["--csv", "--ply", "--vtp"] {
+        succeed(
+            here,
+            &[
+                "export",
+                "out/press/press_000004.hdf",
+                format,
+                "--fields",
+                "id,velocity,material",
+                "--out",
+                "given",
+            ],
+        );
+    }
+    let csv = std::fs::read_to_string(here.join("given/press_000004.csv")).expect("CSV");
+    let mut rows = csv.lines();
+    assert_eq!(
+        rows.next(),
+        Some("x [m],y [m],z [m],radius [m],id,velocity_x [m/s],velocity_y [m/s],velocity_z [m/s],material")
+    );
+    let rows: Vec<Vec<f64>> =
+        rows.map(|row| row.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+    assert_eq!(rows.len(), n);
+    for (row, position) in rows.iter().zip(&frame.positions) {
+        assert_eq!(row[..3], *position, "to the last digit");
+    }
+    let ply = std::fs::read(here.join("given/press_000004.ply")).expect("PLY");
+    let end = b"end_header\n";
+    let start = ply.windows(end.len()).position(|part| part == end).expect("its header") + end.len();
+    let header = String::from_utf8_lossy(&ply[..start]);
+    assert!(
+        header.contains(&format!("element vertex {n}\n")) && header.contains("property float radius\n"),
+        "{header}"
+    );
+    assert_eq!(ply.len() - start, n * 9 * 4);
+    let first = f32::from_le_bytes(ply[start..start + 4].try_into().expect("four bytes"));
+    assert_eq!(first, frame.positions[0][0] as f32);
+    let vtp = std::fs::read(here.join("given/press_000004.vtp")).expect("VTP");
+    let mark = b"encoding=\"raw\">\n_";
+    let start = vtp.windows(mark.len()).position(|part| part == mark).expect("its data") + mark.len();
+    assert_eq!(u64::from_le_bytes(vtp[start..start + 8].try_into().expect("eight bytes")), 24 * n as u64);
+    let y = f64::from_le_bytes(vtp[start + 16..start + 24].try_into().expect("eight bytes"));
+    assert_eq!(y, frame.positions[0][1]);
+
+    let output = agimp(here, &["export", "out/press/press_000004.hdf"]);
+    assert_eq!(output.status.code(), Some(2), "which format: {}", told(&output));
+    let output = agimp(here, &["export", "out/press/press_000004.tree.hdf", "--csv"]);
+    assert!(
+        output.status.code() == Some(2) && told(&output).contains("is it a tree file?"),
+        "{}",
+        told(&output)
+    );
+}
