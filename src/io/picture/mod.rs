@@ -363,6 +363,7 @@ impl Drawing {
         }
         if let Some(comm) = comm {
             comm.max_u64(&mut raster.pixels);
+            raster.grain = comm.max_f64(raster.grain);
         }
         let mut canvas = Canvas::new(settings.width, settings.height, paper.paper);
         if comm.is_some_and(|comm| comm.rank() != 0) {

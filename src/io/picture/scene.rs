@@ -29,8 +29,8 @@ pub(super) struct Raster {
     pub width: usize,
     pub height: usize,
     pub pixels: Vec<u64>,
-    /// Radius of the largest ball, pixels.
-    grain: f64,
+    /// Radius of the largest ball of all ranks, pixels.
+    pub grain: f64,
 }
 
 /// How a raster becomes a picture.
