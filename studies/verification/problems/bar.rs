@@ -114,7 +114,8 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
         &["cells", "energy, greatest error", "energy after 10 periods", "mean velocity, rms", "frequency"],
         &rows,
     );
-    if let [.., coarse, fine] = frequencies[..] {
+    // Between the finest two of three.
+    if let [_, coarse, fine] = frequencies[..] {
         page.line("bar.order", order(coarse, fine));
     }
     page.plot(
