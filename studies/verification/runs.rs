@@ -29,8 +29,6 @@ pub(crate) enum Effort {
     Quick,
     /// All.
     Full,
-    /// All, and columns of sand in space with half the cells.
-    Fine,
 }
 
 /// What a run has left.
@@ -44,7 +42,7 @@ pub(crate) struct Results {
 impl Runs {
     /// Whether all sizes are run.
     pub(crate) fn is_full(&self) -> bool {
-        self.effort >= Effort::Full
+        self.effort == Effort::Full
     }
 
     /// Runs a job of `jobs/` with settings `KEY=VALUE`; the results have a name of their own.

@@ -60,14 +60,11 @@ fn arguments() -> Arguments {
         match argument.as_str() {
             "--quick" => found.effort = Effort::Quick,
             "--full" => found.effort = Effort::Full,
-            "--fine" => found.effort = Effort::Fine,
             "--only" => found.only.extend(all.next()),
             "--set" => found.set.extend(all.next()),
             "--page" => found.page = all.next().unwrap_or_default().into(),
             other => {
-                panic!(
-                    "found {other}; expected --quick, --full, --fine, --only NAME, --set KEY=VALUE or --page FILE"
-                )
+                panic!("found {other}; expected --quick, --full, --only NAME, --set KEY=VALUE or --page FILE")
             }
         }
     }
@@ -85,7 +82,7 @@ impl Store {
         let program = checked(std::fs::read(&runs.agimp));
         let words = program.chunks_exact(8).map(|word| u64::from_le_bytes(std::array::from_fn(|i| word[i])));
         let folder = runs.top.join("target/verification").join(format!("{:016x}", fnv1a(words)));
-        let is_page = runs.effort == Effort::Full && runs.set.is_empty();
+        let is_page = runs.is_full() && runs.set.is_empty();
         Self { folder: is_page.then_some(folder) }
     }
 

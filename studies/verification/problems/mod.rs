@@ -20,10 +20,11 @@ pub(crate) mod taylor;
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 14] = [
+pub(crate) const ALL: [(&str, Problem); 15] = [
     ("bar", bar::section),
     ("manufactured", manufactured::square),
     ("manufactured_3d", manufactured::cube),
+    ("rings", manufactured::rings),
     ("column", column::section),
     ("cantilever", cantilever::section),
     ("disks", disks::section),

@@ -3,13 +3,16 @@
 //! | file | what |
 //! |---|---|
 //! | `axes.rs` | waves along the axes of a square and a cube |
+//! | `rings.rs` | the generalised vortex and the expanding ring |
 use super::order;
 use crate::page::Page;
 use crate::plot::{Chart, Series};
 
 mod axes;
+mod rings;
 
 pub(crate) use axes::{cube, flip, square};
+pub(crate) use rings::section as rings;
 
 /// Settings of the transfers.
 const FLIP: [&str; 2] = ["numerics.transfer=\"flip\"", "numerics.flip=1"];
@@ -27,6 +30,14 @@ impl Study {
     fn last_order(&self) -> f64 {
         match self.points[..] {
             [.., coarse, fine] => order(coarse, fine),
+            _ => f64::NAN,
+        }
+    }
+
+    /// Order over the finest three meshes.
+    fn order_of_three(&self) -> f64 {
+        match self.points[..] {
+            [.., coarse, _, fine] => order(coarse, fine),
             _ => f64::NAN,
         }
     }
