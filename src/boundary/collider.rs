@@ -4,10 +4,11 @@
 //! collider's surface there, with the gradient of the signed distance as normal. The momentum that this takes from
 //! the material is what the material gives to the collider: its force and torque.
 use super::Contact;
-use super::motion::{Free, Motion, Pose, Rate, length};
+use super::motion::{Free, Motion, Pose, Rate, Table, length};
 use super::rigid::Meeting;
 use super::rigid::turning::{self, UPRIGHT};
 use crate::geometry::mesh::Deforming;
+use crate::geometry::vector::in_space;
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
 
@@ -144,8 +145,9 @@ impl<const D: usize> Collider<D> {
 
     /// Goes to the shape that it has at a time (s), if it deforms.
     pub fn deform(&mut self, time: f64) {
-        let Some(deforming) = self.deforming.as_mut().filter(|_| self.start.is_finite()) else { return };
-        if let Some(mesh) = deforming.advance(time - self.start) {
+        let (is_present, start) = (self.is_present(), self.start);
+        let Some(deforming) = self.deforming.as_mut().filter(|_| is_present) else { return };
+        if let Some(mesh) = deforming.advance(time - start) {
             self.shape = Shape::Mesh(mesh);
         }
     }
@@ -154,8 +156,7 @@ impl<const D: usize> Collider<D> {
     pub fn velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
         let rigid = self.rigid_velocity_at(x, pose, rate);
         let (Some(deforming), Shape::Mesh(mesh)) = (&self.deforming, &self.shape) else { return rigid };
-        let own = self.to_own(x, pose);
-        let velocity = deforming.velocity(mesh, &std::array::from_fn(|a| if a < D { own[a] } else { 0.0 }));
+        let velocity = deforming.velocity(mesh, &in_space(&self.to_own(x, pose)));
         let turned = self.turned(&std::array::from_fn(|a| velocity[a]), pose);
         std::array::from_fn(|a| rigid[a] + turned[a])
     }
@@ -166,7 +167,7 @@ impl<const D: usize> Collider<D> {
             return rate.velocity;
         }
         let centre = self.centre(pose);
-        let arm: [f64; 3] = std::array::from_fn(|a| if a < D { x[a] - centre[a] } else { 0.0 });
+        let arm = in_space::<D>(&std::array::from_fn(|a| x[a] - centre[a]));
         if turns {
             let cross = cross(rate.turning, arm);
             return std::array::from_fn(|a| rate.velocity[a] + cross[a]);
@@ -181,7 +182,7 @@ impl<const D: usize> Collider<D> {
         match &self.motion {
             _ if !self.is_present() => Rate::REST,
             Motion::Free(free) => {
-                let driven = free.mean_rate(time - self.start, dt);
+                let driven = free.driven.mean_rate(time - self.start, dt);
                 Rate {
                     velocity: std::array::from_fn(|a| match free.along[a] {
                         true => (0.5 * dt).mul_add(gravity[a], state.rate.velocity[a]),
@@ -222,7 +223,7 @@ impl<const D: usize> Collider<D> {
             return self.state(self.motion.place(time - self.start), *mean);
         };
         let mut rate = *mean;
-        let (mut translation, mut angle) = free.place(time - self.start);
+        let (mut translation, mut angle) = free.driven.place(time - self.start);
         for a in (0..D).filter(|&a| free.along[a]) {
             rate.velocity[a] = dt.mul_add(gravity[a], state.rate.velocity[a]) + impulse[a] / free.mass;
             translation[a] = dt.mul_add(mean.velocity[a], state.pose.translation[a]);
@@ -248,7 +249,7 @@ impl<const D: usize> Collider<D> {
         let (speed, spin) = match &self.motion {
             _ if !self.is_present() => (0.0, 0.0),
             Motion::Free(free) => {
-                let (own, driven) = (state.rate.speeds(), free.greatest_speeds(time - self.start));
+                let (own, driven) = (state.rate.speeds(), free.driven.greatest_speeds(time - self.start));
                 (own.0 + driven.0, own.1.max(driven.1))
             }
             motion => motion.greatest_speeds(time - self.start),
@@ -287,21 +288,22 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
             let spin = if rate.spin == 0.0 { length(&rate.turning) } else { rate.spin };
             both(length(&rate.velocity), spin)
         };
+        let rows = |table: &Table<D>| {
+            let (speed, spin) = table.greatest_speeds(f64::NEG_INFINITY);
+            format!("a table of {} rows, at most {}", table.0.len(), both(speed, spin))
+        };
         match &self.motion {
             Motion::Fixed => write!(f, "fixed"),
             Motion::Steady(rate) => write!(f, "steady with {}", speeds(rate)),
-            Motion::Table(knots) => {
-                let (speed, spin) = self.motion.greatest_speeds(f64::NEG_INFINITY);
-                write!(f, "by a table of {} rows, at most {}", knots.len(), both(speed, spin))
-            }
+            Motion::Table(table) => write!(f, "by {}", rows(table)),
             Motion::Free(free) => {
                 let turns = if free.turning.is_some() { " about any axis" } else { "" };
                 write!(f, "free{turns}, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))?;
-                if free.rows.is_empty() {
-                    return Ok(());
+                if free.driven.0.is_empty() {
+                    Ok(())
+                } else {
+                    write!(f, ", driven by {}", rows(&free.driven))
                 }
-                let (speed, spin) = free.greatest_speeds(f64::NEG_INFINITY);
-                write!(f, ", driven by a table of {} rows, at most {}", free.rows.len(), both(speed, spin))
             }
         }
     }
@@ -355,7 +357,7 @@ mod tests {
             inertia: Some(0.5),
             turning: None,
             meeting: None,
-            rows: Vec::new(),
+            driven: Table::default(),
             start: Rate::about_axis([1.0, 3.0], 0.0),
         };
         let (collider, gravity) = (disc(Motion::Free(free)), [0.0, -10.0]);

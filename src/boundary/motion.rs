@@ -65,6 +65,10 @@ pub struct Knot<const D: usize> {
     pub angle: f64,
 }
 
+/// A motion that is linear between rows with increasing times; at rest before the first and after the last.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table<const D: usize>(pub Vec<Knot<D>>);
+
 /// A rigid body that moves under gravity and the forces of the material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free<const D: usize> {
@@ -79,7 +83,7 @@ pub struct Free<const D: usize> {
     /// What it does to faces of the domain and to other colliders; `None`: it does not feel them.
     pub meeting: Option<Meeting>,
     /// Table that it follows along the other axes, and in its rotation unless it turns; empty: it does neither.
-    pub rows: Vec<Knot<D>>,
+    pub driven: Table<D>,
     /// Velocity and angular velocity at the start.
     pub start: Rate<D>,
 }
@@ -88,21 +92,6 @@ impl<const D: usize> Free<D> {
     /// Whether it turns by itself.
     pub fn turns(&self) -> bool {
         self.inertia.is_some() || self.turning.is_some()
-    }
-
-    /// Where its table wants it at a time (s).
-    pub fn place(&self, time: f64) -> ([f64; D], f64) {
-        place(&self.rows, time)
-    }
-
-    /// The mean velocities that its table gives over a step.
-    pub fn mean_rate(&self, time: f64, dt: f64) -> Rate<D> {
-        mean_rate(&self.rows, time, dt)
-    }
-
-    /// The greatest speeds of its table from a time (s) on.
-    pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
-        greatest_speeds(&self.rows, time)
     }
 }
 
@@ -113,8 +102,8 @@ pub enum Motion<const D: usize> {
     Fixed,
     /// Velocity and angular velocity that never change.
     Steady(Rate<D>),
-    /// Linear between the rows of a table with increasing times; at rest before the first and after the last.
-    Table(Vec<Knot<D>>),
+    /// By a table.
+    Table(Table<D>),
     /// A rigid body.
     Free(Free<D>),
 }
@@ -125,7 +114,7 @@ impl<const D: usize> Motion<D> {
         match self {
             Self::Fixed | Self::Free(_) => ([0.0; D], 0.0),
             Self::Steady(rate) => (rate.velocity.map(|v| v * time), rate.spin * time),
-            Self::Table(knots) => place(knots, time),
+            Self::Table(table) => table.place(time),
         }
     }
 
@@ -137,7 +126,7 @@ impl<const D: usize> Motion<D> {
             Self::Fixed => Rate::REST,
             Self::Steady(rate) => *rate,
             Self::Free(free) => free.start,
-            Self::Table(knots) => mean_rate(knots, time, dt),
+            Self::Table(table) => table.mean_rate(time, dt),
         }
     }
 
@@ -148,50 +137,52 @@ impl<const D: usize> Motion<D> {
             Self::Fixed => (0.0, 0.0),
             Self::Steady(rate) => rate.speeds(),
             Self::Free(free) => free.start.speeds(),
-            Self::Table(knots) => greatest_speeds(knots, time),
+            Self::Table(table) => table.greatest_speeds(time),
         }
     }
 }
 
-/// Translation and angle at a time (s) by a table.
-fn place<const D: usize>(knots: &[Knot<D>], time: f64) -> ([f64; D], f64) {
-    let Some((first, last)) = knots.first().zip(knots.last()) else { return ([0.0; D], 0.0) };
-    if time <= first.time {
-        return (first.translation, first.angle);
+impl<const D: usize> Table<D> {
+    /// Translation and angle at a time (s).
+    pub fn place(&self, time: f64) -> ([f64; D], f64) {
+        let Some((first, last)) = self.0.first().zip(self.0.last()) else { return ([0.0; D], 0.0) };
+        if time <= first.time {
+            return (first.translation, first.angle);
+        }
+        let next = self.0.partition_point(|knot| knot.time < time);
+        let Some(to) = self.0.get(next) else { return (last.translation, last.angle) };
+        let from = &self.0[next - 1];
+        let part = (time - from.time) / (to.time - from.time);
+        let between = |a: f64, b: f64| part.mul_add(b - a, a);
+        let translation = std::array::from_fn(|k| between(from.translation[k], to.translation[k]));
+        (translation, between(from.angle, to.angle))
     }
-    let next = knots.partition_point(|knot| knot.time < time);
-    let Some(to) = knots.get(next) else { return (last.translation, last.angle) };
-    let from = &knots[next - 1];
-    let part = (time - from.time) / (to.time - from.time);
-    let between = |a: f64, b: f64| part.mul_add(b - a, a);
-    let translation = std::array::from_fn(|k| between(from.translation[k], to.translation[k]));
-    (translation, between(from.angle, to.angle))
-}
 
-/// Mean velocities by a table over a step.
-fn mean_rate<const D: usize>(knots: &[Knot<D>], time: f64, dt: f64) -> Rate<D> {
-    let end = time + dt;
-    let mut mean = Rate::REST;
-    for pair in knots.windows(2) {
-        let overlap = end.min(pair[1].time) - time.max(pair[0].time);
-        if overlap > 0.0 {
-            let share = overlap / (end - time);
-            let slope = slope(pair);
-            for k in 0..D {
-                mean.velocity[k] = share.mul_add(slope.velocity[k], mean.velocity[k]);
+    /// Mean velocities over a step from `time` to `time + dt` (s).
+    pub fn mean_rate(&self, time: f64, dt: f64) -> Rate<D> {
+        let end = time + dt;
+        let mut mean = Rate::REST;
+        for pair in self.0.windows(2) {
+            let overlap = end.min(pair[1].time) - time.max(pair[0].time);
+            if overlap > 0.0 {
+                let share = overlap / (end - time);
+                let slope = slope(pair);
+                for k in 0..D {
+                    mean.velocity[k] = share.mul_add(slope.velocity[k], mean.velocity[k]);
+                }
+                mean.spin = share.mul_add(slope.spin, mean.spin);
             }
-            mean.spin = share.mul_add(slope.spin, mean.spin);
         }
+        mean
     }
-    mean
-}
 
-/// The greatest speeds of a table from a time (s) on.
-fn greatest_speeds<const D: usize>(knots: &[Knot<D>], time: f64) -> (f64, f64) {
-    let ahead = knots.windows(2).filter(|pair| pair[1].time > time);
-    ahead
-        .map(|pair| slope(pair).speeds())
-        .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
+    /// The greatest speeds (m/s, rad/s) from a time (s) on.
+    pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
+        let ahead = self.0.windows(2).filter(|pair| pair[1].time > time);
+        ahead
+            .map(|pair| slope(pair).speeds())
+            .fold((0.0, 0.0), |most: (f64, f64), one| (most.0.max(one.0), most.1.max(one.1)))
+    }
 }
 
 /// Velocities between two rows.
@@ -212,7 +203,7 @@ mod tests {
 
     fn table() -> Motion<2> {
         let knot = |time, x, angle| Knot { time, translation: [x, 0.0], angle };
-        Motion::Table(vec![knot(1.0, 0.0, 0.0), knot(2.0, 4.0, 1.0), knot(4.0, 2.0, 1.0)])
+        Motion::Table(Table(vec![knot(1.0, 0.0, 0.0), knot(2.0, 4.0, 1.0), knot(4.0, 2.0, 1.0)]))
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Gradients of signed distances: the outward normals of the surfaces.
-use super::shape::in_space;
+use super::vector::in_space;
 use super::{Aabb, Frustum, Shape};
 
 impl<const D: usize> Shape<D> {

@@ -13,6 +13,7 @@ mod rotation;
 pub mod sampling;
 mod shape;
 pub mod surface;
+pub(crate) mod vector;
 pub mod written;
 
 pub use classify::Side;
@@ -52,6 +53,11 @@ impl<const D: usize> Aabb<D> {
     pub fn half_diagonal(&self) -> f64 {
         let edges = std::array::from_fn::<f64, D, _>(|a| self.upper[a] - self.lower[a]);
         0.5 * edges.iter().map(|e| e * e).sum::<f64>().sqrt()
+    }
+
+    /// The smallest box that holds these points; empty if there are none.
+    pub fn of_points(points: impl IntoIterator<Item = [f64; D]>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |all, x| all.hull(&Self::new(x, x)))
     }
 
     /// The box with all its faces farther out by a distance, m.

@@ -2,6 +2,7 @@
 use super::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };
+use super::vector::in_space;
 use super::{Aabb, Mesh};
 
 /// A truncated cone; a cylinder when both radii are equal, a cone when the upper one is 0.
@@ -150,11 +151,6 @@ impl<const D: usize> Shape<D> {
             Self::Difference(from, _) => from.bounds(),
         }
     }
-}
-
-/// A point of the job as one of space.
-pub(super) fn in_space<const D: usize>(x: &[f64; D]) -> [f64; 3] {
-    std::array::from_fn(|a| if a < D { x[a] } else { 0.0 })
 }
 
 impl<const D: usize> Frustum<D> {

@@ -1,10 +1,11 @@
 //! Points of a collider that may touch something, in its place in the job.
 use std::collections::BTreeMap;
 
-use super::{dot, in_plane, in_space};
+use super::{dot, in_plane};
 use crate::boundary::Collider;
 use crate::boundary::collider::cross;
 use crate::boundary::motion::length;
+use crate::geometry::vector::in_space;
 use crate::geometry::{Frustum, Mesh, Shape};
 
 /// Parts of an edge of a box, of the height of a cylinder, and of the longest edge of the box around a boolean.

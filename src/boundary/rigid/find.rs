@@ -1,8 +1,9 @@
 //! Contacts of rigid bodies: points of one against the signed distance of the other, and against the faces of the domain.
 use super::features::{Feature, points_of_rim};
-use super::{Surroundings, dot, in_plane, in_space};
+use super::{Surroundings, dot, in_plane};
 use crate::boundary::motion::{Pose, Rate, length};
 use crate::boundary::{Collider, Contact};
+use crate::geometry::vector::in_space;
 
 /// Most contacts between two bodies.
 const MOST: usize = 8;

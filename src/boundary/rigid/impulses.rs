@@ -5,9 +5,10 @@
 //! after the other in a fixed order, over and over (Gauss and Seidel), until none changes. Bodies move with the mean of their velocities at start
 //! and end. An overlap that is left at the end is taken back in part by a second pass that moves bodies and gives them no velocity.
 use super::find::Found;
-use super::{Push, Surroundings, dot, in_space};
+use super::{Push, Surroundings, dot};
 use crate::boundary::collider::cross;
 use crate::boundary::motion::{Pose, Rate, length};
+use crate::geometry::vector::in_space;
 
 /// Most sweeps over all contacts.
 const SWEEPS: usize = 1000;
@@ -216,15 +217,17 @@ impl Touch {
         std::array::from_fn(|a| own[a] - theirs[a])
     }
 
+    /// What an impulse on the body gives to both: number of the body, impulse, and its arm.
+    fn both(&self, impulse: &[f64; 3]) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> {
+        let bodies = [(Some(self.found.body), *impulse), (self.found.other, impulse.map(|c| -c))];
+        bodies.into_iter().zip(self.arms).filter_map(|((body, impulse), arm)| Some((body?, impulse, arm)))
+    }
+
     /// Gives an impulse to the body and its opposite to the other.
     fn give(&self, bodies: &mut [Body], impulse: &[f64; 3]) {
-        let opposite = impulse.map(|c| -c);
-        let both = [(Some(self.found.body), impulse), (self.found.other, &opposite)];
-        for ((body, impulse), arm) in both.into_iter().zip(&self.arms) {
-            let Some(body) = body else { continue };
+        for (body, impulse, arm) in self.both(impulse) {
             let body = &mut bodies[body];
-            let turn = cross(*arm, *impulse);
-            let change = body.response(arm, impulse);
+            let (turn, change) = (cross(arm, impulse), body.response(&arm, &impulse));
             for a in 0..3 {
                 body.push.impulse[a] += impulse[a];
                 body.push.turn[a] += turn[a];
@@ -279,12 +282,8 @@ impl Touch {
         let wanted = (self.shift + (self.least - outward) / self.across).max(0.0);
         let more = wanted - self.shift;
         self.shift = wanted;
-        let impulse = self.found.normal.map(|n| n * more);
-        let opposite = impulse.map(|c| -c);
-        let both = [(Some(self.found.body), &impulse), (self.found.other, &opposite)];
-        for ((body, impulse), arm) in both.into_iter().zip(&self.arms) {
-            let Some(body) = body else { continue };
-            let change = bodies[body].response(arm, impulse);
+        for (body, impulse, arm) in self.both(&self.found.normal.map(|n| n * more)) {
+            let change = bodies[body].response(&arm, &impulse);
             for k in 0..2 {
                 (0..3).for_each(|a| bodies[body].shift[k][a] += change[k][a]);
             }

@@ -88,11 +88,6 @@ impl<const D: usize> Surroundings<'_, D> {
     }
 }
 
-/// A vector of the job as one of space.
-pub(super) fn in_space<const D: usize>(v: &[f64; D]) -> [f64; 3] {
-    std::array::from_fn(|a| if a < D { v[a] } else { 0.0 })
-}
-
 /// A vector of space as one of the job.
 pub(super) fn in_plane<const D: usize>(v: &[f64; 3]) -> [f64; D] {
     std::array::from_fn(|a| v[a])

@@ -2,7 +2,7 @@
 use super::turning::Inertia;
 use super::{Features, Meeting, Push, Surroundings};
 use crate::boundary::collider::cross;
-use crate::boundary::motion::{Free, Motion, Rate, length};
+use crate::boundary::motion::{Free, Motion, Rate, Table, length};
 use crate::boundary::{ActsOn, Collider, ColliderState, Contact};
 use crate::geometry::{Aabb, Placement, Shape, rotation};
 
@@ -64,7 +64,7 @@ fn body<const D: usize>(shape: Shape<D>, friction: f64, restitution: f64, start:
     let turning = (D == 3).then(|| Inertia::new(tensor));
     let inertia = (D == 2).then_some(tensor[2][2]);
     let mass = 1000.0 * moments.volume;
-    let free = Free { mass, along: [true; D], inertia, turning, meeting, rows: Vec::new(), start };
+    let free = Free { mass, along: [true; D], inertia, turning, meeting, driven: Table::default(), start };
     collider(shape, Motion::Free(free), moments.centre)
 }
 

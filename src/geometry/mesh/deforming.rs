@@ -9,6 +9,8 @@ pub struct Deforming {
     meshes: Arc<[Mesh]>,
     /// Time between two of them, s.
     every: f64,
+    /// The greatest speed of a vertex from each interval on, m/s.
+    speeds: Arc<[f64]>,
     place: Place,
 }
 
@@ -40,18 +42,23 @@ impl Deforming {
     /// # Errors
     /// One has other triangles than the first.
     pub fn new(meshes: Vec<Mesh>, every: f64) -> Result<Self, Mismatch> {
-        let indices = |mesh: &Mesh| mesh.0.surface.surface.indices().to_vec();
         let counts = |mesh: &Mesh| [mesh.vertices().count(), mesh.0.surface.surface.indices().len()];
-        if let Some(first) = meshes.first() {
-            let (triangles, expected) = (indices(first), counts(first));
-            for (number, mesh) in meshes.iter().enumerate() {
-                let found = counts(mesh);
-                if found != expected || indices(mesh) != triangles {
-                    return Err(Mismatch { mesh: number, found, expected });
-                }
-            }
+        let surface = |mesh: &Mesh, first: &Mesh| {
+            let triangles = [mesh, first].map(|mesh| mesh.0.surface.surface.indices());
+            counts(mesh) == counts(first) && triangles[0] == triangles[1]
+        };
+        if let Some(first) = meshes.first()
+            && let Some(other) = meshes.iter().position(|mesh| !surface(mesh, first))
+        {
+            let (found, expected) = (counts(&meshes[other]), counts(first));
+            return Err(Mismatch { mesh: other, found, expected });
         }
-        Ok(Self { meshes: meshes.into(), every, place: Place::First })
+        let mut speeds: Vec<f64> =
+            meshes.windows(2).map(|pair| farthest(&pair[0], &pair[1]) / every).collect();
+        for interval in (1..speeds.len()).rev() {
+            speeds[interval - 1] = speeds[interval - 1].max(speeds[interval]);
+        }
+        Ok(Self { meshes: meshes.into(), every, speeds: speeds.into(), place: Place::First })
     }
 
     /// How many meshes there are.
@@ -105,11 +112,15 @@ impl Deforming {
     /// The greatest speed of a vertex from a time (s) on, m/s.
     pub fn greatest_speed(&self, time: f64) -> f64 {
         let next = (time / self.every).max(0.0) as usize;
-        let pairs = self.meshes.windows(2).skip(next);
-        let ways = pairs.flat_map(|pair| pair[0].vertices().zip(pair[1].vertices()));
-        let squares = ways.map(|(a, b)| (0..3).map(|i| (b[i] - a[i]).powi(2)).sum::<f64>());
-        squares.fold(0.0, f64::max).sqrt() / self.every
+        self.speeds.get(next).copied().unwrap_or(0.0)
     }
+}
+
+/// The longest way of a vertex between two meshes, m.
+fn farthest(from: &Mesh, to: &Mesh) -> f64 {
+    let ways = from.vertices().zip(to.vertices());
+    let squares = ways.map(|(a, b)| (0..3).map(|i| (b[i] - a[i]).powi(2)).sum::<f64>());
+    squares.fold(0.0, f64::max).sqrt()
 }
 
 #[cfg(test)]

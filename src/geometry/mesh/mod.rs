@@ -146,7 +146,7 @@ impl Mesh {
         if volume.is_some_and(|volume| volume < 0.0) {
             indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
-        let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
+        let bounds = Aabb::of_points(vertices.iter().copied());
         let inside = match (filling, volume) {
             (Filling::Winding, _) => Inside::Winding(Winding::new(&vertices, &indices)),
             (_, Some(_)) => Inside::Normals,
@@ -169,7 +169,7 @@ impl Mesh {
 
     /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a look at whether it crosses itself.
     pub(super) fn moved(&self, vertices: Vec<[f64; 3]>) -> Self {
-        let bounds = vertices.iter().fold(Aabb::EMPTY, |hull, x| hull.hull(&Aabb::new(*x, *x)));
+        let bounds = Aabb::of_points(vertices.iter().copied());
         let indices = self.0.surface.surface.indices().to_vec();
         let (inside, flags) = match self.0.surface.inside {
             Inside::Normals => (Inside::Normals, TriMeshFlags::ORIENTED),

@@ -3,6 +3,8 @@
 //! Solid angles of near triangles are exact (Van Oosterom and Strackee 1983); a group of triangles that is far off counts by the first term
 //! of its expansion (Barill, Dickson, Schmidt, Levin and Jacobson 2018).
 
+use crate::geometry::vector::{cross, dot};
+
 /// Triangles of a group that is not divided.
 const LEAST: usize = 8;
 
@@ -114,14 +116,6 @@ fn solid_angle(triangle: &[[f64; 3]; 3], x: &[f64; 3]) -> f64 {
     let above = dot(a, cross(b, c));
     let below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
     2.0 * libm::atan2(above, below)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::adaptivity::criteria::region::Way;
 use crate::adaptivity::criteria::{Job, Keys, Parameters};
 use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Thresholds};
-use crate::boundary::motion::{Knot, Motion};
+use crate::boundary::motion::{Knot, Motion, Table};
 use crate::geometry::{Shape, written};
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, BoxPolicy, TreeSetup};
@@ -161,5 +161,5 @@ fn ways<const D: usize>(checks: &mut Checks, ways: &[Way], path: &Path) -> Optio
         let translation = checks.vector(&way.translation, &here.key("translation"))?;
         knots.push(Knot { time: way.time, translation, angle: 0.0 });
     }
-    Some(Motion::Table(knots))
+    Some(Motion::Table(Table(knots)))
 }

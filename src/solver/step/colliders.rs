@@ -7,6 +7,7 @@ use crate::boundary::rigid::{Push, Surroundings};
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;
+use crate::geometry::vector::in_space;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
@@ -33,11 +34,9 @@ impl<const D: usize> Touch<D> {
         sums: &mut [[ExactSum; SUMS]],
     ) {
         let centre = colliders[self.collider].centre(&states[self.collider].pose);
-        let in_space = |v: &dyn Fn(usize) -> f64| -> [f64; 3] {
-            std::array::from_fn(|a| if a < D { v(a) } else { 0.0 })
-        };
-        let impulse = in_space(&|a| self.impulse[a]);
-        let turn = cross(in_space(&|a| self.position[a] - centre[a]), impulse);
+        let impulse = in_space(&self.impulse);
+        let arm = in_space::<D>(&std::array::from_fn(|a| self.position[a] - centre[a]));
+        let turn = cross(arm, impulse);
         for (sum, value) in sums[self.collider].iter_mut().zip(impulse.into_iter().chain(turn)) {
             sum.add(value);
         }

@@ -3,7 +3,7 @@ use std::cell::OnceCell;
 
 use super::super::checks::Checks;
 use super::{Z, allowed, optional, table};
-use crate::boundary::motion::{Free, Knot, Rate, length};
+use crate::boundary::motion::{Free, Rate, Table, length};
 use crate::boundary::rigid::{Meeting, turning};
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;
@@ -71,9 +71,9 @@ pub(super) fn free_body<const D: usize>(
         (true, None, _) => Turns::Freely,
     };
     let meeting = meeting(checks, *collides, [*friction, *restitution], path);
-    let rows = match rows {
+    let driven = match rows {
         Some(rows) => driven(checks, rows, &along, !matches!(how, Turns::Never), &path.key("rows"))?,
-        None => Vec::new(),
+        None => Table::default(),
     };
     // To add up the cells of a boolean takes long, so only where they are asked for.
     let found = OnceCell::new();
@@ -102,7 +102,7 @@ pub(super) fn free_body<const D: usize>(
     let spin = angular_velocity.as_ref();
     let here = path.key("angular_velocity");
     let start = Rate::about_axis(velocity, 0.0);
-    let mut free = Free { mass, along, inertia: None, turning: None, meeting, rows, start };
+    let mut free = Free { mass, along, inertia: None, turning: None, meeting, driven, start };
     match how {
         Turns::Never => {
             let at_rest = match spin {
@@ -212,9 +212,9 @@ fn driven<const D: usize>(
     along: &[bool; D],
     turns: bool,
     path: &Path,
-) -> Option<Vec<Knot<D>>> {
+) -> Option<Table<D>> {
     let table = table(checks, rows, path)?;
-    for (i, row) in table.iter().enumerate() {
+    for (i, row) in table.0.iter().enumerate() {
         for a in (0..D).filter(|&a| along[a] && row.translation[a] != 0.0) {
             let message = format!(
                 "found {}; expected 0 along an axis on which the body is free: leave it out of `along`",

@@ -10,7 +10,7 @@ mod free_bodies;
 
 use self::free_bodies::free_body;
 use super::checks::{Checks, Space};
-use crate::boundary::motion::{Knot, Motion, Rate};
+use crate::boundary::motion::{Knot, Motion, Rate, Table};
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::Aabb;
 use crate::geometry::written::Vector;
@@ -173,7 +173,7 @@ fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: 
     vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
 }
 
-fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Vec<Knot<D>>> {
+fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Table<D>> {
     if rows.len() < 2 {
         checks.fault(path, format!("found {} rows; expected at least 2", rows.len()));
         return None;
@@ -196,7 +196,7 @@ fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Opti
             angle: row.rotation.to_radians(),
         }));
     }
-    knots.into_iter().collect()
+    knots.into_iter().collect::<Option<_>>().map(Table)
 }
 
 /// Which axes a list names.

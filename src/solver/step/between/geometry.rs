@@ -52,14 +52,8 @@ fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[u64]) -> Vec<u64> 
 
 /// The box around these nodes of a block.
 fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) -> Aabb<D> {
-    let (cell, first) = (plan.cell(plan.blocks[block].level), plan.blocks[block].coord);
-    bits(nodes).fold(Aabb::EMPTY, |all, bit| {
-        let x = std::array::from_fn(|a| {
-            let along = bit as usize / BLOCK.pow(a as u32) % BLOCK;
-            (BLOCK as u32 * first[a] + along as u32) as f64 * cell
-        });
-        all.hull(&Aabb::new(x, x))
-    })
+    let places = bits(nodes).map(|bit| plan.node_place(&plan.blocks[block], bit as usize));
+    Aabb::of_points(places)
 }
 
 /// Copies of the particles of a group in a box that scatter volumes in place of masses, and gradients of volumes in place of the impulse of stress
