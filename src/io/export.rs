@@ -6,7 +6,7 @@ use std::path::Path;
 use super::frame::Frame;
 use super::hdf5_file::FileError;
 use super::lines::create_new;
-use super::snapshot::fields::Values;
+use super::snapshot::fields::{COMPONENTS, Values};
 
 /// What a file is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +38,6 @@ struct Column<'a> {
     /// The same where it is a whole number of up to 64 binary digits.
     whole: Option<Box<dyn Fn(usize) -> u64 + 'a>>,
 }
-
-/// Endings of the components of vectors and tensors.
-const COMPONENTS: [&[&str]; 2] = [&["_x", "_y", "_z"], &["_xx", "_yy", "_zz", "_xy", "_yz", "_xz"]];
 
 /// Not collective. Writes the particles with their half widths and fields, under a temporary name first.
 ///
@@ -100,7 +97,7 @@ fn push<'a>(
     let width = width.max(1);
     let endings = COMPONENTS.iter().find(|endings| endings.len() == width);
     for component in 0..width {
-        let ending = endings.map_or(String::new(), |endings| endings[component].to_owned());
+        let ending = endings.map_or(String::new(), |endings| format!("_{}", endings[component]));
         let value = Box::new(move |p: usize| value(width * p + component));
         columns.push(Column { name: format!("{name}{ending}"), unit, value, whole: None });
     }

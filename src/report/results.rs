@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::io::hdf5_file::Reader;
+use crate::io::snapshot::Header;
 use crate::io::snapshot::directory::{listed, series_path};
-use crate::io::snapshot::{self, Header};
 use crate::run::claim;
 use crate::run::report::{self, Report};
 
@@ -76,24 +76,15 @@ impl Results {
             .collect()
     }
 
-    /// What the last output says about itself.
-    pub(super) fn header(&self) -> Option<Header> {
-        Header::read(&Reader::open_alone(self.outputs().last()?).ok()?).ok()
-    }
-
-    /// Text of the job, as the last output has it.
-    pub(super) fn job_text(&self) -> Option<String> {
-        snapshot::job_text(self.outputs().last()?)
-    }
-
     /// What the run says of itself, if it has finished.
     pub(super) fn report(&self) -> Option<Report> {
         serde_json::from_slice(&std::fs::read(report::path(&self.directory, &self.name)).ok()?).ok()
     }
 
-    pub(super) fn state(&self) -> State {
+    /// How far the run has come, which says of itself whether it has finished.
+    pub(super) fn state(&self, is_finished: bool) -> State {
         match claim::holder(&self.path("lock")) {
-            _ if self.report().is_some() => State::Finished,
+            _ if is_finished => State::Finished,
             Some(holder) => State::Running(holder),
             None => State::Ended,
         }
@@ -124,6 +115,11 @@ impl Results {
     }
 }
 
+/// What an output says about itself.
+pub(super) fn header(output: &Path) -> Option<Header> {
+    Header::read(&Reader::open_alone(output).ok()?).ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,7 +135,7 @@ mod tests {
         let names = vec!["a".to_owned(), "b.c".to_owned()];
         assert_eq!(Results::in_directory(here, None), Err(Unclear::Several(here.into(), names)));
         assert_eq!(Results::in_directory(here, Some("b.c")).unwrap().name, "b.c");
-        assert_eq!(Results::in_directory(here, Some("a")).unwrap().state(), State::Ended);
+        assert_eq!(Results::in_directory(here, Some("a")).unwrap().state(false), State::Ended);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::restart;
 use crate::boundary::{Collider, ColliderState};
 use crate::geometry::{Aabb, Shape};
 use crate::io::picture::Solid;
-use crate::io::snapshot::{self, Header};
+use crate::io::snapshot::{self, Header, directory};
 use crate::job::{self, AnyProblem, Problem};
 use crate::setup::stages;
 
@@ -95,13 +95,7 @@ fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Vec<Solid> {
 /// The output holds no job, or the job names files that are not found; why, in words.
 pub fn job_of(output: &Path, job: Option<&Path>) -> Result<AnyProblem, String> {
     let text = snapshot::job_text(output).ok_or("the output holds no job")?;
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    let name = stem.split(".checkpoint").next().unwrap_or(&stem);
-    let name = match name.rsplit_once('_') {
-        Some((name, number)) if number.bytes().all(|byte| byte.is_ascii_digit()) => name,
-        _ => name,
-    };
-    let file = format!("{name}.toml");
+    let file = format!("{}.toml", directory::run_of(output));
     let mut places = vec![PathBuf::from(&file), Path::new("jobs").join(&file)];
     places.extend(output.ancestors().skip(1).map(|above| above.join(&file)));
     let places = job.map_or(places, |job| vec![job.to_path_buf()]);

@@ -4,6 +4,7 @@ use std::path::Path;
 use crate::io::frame::{Frame, is_integer};
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::PointField;
+use crate::io::snapshot::fields::COMPONENTS;
 use crate::io::snapshot::fields::Values;
 
 /// One number for each particle.
@@ -67,12 +68,12 @@ impl Column {
         for field in fields {
             columns.extend(match field {
                 PointField::Velocity if asked.is_some() => {
-                    let mut columns = components(field, &["x", "y", "z"]);
+                    let mut columns = components(field, COMPONENTS[0]);
                     columns.push(speed());
                     columns
                 }
                 PointField::Velocity => vec![speed()],
-                PointField::Stress => components(field, &["xx", "yy", "zz", "xy", "yz", "xz"]),
+                PointField::Stress => components(field, COMPONENTS[1]),
                 other => vec![whole(other)],
             });
         }

@@ -1,6 +1,8 @@
 //! From space to pixels.
 use std::ops::Range;
 
+use crate::geometry::vector::{cross, dot};
+
 /// Lower and upper corner of a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
@@ -113,14 +115,6 @@ pub(super) struct Camera {
     /// Pixels per metre.
     pub scale: f64,
     origin: [f64; 2],
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Of length 1; 0 stays 0.

@@ -9,7 +9,7 @@
 //! | `settings.rs` | what can be chosen |
 //! | `camera.rs`, `scene.rs`, `solids.rs`, `tree.rs` | from space to pixels; particles with their light; colliders; leaves |
 //! | `canvas.rs`, `colour.rs`, `scales.rs`, `font.rs` | an image and its file; colours; legends; letters |
-//! | `source.rs`, `derived.rs` | what a file offers, and what follows from it |
+//! | `source/` | what a file offers, and what follows from it |
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,6 @@ use crate::text::quantity;
 mod camera;
 mod canvas;
 mod colour;
-mod derived;
 mod font;
 mod scales;
 mod scene;
@@ -37,12 +36,12 @@ pub use camera::View as Direction;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
 pub use colour::Map;
-use derived::{Source, is_class, magnitude};
 use scales::{axes, colour_bar, legend, nice};
 use scene::{Looks, Raster, Splat};
 pub use settings::{Clip, Look, Settings, place};
 use solids::Layer;
 pub use solids::{Distance, Solid};
+use source::derived::{Source, is_class, magnitude};
 use tree::leaves;
 /// The rigid bodies where they are at the time of a file.
 pub type SolidsOf<'a> = dyn Fn(&Header) -> Vec<Solid> + 'a;

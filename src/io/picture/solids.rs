@@ -1,7 +1,8 @@
 //! Colliders and terrain behind and before the particles.
 use rayon::prelude::*;
 
-use super::camera::{Bounds, Camera, cross, dot, unit};
+use super::camera::{Bounds, Camera, unit};
+use crate::geometry::vector::{cross, dot};
 
 /// Signed distance of a place, m.
 pub type Distance = dyn Fn(&[f64; 3]) -> f64 + Send + Sync;

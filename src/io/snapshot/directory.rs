@@ -45,9 +45,12 @@ fn stem(name: &str) -> Option<&str> {
     KNOWN_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending))
 }
 
+/// What stands between the name of a run and the step of a checkpoint.
+const CHECKPOINT: &str = ".checkpoint_";
+
 /// Path of the checkpoint of a step.
 pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
-    directory.join(format!("{name}.checkpoint_{step:09}{ENDING}"))
+    directory.join(format!("{name}{CHECKPOINT}{step:09}{ENDING}"))
 }
 
 /// Files that a run may go on from.
@@ -145,11 +148,22 @@ enum Kind {
     Output,
 }
 
+/// Name of the run that wrote an output or checkpoint, by the name of the file.
+pub fn run_of(path: &Path) -> &str {
+    let own = || path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
+    let stem = stem(file_name(path)).unwrap_or_else(own);
+    let stem = stem.split(CHECKPOINT).next().unwrap_or(stem);
+    match stem.rsplit_once('_') {
+        Some((name, number)) if number.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => stem,
+    }
+}
+
 /// Checkpoints and outputs of the run `name` with their numbers, in the order of these.
 fn results(directory: &Path, name: &str) -> Result<Vec<(Kind, u64, PathBuf)>, FileError> {
     let result = |path: PathBuf| {
         let number = stem(file_name(&path).strip_prefix(name)?)?;
-        let (kind, digits) = match number.strip_prefix(".checkpoint_") {
+        let (kind, digits) = match number.strip_prefix(CHECKPOINT) {
             Some(digits) => (Kind::Checkpoint, digits),
             None => (Kind::Output, number.strip_prefix('_')?),
         };

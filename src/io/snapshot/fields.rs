@@ -10,6 +10,9 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 
+/// Names of the components of vectors and tensors, by their number, in the order of the files.
+pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
+
 /// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit (empty for pure numbers), values of all
 /// particles of a view in order.
 macro_rules! fields {

@@ -1,10 +1,11 @@
 //! What the particles of a file can be coloured by: the fields that it shows, and what follows from them or from its state.
 
-use super::{Tint, source};
+use super::super::Tint;
+use super::numbers;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::averages::{principal, third_invariant};
 use crate::io::snapshot::checked::Checked;
-use crate::io::snapshot::fields::{mean, von_mises};
+use crate::io::snapshot::fields::{COMPONENTS, mean, von_mises};
 use crate::io::snapshot::{Header, PointField};
 use crate::material::{PLASTIC_STRAIN, PLASTIC_VOLUME};
 use crate::particle::chunk::Tag;
@@ -73,17 +74,14 @@ const RULES: &[Rule] = rules! {
 /// Fields that a file may show although this version of the program does not compute them.
 const EXTRA: [(&str, &str); 1] = [("displacement", "m")];
 
-/// Endings that pick a component, by the number of components.
-const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
-
 /// A file whose particles are to be drawn.
-pub(super) struct Source<'f> {
+pub(in crate::io::picture) struct Source<'f> {
     file: &'f Reader,
     header: &'f Header,
 }
 
 impl<'f> Source<'f> {
-    pub(super) fn new(file: &'f Reader, header: &'f Header) -> Self {
+    pub(in crate::io::picture) fn new(file: &'f Reader, header: &'f Header) -> Self {
         Self { file, header }
     }
 
@@ -91,7 +89,7 @@ impl<'f> Source<'f> {
     ///
     /// # Errors
     /// The file offers no such quantity, or cannot be read.
-    pub(super) fn quantity(&self, name: &str) -> Result<(Tint, Vec<f64>), FileError> {
+    pub(in crate::io::picture) fn quantity(&self, name: &str) -> Result<(Tint, Vec<f64>), FileError> {
         let tint = Tint {
             name: name.to_owned(),
             unit: self.unit(name).to_owned(),
@@ -224,7 +222,7 @@ impl<'f> Source<'f> {
                 Ok(Table { components: 1, values })
             }
             _ => {
-                let (values, components) = source::numbers(self.file, self.header, path)?;
+                let (values, components) = numbers(self.file, self.header, path)?;
                 Ok(Table { components, values })
             }
         }
@@ -235,12 +233,12 @@ const TAG: &str = "state/particles/tag";
 const LEVEL: &str = "state/tree/level";
 
 /// Whether the numbers of a quantity are names rather than amounts.
-pub(super) fn is_class(name: &str) -> bool {
+pub(in crate::io::picture) fn is_class(name: &str) -> bool {
     ["material", "body", "particle_level", "leaf_level"].contains(&name)
 }
 
 /// Length of a vector; of six components √(σ:σ) of the symmetric tensor.
-pub(super) fn magnitude(row: &[f64]) -> f64 {
+pub(in crate::io::picture) fn magnitude(row: &[f64]) -> f64 {
     let squares = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>();
     match row.len() {
         6 => (squares(&row[..3]) + 2.0 * squares(&row[3..])).sqrt(),

@@ -1,4 +1,10 @@
 //! What a picture takes from an output file. All of it has the right checksum.
+//!
+//! | file | what it reads |
+//! |---|---|
+//! | this | places, sizes and numbers of the particles |
+//! | `derived.rs` | quantities that give colours |
+pub(super) mod derived;
 
 use crate::io::hdf5_file::{FileError, Kind, Reader};
 use crate::io::snapshot::Header;
