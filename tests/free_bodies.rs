@@ -4,7 +4,7 @@
 mod runs;
 
 use runs::history::History;
-use runs::launch::{Outcome, job, run, succeed};
+use runs::launch::{run, succeed};
 use runs::restart;
 
 /// The vector with these components in space, along the axes of the body in the job; and back.
@@ -69,21 +69,7 @@ fn bodies_without_torque_keep_energy_and_angular_momentum() {
 /// A block of 160 x 120 x 80 mm that falls on an edge into sand gains what its forces and torques give, and comes to rest in it.
 #[test]
 fn blocks_tumble_with_the_same_bits_in_all_ways_and_across_restart() {
-    let name = "tumbling_block";
-    let mut reference: Option<Outcome> = None;
-    for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1)] {
-        let directory = tempfile::tempdir().expect("temporary directory");
-        succeed(&mut run(directory.path(), ranks, threads, &job(name), &["--quiet"]));
-        let result = Outcome::read(directory.path(), name);
-        match &reference {
-            Some(first) => first.assert_same(&result, &format!("{ranks} ranks x {threads} threads")),
-            None => {
-                balances(&History::read(directory.path(), name));
-                restart::assert_middle_gives(&result, directory.path(), &job(name), name);
-                reference = Some(result);
-            }
-        }
-    }
+    restart::assert_same_in_all_ways("tumbling_block", balances);
 }
 
 /// Momentum and angular momentum of the block are those at the start and what gravity and the sand gave.

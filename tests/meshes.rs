@@ -322,20 +322,9 @@ fn a_foot_that_deforms_presses_as_one_that_moves() {
     std::fs::write(&path, rigid).expect("job");
     succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
     let rigid = History::read(directory.path(), "rigid_foot");
-    let mut reference: Option<Outcome> = None;
-    for ranks in [1, 2, 3] {
-        succeed(&mut run(directory.path(), ranks, 1, &launch::job(name), &["--quiet", "--overwrite"]));
-        let result = Outcome::read(directory.path(), name);
-        match &reference {
-            Some(first) => first.assert_same(&result, &format!("{ranks} ranks")),
-            None => {
-                let history = History::read(directory.path(), name);
-                let impulse = [&history, &rigid].map(|one| one.integral("force_foot_z", 0.0));
-                println!("impulse {:.1} and {:.1} kg m/s", impulse[0], impulse[1]);
-                assert!(impulse[1] > 1000.0 && (impulse[0] / impulse[1] - 1.0).abs() < 0.005, "{impulse:?}");
-                restart::assert_middle_gives(&result, directory.path(), &launch::job(name), name);
-                reference = Some(result);
-            }
-        }
-    }
+    restart::assert_same_in_all_ways(name, |history| {
+        let impulse = [history, &rigid].map(|one| one.integral("force_foot_z", 0.0));
+        println!("impulse {:.1} and {:.1} kg m/s", impulse[0], impulse[1]);
+        assert!(impulse[1] > 1000.0 && (impulse[0] / impulse[1] - 1.0).abs() < 0.005, "{impulse:?}");
+    });
 }

@@ -1,29 +1,17 @@
 //! `agimp plot`, `movie` and `export`: what the files hold is what is seen, and what other programs read.
+#[path = "common/program.rs"]
+mod program;
+
 use std::path::Path;
-use std::process::{Command, Output};
 
 use agimp::io::frame::Frame;
 use agimp::io::snapshot::PointField;
+use program::{RUBBER_BLOCK, agimp, finished, succeed, told};
 
-/// A block of rubber at rest below a plate that comes down on it.
+/// A plate comes down on the block of rubber.
 const JOB: &str = r#"
 version = 1
 dimension = 2
-[domain]
-size = [1, 1]
-root_edge = 0.25
-[boundaries]
-y_min = { kind = "sticky" }
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e5
-poisson = 0.3
-[[bodies]]
-name = "block"
-material = "rubber"
-shape = { kind = "box", min = [0.25, 0.0], max = [0.75, 0.25] }
 [[colliders]]
 name = "plate"
 shape = { kind = "box", min = [0.3, 0.3], max = [0.7, 0.4] }
@@ -40,26 +28,9 @@ picture = false
 const RUBBER: [u8; 3] = [94, 110, 160];
 const PLATE: [u8; 3] = [186, 190, 198];
 
-fn agimp(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().expect("starts")
-}
-
-fn told(output: &Output) -> String {
-    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()
-}
-
 /// A directory with a run of the job.
 fn run() -> tempfile::TempDir {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    std::fs::write(directory.path().join("press.toml"), JOB).expect("written");
-    succeed(directory.path(), &["run", "--quiet", "press.toml"]);
-    directory
-}
-
-fn succeed(directory: &Path, arguments: &[&str]) -> String {
-    let output = agimp(directory, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", told(&output));
-    told(&output)
+    finished("press", &[JOB, RUBBER_BLOCK].concat(), &[])
 }
 
 /// An image that is read back: width and pixels.

@@ -2,30 +2,20 @@
 //!
 //! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM` names another
 //! one than that of the path.
-use std::path::Path;
-use std::process::{Command, Output};
+#[path = "common/program.rs"]
+mod program;
 
-/// A block of rubber falls on a plate that is pressed into it.
+use std::path::Path;
+use std::process::Command;
+
+use program::{RUBBER_BLOCK, agimp, chromium, finished, told};
+
+/// A plate is pressed into the block of rubber.
 const JOB: &str = r#"
 version = 1
 title = "Block & <plate>"
 dimension = 2
 gravity = [0, -9.81]
-[domain]
-size = [1, 1]
-root_edge = 0.25
-[boundaries]
-y_min = { kind = "sticky" }
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e5
-poisson = 0.3
-[[bodies]]
-name = "block"
-material = "rubber"
-shape = { kind = "box", min = [0.25, 0.0], max = [0.75, 0.25] }
 [[colliders]]
 name = "plate"
 shape = { kind = "box", min = [0, 0.25], max = [1, 0.4] }
@@ -43,21 +33,8 @@ every = 0.005
 picture = false
 "#;
 
-fn agimp(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().expect("starts")
-}
-
-fn told(output: &Output) -> String {
-    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()
-}
-
-/// A directory with a run of the job, with these options.
-fn run(job: &str, options: &[&str]) -> tempfile::TempDir {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    std::fs::write(directory.path().join("press.toml"), job).expect("written");
-    let output = agimp(directory.path(), &[&["run", "--quiet", "press.toml"], options].concat());
-    assert!(output.status.success(), "{}", told(&output));
-    directory
+fn job() -> String {
+    [JOB, RUBBER_BLOCK].concat()
 }
 
 fn page(directory: &Path) -> String {
@@ -86,7 +63,7 @@ fn numbers(page: &str, column: &str) -> Vec<f64> {
 
 #[test]
 fn a_finished_run_has_its_pictures_curves_numbers_and_job_on_one_page() {
-    let directory = run(JOB, &["--set", "output.report=true"]);
+    let directory = finished("press", &job(), &["--set", "output.report=true"]);
     let page = page(directory.path());
     assert!(page.contains("<title>Block &amp; &lt;plate&gt;</title>"));
     assert!(page.contains("class=\"state finished\""), "it has finished");
@@ -123,7 +100,7 @@ fn a_finished_run_has_its_pictures_curves_numbers_and_job_on_one_page() {
 /// As a run that was killed leaves it: no report, half a row.
 #[test]
 fn a_run_that_was_killed_is_shown_as_far_as_it_came() {
-    let directory = run(JOB, &[]);
+    let directory = finished("press", &job(), &[]);
     let results = directory.path().join("out/press");
     assert!(!results.join("press.report.html").exists(), "only if the job asks");
     std::fs::remove_file(results.join("press.report.json")).expect("removed");
@@ -143,7 +120,7 @@ fn a_run_that_was_killed_is_shown_as_far_as_it_came() {
 fn what_is_no_run_is_refused_with_a_word_of_what_to_do() {
     let directory = tempfile::tempdir().expect("temporary directory");
     let here = directory.path();
-    std::fs::write(here.join("press.toml"), JOB).expect("written");
+    std::fs::write(here.join("press.toml"), job()).expect("written");
     std::fs::create_dir(here.join("two")).expect("made");
     for name in ["a", "b"] {
         std::fs::write(here.join(format!("two/{name}.history.csv")), "step,time [s]\n").expect("written");
@@ -168,16 +145,8 @@ fn what_is_no_run_is_refused_with_a_word_of_what_to_do() {
 
 #[test]
 fn browser_shows_the_page_without_complaint() {
-    let given = std::env::var("AGIMP_CHROMIUM").ok();
-    let usual = ["chromium", "chromium-browser", "google-chrome"].map(str::to_owned);
-    let works = |program: &String| {
-        Command::new(program).arg("--version").output().is_ok_and(|out| out.status.success())
-    };
-    let Some(chromium) = given.into_iter().chain(usual).find(works) else {
-        eprintln!("passed over: there is no Chromium (Debian: chromium)");
-        return;
-    };
-    let directory = run(JOB, &["--set", "output.report=true"]);
+    let Some(chromium) = chromium() else { return };
+    let directory = finished("press", &job(), &["--set", "output.report=true"]);
     let here = directory.path();
     let output = Command::new(chromium)
         .args([

@@ -4,7 +4,7 @@
 mod runs;
 
 use runs::history::History;
-use runs::launch::{Outcome, job, run, succeed};
+use runs::launch::{job, run, succeed};
 use runs::restart;
 
 const G: f64 = 9.81;
@@ -40,21 +40,7 @@ fn balls_and_cylinders_roll_and_slip_as_the_closed_forms_say() {
 /// its table; nothing goes through walls.
 #[test]
 fn bodies_meet_with_the_same_results_in_all_ways_and_across_restart() {
-    let name = "bodies_that_meet";
-    let mut reference: Option<Outcome> = None;
-    for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1)] {
-        let directory = tempfile::tempdir().expect("temporary directory");
-        succeed(&mut run(directory.path(), ranks, threads, &job(name), &["--quiet"]));
-        let result = Outcome::read(directory.path(), name);
-        match &reference {
-            Some(first) => first.assert_same(&result, &format!("{ranks} ranks x {threads} threads")),
-            None => {
-                balances(&History::read(directory.path(), name));
-                restart::assert_middle_gives(&result, directory.path(), &job(name), name);
-                reference = Some(result);
-            }
-        }
-    }
+    restart::assert_same_in_all_ways("bodies_that_meet", balances);
 }
 
 fn balances(history: &History) {

@@ -2,13 +2,17 @@
 //!
 //! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM` names another
 //! one than that of the path.
+#[path = "common/program.rs"]
+mod program;
+
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use agimp::io::frame::{Frame, Leaves};
 use agimp::io::snapshot::PointField;
 use base64::Engine as _;
+use program::{agimp, chromium, finished};
 use serde_json::Value;
 
 /// Half of the lower part of a domain of 1 m by 1 m is rubber that moves to the right; cells of two sizes.
@@ -40,18 +44,9 @@ every = 0.005
 picture = false
 "#;
 
-fn agimp(directory: &Path, arguments: &[&str]) -> Output {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_agimp"));
-    program.args(arguments).current_dir(directory).output().expect("starts")
-}
-
 /// A directory with a finished run of [`JOB`].
 fn run() -> tempfile::TempDir {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    std::fs::write(directory.path().join("half.toml"), JOB).expect("written");
-    let output = agimp(directory.path(), &["run", "--quiet", "half.toml"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    directory
+    finished("half", JOB, &[])
 }
 
 fn outputs(directory: &Path) -> Vec<PathBuf> {
@@ -223,16 +218,6 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
     assert!(pages().all(|entry| !entry.file_name().to_string_lossy().contains("html")));
 }
 
-/// The Chromium of this machine.
-fn chromium() -> Option<String> {
-    let given = std::env::var("AGIMP_CHROMIUM").ok();
-    let usual = ["chromium", "chromium-browser", "google-chrome"].map(str::to_owned);
-    given
-        .into_iter()
-        .chain(usual)
-        .find(|program| Command::new(program).arg("--version").output().is_ok_and(|out| out.status.success()))
-}
-
 /// Opens the page in a browser without a window, runs `script` in it when it is ready (`v` is the viewer), and returns what
 /// the script returns and how many pixels of the screenshot are coloured.
 fn in_browser(chromium: &str, directory: &Path, page: &str, script: &str) -> (Value, usize) {
@@ -286,10 +271,7 @@ fn in_browser(chromium: &str, directory: &Path, page: &str, script: &str) -> (Va
 
 #[test]
 fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
-    let Some(chromium) = chromium() else {
-        eprintln!("passed over: there is no Chromium (Debian: chromium)");
-        return;
-    };
+    let Some(chromium) = chromium() else { return };
     let directory = run();
     let page = page(directory.path(), &["--title", "Half"]);
     // The block by its material; the middle of the screen shows its upper right quarter.

@@ -1,7 +1,8 @@
 //! Runs on several ranks, and from one of their checkpoints, that must give the same. The test has the module `launch`.
 use std::path::Path;
 
-use super::launch::{Outcome, contents, run, succeed, text};
+use super::history::History;
+use super::launch::{Outcome, contents, job, run, succeed, text};
 
 /// Runs a job of that name on 1, 2 and 3 ranks and goes on from its second checkpoint: the results are the same. `look` sees the
 /// directory of each run, and what the run said.
@@ -20,6 +21,23 @@ pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnM
             let from = &checkpoints(directory.path(), name)[1];
             assert_restart_gives(reference, directory.path(), &path, name, from);
         }
+    }
+}
+
+/// Runs a job of `tests/jobs/runs` on 1, 2 and 3 ranks and with 2 threads, and goes on from the checkpoint in the middle of it: the results are the
+/// same. `look` sees the history of the first run.
+pub(crate) fn assert_same_in_all_ways(name: &str, look: impl FnOnce(&History)) {
+    let (mut reference, mut look): (Option<Outcome>, _) = (None, Some(look));
+    for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1)] {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        succeed(&mut run(directory.path(), ranks, threads, &job(name), &["--quiet"]));
+        let result = Outcome::read(directory.path(), name);
+        if let Some(look) = look.take() {
+            look(&History::read(directory.path(), name));
+            assert_middle_gives(&result, directory.path(), &job(name), name);
+        }
+        let reference = reference.get_or_insert(result.clone());
+        reference.assert_same(&result, &format!("{ranks} ranks x {threads} threads"));
     }
 }
 
