@@ -132,6 +132,7 @@ impl<const D: usize> Run<D> {
             histories: &self.histories,
             job_digest: 0xfeed_face_dead_beef,
             job_text: "title = \"a job\"\n",
+            job_file: Path::new(""),
             step: 120,
             time: 0.1 + 0.2,
             dt: 1e-5,

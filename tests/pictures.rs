@@ -81,6 +81,51 @@ fn colliders_are_drawn_where_they_are_at_the_time_of_the_file() {
     assert!(seen(&plot(0, &[]), PLATE).0 > 1000, "the output holds the job");
 }
 
+/// The job names a file, which lies beside it and nowhere near the outputs.
+#[test]
+fn outputs_know_where_their_job_is() {
+    let home = tempfile::tempdir().expect("temporary directory");
+    let here = home.path();
+    let load = "[[loads]]\nname = \"shake\"\nkind = \"body_force\"\nacceleration = [{ file = \"shake.csv\", time = \"t\", value = \"a\" }, 0]\n";
+    std::fs::create_dir_all(here.join("project/cases")).expect("made");
+    std::fs::write(here.join("project/cases/press.toml"), [JOB, load, RUBBER_BLOCK].concat())
+        .expect("written");
+    std::fs::write(here.join("project/cases/shake.csv"), "t,a\n0,0\n1,1\n").expect("written");
+    let project = here.join("project");
+    succeed(&project, &["run", "--quiet", "cases/press.toml", "--out", "results/one"]);
+    let plate = |from: &Path, output: &str| {
+        let picture = here.join("picture.png");
+        let name = picture.to_str().expect("a name");
+        let told = succeed(from, &["plot", output, "--colour", "material", "--out", name]);
+        (seen(&image(&picture), PLATE).0, told)
+    };
+    // From anywhere, and after all has been moved together.
+    assert!(plate(&project.join("results/one"), "press_000000.hdf").0 > 1000);
+    assert!(
+        plate(Path::new("/"), project.join("results/one/press_000000.hdf").to_str().expect("a name")).0
+            > 1000
+    );
+    std::fs::rename(&project, here.join("moved")).expect("moved");
+    assert!(plate(here, "moved/results/one/press_000000.hdf").0 > 1000);
+    // The output alone: what it has lost is said.
+    std::fs::copy(here.join("moved/results/one/press_000000.hdf"), here.join("alone_000000.hdf"))
+        .expect("copied");
+    let (pixels, told) = plate(here, "alone_000000.hdf");
+    assert!(pixels == 0 && told.contains("colliders are not drawn") && told.contains("--job"), "{told}");
+    let given = [
+        "plot",
+        "alone_000000.hdf",
+        "--colour",
+        "material",
+        "--job",
+        "moved/cases/press.toml",
+        "--out",
+        "picture.png",
+    ];
+    succeed(here, &given);
+    assert!(seen(&image(&here.join("picture.png")), PLATE).0 > 1000);
+}
+
 #[test]
 fn looks_can_be_chosen() {
     let directory = run();

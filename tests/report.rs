@@ -8,7 +8,7 @@ mod program;
 use std::path::Path;
 use std::process::Command;
 
-use program::{RUBBER_BLOCK, agimp, chromium, finished, told};
+use program::{RUBBER_BLOCK, agimp, chromium, finished, succeed, told};
 
 /// A plate is pressed into the block of rubber.
 const JOB: &str = r#"
@@ -24,6 +24,12 @@ contact = { kind = "slip" }
 [[probes]]
 name = "top"
 quantities = ["extent"]
+[[lines]]
+name = "row"
+from = [0.3, 0.1]
+to = [0.7, 0.1]
+points = 9
+quantities = ["velocity"]
 [history]
 every_steps = 1
 [time]
@@ -80,6 +86,8 @@ fn a_finished_run_has_its_pictures_curves_numbers_and_job_on_one_page() {
         assert!(page.contains(&format!("<b>{chart}</b>")), "a chart {chart}");
     }
     assert!(page.matches("<svg").count() >= 8);
+    // Along the line the rubber is pressed down, at the end more than at the start, where nothing moves.
+    assert!(page.contains("<b>velocity y along row</b>") && page.contains(">t = 0 s</span>"));
     // From the first output to the last, the last one among them.
     assert_eq!(page.matches("data:image/png;base64,").count(), 4);
     assert!(page.contains("press_000000.hdf") && page.contains("press_000004.hdf"));
@@ -114,6 +122,101 @@ fn a_run_that_was_killed_is_shown_as_far_as_it_came() {
     assert!(page.contains("class=\"state ended\"") && page.contains("of 20 ms"), "it has not finished");
     let time: f64 = rows[rows.len() / 2 - 1].split(',').nth(1).expect("the time").parse().expect("a number");
     assert!((numbers(&page, "time")[1] / time - 1.0).abs() < 1e-5, "the last whole row");
+}
+
+/// The block flies up and through a face that nobody has opened.
+#[test]
+fn a_run_that_fails_has_a_page_that_says_why_and_from_where_to_go_on() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let here = directory.path();
+    let block = RUBBER_BLOCK.replace(
+        "min = [0.25, 0.0], max = [0.75, 0.25] }",
+        "min = [0.25, 0.25], max = [0.75, 0.5] }\nvelocity = [0, 50]",
+    );
+    let job = JOB.replace("min = [0, 0.25], max = [1, 0.4]", "min = [0, 0.05], max = [1, 0.1]");
+    std::fs::write(here.join("press.toml"), [job, block].concat()).expect("written");
+    let run = |options: &[&str]| {
+        agimp(here, &[&["run", "press.toml", "--set", "output.report=true"], options].concat())
+    };
+    let output = run(&[]);
+    assert_eq!(output.status.code(), Some(1), "{}", told(&output));
+    assert!(told(&output).contains("report   out/press/press.report.html"), "{}", told(&output));
+    let failed = page(here);
+    assert!(failed.contains("class=\"state failed\"") && failed.contains("failed at"), "its state");
+    for part in ["<b>Why it ended:</b> step ", "left the domain at", "<b>What to do:</b>"] {
+        assert!(failed.contains(part), "{part}");
+    }
+    let last = std::fs::read_dir(here.join("out/press")).expect("results").flatten();
+    let last = last.filter_map(|entry| entry.file_name().into_string().ok());
+    let last =
+        last.filter(|name| name.starts_with("press_") && !name.contains("tree")).max().expect("an output");
+    assert!(failed.contains(&format!("<b>Last state:</b> <code>out/press/{last}</code>, t = ")), "{last}");
+    let (_, command) = failed.split_once("<code>agimp run ").expect("a command to go on");
+    let command = command.split_once("</code>").expect("its end").0;
+    assert!(command.ends_with("press.toml --restart latest"), "{command}");
+    assert_eq!(failed.matches("data:image/png;base64,").count(), 4, "pictures as far as there are outputs");
+    // The same later, with another eye.
+    succeed(here, &["report", "out/press", "--colour", "velocity_y"]);
+    assert!(page(here).contains("left the domain at") && page(here).contains("Coloured by velocity y"));
+    // What has been said of the end holds no longer than that.
+    let output =
+        agimp(here, &["run", "press.toml", "--set", "output.report=true", "--end", "0.005", "--quiet"]);
+    assert!(output.status.success(), "{}", told(&output));
+    assert!(page(here).contains("class=\"state finished\"") && !page(here).contains("left the domain"));
+    assert!(!here.join("out/press/press.ended.json").exists());
+}
+
+#[test]
+fn a_run_that_is_stopped_has_a_page_that_names_its_checkpoint() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let here = directory.path();
+    std::fs::write(here.join("press.toml"), job()).expect("written");
+    let words = ["run", "press.toml", "--quiet", "--end", "1e3", "--set", "output.report=true"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_agimp"))
+        .args(words)
+        .args(["--set", "output.every=1e3", "--set", "colliders.plate.motion.velocity=[0, 0]"])
+        .current_dir(here)
+        .spawn()
+        .expect("starts");
+    let rows = || {
+        std::fs::read_to_string(here.join("out/press/press.history.csv"))
+            .map_or(0, |text| text.lines().count())
+    };
+    while rows() < 5 {
+        assert!(child.try_wait().expect("a child").is_none(), "it runs on");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let stopped = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(stopped.expect("kill").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(3));
+    let page = page(here);
+    assert!(page.contains("class=\"state ended\"") && page.contains("stopped at"), "its state");
+    assert!(page.contains("stopped on request") && page.contains("press.checkpoint_0"), "its checkpoint");
+}
+
+/// The block of results at the end: each of its commands does what it says.
+#[test]
+fn the_commands_at_the_end_of_a_run_work() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let here = directory.path();
+    std::fs::write(here.join("press.toml"), job()).expect("written");
+    // A name that a shell would take apart.
+    let output = agimp(here, &["run", "press.toml", "--out", "it's here"]);
+    let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", told(&output));
+    assert!(shown.contains("took     ") && shown.contains("history  it's here/press.history.csv"), "{shown}");
+    let commands: Vec<&str> = shown.lines().filter_map(|line| Some(&line[line.find("agimp ")?..])).collect();
+    assert_eq!(commands.len(), 4, "{shown}");
+    let program = Path::new(env!("CARGO_BIN_EXE_agimp")).parent().expect("a directory");
+    let paths = format!("{}:{}", program.display(), std::env::var("PATH").expect("a path"));
+    for command in commands {
+        let output = Command::new("sh").args(["-c", command]).env("PATH", &paths).current_dir(here).output();
+        let output = output.expect("a shell");
+        assert!(output.status.success(), "{command}: {}", told(&output));
+    }
+    for made in ["press.html", "press_000004.png", "press.movie.png", "press.report.html"] {
+        assert!(here.join("it's here").join(made).is_file(), "{made}");
+    }
 }
 
 #[test]

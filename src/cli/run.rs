@@ -14,9 +14,10 @@ use crate::job::problem::AnyProblem;
 use crate::job::{Problem, Settings};
 use crate::report::{self, Results};
 use crate::run::stop::StopRequest;
-use crate::run::{self, Options, Outcome, RunError, Summary, restart};
+use crate::run::{self, Effort, Options, Outcome, RunError, Summary, restart};
 use crate::setup::estimate::steps;
 use crate::setup::warnings::warnings;
+use crate::text::{count, quantity, wall_time};
 
 /// Arguments of `agimp run`.
 #[derive(Debug, clap::Args)]
@@ -88,14 +89,14 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
-    let page = match (&outcome, comm.rank()) {
-        (Ok(Outcome::Finished(_)), 0) if problem.output().report => Some(page(&problem, &arguments.job)),
-        _ => None,
-    };
-    together(comm, conclude(outcome, page, options.speaks))
+    let has_begun = !matches!(&outcome, Err(RunError::Seed(_) | RunError::Refused(_)));
+    let wants_page = problem.output().report && has_begun && comm.rank() == 0;
+    let page = wants_page.then(|| page(&problem, &arguments.job));
+    let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
+    together(comm, conclude(outcome, page, options.speaks.then_some(&results)))
 }
 
-/// Writes the page of a finished run. All results are on disk by now, so a failure is only a message.
+/// Writes the page of a run that is over. All results are on disk by now, so a failure is only a message.
 fn page(problem: &AnyProblem, job: &Path) -> Result<PathBuf, String> {
     let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
     let path = results.path("report.html");
@@ -116,13 +117,19 @@ fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Re
 fn conclude(
     outcome: Result<Outcome, RunError>,
     page: Option<Result<PathBuf, String>>,
-    speaks: bool,
+    speaks_of: Option<&Results>,
 ) -> Result<(), Failure> {
+    if let (Some(Ok(page)), Some(_), false) = (&page, speaks_of, matches!(outcome, Ok(Outcome::Finished(_))))
+    {
+        // In one piece; a closed pipe is no error.
+        let line = format!("report   {} (open in a browser)\n", page.display());
+        let _ = std::io::stderr().write_all(line.as_bytes());
+    }
     match outcome {
         Ok(Outcome::Finished(summary)) => {
-            if speaks {
+            if let Some(results) = speaks_of {
                 // The run is complete and its results are on disk, whether somebody listens or not.
-                let _ = print(&mut std::io::stdout().lock(), &summary, page.as_ref());
+                let _ = print(&mut std::io::stdout().lock(), &summary, page.as_ref(), results);
             }
             Ok(())
         }
@@ -132,11 +139,13 @@ fn conclude(
     }
 }
 
-/// What the user wants to know when the run is over.
+/// What the user wants to know when the run is over: where the results are, what the run has taken, and the commands that show
+/// more.
 fn print(
     out: &mut impl Write,
     summary: &Summary,
     page: Option<&Result<PathBuf, String>>,
+    results: &Results,
 ) -> std::io::Result<()> {
     writeln!(out, "outputs  {} (open in ParaView)", summary.series.display())?;
     match &summary.picture {
@@ -149,10 +158,70 @@ fn print(
         Some(Err(reason)) => writeln!(out, "no report: {reason}")?,
         None => {}
     }
+    writeln!(out, "history  {}", results.path("history.csv").display())?;
+    let Effort { steps, time, wall_seconds, particles, warnings } = summary.effort;
+    write!(
+        out,
+        "took     {} steps to {} in {}, {} particles",
+        count(steps),
+        quantity(time, "s"),
+        wall_time(wall_seconds),
+        count(particles)
+    )?;
+    match warnings {
+        0 => writeln!(out)?,
+        1 => writeln!(out, ", 1 warning")?,
+        more => writeln!(out, ", {more} warnings")?,
+    }
+    let series = shell_word(&summary.series);
+    writeln!(out, "turn     agimp view {series}")?;
+    if let Some(last) = &summary.last_output {
+        writeln!(out, "draw     agimp plot {} --colour speed", shell_word(last))?;
+    }
+    writeln!(out, "play     agimp movie {series} --colour speed")?;
+    if !matches!(page, Some(Ok(_))) {
+        let directory = shell_word(&results.directory);
+        let is_alone = Results::in_directory(&results.directory, None).is_ok();
+        let name = if is_alone {
+            String::new()
+        } else {
+            format!(" --name {}", shell_word(Path::new(&results.name)))
+        };
+        writeln!(out, "read     agimp report {directory}{name}")?;
+    }
     if let Some(collapse) = &summary.collapse {
         writeln!(out, "{collapse}")?;
     }
     Ok(())
+}
+
+/// A path as a shell takes it for one word, and no program for an option.
+fn shell_word(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let text = if text.starts_with('-') { format!("./{text}").into() } else { text };
+    let is_plain = |c: char| c.is_alphanumeric() || "_./+-,=:@%".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_one_word_for_a_shell() {
+        for (path, word) in [
+            ("out/a_b/µ-1.hdf", "out/a_b/µ-1.hdf"),
+            ("my out/a.hdf", "'my out/a.hdf'"),
+            ("it's", "'it'\\''s'"),
+            ("-x", "./-x"),
+            ("$HOME", "'$HOME'"),
+        ] {
+            assert_eq!(shell_word(Path::new(path)), word);
+        }
+    }
 }
 
 /// Starts the threads of this rank.

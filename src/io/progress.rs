@@ -1,4 +1,4 @@
-//! What a user sees while the run goes on: a bar on a terminal, a line every few seconds elsewhere.
+//! What a user sees while the run goes on: a row of figures on a terminal, a line now and then elsewhere.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -8,18 +8,32 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::telemetry::Record;
 use crate::text::{bytes, count, number, quantity, quantity_to};
 
-/// Time between lines where there is no terminal.
+/// Time between lines where there is no terminal; in long runs a sixtieth of what has passed.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
-/// Time between changes of the bar.
+/// Time between changes on a terminal.
 const BETWEEN_DRAWS: Duration = Duration::from_millis(200);
-/// Units of the bar.
-const LENGTH: u64 = 1000;
+/// Time over which the speed on a terminal is a mean.
+const BETWEEN_SPEEDS: Duration = Duration::from_secs(2);
+/// Columns of a terminal that does not say how many it has.
+const COLUMNS: usize = 80;
 
 /// How the progress is shown.
 enum Display {
     Nothing,
     Bar(ProgressBar),
     Lines(Box<dyn Write>),
+}
+
+/// What changes with the telemetry.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    particles: u64,
+    /// Coarsest and finest level of the tree.
+    levels: Option<[u8; 2]>,
+    /// Of all ranks, bytes.
+    memory: f64,
+    /// In words, for lines.
+    words: String,
 }
 
 /// The progress of a run, on standard error. Speaks on rank 0 only; the other ranks create it silent.
@@ -29,26 +43,41 @@ pub struct Progress {
     end_time: f64,
     began: Instant,
     shown: Option<Instant>,
-    tree: String,
+    known: Known,
+    warnings: usize,
+    /// When the mean of the speed began, and at which step.
+    since: Option<(Instant, u64)>,
+    /// Steps per second.
+    speed: Option<f64>,
 }
 
 impl Progress {
-    /// A run from `start_time` to `end_time` (s). `speaks` on rank 0 and unless the user wants it quiet.
-    pub fn new(speaks: bool, start_time: f64, end_time: f64) -> Self {
+    /// A run from `start_time` to `end_time` (s), of which the user has been warned `warnings` times. `speaks` on rank 0 and
+    /// unless the user wants it quiet.
+    pub fn new(speaks: bool, start_time: f64, end_time: f64, warnings: usize) -> Self {
         let display = if !speaks {
             Display::Nothing
         } else if std::io::stderr().is_terminal() {
-            let bar = ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr());
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
             // The template is fixed; if it could not be read, the plain style would do.
-            if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/blue} {msg}") {
+            if let Ok(style) = ProgressStyle::with_template("{msg}") {
                 bar.set_style(style);
             }
             Display::Bar(bar)
         } else {
             Display::Lines(Box::new(std::io::stderr()))
         };
-        let tree = String::new();
-        Self { display, start_time, end_time, began: Instant::now(), shown: None, tree }
+        Self {
+            display,
+            start_time,
+            end_time,
+            began: Instant::now(),
+            shown: None,
+            known: Known::default(),
+            warnings,
+            since: None,
+            speed: None,
+        }
     }
 
     /// Takes over what changes slowly: particles, leaves per level, imbalance and memory.
@@ -58,13 +87,20 @@ impl Progress {
         let resampled = record.resampled.map_or_else(String::new, |r| {
             format!(", {} regrids, {} splits, {} merges", r.regrids, count(r.splits), count(r.merges))
         });
-        self.tree = format!(
+        let words = format!(
             "{} particles, leaves {}, imbalance {}, {}/rank{resampled}",
             count(record.particles),
             levels.join(" "),
             number(record.imbalance, 3),
             bytes(record.memory.max)
         );
+        let ends = record.levels.first().zip(record.levels.last());
+        self.known = Known {
+            particles: record.particles,
+            levels: ends.map(|(coarse, fine)| [coarse.level, fine.level]),
+            memory: record.memory.mean * record.ranks as f64,
+            words,
+        };
     }
 
     /// After each step; shows it now and then.
@@ -72,7 +108,7 @@ impl Progress {
         let pause = match self.display {
             Display::Nothing => return,
             Display::Bar(_) => BETWEEN_DRAWS,
-            Display::Lines(_) => BETWEEN_LINES,
+            Display::Lines(_) => BETWEEN_LINES.max(self.began.elapsed() / 60),
         };
         if self.shown.is_some_and(|shown| shown.elapsed() < pause) {
             return;
@@ -84,15 +120,37 @@ impl Progress {
     fn show(&mut self, step: u64, time: f64, dt: f64) {
         let done = self.done(time);
         let left = remaining(self.began.elapsed(), done);
+        self.measure(step);
         let text = self.text(step, time, dt, done, left);
         match &mut self.display {
             Display::Nothing => {}
             Display::Bar(bar) => {
-                bar.set_position((done * LENGTH as f64) as u64);
-                bar.set_message(text);
+                let columns = console_columns().saturating_sub(1);
+                let row = Row {
+                    done,
+                    step,
+                    time,
+                    left,
+                    speed: self.speed.map(|steps| steps * self.known.particles as f64),
+                    known: &self.known,
+                    warnings: self.warnings,
+                };
+                bar.set_message(row.fit(columns));
             }
             // A closed pipe must not end the run.
             Display::Lines(out) => drop(writeln!(out, "{text}")),
+        }
+    }
+
+    /// Steps per second over the last seconds.
+    fn measure(&mut self, step: u64) {
+        let (since, first) = *self.since.get_or_insert((Instant::now(), step));
+        let passed = since.elapsed();
+        if passed >= BETWEEN_SPEEDS || self.speed.is_none() && step > first {
+            self.speed = Some((step - first.min(step)) as f64 / passed.as_secs_f64().max(1e-9));
+        }
+        if passed >= BETWEEN_SPEEDS {
+            self.since = Some((Instant::now(), step));
         }
     }
 
@@ -105,9 +163,9 @@ impl Progress {
         let left = left.map_or_else(|| "?".to_owned(), clock);
         let (time, dt) = (quantity_to(time, "s", 5), quantity(dt, "s"));
         let mut text = format!("{:5.1} %  step {step}  t = {time}  dt = {dt}  ETA {left}", 100.0 * done);
-        if !self.tree.is_empty() {
+        if !self.known.words.is_empty() {
             text.push_str("  ");
-            text.push_str(&self.tree);
+            text.push_str(&self.known.words);
         }
         text
     }
@@ -123,13 +181,14 @@ impl Progress {
 
     /// A message that is shown even if the user wants it quiet. On rank 0 only.
     pub fn warning(&mut self, text: &str) {
+        self.warnings += 1;
         match &mut self.display {
             Display::Nothing => warn(text),
             _ => self.message(&format!("agimp: warning: {text}")),
         }
     }
 
-    /// The last state; the bar stays on the terminal.
+    /// The last state; it stays on the terminal.
     pub fn finish(&mut self, step: u64, time: f64, dt: f64) {
         self.show(step, time, dt);
         if let Display::Bar(bar) = &self.display {
@@ -144,15 +203,97 @@ pub fn warn(text: &str) {
     let _ = std::io::stderr().write_all(format!("agimp: warning: {text}\n").as_bytes());
 }
 
+/// Columns of the terminal, as far as it says so.
+fn console_columns() -> usize {
+    let asked = rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| usize::from(size.ws_col));
+    if asked == 0 { COLUMNS } else { asked }
+}
+
+/// Name, width, figure, and how much it matters: the greater the number, the earlier it goes.
+type Figure = (&'static str, usize, String, i32);
+
+/// What a terminal shows of the present state.
+struct Row<'a> {
+    /// Share of the run.
+    done: f64,
+    step: u64,
+    /// s.
+    time: f64,
+    left: Option<Duration>,
+    /// Particles times steps per second.
+    speed: Option<f64>,
+    known: &'a Known,
+    warnings: usize,
+}
+
+impl Row<'_> {
+    /// Names of the figures, and the figures below them, in at most so many columns: on a narrow terminal the least
+    /// important ones are left out.
+    fn fit(&self, columns: usize) -> String {
+        let known = self.known;
+        let levels = match known.levels {
+            Some([coarse, fine]) if coarse < fine => format!("{coarse}-{fine}"),
+            Some([level, _]) => level.to_string(),
+            None => "-".into(),
+        };
+        let dash = || "-".to_owned();
+        let step = if self.step < 10_000_000 { self.step.to_string() } else { compact(self.step as f64) };
+        let mut all: Vec<Figure> = vec![
+            ("done", 11, format!("{} {:3.0}%", bar(self.done), (100.0 * self.done).floor()), 0),
+            ("step", 7, step, 2),
+            ("time", 9, quantity(self.time, "s"), 1),
+            ("ETA", 8, self.left.map_or_else(|| "?".into(), clock), 0),
+            ("p/s", 7, self.speed.map_or_else(dash, compact), 5),
+            ("particles", 9, compact(known.particles as f64), 4),
+            ("levels", 6, levels, 6),
+            ("memory", 8, bytes(known.memory), 7),
+            ("warn", 4, self.warnings.min(9999).to_string(), 3),
+        ];
+        let width = |all: &[Figure]| {
+            all.iter().map(|(_, width, text, _)| width.max(&text.chars().count()) + 1).sum::<usize>() - 1
+        };
+        while width(&all) > columns && all.len() > 1 {
+            let least = (0..all.len()).max_by_key(|&at| all[at].3).unwrap_or(0);
+            all.remove(least);
+        }
+        let line = |text: &dyn Fn(&Figure) -> String| {
+            let cells: Vec<String> = all.iter().map(|cell| format!("{:>1$}", text(cell), cell.1)).collect();
+            let line = cells.join(" ");
+            line.chars().take(columns).collect::<String>()
+        };
+        format!("{}\n{}", line(&|cell| cell.0.to_owned()), line(&|cell| cell.2.clone()))
+    }
+}
+
+/// Six columns of a bar, filled to a share.
+fn bar(done: f64) -> String {
+    const WIDTH: usize = 6;
+    let filled = ((done * WIDTH as f64) as usize).min(WIDTH);
+    format!("{}{}", "█".repeat(filled), "░".repeat(WIDTH - filled))
+}
+
+/// A count in at most seven columns: whole below ten thousand, else with three digits: `12.3M`.
+fn compact(value: f64) -> String {
+    let steps = [(1e15, "P"), (1e12, "T"), (1e9, "G"), (1e6, "M"), (1e4, "k")];
+    match steps.into_iter().find(|(least, _)| value >= *least) {
+        Some((1e4, unit)) => format!("{}{unit}", number(value / 1e3, 3)),
+        Some((least, unit)) => format!("{}{unit}", number(value / least, 3)),
+        None => number(value.round(), 4),
+    }
+}
+
 /// Wall time that is left when the part `done` took `elapsed`.
 fn remaining(elapsed: Duration, done: f64) -> Option<Duration> {
     // Too early for an estimate in the first thousandth.
     (done > 1e-3).then(|| elapsed.mul_f64((1.0 - done) / done))
 }
 
-/// `h:mm:ss`.
+/// `h:mm:ss`; from a hundred hours on, days and hours.
 fn clock(duration: Duration) -> String {
     let seconds = duration.as_secs();
+    if seconds >= 360_000 {
+        return format!("{}d {}h", seconds / 86_400, seconds / 3600 % 24);
+    }
     format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
@@ -162,18 +303,66 @@ mod tests {
 
     #[test]
     fn one_line_has_it_all() {
-        let progress = Progress {
-            display: Display::Nothing,
-            start_time: 1.0,
-            end_time: 3.0,
-            began: Instant::now(),
-            shown: None,
-            tree: "1 particles".into(),
-        };
+        let mut progress = Progress::new(false, 1.0, 3.0, 0);
+        progress.known.words = "1 particles".into();
         let done = progress.done(1.5);
         let left = remaining(Duration::from_secs(60), done);
         let text = progress.text(12, 1.5, 1e-4, done, left);
         assert_eq!(text, " 25.0 %  step 12  t = 1.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
         assert_eq!(remaining(Duration::from_secs(1), 0.0), None);
+    }
+
+    #[test]
+    fn a_terminal_of_80_columns_shows_all_figures_whatever_their_size() {
+        let known =
+            |particles, levels, memory| Known { particles, levels: Some(levels), memory, ..Known::default() };
+        let usual = Row {
+            done: 0.423,
+            step: 12_345,
+            time: 0.1234,
+            left: Some(Duration::from_secs(754)),
+            speed: Some(3.21e6),
+            known: &known(290_000, [3, 6], 1.23e9),
+            warnings: 2,
+        };
+        assert_eq!(
+            usual.fit(79),
+            "       done    step      time      ETA     p/s particles levels   memory warn\n\
+             ██░░░░  42%   12345  123.4 ms  0:12:34   3.21M      290k    3-6   1.2 GB    2"
+        );
+        let largest = Row {
+            done: 1.0,
+            step: 9_876_543_210,
+            time: 1234.5e-9,
+            left: Some(Duration::from_secs(8_639_999)),
+            speed: Some(9.876e11),
+            known: &known(999_999_999_999, [10, 20], 999.9e12),
+            warnings: 123_456,
+        };
+        let least = Row {
+            done: 0.0,
+            step: 0,
+            time: 0.0,
+            left: None,
+            speed: None,
+            known: &Known::default(),
+            warnings: 0,
+        };
+        for row in [&usual, &largest, &least] {
+            for line in row.fit(79).lines() {
+                assert!(line.chars().count() <= 79, "{line}");
+            }
+            for name in ["done", "step", "time", "ETA", "p/s", "particles", "levels", "memory", "warn"] {
+                assert!(row.fit(79).contains(name), "{name} is shown");
+            }
+            // Narrow ones keep how far the run is and how long it takes.
+            for columns in [1, 10, 30, 50] {
+                let text = row.fit(columns);
+                assert!(
+                    text.lines().count() == 2 && text.lines().all(|line| line.chars().count() <= columns)
+                );
+            }
+            assert!(row.fit(40).contains("done") && row.fit(40).contains("ETA"));
+        }
     }
 }

@@ -7,18 +7,21 @@
 //! | `figures.rs` | its pictures and charts |
 //! | `results.rs` | the files of a run: which are there, and how far it has come |
 //! | `history.rs` | the table of the history |
+//! | `along.rs` | curves along lines of points |
 //! | `panels.rs` | columns of the history that belong into one chart |
 //! | `cost.rs` | where the time went, balance and memory, from telemetry |
 //! | `page.html`, `page.css` | frame and looks of the page |
 //!
 //! Runs that go on, and runs that have ended by a fault, are shown as far as they have come.
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::io::hdf5_file::FileError;
 use crate::io::lines::write_whole;
 use crate::io::snapshot::{self, Header};
-use crate::text::{html, quantity};
+use crate::text::{count, html, quantity};
 
+mod along;
 mod cost;
 mod figures;
 mod history;
@@ -31,7 +34,7 @@ use figures::{charts, pictures};
 use history::History;
 use results::State;
 pub use results::{Results, Unclear};
-use sections::{collapse, costs, facts, files, job, remarks, table};
+use sections::{collapse, costs, ending, facts, files, job, remarks, table};
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
@@ -71,9 +74,19 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
     let run = Run::read(results);
     let mut body = String::new();
     facts(&mut body, &run);
+    ending(&mut body, &run, results);
     remarks(&mut body, &run);
-    pictures(&mut body, &run, options)?;
+    let mut drawn = String::new();
+    match pictures(&mut drawn, &run, options) {
+        Ok(()) => body.push_str(&drawn),
+        Err(error) if options.colour.is_some() => return Err(error),
+        // A page of what can be read is worth more than none.
+        Err(error) => {
+            let _ = writeln!(body, "<p class=\"warning\">no pictures: {}</p>", html(&error.to_string()));
+        }
+    }
     charts(&mut body, "curves", "Over time", &panels::panels(&run.history));
+    charts(&mut body, "lines", "Along lines", &along::panels(&results.lines()));
     table(&mut body, &run.history);
     collapse(&mut body, &run);
     costs(&mut body, &run);
@@ -105,7 +118,8 @@ struct Run {
 impl Run {
     fn read(results: &Results) -> Self {
         let (outputs, report) = (results.outputs(), results.report());
-        let last = outputs.last();
+        // The last one that can be read.
+        let last = outputs.iter().rfind(|output| results::header(output).is_some());
         let job_text = last.and_then(|last| snapshot::job_text(last));
         Self {
             history: History::read(&results.path("history.csv")),
@@ -137,6 +151,10 @@ impl Run {
         match &self.state {
             State::Finished => ("finished", format!("finished at {time}")),
             State::Running(holder) => ("running", format!("running, at {time}{end} ({holder})")),
+            State::Told(ending) => {
+                let (what, at) = if ending.is_stop { ("stopped", "ended") } else { ("failed", "failed") };
+                (at, format!("{what} at {}{end}, step {}", quantity(ending.time, "s"), count(ending.step)))
+            }
             State::Ended => ("ended", format!("ended without finishing, at {time}{end}")),
         }
     }

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::io::hdf5_file::Reader;
 use crate::io::snapshot::Header;
-use crate::io::snapshot::directory::{listed, series_path};
+use crate::io::snapshot::directory::{self, listed, series_path};
 use crate::run::claim;
+use crate::run::ending::Ending;
 use crate::run::report::{self, Report};
 
 /// The results of a run in a directory.
@@ -29,13 +30,15 @@ pub enum Unclear {
 }
 
 /// How far a run has come.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) enum State {
     /// It has written its report.
     Finished,
     /// It has its lock; who it is.
     Running(String),
-    /// Neither.
+    /// It has left word of why it has ended.
+    Told(Ending),
+    /// None of these: it was killed.
     Ended,
 }
 
@@ -76,6 +79,27 @@ impl Results {
             .collect()
     }
 
+    /// Name and path of the table of each line of points.
+    pub(super) fn lines(&self) -> Vec<(String, PathBuf)> {
+        let start = format!("{}.line_", self.name);
+        let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
+        let line = |entry: std::fs::DirEntry| {
+            let name = entry.file_name().to_str()?.strip_prefix(&start)?.strip_suffix(".csv")?.to_owned();
+            Some((name, entry.path()))
+        };
+        let mut lines: Vec<_> = entries.filter_map(line).collect();
+        lines.sort();
+        lines
+    }
+
+    /// The latest state that a run can go on from, by its header: file, step, time (s).
+    pub(super) fn last_state(&self) -> Option<(PathBuf, u64, f64)> {
+        let candidates = directory::candidates(&self.directory, &self.name, None).ok()?;
+        let (path, step) = candidates.whole.into_iter().next()?;
+        let time = header(&path)?.time;
+        Some((path, step, time))
+    }
+
     /// What the run says of itself, if it has finished.
     pub(super) fn report(&self) -> Option<Report> {
         serde_json::from_slice(&std::fs::read(report::path(&self.directory, &self.name)).ok()?).ok()
@@ -86,7 +110,7 @@ impl Results {
         match claim::holder(&self.path("lock")) {
             _ if is_finished => State::Finished,
             Some(holder) => State::Running(holder),
-            None => State::Ended,
+            None => Ending::read(&self.directory, &self.name).map_or(State::Ended, State::Told),
         }
     }
 

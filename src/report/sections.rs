@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use super::Run;
 use super::figures::charts;
 use super::history::History;
-use super::results::Results;
+use super::results::{Results, State};
+use crate::io::snapshot;
 use crate::text::{bytes, count, html, number, quantity, quantity_to, wall_time};
 
 /// Begins a section.
@@ -59,6 +60,44 @@ pub(super) fn facts(body: &mut String, run: &Run) {
         let _ = writeln!(body, "<div><dt>{name}</dt><dd>{value}</dd></div>");
     }
     body.push_str("</dl>\n");
+}
+
+/// Why a run has ended ahead of its time, what to do, and from where it can go on.
+pub(super) fn ending(body: &mut String, run: &Run, results: &Results) {
+    let (reason, advice) = match &run.state {
+        State::Finished | State::Running(_) => return,
+        State::Told(ending) => (ending.reason.as_str(), ending.advice.as_str()),
+        State::Ended => (
+            "The run has left no word: it was killed, or its machine failed.",
+            "Look at the messages of the batch system or the kernel: wall time, memory (see the chart below).",
+        ),
+    };
+    let _ = write!(
+        body,
+        "<div class=\"failure\">\n<p><b>Why it ended:</b> {}</p>\n<p><b>What to do:</b> {}</p>\n",
+        html(reason),
+        html(advice)
+    );
+    match results.last_state() {
+        Some((path, step, time)) => {
+            let job = run.outputs.last().map(|output| snapshot::job_files(output)).unwrap_or_default();
+            let job = job.into_iter().find(|job| job.is_file());
+            let job = job
+                .and_then(|job| job.canonicalize().ok())
+                .map_or_else(|| format!("{}.toml", results.name), |job| job.display().to_string());
+            let _ = writeln!(
+                body,
+                "<p><b>Last state:</b> <code>{}</code>, t = {}, step {}. To go on from it: <code>agimp run {} --restart \
+                 latest</code></p>",
+                html(&path.display().to_string()),
+                quantity(time, "s"),
+                count(step),
+                html(&job)
+            );
+        }
+        None => body.push_str("<p><b>Last state:</b> none that a run can go on from; start anew.</p>\n"),
+    }
+    body.push_str("</div>\n");
 }
 
 /// Warnings, messages and stages.

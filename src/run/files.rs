@@ -15,6 +15,8 @@ pub(super) struct Names {
     materials: Vec<String>,
     bodies: Vec<String>,
     histories: Vec<String>,
+    /// The job file, from the root of the file system; empty if it is not there any more.
+    job_file: PathBuf,
 }
 
 impl Names {
@@ -23,6 +25,7 @@ impl Names {
             materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
             bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
             histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
+            job_file: problem.path.canonicalize().unwrap_or_default(),
         }
     }
 }
@@ -134,6 +137,7 @@ fn view<'a, const D: usize>(
         histories: &names.histories,
         job_digest: problem.digest,
         job_text: &problem.text,
+        job_file: &names.job_file,
         step: solver.clock.step,
         time: solver.clock.time,
         dt: solver.clock.dt,

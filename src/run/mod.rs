@@ -1,6 +1,7 @@
 //! A whole run: from a checked job to its last file.
 pub mod claim;
 pub mod collapse;
+pub mod ending;
 mod files;
 pub mod history;
 mod measures;
@@ -15,8 +16,9 @@ pub mod stop;
 use partition::comm::{Comm, Disagreement};
 
 use self::claim::Claim;
+use self::ending::Ending;
 use self::files::Names;
-pub use self::outcome::{Options, Outcome, RunError, Summary};
+pub use self::outcome::{Effort, Options, Outcome, RunError, Summary};
 use self::record::Recorder;
 use self::restart::From;
 use self::schedule::Schedule;
@@ -45,9 +47,9 @@ pub fn run<const D: usize>(
     let outcome = run.advance(stop).map_err(|error| error.after(run.solver.clock));
     // Also after an error: the checkpoint on its way to disk is what the next run can start from.
     let settled = run.settle(true);
-    let outcome = outcome?;
-    settled?;
-    Ok(outcome)
+    let outcome = outcome.and_then(|outcome| settled.map(|()| outcome));
+    run.note_end(&outcome);
+    outcome
 }
 
 /// A run under way.
@@ -132,6 +134,7 @@ impl<'a, const D: usize> Run<'a, D> {
         if comm.rank() == 0 {
             // That of an earlier end would be taken for this one's.
             let _ = std::fs::remove_file(report::path(&problem.output.directory, &problem.name));
+            let _ = std::fs::remove_file(ending::path(&problem.output.directory, &problem.name));
         }
         let (cores, wanted) = (available_cores(), comm.size() * options.threads);
         recorder.message(&format!(
@@ -251,6 +254,20 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
+    /// Not collective. Leaves word of why a run ends ahead of its time, on rank 0. The user is told in any case, so a failure to
+    /// write it is none of the run.
+    fn note_end(&self, outcome: &Result<Outcome, RunError>) {
+        let Clock { step, time, .. } = self.solver.clock;
+        let ending = match outcome {
+            Ok(Outcome::Finished(_)) => return,
+            Ok(Outcome::Stopped { .. }) => Ending::stopped(step, time),
+            Err(error) => Ending::failed(error, step, time),
+        };
+        if self.comm.rank() == 0 {
+            let _ = ending.write(&ending::path(&self.problem.output.directory, &self.problem.name));
+        }
+    }
+
     fn step(&mut self, requests: Requests) -> Result<StepReport, RunError> {
         let clock = self.solver.clock;
         let report = self.solver.step(f64::INFINITY, requests);
@@ -298,7 +315,13 @@ impl<'a, const D: usize> Run<'a, D> {
             let mass = self.solver.particle_totals().mass;
             collapse::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
         });
-        let summary = Summary { series: self.outputs.series().to_owned(), picture, collapse };
+        let summary = Summary {
+            effort: self.recorder.effort(&self.solver),
+            last_output: self.outputs.last(),
+            series: self.outputs.series().to_owned(),
+            picture,
+            collapse,
+        };
         self.recorder.report(&self.solver, &summary);
         Ok(summary)
     }

@@ -35,9 +35,28 @@ pub enum Outcome {
     },
 }
 
+/// What a run has taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Steps done since the start.
+    pub steps: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Wall time of this part of the run, s.
+    pub wall_seconds: f64,
+    /// Particles at the end; known on rank 0.
+    pub particles: u64,
+    /// How often the user has been warned; known on rank 0.
+    pub warnings: usize,
+}
+
 /// What a finished run leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
+    /// What it has taken.
+    pub effort: Effort,
+    /// The last output, to look at.
+    pub last_output: Option<PathBuf>,
     /// Index of the output files, for ParaView.
     pub series: PathBuf,
     /// Picture of the last state, or why there is none; `Ok(None)` if the job wants none.

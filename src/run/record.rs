@@ -6,7 +6,7 @@ use partition::comm::{Comm, Traffic};
 
 use super::measures::lines;
 use super::report::{self, Report};
-use super::{Options, RunError, Summary, history};
+use super::{Effort, Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
 use crate::io::history::{Column, Gap, History, Kept};
 use crate::io::progress::Progress;
@@ -83,7 +83,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             history,
             telemetry,
             lines,
-            progress: Progress::new(options.speaks, time, problem.time.end),
+            progress: Progress::new(options.speaks, time, problem.time.end, options.warnings.len()),
             last_row,
             last_values: Vec::new(),
             report: Report {
@@ -318,6 +318,17 @@ impl<'a, const D: usize> Recorder<'a, D> {
     pub fn message(&mut self, text: &str) {
         self.report.messages.push(text.to_owned());
         self.progress.message(text);
+    }
+
+    /// Not collective. Steps, wall time (s) and warnings of this part of the run.
+    pub fn effort(&self, solver: &Solver<D>) -> Effort {
+        Effort {
+            steps: solver.clock.step,
+            time: solver.clock.time,
+            wall_seconds: self.began.elapsed().as_secs_f64(),
+            particles: self.report.particles,
+            warnings: self.report.warnings.len(),
+        }
     }
 
     /// Not collective. Writes the report of the run, on rank 0. All results are on disk by now, so a failure is only a warning.

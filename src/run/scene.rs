@@ -89,16 +89,17 @@ fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Vec<Solid> {
 }
 
 /// Not collective. The job of the run that wrote an output, from the text in it. Files that it names (meshes, records) lie
-/// beside the job file: `job`, or one of the job's name here, in `jobs/`, or above the output.
+/// beside the job file: `job`, or where the output says it is.
 ///
 /// # Errors
 /// The output holds no job, or the job names files that are not found; why, in words.
 pub fn job_of(output: &Path, job: Option<&Path>) -> Result<AnyProblem, String> {
     let text = snapshot::job_text(output).ok_or("the output holds no job")?;
-    let file = format!("{}.toml", directory::run_of(output));
-    let mut places = vec![PathBuf::from(&file), Path::new("jobs").join(&file)];
-    places.extend(output.ancestors().skip(1).map(|above| above.join(&file)));
-    let places = job.map_or(places, |job| vec![job.to_path_buf()]);
+    let mut places = job.map_or_else(|| snapshot::job_files(output), |job| vec![job.to_path_buf()]);
+    if places.is_empty() {
+        // Enough for a job that names no files.
+        places.push(PathBuf::from(format!("{}.toml", directory::run_of(output))));
+    }
     let mut reason = String::new();
     for place in places {
         match job::parse(&text, &place) {

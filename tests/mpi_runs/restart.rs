@@ -175,6 +175,12 @@ fn says_where_results_are(shown: &str) {
     let expected = [
         "outputs  out/collapse_2d/collapse_2d.hdf.series",
         "picture  out/collapse_2d/collapse_2d.png",
+        "history  out/collapse_2d/collapse_2d.history.csv",
+        "took     ",
+        "turn     agimp view out/collapse_2d/collapse_2d.hdf.series",
+        "draw     agimp plot out/collapse_2d/collapse_2d_",
+        "play     agimp movie out/collapse_2d/collapse_2d.hdf.series",
+        "read     agimp report out/collapse_2d",
         "column collapse, aspect ratio",
         "  run-out radius  ",
         "  outer edge ",

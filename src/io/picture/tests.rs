@@ -45,6 +45,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         histories: &[],
         job_digest: 0,
         job_text: "",
+        job_file: Path::new(""),
         step: 0,
         time: 0.0,
         dt: 0.0,

@@ -22,6 +22,7 @@ pub(crate) mod fields;
 mod given;
 pub mod header;
 pub mod outputs;
+mod place;
 mod sane;
 mod state;
 mod vtkhdf;
@@ -32,6 +33,7 @@ pub use fields::PointField;
 pub use given::particles;
 pub use header::{Header, Scalars};
 pub use outputs::Outputs;
+pub use place::job_files;
 pub use sane::Limits;
 
 /// The run as a file shows it: borrowed, this rank's part.
@@ -63,6 +65,8 @@ pub struct View<'a, const D: usize> {
     pub job_digest: u64,
     /// Text of the job file.
     pub job_text: &'a str,
+    /// The job file, from the root of the file system; empty if that is not known.
+    pub job_file: &'a Path,
     /// Steps done.
     pub step: u64,
     /// Simulated time, s.
@@ -131,6 +135,7 @@ pub fn start_write<const D: usize>(
         }
         vtkhdf::write_particles(file, &mut recorded, comm, view, particles, options)?;
         let header = Header::new(view, leaves.total, particles.total, options.restart);
+        place::write(file, path, view.job_file)?;
         Header { checksums: recorded.checksums(), ..header }.write(file)
     })
 }
@@ -143,6 +148,7 @@ pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> R
         let mut recorded = Recorded::new(comm, file);
         vtkhdf::write_leaves(file, &mut recorded, comm, view, leaves)?;
         let header = Header::new(view, leaves.total, particles.total, false);
+        place::write(file, path, view.job_file)?;
         Header { checksums: recorded.checksums(), ..header }.write(file)
     });
     written?.finish(comm)

@@ -90,6 +90,11 @@ impl Outputs {
         self.particles.path()
     }
 
+    /// Not collective. The last output in the index; known on rank 0.
+    pub fn last(&self) -> Option<PathBuf> {
+        Some(self.directory.join(&self.particles.entries().last()?.name))
+    }
+
     /// Number of the next output.
     pub fn next(&self) -> u64 {
         self.next

@@ -29,7 +29,7 @@ pub struct Output {
     /// Field that colours the picture; by default the plastic strain if a material has it, else the speed.
     #[serde(default)]
     pub picture_field: Option<Field>,
-    /// Whether the run ends with a page for a browser, `JOB.report.html`, as `agimp report` writes it.
+    /// Whether the run ends with a page for a browser, `JOB.report.html`, as `agimp report` writes it; also when it fails or is stopped.
     #[serde(default)]
     pub report: bool,
 }

@@ -1,0 +1,78 @@
+//! `JOB.ended.json`: why a run has ended ahead of its time, and what to do.
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::RunError;
+use crate::io::lines::write_whole;
+
+/// Why a run has ended ahead of its time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ending {
+    /// The message that the user has got.
+    pub reason: String,
+    /// What may help.
+    pub advice: String,
+    /// Whether it was asked to stop.
+    pub is_stop: bool,
+    /// Steps done.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+}
+
+/// What helps a run that has become unstable.
+const UNSTABLE: &str = "Look at the last output where the speed is greatest (agimp plot --colour speed, agimp view). If the \
+    material is torn or pressed beyond what its law can bear, mend the job there: a stiffer or plastic material, a slower load, finer \
+    cells. Else try a smaller Courant number (time.cfl, for example half of it), or damping.";
+/// What helps where a file cannot be written.
+const FILE: &str =
+    "Make room on the disk, or permit this user to write there; then go on from the last state.";
+/// What helps where material has left the domain.
+const LEFT: &str = "Look at the last output where material has come to that face. If it should get there, open the face \
+    (kind outflow) or say what becomes of it (boundaries.leaving); else make the domain larger, or find out why it flies.";
+/// What helps in all other cases.
+const OTHER: &str =
+    "Mend what the message names; then go on from the last state, or start anew if the job has to change.";
+
+impl Ending {
+    /// Asked to stop by a signal.
+    pub(super) fn stopped(step: u64, time: f64) -> Self {
+        let reason = "stopped on request (signal), after a checkpoint".into();
+        Self { reason, advice: "Go on from the last state.".into(), is_stop: true, step, time }
+    }
+
+    /// By an error.
+    pub(super) fn failed(error: &RunError, step: u64, time: f64) -> Self {
+        let reason = error.to_string();
+        let is_unstable =
+            ["unstable", "not finite", "NaN", "reaches beyond"].iter().any(|word| reason.contains(word));
+        let is_file = ["cannot write", "cannot create", "cannot rename", "no space"]
+            .iter()
+            .any(|word| reason.contains(word));
+        let advice = match () {
+            () if reason.contains("left the domain") => LEFT,
+            () if is_unstable => UNSTABLE,
+            () if is_file => FILE,
+            () => OTHER,
+        };
+        Self { reason, advice: advice.into(), is_stop: false, step, time }
+    }
+
+    /// Not collective. Writes it, under a temporary name first.
+    pub(super) fn write(&self, path: &Path) -> std::io::Result<()> {
+        let mut text = serde_json::to_string_pretty(self).map_err(std::io::Error::other)?;
+        text.push('\n');
+        write_whole(path, text.as_bytes())
+    }
+
+    /// Not collective. What a run has left, if it has ended so.
+    pub fn read(directory: &Path, name: &str) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(path(directory, name)).ok()?).ok()
+    }
+}
+
+/// Where it is, for a job of this name, in the directory of its results.
+pub fn path(directory: &Path, name: &str) -> PathBuf {
+    directory.join(format!("{name}.ended.json"))
+}
