@@ -206,6 +206,19 @@ fn shell_word(path: &Path) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
+/// Starts the threads of this rank.
+pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = wanted.map_or_else(|| (cores / comm.size()).max(1), usize::from);
+    // The main thread works too; handing each small loop to another thread would cost more than the loop.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .use_current_thread()
+        .build_global()
+        .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))?;
+    Ok(threads)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,17 +235,4 @@ mod tests {
             assert_eq!(shell_word(Path::new(path)), word);
         }
     }
-}
-
-/// Starts the threads of this rank.
-pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = wanted.map_or_else(|| (cores / comm.size()).max(1), usize::from);
-    // The main thread works too; handing each small loop to another thread would cost more than the loop.
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .use_current_thread()
-        .build_global()
-        .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))?;
-    Ok(threads)
 }
