@@ -126,6 +126,75 @@ fn outputs_know_where_their_job_is() {
     assert!(seen(&image(&here.join("picture.png")), PLATE).0 > 1000);
 }
 
+/// Corners of the polygons of a colour in an SVG.
+fn polygons(svg: &str, colour: &str) -> Vec<Vec<[f64; 2]>> {
+    let pair = |pair: &str| {
+        let (x, y) = pair.split_once(',').expect("two numbers");
+        [x, y].map(|number| number.parse().expect("a number"))
+    };
+    let of_colour =
+        |line: &&str| line.starts_with("<polygon") && line.contains(&format!("fill=\"{colour}\""));
+    let corners = |line: &str| line.split('"').nth(1).expect("points").split(' ').map(pair).collect();
+    svg.lines().filter(of_colour).map(corners).collect()
+}
+
+/// A block that flies to the right: all its arrows do, as long as the arrow of the scale says.
+#[test]
+fn arrows_show_vectors_and_svg_keeps_lines_and_text() {
+    let block = RUBBER_BLOCK.replace("max = [0.75, 0.25] }", "max = [0.75, 0.25] }\nvelocity = [4, 0]");
+    let directory =
+        finished("press", &[JOB, &block.replace("sticky", "separating")].concat(), &["--end", "1e-4"]);
+    let here = directory.path();
+    let plot = |options: &[&str]| {
+        let words = [
+            "plot",
+            "out/press/press_000000.hdf",
+            "--colour",
+            "material",
+            "--width",
+            "800",
+            "--height",
+            "500",
+        ];
+        agimp(here, &[&words, options].concat())
+    };
+    assert!(plot(&["--vectors", "velocity", "--out", "a.svg", "--title", "Fast & <right>"]).status.success());
+    let svg = std::fs::read_to_string(here.join("a.svg")).expect("SVG");
+    assert!(svg.contains(">Fast &amp; &lt;right&gt;</text>") && svg.contains(">t = 0 s   step 0"), "texts");
+    assert_eq!(svg.matches("<image ").count(), 1);
+    let arrows = polygons(&svg, "#28282c");
+    // 0.5 m by 0.25 m of the block, in squares of the lattice; and the arrow of the scale.
+    let (width, pixels) = {
+        plot(&["--out", "b.png"]);
+        image(&here.join("b.png"))
+    };
+    let area = seen(&(width, pixels), RUBBER).0 as f64 / (26.0 * 26.0);
+    let count = arrows.len() as f64 - 1.0;
+    assert!(count > 0.8 * area && count < 1.5 * area + 20.0, "{count} arrows for {area} squares");
+    // The arrow of the scale is as long as half of that speed.
+    for (number, arrow) in arrows.iter().enumerate() {
+        let length = if number + 1 == arrows.len() { 22.0 } else { 44.0 };
+        let (tail, tip) = ([0, 1].map(|i| 0.5 * (arrow[0][i] + arrow[6][i])), arrow[3]);
+        assert!(
+            (tip[0] - tail[0] - length).abs() < 0.05 && (tip[1] - tail[1]).abs() < 0.05,
+            "{tail:?} {tip:?}"
+        );
+    }
+    assert!(svg.contains(">2 m/s</text>"), "the arrow of the scale says how long it is");
+    // As pixels too; and what is not there is said.
+    assert!(plot(&["--vectors", "velocity", "--out", "c.png"]).status.success());
+    assert!(image(&here.join("c.png")).1 != image(&here.join("b.png")).1);
+    for (options, message) in [
+        (&["--vectors", "pressure"][..], "found no vectors pressure; expected one of: velocity"),
+        (&["--out", "a.jpg"], "a.jpg: found no ending of a picture; expected .png or .svg"),
+        (&["--out", "none/a.svg"], "cannot write the picture"),
+    ] {
+        let output = plot(options);
+        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+        assert!(told(&output).contains(message), "{}", told(&output));
+    }
+}
+
 #[test]
 fn looks_can_be_chosen() {
     let directory = run();

@@ -11,6 +11,7 @@ pub mod schema;
 
 pub use difference::{Difference, differences};
 pub use parse::error::{Fault, FaultList, JobError};
+pub use parse::include::Included;
 pub use parse::settings::Settings;
 pub use problem::{AnyProblem, Problem};
 pub use schema::json::schema;
@@ -20,6 +21,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use self::parse::error::Lines;
+use self::parse::include::Whole;
 use self::parse::settings::Edited;
 
 /// Reads and checks a job file. Not collective: every rank that calls it reads the file.
@@ -69,8 +71,14 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<An
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
         let message = "found a byte that is not UTF-8; expected text in UTF-8".into();
-        let faults =
-            vec![Fault { key: String::new(), message, span: valid..valid, help: None, setting: None }];
+        let faults = vec![Fault {
+            key: String::new(),
+            message,
+            span: valid..valid,
+            help: None,
+            setting: None,
+            included: None,
+        }];
         FaultList { path: path.to_path_buf(), text, faults }
     })?;
     parse_with(&text, path, settings)
@@ -78,7 +86,7 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<An
 }
 
 /// Checks the text of a job file. Nothing is read from `path` itself: its stem becomes the name of the job, and files that the job
-/// names lie relative to its directory.
+/// names or includes lie relative to its directory.
 ///
 /// # Errors
 /// All faults that were found.
@@ -91,19 +99,27 @@ pub fn parse(text: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
 /// # Errors
 /// All faults that were found, in the file and in the settings.
 pub fn parse_with(text: &str, path: &Path, settings: &Settings) -> Result<AnyProblem, Vec<Fault>> {
-    let edited = settings.apply(text)?;
-    parse_edited(&edited, text, path)
-        .map_err(|faults| faults.into_iter().map(|fault| edited.attribute(fault)).collect())
+    let whole = Whole::of(text, path)?;
+    let edited = settings.apply(&whole.text)?;
+    parse_edited(&edited, &whole, text, path)
+        .map_err(|faults| faults.into_iter().map(|fault| whole.attribute(edited.attribute(fault))).collect())
 }
 
-/// `original` is the text before settings have changed it.
-fn parse_edited(edited: &Edited, original: &str, path: &Path) -> Result<AnyProblem, Vec<Fault>> {
+/// `original` is the text of the job file, `whole` that with what it includes, before settings have changed it.
+fn parse_edited(
+    edited: &Edited,
+    whole: &Whole,
+    original: &str,
+    path: &Path,
+) -> Result<AnyProblem, Vec<Fault>> {
     let text = edited.text.as_str();
-    let alone = |span, message| vec![Fault { key: String::new(), message, span, help: None, setting: None }];
+    let alone = |span, message| {
+        vec![Fault { key: String::new(), message, span, help: None, setting: None, included: None }]
+    };
     let tree = parse::source::Node::parse(text).map_err(|(span, message)| match text.get(span.clone()) {
         Some(key) if message == "duplicate key" => {
             let message = "found the key a second time; expected it once".into();
-            vec![Fault { key: key.to_owned(), message, span, help: None, setting: None }]
+            vec![Fault { key: key.to_owned(), message, span, help: None, setting: None, included: None }]
         }
         _ => alone(span, message),
     })?;
@@ -115,7 +131,7 @@ fn parse_edited(edited: &Edited, original: &str, path: &Path) -> Result<AnyProbl
     let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
     let lines = Lines::of(original);
-    convert::convert(&file, &tree, text, &|byte| lines.position(edited.original(byte)), path)
+    convert::convert(&file, &tree, text, &|byte| whole.position(edited.original(byte), &lines), path)
 }
 
 /// The schema that all jobs are checked against, made once.

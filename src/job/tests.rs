@@ -59,3 +59,39 @@ fn text_that_is_not_toml_is_a_fault_with_a_place() {
     assert_eq!(faults.len(), 1);
     assert!(faults[0].span.start >= 12, "{faults:?}");
 }
+
+/// Included tables are those of the job; what is wrong with them is said of their file, and what is wrong with the job of the job.
+#[test]
+fn faults_of_included_files_name_these() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    let start = JOB.find("[[materials]]").unwrap();
+    let end = start + JOB[start..].find("[[bodies]]").unwrap();
+    let materials = format!("# Sand.\n{}", &JOB[start..end]);
+    let rest = [&JOB[..start], &JOB[end..]].concat();
+    let job = rest.replace("version = 1", "version = 1\ninclude = [\"materials.toml\"]");
+    let path = directory.path().join("column_collapse.toml");
+    let text = |job: &str, materials: &str| {
+        write("materials.toml", materials);
+        write("column_collapse.toml", job);
+        load(&path).map(|problem| problem.digest()).map_err(|error| error.to_string())
+    };
+    // The order of the tables of a job does not matter, and neither does the file in which they stand.
+    assert_eq!(text(&job, &materials), Ok(digest(JOB)));
+    let line = 1 + materials[..materials.find("density").unwrap()].matches('\n').count();
+    let wrong = text(&job, &materials.replace("density = ", "density = -")).unwrap_err();
+    assert!(wrong.contains(&format!("materials.toml:{line}:11: materials[0].density")), "{wrong}");
+    let wrong = text(&job, &materials.replace("density", "densty")).unwrap_err();
+    assert!(wrong.contains(&format!("materials.toml:{line}:1: materials[0].densty")), "{wrong}");
+    let line = 1 + job[..job.find("[time]").unwrap()].matches('\n').count();
+    let wrong = text(&job.replace("[time]", "[time]\nedn = 1"), &materials).unwrap_err();
+    assert!(wrong.contains(&format!("column_collapse.toml:{}:1: time.edn", line + 1)), "{wrong}");
+    let wrong = text(&job, &[&materials, "[time]\nend = 2\n"].concat()).unwrap_err();
+    assert!(wrong.contains("materials.toml:") && wrong.contains("a second time"), "{wrong}");
+    // Settings hold for what is included too.
+    let mut settings = Settings::default();
+    settings.set("materials.0.density=-1").unwrap();
+    text(&job, &materials).unwrap();
+    let wrong = load_with(&path, &settings).map(|problem| problem.digest()).unwrap_err().to_string();
+    assert!(wrong.contains("--set materials.0.density=-1: materials[0].density"), "{wrong}");
+}

@@ -54,6 +54,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     // One look for all frames.
     let look = survey(&files, &given_looks.colour, &settings, &solids).map_err(failed)?;
     settings.frame = Some(look.frame);
+    settings.longest = Some(look.longest);
     settings.range = settings.range.or(Some(look.range));
 
     let size = [settings.width, settings.height];

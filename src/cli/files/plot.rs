@@ -16,7 +16,7 @@ pub struct Arguments {
     /// Title; without it, the name of the file.
     #[arg(long)]
     title: Option<String>,
-    /// Picture to write; without it, beside the file with the ending png.
+    /// Picture to write: .png, or .svg with text and lines as such; without it, beside the file with the ending png.
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -27,8 +27,19 @@ pub struct Arguments {
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-    let settings = arguments.looks.settings(arguments.title.as_deref().unwrap_or(&name));
+    let mut settings = arguments.looks.settings(arguments.title.as_deref().unwrap_or(&name));
     let out = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension("png"));
+    settings.collect =
+        match out.extension().and_then(|ending| ending.to_str()).map(str::to_lowercase).as_deref() {
+            Some("svg") => true,
+            Some("png") => false,
+            _ => {
+                let out = out.display();
+                return Err(Failure::Usage(format!(
+                    "{out}: found no ending of a picture; expected .png or .svg"
+                )));
+            }
+        };
     let job = arguments.file.is_file().then(|| arguments.looks.job(&arguments.file)).flatten();
     draw_file(&arguments.file, &arguments.looks.colour, &settings, &solids(job.as_ref()), &out)
         .map_err(|error| Failure::Usage(error.to_string()))?;

@@ -44,10 +44,13 @@ pub(in crate::cli) struct Looks {
     /// Draw the leaves of the tree: in 2D, at the clip, or at the floor.
     #[arg(long)]
     tree: bool,
+    /// Draw vectors as arrows: velocity, or displacement where outputs have it.
+    #[arg(long, value_name = "QUANTITY")]
+    vectors: Option<String>,
     /// Leave colliders out.
     #[arg(long)]
     bare: bool,
-    /// Job file of the run, where the meshes of its colliders are not found by its name.
+    /// Job file of the run, if it is not where the output says.
     #[arg(long)]
     job: Option<PathBuf>,
     /// Pixels across.
@@ -94,6 +97,7 @@ impl Looks {
             clip: self.clip,
             mirror: self.mirror.0,
             tree: self.tree,
+            vectors: self.vectors.clone(),
             ..Settings::new(title)
         }
     }

@@ -22,17 +22,17 @@ pub(super) struct Quote {
 
 impl Quote {
     pub(super) fn of(list: &FaultList, fault: &Fault) -> Self {
-        let (line, column) = list.position(fault.span.start);
+        let (line, column) = list.position(fault);
+        let (path, whole) = list.source(fault);
         let (line, column) = (line - 1, column - 1);
         // The window slides along a long line; its neighbours are shown from their start.
         let from = column.saturating_sub(WIDTH / 2);
-        let length = list
-            .text
+        let length = whole
             .get(fault.span.clone())
             .map_or(0, |text| text.lines().next().map_or(0, |l| l.chars().count()));
         let first = line.saturating_sub(1);
         let (mut text, mut label) = (String::new(), 0..0);
-        for (number, content) in list.text.split('\n').enumerate().skip(first).take(3) {
+        for (number, content) in whole.split('\n').enumerate().skip(first).take(3) {
             let from = if number == line { from } else { 0 };
             if number == line {
                 let start = text.len();
@@ -46,7 +46,7 @@ impl Quote {
             text.push('\n');
         }
         Self {
-            name: crate::text::printable(&list.path.display().to_string()).into_owned(),
+            name: crate::text::printable(&path.display().to_string()).into_owned(),
             text,
             line: first,
             label,
@@ -103,7 +103,14 @@ mod tests {
     use super::*;
 
     fn quote(text: &str, span: Range<usize>) -> Quote {
-        let fault = Fault { key: String::new(), message: "wrong".into(), span, help: None, setting: None };
+        let fault = Fault {
+            key: String::new(),
+            message: "wrong".into(),
+            span,
+            help: None,
+            setting: None,
+            included: None,
+        };
         let list = FaultList { path: "job.toml".into(), text: text.into(), faults: vec![fault.clone()] };
         Quote::of(&list, &fault)
     }

@@ -1,28 +1,45 @@
 //! An image to write and draw on, and its file.
 
+use std::fmt::Write as _;
 use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::colour::Rgb;
 use super::font;
 use crate::io::hdf5_file::FileError;
 use crate::io::lines::write_whole;
+use crate::text::html;
+
+/// A colour as SVG has it.
+fn hex([red, green, blue]: Rgb) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
 
 /// An image.
 pub(super) struct Canvas {
     pub width: usize,
     pub height: usize,
     pixels: Vec<u8>,
+    /// Elements of SVG over the pixels, once they are collected.
+    marks: Option<String>,
 }
 
 impl Canvas {
     /// A canvas of one colour.
     pub(super) fn new(width: usize, height: usize, colour: Rgb) -> Self {
-        Self { width, height, pixels: colour.repeat(width * height) }
+        Self { width, height, pixels: colour.repeat(width * height), marks: None }
     }
 
     /// Red, green and blue of each pixel, row by row.
     pub(super) fn into_pixels(self) -> Vec<u8> {
         self.pixels
+    }
+
+    /// From here on rectangles, texts and polygons are kept as elements of SVG; what is there stays pixels.
+    pub(super) fn collect(&mut self) {
+        self.marks = Some(String::new());
     }
 
     /// Colours a pixel; outside nothing happens.
@@ -42,6 +59,14 @@ impl Canvas {
 
     /// Fills a rectangle.
     pub(super) fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
+        if let Some(marks) = &mut self.marks {
+            let colour = hex(colour);
+            let _ = writeln!(
+                marks,
+                "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"{colour}\" shape-rendering=\"crispEdges\"/>"
+            );
+            return;
+        }
         for row in y..y + height {
             (x..x + width).for_each(|column| self.set(column, row, colour));
         }
@@ -49,12 +74,55 @@ impl Canvas {
 
     /// Writes a text with the upper left corner of its capitals at `(x, y)`; they are `7 size` pixels high.
     pub(super) fn text(&mut self, x: i64, y: i64, size: i64, text: &str, colour: Rgb) {
+        if let Some(marks) = &mut self.marks {
+            let (base, em, colour) = (y + font::cap_height(size), font::em(size), hex(colour));
+            let _ = writeln!(
+                marks,
+                "<text x=\"{x}\" y=\"{base}\" font-size=\"{em:.2}\" fill=\"{colour}\">{}</text>",
+                html(text)
+            );
+            return;
+        }
         font::draw(size, text, |column, row, coverage| self.blend(x + column, y + row, colour, coverage));
     }
 
     /// Pixels that a text is wide.
     pub(super) fn text_width(size: i64, text: &str) -> i64 {
         font::draw(size, text, |_, _, _| ())
+    }
+
+    /// Fills a polygon with smooth edges.
+    pub(super) fn polygon(&mut self, corners: &[[f64; 2]], colour: Rgb) {
+        if let Some(marks) = &mut self.marks {
+            let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
+            let _ = writeln!(marks, "<polygon points=\"{}\" fill=\"{}\"/>", points.join(" "), hex(colour));
+            return;
+        }
+        /// Samples of a pixel along each axis.
+        const FINE: i64 = 4;
+        let range = |axis: usize, most: usize| {
+            let values = || corners.iter().map(|corner| corner[axis]);
+            let (low, high) =
+                (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            low.floor().max(0.0) as i64..(high.ceil() + 1.0).clamp(0.0, most as f64) as i64
+        };
+        for row in range(1, self.height) {
+            for column in range(0, self.width) {
+                let sample = |n: i64, at: i64| at as f64 + (n as f64 + 0.5) / FINE as f64;
+                let inside = (0..FINE * FINE).filter(|n| {
+                    let (x, y) = (sample(n % FINE, column), sample(n / FINE, row));
+                    let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+                    let crossed = edges.filter(|(a, b)| {
+                        (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+                    });
+                    crossed.count() % 2 == 1
+                });
+                let share = inside.count() as f32 / (FINE * FINE) as f32;
+                if share > 0.0 {
+                    self.blend(column, row, colour, share);
+                }
+            }
+        }
     }
 
     /// Mixes a share of a colour into a pixel; outside nothing happens.
@@ -80,10 +148,22 @@ impl Canvas {
         Ok(bytes)
     }
 
-    /// Not collective. Writes the image as PNG, under a temporary name first.
+    /// The image as SVG: its pixels, and over them what has been collected.
+    fn svg(&self) -> std::io::Result<String> {
+        let (width, height, png) = (self.width, self.height, BASE64.encode(self.png()?));
+        Ok(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<image width=\"{width}\" height=\"{height}\" \
+             href=\"data:image/png;base64,{png}\"/>\n{}</svg>\n",
+            self.marks.as_deref().unwrap_or_default()
+        ))
+    }
+
+    /// Not collective. Writes the image under a temporary name first: as SVG if marks were collected, else as PNG.
     pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
         // In memory first, as a buffered writer hides the error of its last piece.
-        let saved = self.png().and_then(|bytes| write_whole(path, &bytes));
+        let bytes = if self.marks.is_some() { self.svg().map(String::into_bytes) } else { self.png() };
+        let saved = bytes.and_then(|bytes| write_whole(path, &bytes));
         saved.map_err(|source| FileError::System { path: path.into(), action: "write the picture", source })
     }
 }

@@ -12,12 +12,17 @@ pub(super) fn cap_height(size: i64) -> i64 {
     7 * size
 }
 
+/// Size of the font, pixels: capitals of DejaVu Sans are 0.729 em high.
+pub(super) fn em(size: i64) -> f32 {
+    cap_height(size) as f32 / 0.729
+}
+
 /// Calls `each` with column, row and coverage (0 to 1) of the pixels of a text whose first letter begins at column 0 and whose
 /// capital letters have their tops at row 0. Characters that the font does not have are boxes. Returns the width, pixels.
 pub(super) fn draw(size: i64, text: &str, mut each: impl FnMut(i64, i64, f32)) -> i64 {
     let Some(font) = FONT.as_ref() else { return 0 };
-    // Capitals of DejaVu Sans are 0.729 em high; em over height of a line is the font's own.
-    let em = cap_height(size) as f32 / 0.729;
+    // Em over height of a line is the font's own.
+    let em = em(size);
     let units = font.units_per_em().unwrap_or(2048.0);
     let font = font.as_scaled(em * font.height_unscaled() / units);
     let (mut pen, mut before) = (0.0, None::<GlyphId>);

@@ -8,6 +8,7 @@
 //! | this | what a picture is made of, and how it is put together |
 //! | `settings.rs` | what can be chosen |
 //! | `camera.rs`, `scene.rs`, `solids.rs`, `tree.rs` | from space to pixels; particles with their light; colliders; leaves |
+//! | `arrows.rs` | vectors |
 //! | `canvas.rs`, `colour.rs`, `scales.rs`, `font.rs` | an image and its file; colours; legends; letters |
 //! | `source/` | what a file offers, and what follows from it |
 
@@ -21,6 +22,7 @@ use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
 use crate::text::quantity;
 
+mod arrows;
 mod camera;
 mod canvas;
 mod colour;
@@ -32,6 +34,7 @@ mod solids;
 pub(super) mod source;
 mod tree;
 
+use arrows::Vectors;
 pub use camera::View as Direction;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
@@ -90,6 +93,7 @@ struct Drawing {
     solids: Vec<Solid>,
     /// Leaves of the tree, if they are drawn: lower corner and edge, m.
     leaves: Vec<([f64; 3], f64)>,
+    vectors: Vectors,
 }
 
 /// Collective. Draws the particles of a run, coloured by `field` (of vectors the magnitude), and writes the picture as PNG on rank 0.
@@ -117,7 +121,8 @@ pub fn draw<const D: usize>(
     comm.sum_u64(&mut particles);
     let caption = caption(view.time, view.step, particles[0]);
     let tint = Tint::of(field, view.materials, view.bodies);
-    let drawing = Drawing { flat: D == 2, domain, splats, tint, caption, solids, leaves: Vec::new() };
+    let (leaves, vectors) = (Vec::new(), Vectors::default());
+    let drawing = Drawing { flat: D == 2, domain, splats, tint, caption, solids, leaves, vectors };
     let canvas = drawing.compose(Some(comm), settings);
     let saved = if comm.rank() == 0 { canvas.save(path) } else { Ok(()) };
     Ok(comm.agree(saved)?)
@@ -191,14 +196,16 @@ pub fn survey(
     for file in files {
         let (drawing, _) = drawing(file, name, settings, solids)?;
         let (Bounds { low, high }, [from, to]) = (drawing.frame(None), drawing.range(None, None));
-        let seen = all.get_or_insert(Look { range: [from, to], frame: [low, high] });
+        let longest = drawing.vectors.longest();
+        let seen = all.get_or_insert(Look { range: [from, to], frame: [low, high], longest });
+        seen.longest = seen.longest.max(longest);
         seen.range = [seen.range[0].min(from), seen.range[1].max(to)];
         for axis in 0..3 {
             seen.frame[0][axis] = seen.frame[0][axis].min(low[axis]);
             seen.frame[1][axis] = seen.frame[1][axis].max(high[axis]);
         }
     }
-    Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]] }))
+    Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]], longest: 0.0 }))
 }
 
 /// What a file shows of a quantity, and its time, s.
@@ -228,7 +235,8 @@ fn drawing(
     let flat = header.dimension == 2;
     let leaves = if settings.tree { leaves(from, &header)? } else { Vec::new() };
     let solids = solids(&header);
-    Ok((Drawing { flat, domain, splats, tint, caption, solids, leaves }, header.time))
+    let vectors = Vectors::read(&file, &header, settings.vectors.as_deref())?;
+    Ok((Drawing { flat, domain, splats, tint, caption, solids, leaves, vectors }, header.time))
 }
 
 /// Collective on a shared drawing. The least value of all ranks.
@@ -386,6 +394,15 @@ impl Drawing {
         if settings.tree {
             self.tree(&mut canvas, &camera, (&raster, &solids), &shown, settings);
         }
+        if settings.collect {
+            canvas.collect();
+        }
+        self.arrows(&mut canvas, &camera, settings, |splat, [column, row, depth]| {
+            let at = row as usize * raster.width + column as usize;
+            let inside = (column as usize) < raster.width && (row as usize) < raster.height;
+            let front = depth + splat.radius + 1.5 / camera.scale;
+            inside && is_kept(splat) && (self.flat || raster.is_free(&camera, &solids, at, front))
+        });
         if self.flat {
             axes(&mut canvas, &camera, &frame, spacing, paper);
         } else {
@@ -397,7 +414,8 @@ impl Drawing {
         if classes {
             legend(&mut canvas, &self.tint, low as usize..=high as usize, paper);
         } else {
-            colour_bar(&mut canvas, &self.tint, [low, high], (settings.map, paper));
+            let room = if self.vectors.each.is_empty() { 0 } else { 60 };
+            colour_bar(&mut canvas, &self.tint, [low, high], (settings.map, paper), room);
         }
         canvas
     }
@@ -416,6 +434,13 @@ impl Drawing {
                 })
                 .collect();
             self.splats.extend(behind);
+            let behind: Vec<[f64; 3]> = self
+                .vectors
+                .each
+                .iter()
+                .map(|vector| std::array::from_fn(|i| if i == axis { -vector[i] } else { vector[i] }))
+                .collect();
+            self.vectors.each.extend(behind);
             let images: Vec<_> = self
                 .leaves
                 .iter()

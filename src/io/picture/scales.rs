@@ -66,14 +66,16 @@ pub(super) fn lines(name: &str, width: i64) -> Vec<String> {
     lines
 }
 
+/// The bar of the colours; `room` is what is kept free below it, pixels.
 pub(super) fn colour_bar(
     canvas: &mut Canvas,
     tint: &Tint,
     [low, high]: [f64; 2],
     (map, paper): (Map, &Paper),
+    room: i64,
 ) {
     let (x, top) = heading(canvas, tint, paper);
-    let length = (canvas.height as i64 - top - 80).max(10);
+    let length = (canvas.height as i64 - top - 80 - room).max(10);
     for row in 0..length {
         let value = 1.0 - row as f64 / (length - 1) as f64;
         canvas.fill(x, top + row, 24, 1, map.colour(value));

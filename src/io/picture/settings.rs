@@ -32,6 +32,12 @@ pub struct Settings {
     pub mirror: [bool; 3],
     /// Whether leaves of the tree are drawn: in the plane, at the clip, or at the floor.
     pub tree: bool,
+    /// Vectors that are drawn as arrows, by the name of their quantity.
+    pub vectors: Option<String>,
+    /// Length of the longest vector, in its unit; `None`: as found.
+    pub longest: Option<f64>,
+    /// Whether frame, axes, texts and arrows are kept apart from pixels, for SVG.
+    pub collect: bool,
 }
 
 /// A cut across an axis.
@@ -81,6 +87,8 @@ pub struct Look {
     pub range: [f64; 2],
     /// Lower and upper corner of what they show, m.
     pub frame: [[f64; 3]; 2],
+    /// Length of the longest vector, in its unit; 0 if there are none.
+    pub longest: f64,
 }
 
 impl Settings {
@@ -100,6 +108,9 @@ impl Settings {
             clip: None,
             mirror: [false; 3],
             tree: false,
+            vectors: None,
+            longest: None,
+            collect: false,
         }
     }
 

@@ -57,8 +57,17 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         .collect();
     let domain = domain(&[0.0; 3], 1.0, &[1; 3]);
     let (tint, caption) = (Tint::of(field, &[], &[]), caption(0.0, 0, 1));
-    Drawing { flat: false, domain, splats, tint, caption, solids: Vec::new(), leaves: Vec::new() }
-        .compose(None, &Settings::new("pile"))
+    Drawing {
+        flat: false,
+        domain,
+        splats,
+        tint,
+        caption,
+        solids: Vec::new(),
+        leaves: Vec::new(),
+        vectors: Vectors::default(),
+    }
+    .compose(None, &Settings::new("pile"))
 }
 
 #[test]

@@ -34,7 +34,14 @@ impl Checks<'_> {
             return;
         }
         let span = self.tree.locate(path);
-        self.faults.push(Fault { key: path.to_string(), message, span, help: None, setting: None });
+        self.faults.push(Fault {
+            key: path.to_string(),
+            message,
+            span,
+            help: None,
+            setting: None,
+            included: None,
+        });
     }
 
     /// Line and column of the value at `path`, both from 1.

@@ -1,8 +1,10 @@
 //! What can be wrong with a job file, and where.
 use std::fmt;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::include::Included;
 use crate::text::{excerpt, printable};
 
 /// One fault of a job file: where it is, what was found and what would be right.
@@ -19,6 +21,8 @@ pub struct Fault {
     pub help: Option<String>,
     /// The setting that the fault is about, as typed, such as `--end 0`; `None` if the file is at fault.
     pub setting: Option<String>,
+    /// The file in which it stands, if that is one that the job includes.
+    pub included: Option<Arc<Included>>,
 }
 
 /// A job cannot be read.
@@ -76,9 +80,17 @@ pub struct FaultList {
 }
 
 impl FaultList {
-    /// Line and column, both from 1, of a byte position; columns count characters.
-    pub fn position(&self, byte: usize) -> (usize, usize) {
-        position(&self.text, byte)
+    /// Name and text of the file in which a fault stands.
+    pub fn source<'a>(&'a self, fault: &'a Fault) -> (&'a Path, &'a str) {
+        match &fault.included {
+            Some(file) => (&file.path, &file.text),
+            None => (&self.path, &self.text),
+        }
+    }
+
+    /// Line and column, both from 1, of a fault in its file; columns count characters.
+    pub fn position(&self, fault: &Fault) -> (usize, usize) {
+        position(self.source(fault).1, fault.span.start)
     }
 
     /// `file:line:column: key: message` of one fault, or with the setting in the place of the file's; without characters that control a terminal.
@@ -86,8 +98,8 @@ impl FaultList {
         let path = match &fault.setting {
             Some(typed) => excerpt(typed, LONGEST_KEY).into_owned(),
             None => {
-                let (line, column) = self.position(fault.span.start);
-                format!("{}:{line}:{column}", printable(&self.path.display().to_string()))
+                let (line, column) = self.position(fault);
+                format!("{}:{line}:{column}", printable(&self.source(fault).0.display().to_string()))
             }
         };
         let key = excerpt(&fault.key, LONGEST_KEY);

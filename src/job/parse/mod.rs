@@ -1,5 +1,6 @@
 //! From text to a tree that knows where everything stands, checked against the schema; faults with their places.
 pub(super) mod error;
+pub(super) mod include;
 pub(super) mod settings;
 pub(super) mod source;
 pub(super) mod structure;

@@ -91,6 +91,7 @@ impl Settings {
                     span: 0..0,
                     help: None,
                     setting: Some(setting.typed.clone()),
+                    included: None,
                 }),
             }
         }

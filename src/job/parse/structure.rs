@@ -217,7 +217,14 @@ impl<'s> Checker<'s> {
             let whole = path.key(key.clone()).to_string();
             if let Some((_, why)) = GONE.iter().find(|(gone, _)| *gone == whole) {
                 let (message, span) = (format!("the key `{key}` is gone: {why}"), inner.key_span.clone());
-                self.faults.push(Fault { key: whole, message, span, help: None, setting: None });
+                self.faults.push(Fault {
+                    key: whole,
+                    message,
+                    span,
+                    help: None,
+                    setting: None,
+                    included: None,
+                });
                 continue;
             }
             // A key that is missing is what a misspelt one was most likely meant to be.
@@ -242,6 +249,7 @@ impl<'s> Checker<'s> {
                 span: inner.key_span.clone(),
                 help: help.and_then(|(_, schema)| schema.get("description")?.as_str().map(str::to_owned)),
                 setting: None,
+                included: None,
             });
         }
         for key in missing {
@@ -256,6 +264,7 @@ impl<'s> Checker<'s> {
                 span: node.span.clone(),
                 help: None,
                 setting: None,
+                included: None,
             });
         }
     }
@@ -305,7 +314,14 @@ impl<'s> Checker<'s> {
 
     fn fault(&mut self, node: &Node, path: &Path, message: String, layers: &Layers<'s>) {
         let (key, help) = (path.to_string(), layers.description());
-        self.faults.push(Fault { key, message, span: node.span.clone(), help, setting: None });
+        self.faults.push(Fault {
+            key,
+            message,
+            span: node.span.clone(),
+            help,
+            setting: None,
+            included: None,
+        });
     }
 }
 

@@ -28,6 +28,11 @@ pub struct JobFile {
     /// Version of the job file format; 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
+    /// Files of TOML that are part of the job, relative to its own; their tables and those of the job become one, and elements of
+    /// arrays such as `[[materials]]` follow those of the job. Each key stands once in all of them. They may include others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 64))]
+    pub include: Vec<String>,
     /// Title for people.
     #[serde(default)]
     pub title: String,

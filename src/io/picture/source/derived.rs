@@ -120,6 +120,11 @@ impl<'f> Source<'f> {
         Err(self.file.refuse(reason))
     }
 
+    /// Whether there is a quantity of that name.
+    pub(in crate::io::picture) fn offers(&self, name: &str) -> bool {
+        self.components(name).is_some() || self.component(name).is_some()
+    }
+
     fn len(&self) -> usize {
         self.header.particles as usize
     }

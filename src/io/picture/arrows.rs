@@ -1,0 +1,150 @@
+//! Vectors as arrows on a lattice of the picture, with an arrow beside them that says how long they are.
+use super::camera::Camera;
+use super::canvas::Canvas;
+use super::colour::Rgb;
+use super::scales::{nice, short};
+use super::{Drawing, Settings, Splat};
+use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::snapshot::Header;
+
+use super::source::derived::{Source, magnitude};
+
+/// Pixels between arrows.
+const SPACING: f64 = 26.0;
+/// Pixels of the longest arrow: it may reach into the next place, not beyond it.
+const LONGEST: f64 = 44.0;
+/// Pixels below which an arrow is none.
+const SHORTEST: f64 = 2.5;
+
+/// The vectors that a picture shows.
+#[derive(Debug, Default)]
+pub(super) struct Vectors {
+    /// Name of the quantity, and its unit.
+    pub name: String,
+    pub unit: String,
+    /// One for each particle; empty if none are drawn.
+    pub each: Vec<[f64; 3]>,
+}
+
+impl Vectors {
+    /// The vectors of this name, if one is given, of all particles of a file.
+    pub(super) fn read(file: &Reader, header: &Header, name: Option<&str>) -> Result<Self, FileError> {
+        let Some(name) = name else { return Ok(Self::default()) };
+        let source = Source::new(file, header);
+        if !["x", "y"].iter().all(|axis| source.offers(&format!("{name}_{axis}"))) {
+            let known =
+                ["velocity", "displacement"].into_iter().filter(|name| source.offers(&format!("{name}_x")));
+            let known: Vec<&str> = known.collect();
+            let name = crate::text::excerpt(name, 60);
+            return Err(
+                file.refuse(format!("found no vectors {name}; expected one of: {}", known.join(", ")))
+            );
+        }
+        let mut each = vec![[0.0; 3]; header.particles as usize];
+        let mut unit = String::new();
+        for (axis, ending) in ["x", "y", "z"].into_iter().enumerate() {
+            let component = format!("{name}_{ending}");
+            if source.offers(&component) {
+                let (tint, values) = source.quantity(&component)?;
+                unit = tint.unit;
+                each.iter_mut().zip(values).for_each(|(vector, value)| vector[axis] = value);
+            }
+        }
+        Ok(Self { name: name.to_owned(), unit, each })
+    }
+
+    /// Length of the longest one.
+    pub(super) fn longest(&self) -> f64 {
+        self.each
+            .iter()
+            .map(|vector| magnitude(vector))
+            .filter(|length| length.is_finite())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Mean of the vectors about a place of the lattice.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    place: [f64; 3],
+    vector: [f64; 3],
+    count: f64,
+}
+
+impl Drawing {
+    /// Draws the arrows of the particles that are seen, and the arrow of the scale.
+    pub(super) fn arrows(
+        &self,
+        canvas: &mut Canvas,
+        camera: &Camera,
+        settings: &Settings,
+        is_seen: impl Fn(&Splat, [f64; 3]) -> bool,
+    ) {
+        let longest = settings.longest.unwrap_or_else(|| self.vectors.longest());
+        if self.vectors.each.is_empty() {
+            return;
+        }
+        let scale = if longest > 0.0 { LONGEST / longest } else { 0.0 };
+        let (columns, rows) =
+            ((canvas.width as f64 / SPACING) as usize + 1, (canvas.height as f64 / SPACING) as usize + 1);
+        let mut lattice = vec![Mean::default(); columns * rows];
+        for (splat, vector) in self.splats.iter().zip(&self.vectors.each) {
+            let at = camera.project(splat.position);
+            let inside = at[0] >= 0.0 && at[1] >= 0.0 && vector.iter().all(|x| x.is_finite());
+            let (column, row) = ((at[0] / SPACING) as usize, (at[1] / SPACING) as usize);
+            if !inside || column >= columns || row >= rows || !is_seen(splat, at) {
+                continue;
+            }
+            let mean = &mut lattice[row * columns + column];
+            for axis in 0..3 {
+                mean.place[axis] += splat.position[axis];
+                mean.vector[axis] += vector[axis];
+            }
+            mean.count += 1.0;
+        }
+        let paper = settings.paper();
+        for mean in lattice.iter().filter(|mean| mean.count > 0.0) {
+            let place = mean.place.map(|x| x / mean.count);
+            let from = camera.project(place);
+            // The way of a metre per unit of the vector, in pixels, brought to the length of the scale.
+            let end =
+                camera.project(std::array::from_fn(|axis| place[axis] + mean.vector[axis] / mean.count));
+            let way = [0, 1].map(|i| (end[i] - from[i]) / camera.scale * scale);
+            arrow(canvas, [from[0] - 0.5 * way[0], from[1] - 0.5 * way[1]], way, [paper.ink, paper.paper]);
+        }
+        if longest > 0.0 {
+            let (value, unit) = (nice(longest), &self.vectors.unit);
+            let (x, y) = (canvas.width as f64 - 185.0, canvas.height as f64 - 44.0);
+            arrow(canvas, [x, y], [value * scale, 0.0], [paper.ink, paper.paper]);
+            let text = format!("{} {unit}", short(value));
+            canvas.text((x + LONGEST) as i64 + 10, y as i64 - 7, 2, &text, paper.ink);
+            canvas.text(x as i64, y as i64 + 14, 2, &self.vectors.name, paper.ink);
+        }
+    }
+}
+
+/// An arrow from a pixel along a way, with an edge of the other colour.
+fn arrow(canvas: &mut Canvas, from: [f64; 2], way: [f64; 2], [ink, edge]: [Rgb; 2]) {
+    let length = way[0].hypot(way[1]);
+    if length < SHORTEST {
+        return;
+    }
+    let (along, across) = ([way[0] / length, way[1] / length], [-way[1] / length, way[0] / length]);
+    let at = |a: f64, b: f64| [0, 1].map(|i| from[i] + a * along[i] + b * across[i]);
+    let head = (0.45 * length).min(9.0);
+    let outline = |room: f64| {
+        let (half, wide) = (0.8 + room, 0.42 * head + room);
+        let neck = length - head;
+        [
+            at(-room, -half),
+            at(neck - room, -half),
+            at(neck - room, -wide - room),
+            at(length + 2.0 * room, 0.0),
+            at(neck - room, wide + room),
+            at(neck - room, half),
+            at(-room, half),
+        ]
+    };
+    canvas.polygon(&outline(0.9), edge);
+    canvas.polygon(&outline(0.0), ink);
+}
