@@ -11,32 +11,32 @@ use serde::{Deserialize, Serialize};
 pub struct Collider {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Where it is before it moves; may reach out of the domain.
+    /// Initial shape; may extend beyond the domain.
     pub shape: Shape,
     /// What happens to material that touches it; by default it may leave, without friction.
     #[serde(default)]
     pub contact: Option<Contact>,
-    /// On what it acts; `nodes` by default.
+    /// What it acts on; `nodes` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acts_on: Option<ActsOn>,
-    /// How it moves; not at all by default.
+    /// Motion; fixed by default.
     #[serde(default)]
     pub motion: Option<Motion>,
-    /// Meshes that follow the one of `shape`, for what deforms.
+    /// Meshes that follow that of `shape`, for a collider that deforms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<Frames>,
-    /// Names of the stages in which it is there; all by default. With them the times of its motion are counted from the start of the
-    /// first of them.
+    /// Names of the stages in which it exists; all by default. If given, the times of its motion count from the start of the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 20))]
     pub stages: Option<Vec<String>>,
-    /// Point about which it turns and to which its torque refers, m; by default the centre of its bounding box, cut by
-    /// the domain where it is unbounded, and of free bodies whose inertia follows from the shape the centre of mass.
+    /// Centre of its rotation and reference point of its torque, m. By default the centre of mass for a free body whose inertia follows
+    /// from its shape, and otherwise the centre of its bounding box, cut by the domain.
     #[serde(default)]
     pub reference: Option<Vector>,
 }
 
-/// Meshes of a surface that deforms. Its vertices move on straight lines from one mesh to the next, and stay after the last one; `motion` comes on top.
+/// Meshes of a surface that deforms. Vertices move on straight lines from one mesh to the next, and stop at the last one. `motion` is
+/// added.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Frames {
@@ -52,11 +52,11 @@ pub struct Frames {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ActsOn {
-    /// On the nodes of the grid inside it: the least work. Material stays a fraction of a cell away from its surface, and what is less than two
-    /// cells thick leaks.
+    /// On the grid nodes inside it: the cheapest way. Material stays a fraction of a cell off its surface, and walls thinner than two cells
+    /// leak.
     Nodes,
-    /// On the particles that touch it: contact is at its surface, and walls of any thickness hold, also sheets: boxes that are flat along one axis, and
-    /// meshes that are not closed.
+    /// On the particles that touch it: contact is at its surface, and walls of any thickness hold. This includes sheets: boxes that are
+    /// flat along one axis, and open meshes.
     Particles,
 }
 
@@ -64,11 +64,11 @@ pub enum ActsOn {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Contact {
-    /// It moves with the collider.
+    /// Material moves with the collider.
     Sticky {},
-    /// It moves along the surface without friction and never leaves it.
+    /// Material slides along the surface without friction and never leaves it.
     Slip {},
-    /// It may leave; while it presses, Coulomb friction.
+    /// Material may leave the surface; Coulomb friction acts while it presses.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
@@ -81,9 +81,9 @@ pub enum Contact {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Motion {
-    /// Not at all.
+    /// None.
     Fixed {},
-    /// With velocities that never change.
+    /// Constant velocities.
     Steady {
         /// Velocity of the reference point, m/s; 0 by default.
         #[serde(default)]
@@ -93,8 +93,8 @@ pub enum Motion {
         #[serde(default)]
         angular_velocity: Option<Spin>,
     },
-    /// By a table, linear between its rows; at rest before the first and after the last one. The velocity in a time
-    /// step is the mean of the table over it.
+    /// Prescribed by a table, linear between rows, at rest before the first and after the last one. The velocity in a time step is the mean
+    /// over the step.
     Table {
         /// Axis of the rotations, any length; 3D only, z by default.
         #[serde(default)]
@@ -123,7 +123,7 @@ pub enum Motion {
         /// Axes along which it may move; all by default.
         #[serde(default)]
         along: Option<Vec<AxisName>>,
-        /// Whether it turns; by default in 3D, and in 2D where `density` or `inertia` is given.
+        /// Whether it rotates; by default in 3D, and in 2D if `density` or `inertia` is given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         turns: Option<bool>,
         /// A number: moment of inertia about a fixed axis through the reference point, kg m²; in 2D of one metre of thickness. Three
@@ -131,8 +131,7 @@ pub enum Motion {
         /// axis. By default that of the shape, filled evenly.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         inertia: Option<Inertia>,
-        /// Fixed axis about which it turns, any length; 3D only. Without it a body turns about any axis, or about z where `inertia` is a
-        /// number.
+        /// Fixed axis of rotation, any length; 3D only. By default the body rotates about any axis, or about z if `inertia` is a number.
         #[serde(default)]
         #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
@@ -140,14 +139,15 @@ pub enum Motion {
         /// default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         angular_velocity: Option<Spin>,
-        /// Whether it meets faces of the domain and other colliders; true by default.
+        /// Whether it collides with faces of the domain and other colliders; true by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         collides: Option<bool>,
-        /// Coefficient of friction there, of two free bodies the smaller one; 0.5 by default. That with material is in `contact`.
+        /// Coefficient of friction in these collisions; between two free bodies the smaller value applies; 0.5 by default. Friction with
+        /// the material is in `contact`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 100.0))]
         friction: Option<f64>,
-        /// Coefficient of restitution there, speed after over speed before a blow, of two free bodies the smaller one; 0 by default.
+        /// Coefficient of restitution in these collisions; between two free bodies the smaller value applies; 0 by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 1.0))]
         restitution: Option<f64>,
@@ -176,10 +176,10 @@ pub struct Row {
     /// Time, s.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub time: f64,
-    /// Way of the reference point from its place in the job, m; 0 by default.
+    /// Displacement of the reference point from its initial position, m; 0 by default.
     #[serde(default)]
     pub translation: Option<Vector>,
-    /// Angle from the place in the job, degrees, counter-clockwise seen against the axis; may exceed a turn.
+    /// Angle from the initial orientation, degrees, counter-clockwise seen against the axis; may exceed a full turn.
     #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9))]
     pub rotation: f64,

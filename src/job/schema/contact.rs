@@ -2,32 +2,32 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Contact between bodies that deform: they move with velocities of their own and meet at their surfaces. Bodies that no contact names stick
-/// where they touch, as if they were one. The mean force (N) on the first of two sides since the row before, and the work (J) since the
-/// start, are columns of `history.csv`: `contact_NAME_x` and so on, `contact_work_NAME`.
+/// Contact between deformable bodies: each moves with its own velocity field, and they meet at their surfaces. Bodies that no contact names
+/// stick where they touch, as if glued. Columns of `history.csv`: the mean force (N) on the first of two sides since the previous row,
+/// `contact_NAME_x` and so on, and the work (J) since the start, `contact_work_NAME`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyContact {
-    /// Name, of letters, digits, `_` and `-`; the number of the contact in the job, from 1, by default.
+    /// Name, of letters, digits, `_` and `-`; by default the number of the contact in the job, from 1.
     #[serde(default)]
     pub name: Option<String>,
-    /// The sides between which it holds, each the name of a body or a list of names: bodies of different sides are in contact. Each
-    /// body is a side by default. Where several contacts name the same two bodies, the last holds.
+    /// The sides of the contact, each the name of a body or a list of names: bodies on different sides are in contact. By default each body
+    /// is a side. If several contacts name the same pair of bodies, the last one applies.
     #[serde(default)]
     #[schemars(length(min = 2, max = 250))]
     pub between: Option<Vec<Side>>,
     /// What happens where they touch.
     #[serde(default)]
     pub kind: PairKind,
-    /// Friction coefficient, the tangent of the friction angle; 0 by default. Of `separating` only.
+    /// Friction coefficient, the tangent of the friction angle; 0 by default. For `separating` only.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub friction: Option<f64>,
-    /// Shear stress that holds while they touch, whatever the pressure, Pa; 0 by default. Of `separating` only.
+    /// Shear strength of the interface at zero pressure, Pa; 0 by default. For `separating` only.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e15))]
     pub cohesion: Option<f64>,
-    /// Tension up to which they do not part, Pa; 0 by default. Of `separating` only.
+    /// Tensile strength of the interface, Pa; 0 by default. For `separating` only.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e15))]
     pub tension: Option<f64>,
@@ -49,9 +49,9 @@ pub enum Side {
 pub enum PairKind {
     /// They move as one.
     Sticky,
-    /// Once they touch they stay together and slide freely.
+    /// Once in touch, they stay together and slide freely.
     Slip,
-    /// They part freely; Coulomb friction while they press.
+    /// They may separate; Coulomb friction acts under pressure.
     #[default]
     Separating,
 }

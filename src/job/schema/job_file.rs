@@ -28,12 +28,12 @@ pub struct JobFile {
     /// Version of the job file format; 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
-    /// Files of TOML that are part of the job, relative to its own; their tables and those of the job become one, and elements of
-    /// arrays such as `[[materials]]` follow those of the job. Each key stands once in all of them. They may include others.
+    /// TOML files that are part of the job, relative to the job file. Their tables are merged with those of the job, and elements of
+    /// arrays such as `[[materials]]` follow those of the job. Each key may occur once. Included files may include others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 64))]
     pub include: Vec<String>,
-    /// Title for people.
+    /// Title, shown in pictures and reports.
     #[serde(default)]
     pub title: String,
     /// Dimension: 2 for plane strain (one metre thick), 3 for space.
@@ -44,7 +44,7 @@ pub struct JobFile {
     #[serde(default)]
     #[schemars(length(min = 2, max = 3))]
     pub gravity: Option<Vec<Quantity>>,
-    /// The box in which everything happens.
+    /// The computational domain.
     pub domain: Domain,
     /// Conditions on the faces of the domain.
     #[serde(default)]
@@ -73,14 +73,14 @@ pub struct JobFile {
     pub contact: Vec<BodyContact>,
     /// End of the run and time step.
     pub time: Time,
-    /// The way to equilibrium; none by default. Jobs with stages have it there.
+    /// Run to equilibrium; none by default. In a job with stages, set it in the stages.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
     /// Stages of the run; one without changes by default.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 20))]
     pub stages: Vec<Stage>,
-    /// Choices of the method.
+    /// Numerical method.
     #[serde(default)]
     pub numerics: Numerics,
     /// Output files.
@@ -96,11 +96,11 @@ pub struct JobFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 1000))]
     pub probes: Vec<Probe>,
-    /// Particles that are followed, columns of `history.csv`.
+    /// Tracked particles, columns of `history.csv`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 100))]
     pub tracks: Vec<Track>,
-    /// Mass that passes planes or faces, columns of `history.csv`.
+    /// Mass flow through planes or faces, columns of `history.csv`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 20))]
     pub fluxes: Vec<Flux>,
@@ -108,11 +108,11 @@ pub struct JobFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 100))]
     pub lines: Vec<Line>,
-    /// Rasters in plan with the largest depth and speed of the run, ESRI ASCII grids.
+    /// Rasters in plan view with the largest depth and speed during the run, ESRI ASCII grids.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 20))]
     pub maps: Vec<Map>,
-    /// Measurements of the run itself, `telemetry.jsonl`.
+    /// Performance of the run, `telemetry.jsonl`.
     #[serde(default)]
     pub telemetry: Telemetry,
     /// Evaluation at the end of the run.
@@ -120,7 +120,7 @@ pub struct JobFile {
     pub report: Option<Report>,
 }
 
-/// The box in which everything happens: a brick of cubic root octants.
+/// The computational domain: a box of cubic root octants.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Domain {
@@ -135,7 +135,7 @@ pub struct Domain {
     pub root_edge: f64,
 }
 
-/// Conditions on the faces of the domain; a face not named is `separating` without friction.
+/// Conditions on the faces of the domain. By default a face is `separating` without friction.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundaries {
@@ -159,8 +159,8 @@ pub struct Boundaries {
     #[serde(default)]
     #[schemars(extend("x-dimension" = 3))]
     pub z_max: Option<Face>,
-    /// What happens to particles that leave the domain through other faces than those of kind `outflow`. Particles that
-    /// rounding alone takes through a face are put back and counted in any case. An error by default.
+    /// What happens to particles that leave the domain through a face of another kind than `outflow`; an error by default. Particles that
+    /// cross a face only by rounding are always put back and counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leaving: Option<Leaving>,
 }
@@ -173,7 +173,7 @@ pub enum Face {
     Sticky {},
     /// No velocity through the face, no friction.
     Slip {},
-    /// Material may leave the face; while it presses on it, Coulomb friction.
+    /// Material may leave the face; Coulomb friction acts while it presses.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
@@ -182,8 +182,8 @@ pub enum Face {
     },
     /// A plane of symmetry.
     Symmetric {},
-    /// An open end: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted
-    /// with their mass.
+    /// An open boundary: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted with
+    /// their mass.
     Outflow {},
     /// Waves go out, as if the material went on: dashpots in proportion to the velocity (Lysmer and Kuhlemeyer). Alone they
     /// creep under a lasting stress, so `pressure` holds the material at rest.
@@ -212,7 +212,7 @@ pub enum Leaving {
     Error,
     /// They are deleted and counted.
     Delete,
-    /// They are put back to the face and counted.
+    /// They are moved back to the face and counted.
     Clamp,
 }
 
@@ -224,10 +224,10 @@ pub struct Tree {
     #[serde(default)]
     #[schemars(range(max = 15))]
     pub base_level: u8,
-    /// Whether neighbouring leaves differ by one level at most (over faces, edges and corners).
+    /// Whether neighbouring leaves (across faces, edges and corners) differ by at most one level.
     #[serde(default = "yes")]
     pub graded: bool,
-    /// Regions of deeper level.
+    /// Regions with finer cells.
     #[serde(default)]
     pub regions: Vec<Region>,
 }
@@ -238,13 +238,13 @@ impl Default for Tree {
     }
 }
 
-/// A region of deeper level: every leaf that meets it is split until it has that level.
+/// A region with finer cells: every leaf that intersects it is refined to this level.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
     /// Where.
     pub shape: Shape,
-    /// Level of the leaves there; deeper than `base_level`.
+    /// Level of the leaves there; above `base_level`.
     #[schemars(range(max = 15))]
     pub level: u8,
 }
@@ -360,7 +360,7 @@ pub struct Equilibrium {
     pub mass_scaling: bool,
 }
 
-/// Choices of the method.
+/// Numerical method.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Numerics {

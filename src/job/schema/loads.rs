@@ -20,20 +20,20 @@ pub enum Quantity {
     Record(Box<Record>),
 }
 
-/// A table over time from a file of comma-separated values (or semicolons, or tabs). Lines that begin with # are remarks, and the first line
-/// may hold names of columns. A state file belongs to the rows that the run began with: where they differ, it is of another job.
+/// A table over time from a file with comma-, semicolon- or tab-separated columns. Lines that start with # are comments, and the first line
+/// may hold the names of the columns. If its rows change, a restart is refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// Name of the file, relative to the job file.
     pub file: String,
-    /// Column of the times, s, by its number, from 1, or by its name in the first line; the first by default.
+    /// Column of the times, s: its number, from 1, or its name in the first line; the first by default.
     #[serde(default = "first")]
     pub time: Column,
-    /// Column of the values, by its number or name; the second by default.
+    /// Column of the values: its number or name; the second by default.
     #[serde(default = "second")]
     pub value: Column,
-    /// Factor of the values: 9.81 for a record in g.
+    /// Factor for the values: 9.81 converts g to m/s².
     #[serde(default = "one")]
     #[schemars(range(min = -1e12, max = 1e12))]
     pub scale: f64,
@@ -74,12 +74,11 @@ impl Default for Quantity {
 pub struct Load {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Where it acts; everywhere by default. Of a traction or a pressure: the part of the bodies' surfaces that lies in it or on its
-    /// own surface; what lies on a face of the domain or against another body counts as no surface.
+    /// Where the load acts; everywhere by default. A traction or a pressure acts on the part of the bodies' surfaces that lies in the shape
+    /// or on its surface. Material at a face of the domain or against another body has no surface there.
     #[serde(default)]
     pub shape: Option<Shape>,
-    /// Names of the stages in which it acts; all by default. With them all times of the load are counted from the start of the first
-    /// of them.
+    /// Names of the stages in which it acts; all by default. If given, all times of the load count from the start of the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 20))]
     pub stages: Option<Vec<String>>,
@@ -91,12 +90,12 @@ pub struct Load {
     #[serde(default)]
     #[schemars(range(min = -1e12, max = 1e12))]
     pub until: Option<f64>,
-    /// What it does.
+    /// Kind of load.
     #[serde(flatten)]
     pub kind: LoadKind,
 }
 
-/// What a load does.
+/// Kinds of loads.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum LoadKind {
@@ -105,7 +104,7 @@ pub enum LoadKind {
         /// Components of the acceleration, m/s²: as many as the job has dimensions.
         acceleration: Vec<Quantity>,
     },
-    /// Material is gripped: its velocity is prescribed along the axes that are named.
+    /// A grip: it prescribes the velocity of the material along the named axes.
     Velocity {
         /// Component along x, m/s; free by default.
         #[serde(default)]
@@ -117,7 +116,7 @@ pub enum LoadKind {
         #[serde(default)]
         z: Option<Quantity>,
     },
-    /// Drag in proportion to mass: velocities decay as exp(-rate time).
+    /// Drag proportional to mass: velocities decay as exp(-rate time).
     Damping {
         /// Rate, 1/s.
         rate: Quantity,
@@ -129,29 +128,29 @@ pub enum LoadKind {
         /// Bodies whose surfaces count; all by default.
         #[serde(default)]
         bodies: Option<Vec<String>>,
-        /// Only surface counts whose outward normal at the start is within 45° of this vector; all by default.
+        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all by default.
         #[serde(default)]
         facing: Option<Vector>,
     },
     /// A pressure on the surface of bodies, against its outward normal.
     Pressure {
-        /// The pressure, Pa; below 0 it pulls.
+        /// The pressure, Pa; a negative value pulls.
         pressure: Quantity,
-        /// Whether it acts on the deformed surface, along its normal; else on the undeformed one.
+        /// Whether it acts on the deformed surface, along its normal, or on the undeformed one.
         #[serde(default = "yes")]
         follow: bool,
         /// Bodies whose surfaces count; all by default.
         #[serde(default)]
         bodies: Option<Vec<String>>,
-        /// Only surface counts whose outward normal at the start is within 45° of this vector; all by default.
+        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all by default.
         #[serde(default)]
         facing: Option<Vector>,
     },
-    /// A dead force, shared over the particles that lie in the shape at the start.
+    /// A dead force, distributed over the particles that lie in the shape at the start.
     PointForce {
-        /// Components of the whole force, N; in plane strain per metre of thickness.
+        /// Components of the total force, N; in plane strain per metre of thickness.
         force: Vec<Quantity>,
-        /// How it is shared.
+        /// How it is distributed.
         #[serde(default)]
         share: Sharing,
         /// Bodies whose particles count; all by default.

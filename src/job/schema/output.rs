@@ -9,27 +9,26 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Directory for all files of the run, relative to where agimp is started; `out/` and the name of
-    /// the job file by default.
+    /// Directory for the files of the run, relative to the current directory; `out/` and the name of the job file by default.
     #[serde(default)]
     pub directory: Option<String>,
-    /// Simulated time between output files, s; only start and end by default.
+    /// Simulated time between outputs, s; by default only the start and the end.
     #[serde(default)]
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every: Option<f64>,
     /// Particle fields.
     #[serde(default = "default_fields")]
     pub fields: Vec<Field>,
-    /// Whether each output file carries the complete state, so that a run can restart from it.
+    /// Whether each output contains the complete state, so that a run can restart from it.
     #[serde(default = "yes")]
     pub restart: bool,
-    /// Whether a picture of the last state is drawn when the run ends.
+    /// Whether the run draws a picture of its final state.
     #[serde(default = "yes")]
     pub picture: bool,
     /// Field that colours the picture; by default the plastic strain if a material has it, else the speed.
     #[serde(default)]
     pub picture_field: Option<Field>,
-    /// Whether the run ends with a page for a browser, `JOB.report.html`, as `agimp report` writes it; also when it fails or is stopped.
+    /// Whether the run writes the HTML page `JOB.report.html` when it ends, fails or is stopped, as `agimp report` does.
     #[serde(default)]
     pub report: bool,
 }
@@ -60,8 +59,7 @@ fn default_fields() -> Vec<Field> {
     vec![Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain]
 }
 
-/// Checkpoints. With no interval, one is written only when the run is asked to stop, and when it ends if the
-/// output files carry no state.
+/// Checkpoints. Without an interval, a run writes one only when asked to stop, and at its end if the outputs contain no state.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
@@ -77,7 +75,7 @@ pub struct Checkpoint {
     #[serde(default)]
     #[schemars(range(max = 1e7), extend("exclusiveMinimum" = 0.0))]
     pub every_wall_minutes: Option<f64>,
-    /// Checkpoints kept; older ones are deleted when a newer one is complete.
+    /// Number of checkpoints to keep; older ones are deleted once a newer one is complete.
     #[serde(default = "default_keep")]
     #[schemars(range(min = 1, max = 1000))]
     pub keep: u32,
@@ -101,7 +99,7 @@ pub struct History {
     #[serde(default = "ten")]
     #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: u64,
-    /// Whether it has the mean force on each face of the domain since the row before, N: `force_x_min_x` and so on.
+    /// Whether to record the mean force on each face of the domain since the previous row, N: `force_x_min_x` and so on.
     #[serde(default)]
     pub face_forces: bool,
 }
@@ -116,7 +114,7 @@ fn ten() -> u64 {
     10
 }
 
-/// Measurements of the run itself, `telemetry.jsonl`.
+/// Performance of the run, `telemetry.jsonl`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Telemetry {
@@ -135,7 +133,7 @@ impl Default for Telemetry {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Report {
-    /// Run-out and height of a collapsed granular column, beside published laws.
+    /// Run-out and height of a collapsed granular column, compared with published laws.
     ColumnCollapse {
         /// Centre of the column's foot, m.
         base: Vector,

@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 pub struct Probe {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Where it measures; everywhere by default.
+    /// Where to measure; everywhere by default.
     #[serde(default)]
     pub shape: Option<Shape>,
     /// Names of the bodies that it measures; all by default.
     #[serde(default)]
     #[schemars(length(min = 1, max = 65_535))]
     pub bodies: Option<Vec<String>>,
-    /// What it measures; mass, centre and velocity by default.
+    /// Recorded quantities; mass, centre and velocity by default.
     #[serde(default = "usual")]
     #[schemars(length(min = 1, max = 13))]
     pub quantities: Vec<Measured>,
@@ -29,9 +29,9 @@ fn usual() -> Vec<Measured> {
     vec![Measured::Mass, Measured::Centre, Measured::Velocity]
 }
 
-/// A particle that is followed, with columns of `history.csv` such as `centre_NAME_x`: at the start the one nearest to a point. Where it
-/// has split, the columns are sums and means over all into which it has; where a merge has undone a split, they are those of the whole.
-/// Once a merge of strangers has taken it, the particle nearest to its last place takes over.
+/// A tracked particle, with columns of `history.csv` such as `centre_NAME_x`: the one nearest to a point at the start. If it splits, the
+/// columns are sums and means over its pieces, and those of the whole again once they merge back. If it merges with other particles, the
+/// particle nearest to its last position takes over.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Track {
@@ -43,7 +43,7 @@ pub struct Track {
     #[serde(default)]
     #[schemars(length(min = 1, max = 65_535))]
     pub bodies: Option<Vec<String>>,
-    /// What is shown of it; centre and velocity by default.
+    /// Recorded quantities; centre and velocity by default.
     #[serde(default = "usual_of_track")]
     #[schemars(length(min = 1, max = 13))]
     pub quantities: Vec<Measured>,
@@ -53,9 +53,8 @@ fn usual_of_track() -> Vec<Measured> {
     vec![Measured::Centre, Measured::Velocity]
 }
 
-/// Mass that has passed since the start of the run, the column `passed_NAME` of `history.csv` (kg): through a plane in the direction of its
-/// normal, less what has come back; or out of the domain through a face. An exact sum: what is there, and what has passed out of the
-/// domain, make up the whole.
+/// Net mass that has passed since the start of the run, the column `passed_NAME` of `history.csv` (kg): through a plane in the direction of
+/// its normal, or out of the domain through a face. The sums are exact: the mass inside and the mass that has left add up to the total.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Flux {
@@ -64,17 +63,17 @@ pub struct Flux {
     /// A point of the plane, m.
     #[serde(default)]
     pub point: Option<Vector>,
-    /// Normal of the plane, any length: mass counts where it goes.
+    /// Normal of the plane, any length: mass that passes in this direction counts as positive.
     #[serde(default)]
     pub normal: Option<Vector>,
-    /// Lower corner of a box, m: with `max`, only what crosses the plane within it counts, such as at a slot or a gate. Masses are then
-    /// summed up as particles cross; what splits or merges across the plane crosses nothing.
+    /// Lower corner of a box, m: with `max`, only mass that crosses the plane inside the box counts, such as at a slot or a gate. Masses
+    /// are then added as particles cross; splits and merges across the plane count as nothing.
     #[serde(default)]
     pub min: Option<Vector>,
     /// Upper corner of the box, m.
     #[serde(default)]
     pub max: Option<Vector>,
-    /// A face of the domain, in the place of a plane.
+    /// A face of the domain, in place of a plane.
     #[serde(default)]
     pub face: Option<FaceName>,
 }
@@ -119,7 +118,7 @@ pub struct Line {
     #[serde(default)]
     #[schemars(length(min = 1, max = 65_535))]
     pub bodies: Option<Vec<String>>,
-    /// What is shown; all by default.
+    /// Recorded quantities; all by default.
     #[serde(default = "all_sampled")]
     #[schemars(length(min = 1, max = 6))]
     pub quantities: Vec<Sampled>,

@@ -4,8 +4,8 @@ use crate::geometry::written::bound_items;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Stress of a body at the start. The elastic state is the one to which the material answers with this stress; a stress at which
-/// it yields is refused. Vertical is the axis of `gravity` at the start.
+/// Initial stress of a body. The elastic strain is set to the one that produces this stress; a stress outside the yield surface is refused.
+/// Vertical is the axis of `gravity` at the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stress {
     /// Overconsolidation ratio: preconsolidation pressure over that of the yield surface through the stress; 1 is normally
@@ -17,16 +17,16 @@ pub struct Stress {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub preconsolidation: Option<f64>,
-    /// What the stress is.
+    /// Kind of initial stress.
     #[serde(flatten)]
     pub kind: StressKind,
 }
 
-/// What the stress of a body is.
+/// Kinds of initial stress.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum StressKind {
-    /// Vertical stress from the weight above, horizontal stresses in proportion to it.
+    /// Vertical stress from the weight above, horizontal stresses proportional to it.
     Geostatic {
         /// Horizontal over vertical stress, K0; a number or an expression in x, y, z.
         k0: Quantity,
@@ -38,7 +38,7 @@ pub enum StressKind {
         #[serde(default)]
         surcharge: Quantity,
     },
-    /// The weight above as a pressure, the same in all directions.
+    /// The weight above as a pressure, equal in all directions.
     Hydrostatic {
         /// Level of the surface, m, as for `geostatic`; found by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
