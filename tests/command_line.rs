@@ -221,31 +221,42 @@ fn new_without_a_name_lists_the_templates() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean \"elastic_cubes\"?"));
 }
 
-/// Each template of a job in the plane is written, checked and does a step as it is; the schema lies beside it, where editors look.
+/// Each template is written with the files that it names, checked, and does a few steps as it is; the schema lies beside it, where editors look.
 #[test]
 fn templates_run_as_they_are() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let list = printed(&agimp(here, &["new", "--list"]));
     let names: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert!(names.len() >= 14, "{names:?}");
-    let mut runs = 0;
+    assert!(names.len() >= 24, "{names:?}");
     for name in names {
         let file = format!("my_{name}.toml");
         assert_eq!(agimp(here, &["new", "--template", name, &file]).status.code(), Some(0), "{name}");
         let text = std::fs::read_to_string(here.join(&file)).unwrap();
         assert!(text.starts_with("#:schema ./agimp.schema.json\n"), "{name}");
-        // Those in space take longer; tests of the documentation run them shortened.
-        if text.contains("dimension = 2") {
-            let output =
-                agimp(here, &["run", &file, "--end", "1e-9", "--quiet", "--set", "output.picture=false"]);
-            assert_eq!(output.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-            runs += 1;
-        }
+        let end = format!("{:e}", 3.5 * time_step(&printed(&agimp(here, &["check", &file]))));
+        let run = ["run", &file, "--end", &end, "--quiet", "--set", "output.picture=false"];
+        let output = agimp(here, &run);
+        assert_eq!(output.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        std::fs::remove_dir_all(here.join("out")).unwrap();
     }
-    assert!(runs >= 10, "{runs}");
     let schema = std::fs::read_to_string(here.join("agimp.schema.json")).unwrap();
     assert_eq!(schema.trim_end(), printed(&agimp(here, &["schema"])).trim_end());
+}
+
+/// The time step that `agimp check` prints, s.
+fn time_step(check: &str) -> f64 {
+    let line = check.lines().find_map(|line| line.strip_prefix("time step")).expect("a time step");
+    let mut words = line.split_whitespace().skip_while(|word| word.parse::<f64>().is_err());
+    let number: f64 = words.next().and_then(|word| word.parse().ok()).expect("a number");
+    let scale = match words.next().expect("a unit").trim_end_matches([',', ';']) {
+        "s" => 1.0,
+        "ms" => 1e-3,
+        "µs" => 1e-6,
+        "ns" => 1e-9,
+        other => panic!("{other}"),
+    };
+    number * scale
 }
 
 /// As in `agimp schema | head -1`.

@@ -1,42 +1,62 @@
 //! `agimp new`: a commented job file to start from.
 use super::Failure;
 use crate::io::lines::write_whole;
-use crate::job;
+use crate::job::{self, Settings};
 use crate::text::{excerpt, nearest};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// A template for each name: jobs of the project itself that need no other file, so that they always run.
+/// A job to start from: one of the project itself.
+struct Template {
+    name: &'static str,
+    text: &'static str,
+    /// Settings with which it runs in under a minute on two cores, where the job of the project takes longer.
+    quick: &'static [&'static str],
+    /// Files that the job names, relative to it, with their contents.
+    files: &'static [(&'static str, &'static str)],
+}
+
+/// Templates from `jobs/`: a name, perhaps files, perhaps settings.
 macro_rules! templates {
-    ($($name:literal),+ $(,)?) => {
-        [$(($name, include_str!(concat!("../../jobs/", $name, ".toml")))),+]
+    ($($name:literal $(with $($file:literal),+)? $(quick $($setting:literal),+)?;)+) => {
+        &[$(Template {
+            name: $name,
+            text: include_str!(concat!("../../jobs/", $name, ".toml")),
+            quick: &[$($($setting),+)?],
+            files: &[$($(($file, include_str!(concat!("../../jobs/", $file)))),+)?],
+        }),+]
     };
 }
 
-/// Templates by discipline (granular flow, ground, other flow, solids, metal): name and text.
-const TEMPLATES: [(&str, &str); 21] = templates![
-    "column_collapse_2d",
-    "column_collapse_mohr_coulomb",
-    "column_collapse",
-    "column_collapse_tall",
-    "column_collapse_fine",
-    "slope_failure",
-    "excavation",
-    "ground_at_rest",
-    "strip_footing",
-    "clay_footing",
-    "cone_penetration",
-    "silo",
-    "cylinder_in_sand",
-    "snowball",
-    "dam_break",
-    "cantilever",
-    "thick_cylinder",
-    "oblique_disks",
-    "elastic_cubes",
-    "taylor_bar",
-    "taylor_bar_johnson_cook",
+/// Templates by discipline (granular flow, ground, other flow, solids, metal, effects).
+const TEMPLATES: &[Template] = templates![
+    "column_collapse_2d";
+    "column_collapse_mohr_coulomb";
+    "column_collapse" quick "tree.base_level=0", "tree.regions.0.level=1", "tree.regions.1.level=2", "tree.regions.2.level=2";
+    "column_collapse_tall" quick "tree.base_level=0", "adaptivity.criteria.0.level=1", "adaptivity.criteria.1.level=2";
+    "silo";
+    "hopper" with "meshes/hopper.obj", "meshes/glass.obj" quick "time.end=0.2";
+    "cylinder_in_sand";
+    "wheel" with "meshes/wheel.obj" quick "time.end=1.2";
+    "landslide" with "terrain/jacksboro.asc" quick "adaptivity.criteria.0.level=3";
+    "slope_failure";
+    "shaken_slope" with "records/tapered_sine.csv";
+    "excavation";
+    "ground_at_rest";
+    "strip_footing";
+    "clay_footing";
+    "cone_penetration";
+    "dam_break";
+    "snowball";
+    "cantilever";
+    "thick_cylinder";
+    "oblique_disks";
+    "elastic_cubes";
+    "taylor_bar" quick "tree.base_level=1", "adaptivity.criteria.0.level=3", "adaptivity.criteria.1.level=2";
+    "taylor_bar_johnson_cook" quick "tree.base_level=1", "adaptivity.criteria.0.level=2", "adaptivity.criteria.1.level=2";
+    "bunny" with "meshes/bunny.obj" quick "tree.regions.0.level=2";
+    "snow_bunny" with "meshes/bunny.obj";
 ];
 
 /// File that editors complete and check job files by.
@@ -56,9 +76,12 @@ pub struct Arguments {
     /// List the templates, and write nothing.
     #[arg(long)]
     list: bool,
+    /// Write the job as the project has it, also where it takes longer than a minute.
+    #[arg(long)]
+    full: bool,
 }
 
-/// Writes the template, or lists all.
+/// Writes the template with the files that it needs, or lists all.
 ///
 /// # Errors
 /// No such template, the file exists already, or it cannot be written.
@@ -69,13 +92,13 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         (None, name) => (name.as_ref(), arguments.file.clone()),
     };
     let Some(name) = name.map(String::as_str).filter(|_| !arguments.list) else {
-        for (name, text) in TEMPLATES {
-            writeln!(out, "{name:28} {}", title(text))?;
+        for template in TEMPLATES {
+            writeln!(out, "{:28} {}", template.name, title(template.text))?;
         }
         return Ok(());
     };
-    let Some((_, text)) = TEMPLATES.iter().find(|(known, _)| *known == name) else {
-        let known: Vec<&str> = TEMPLATES.iter().map(|(known, _)| *known).collect();
+    let Some(template) = TEMPLATES.iter().find(|known| known.name == name) else {
+        let known: Vec<&str> = TEMPLATES.iter().map(|known| known.name).collect();
         let meant = nearest(name, known.iter().copied());
         let guess = meant.map_or(String::new(), |meant| format!("; did you mean \"{meant}\"?"));
         return Err(Failure::Usage(format!(
@@ -91,18 +114,47 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         }
         _ => Failure::Run(format!("{}: cannot be written: {error}", path.display())),
     };
+    let text = template.text(arguments.full)?;
     let mut file = OpenOptions::new().write(true).create_new(true).open(&path).map_err(failure)?;
     // Editors look for the schema beside the job.
-    let text = format!("#:schema ./{SCHEMA}\n{text}");
-    file.write_all(text.as_bytes()).map_err(failure)?;
+    file.write_all(format!("#:schema ./{SCHEMA}\n{text}").as_bytes()).map_err(failure)?;
     writeln!(out, "{} written; next: agimp check {0}", path.display())?;
-    let schema = path.with_file_name(SCHEMA);
-    if !schema.exists() {
-        let text = serde_json::to_string_pretty(&job::schema()).map_err(std::io::Error::other)?;
-        let written = write_whole(&schema, text.as_bytes());
-        written.map_err(|error| Failure::Run(format!("{}: cannot be written: {error}", schema.display())))?;
-        writeln!(out, "{} written: editors complete and check job files by it", schema.display())?;
+    for (name, contents) in template.files {
+        beside(&path, name, contents, "the job reads it")?;
     }
+    let schema = serde_json::to_string_pretty(&job::schema()).map_err(std::io::Error::other)?;
+    beside(&path, SCHEMA, &schema, "editors complete and check job files by it")
+}
+
+impl Template {
+    /// The job, with the settings that make it quick unless it is to be as the project has it.
+    fn text(&self, full: bool) -> Result<String, Failure> {
+        if full || self.quick.is_empty() {
+            return Ok(self.text.to_owned());
+        }
+        let mut settings = Settings::default();
+        self.quick.iter().try_for_each(|setting| settings.set(setting)).map_err(Failure::Usage)?;
+        let text = job::with_settings(self.text, self.name.as_ref(), &settings)?;
+        let list = self.quick.join(", ");
+        let name = self.name;
+        Ok(format!(
+            "# Made to run in under a minute, with {list}.\n# What is said below holds for the full job: agimp new {name} --full\n#\n{text}"
+        ))
+    }
+}
+
+/// Writes a file that belongs to a job, unless it exists.
+fn beside(job: &Path, name: &str, contents: &str, purpose: &str) -> Result<(), Failure> {
+    let path = job.with_file_name(name);
+    if path.exists() {
+        return Ok(());
+    }
+    let write = || {
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        write_whole(&path, contents.as_bytes())
+    };
+    write().map_err(|error| Failure::Run(format!("{}: cannot be written: {error}", path.display())))?;
+    writeln!(std::io::stdout(), "{} written: {purpose}", path.display())?;
     Ok(())
 }
 
@@ -120,10 +172,16 @@ mod tests {
 
     #[test]
     fn templates_are_valid_jobs_with_titles() {
-        for (name, text) in TEMPLATES {
-            assert!(!title(text).is_empty(), "{name}");
-            let faults = job::parse(text, name.as_ref()).err().unwrap_or_default();
-            assert!(faults.is_empty(), "{name}: {faults:?}");
+        for template in TEMPLATES {
+            assert!(!title(template.text).is_empty(), "{}", template.name);
+            for full in [false, true] {
+                let text = template.text(full).map_err(|failure| failure.to_string()).expect(template.name);
+                // Files are looked for where the project has them.
+                let path = Path::new("jobs").join(template.name);
+                let faults = job::parse(&text, &path).err().unwrap_or_default();
+                assert!(faults.is_empty(), "{}: {faults:?}", template.name);
+                assert_eq!(full || template.quick.is_empty(), text == template.text, "{}", template.name);
+            }
         }
     }
 }

@@ -85,6 +85,17 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<An
         .map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
 }
 
+/// The text of a job with some values set, comments and all. `name` stands for it in messages.
+///
+/// # Errors
+/// A setting leads nowhere.
+pub fn with_settings(text: &str, name: &Path, settings: &Settings) -> Result<String, JobError> {
+    let edited = settings.apply(text);
+    edited
+        .map(|edited| edited.text)
+        .map_err(|faults| FaultList { path: name.to_path_buf(), text: text.to_owned(), faults }.into())
+}
+
 /// Checks the text of a job file. Nothing is read from `path` itself: its stem becomes the name of the job, and files that the job
 /// names or includes lie relative to its directory.
 ///
