@@ -7,49 +7,20 @@
 //! * jobs have one particle per cell and a hundredth of their time,
 //! * `sbatch` and `srun` run a script on two ranks of this machine.
 //!
-//! An HTML comment before a block says what else differs: `<!-- test: needs: PROGRAMS -->` passes over the block where
-//! one of them is missing, `<!-- test: quick: OLD => NEW; REASON -->` replaces words, `<!-- test: skip: REASON -->` leaves it out.
+//! Comments before a block say what else differs (`common/papers.rs`). Tutorials run unabridged in `tutorials.rs`.
 #[path = "common/mpirun.rs"]
 mod mpirun;
+#[path = "common/papers.rs"]
+mod papers;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-fn repository() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Files below a folder of the repository, without what is built or hidden; paths from the top, sorted.
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(repository().join(&folder)).expect("a folder") {
-            let name = entry.expect("an entry").file_name();
-            let path = if folder == Path::new(".") { PathBuf::from(&name) } else { folder.join(&name) };
-            let hidden = name.to_string_lossy().starts_with('.');
-            match repository().join(&path).is_dir() {
-                _ if hidden => {}
-                true if ["target", "out", "node_modules", "__pycache__"]
-                    .iter()
-                    .any(|built| *built == name) => {}
-                true => folders.push(path),
-                false => found.push(path),
-            }
-        }
-    }
-    found.sort();
-    found
-}
-
-fn text(path: &Path) -> String {
-    std::fs::read_to_string(repository().join(path)).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
+use papers::{blocks, commands, files, repository, text};
 
 /// The Markdown files; README first, since the guide goes on from its first job.
-fn papers() -> Vec<PathBuf> {
+fn all_papers() -> Vec<PathBuf> {
     let mut papers: Vec<_> = files(Path::new("."))
         .into_iter()
         .filter(|path| path.extension().is_some_and(|e| e == "md"))
@@ -57,72 +28,6 @@ fn papers() -> Vec<PathBuf> {
     papers.sort_by_key(|path| (path != Path::new("README.md"), path.clone()));
     assert!(papers.len() >= 20, "{papers:?}");
     papers
-}
-
-/// A fenced block.
-#[derive(Debug)]
-struct Block {
-    line: usize,
-    language: String,
-    /// What the comment before it says after `test:`.
-    note: Option<String>,
-    text: String,
-}
-
-fn blocks(paper: &str) -> Vec<Block> {
-    let mut found = Vec::new();
-    let (mut note, mut open): (Option<String>, Option<Block>) = (None, None);
-    for (i, line) in paper.lines().enumerate() {
-        match (&mut open, line.trim_start().strip_prefix("```")) {
-            (Some(_), Some(_)) => found.extend(open.take()),
-            (Some(block), None) => {
-                block.text.push_str(line);
-                block.text.push('\n');
-            }
-            (None, Some(language)) => {
-                let (language, note) = (language.trim().to_owned(), note.take());
-                open = Some(Block { line: i + 1, language, note, text: String::new() });
-            }
-            (None, None) => {
-                let inner = line.trim().strip_prefix("<!-- test:").and_then(|rest| rest.strip_suffix("-->"));
-                note = inner.map(|inner| inner.trim().to_owned());
-            }
-        }
-    }
-    assert!(open.is_none(), "a block without an end");
-    found
-}
-
-/// The commands of a block as they run here; none if it is passed over.
-fn commands(paper: &Path, block: &Block) -> Option<String> {
-    let place = format!("{}:{}", paper.display(), block.line);
-    let note = block.note.as_deref().unwrap_or_default();
-    if let Some(reason) = note.strip_prefix("skip:") {
-        assert!(reason.trim().len() > 10, "{place}: a reason is missing");
-        println!("{place}: not run: {}", reason.trim());
-        return None;
-    }
-    if let Some(programs) = note.strip_prefix("needs:") {
-        let is_missing = |program: &&str| {
-            !Command::new("sh")
-                .args(["-c", "command -v \"$0\" >/dev/null", program])
-                .status()
-                .is_ok_and(|s| s.success())
-        };
-        if let Some(missing) = programs.split_whitespace().find(is_missing) {
-            println!("{place}: passed over: there is no {missing}");
-            return None;
-        }
-    } else if let Some(quick) = note.strip_prefix("quick:") {
-        let (words, reason) = quick.split_once(';').unwrap_or_else(|| panic!("{place}: a reason is missing"));
-        let (old, new) = words.split_once("=>").unwrap_or_else(|| panic!("{place}: OLD => NEW"));
-        assert!(block.text.contains(old.trim()), "{place}: {old} is not there");
-        println!("{place}: {} instead of {}: {}", new.trim(), old.trim(), reason.trim());
-        return Some(block.text.replace(old.trim(), new.trim()));
-    } else {
-        assert!(note.is_empty(), "{place}: unknown note {note:?}");
-    }
-    Some(block.text.clone())
 }
 
 /// A copy of the repository that commands may write to.
@@ -171,17 +76,8 @@ impl Copy {
 
     /// Runs commands from the top of the copy, which must succeed. `environment` are commands before them.
     fn run(&self, place: &str, environment: &str, commands: &str) {
-        let script = format!("{environment}\ntrap 'echo \"failed: $BASH_COMMAND\" >&2' ERR\n{commands}");
-        let path = std::env::var("PATH").unwrap_or_default();
-        let run = || {
-            let mut bash = Command::new("bash");
-            bash.args(["-euo", "pipefail", "-c", &script])
-                .current_dir(self.directory.path())
-                .env("PATH", format!("{}:{path}", self.directory.path().join("bin").display()))
-                .env("MPIEXEC_TIMEOUT", "600")
-                .env("RAYON_NUM_THREADS", "1");
-            bash.output().expect("bash starts")
-        };
+        let run =
+            || papers::bash(self.directory.path(), &self.directory.path().join("bin"), environment, commands);
         let mut output = run();
         // Displays may be taken by others between the look of `xvfb-run` and its start of the server.
         for _ in 0..if commands.contains("xvfb-run") { 4 } else { 0 } {
@@ -234,13 +130,13 @@ fn commands_of_the_papers_run() {
     let copy = Copy::new();
     let environment = environment();
     let mut done = 0;
-    for paper in papers() {
+    for paper in all_papers() {
         for block in blocks(&text(&paper)) {
             let first = block.text.split_whitespace().next().unwrap_or_default();
             let is_command = ["agimp", "mpirun", "cargo"].contains(&first) || first.starts_with("./");
             let place = format!("{}:{}", paper.display(), block.line);
             assert!(block.language == "sh" || !is_command, "{place}: a block of commands begins with ```sh");
-            if block.language != "sh" {
+            if block.language != "sh" || paper.starts_with("docs/tutorials") {
                 continue;
             }
             for target in block
@@ -360,7 +256,7 @@ fn links(paper: &str) -> Vec<(usize, String)> {
 #[test]
 fn links_lead_somewhere() {
     let (mut broken, mut checked) = (Vec::new(), 0);
-    for paper in papers() {
+    for paper in all_papers() {
         let contents = text(&paper);
         for (line, target) in links(&contents) {
             if target.contains("://") || target.starts_with("mailto:") {
@@ -384,4 +280,92 @@ fn links_lead_somewhere() {
     }
     assert!(checked >= 30, "{checked} links");
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
+}
+
+/// What a link of a paper leads to, from the top of the repository; none for other sites and places in the paper itself.
+fn target(paper: &Path, link: &str) -> Option<PathBuf> {
+    let file = link.split('#').next().unwrap_or_default();
+    if file.is_empty() || link.contains("://") || link.starts_with("mailto:") {
+        return None;
+    }
+    let mut path = PathBuf::new();
+    for part in paper.parent().unwrap_or(Path::new("")).join(file).components() {
+        match part {
+            std::path::Component::ParentDir => assert!(path.pop(), "{}: {link}", paper.display()),
+            part => path.push(part),
+        }
+    }
+    Some(path)
+}
+
+/// The pages of the book, as `docs/SUMMARY.md` lists them.
+fn pages() -> Vec<PathBuf> {
+    let summary = Path::new("docs/SUMMARY.md");
+    links(&text(summary)).iter().filter_map(|(_, link)| target(summary, link)).collect()
+}
+
+/// The book has each page of `docs/` once, and whatever its pages link to comes with it.
+#[test]
+fn the_book_is_complete() {
+    let pages = pages();
+    let listed: BTreeSet<&PathBuf> = pages.iter().collect();
+    assert_eq!(listed.len(), pages.len(), "a page twice");
+    let is_page = |path: &PathBuf| path.extension().is_some_and(|e| e == "md");
+    for path in files(Path::new("docs")).iter().filter(|path| is_page(path)) {
+        let is_summary = path == Path::new("docs/SUMMARY.md");
+        assert!(is_summary || listed.contains(path), "{}: not in docs/SUMMARY.md", path.display());
+    }
+    let script = text(Path::new("docs/build_book"));
+    let list = script.split("<<<\"").nth(1).and_then(|rest| rest.split('"').next()).expect("a list of files");
+    let taken: Vec<&Path> = list.split_whitespace().map(Path::new).collect();
+    for page in &pages {
+        for (line, link) in links(&text(page)) {
+            let Some(to) = target(page, &link) else { continue };
+            let place = format!("{}:{line}: {link}", page.display());
+            assert!(taken.iter().any(|path| to.starts_with(path)), "{place}: not taken by docs/build_book");
+            assert!(!is_page(&to) || listed.contains(&to), "{place}: not in docs/SUMMARY.md");
+        }
+    }
+}
+
+/// Where mdBook is installed, the book builds, and no link or picture of it leads nowhere.
+#[test]
+fn the_book_builds() {
+    if papers::is_installed("mdbook") {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let output = std::process::Command::new(repository().join("docs/build_book"))
+            .arg(directory.path())
+            .output()
+            .expect("starts");
+        assert!(output.status.success(), "{}", mpirun::text(&output));
+        let top = directory.path().join("html");
+        let (mut checked, mut broken) = (0, Vec::new());
+        for page in pages() {
+            let page = page.with_extension("html");
+            let html = std::fs::read_to_string(top.join(&page)).expect("a page");
+            let body =
+                html.split("<main>").nth(1).and_then(|rest| rest.split("</main>").next()).expect("text");
+            for attribute in ["href=\"", "src=\""] {
+                for link in body.split(attribute).skip(1).filter_map(|rest| rest.split('"').next()) {
+                    let Some(to) = target(&page, link) else { continue };
+                    checked += 1;
+                    let heading = link.split_once('#').map_or("", |(_, heading)| heading);
+                    let leads = match std::fs::read(top.join(&to)) {
+                        Ok(bytes) => {
+                            heading.is_empty()
+                                || String::from_utf8_lossy(&bytes).contains(&format!("id=\"{heading}\""))
+                        }
+                        Err(_) => top.join(&to).is_dir(),
+                    };
+                    if !leads {
+                        broken.push(format!("{}: {link}", page.display()));
+                    }
+                }
+            }
+        }
+        assert!(checked >= 300, "{checked} links");
+        assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
+    } else {
+        println!("passed over: there is no mdbook (cargo install mdbook)");
+    }
 }
