@@ -69,3 +69,5 @@ def test_templates(needs_program: str) -> None:
     assert job.name == "cubes" and job["dimension"] == 3
     with pytest.raises(agimp.JobError, match="elastic_cubes"):
         agimp.template("elastic_cube")
+    with pytest.raises(agimp.JobError, match="reads files in meshes/"):
+        agimp.template("bunny")

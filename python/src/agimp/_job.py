@@ -110,7 +110,7 @@ def job(source: Mapping[str, Any] | str | os.PathLike[str] | None = None, name: 
 
 
 def template(template: str, name: str | None = None, *, binary: str | os.PathLike[str] | None = None) -> Job:
-    """A job to start from, one of those that `agimp new --list` shows; its run is called `name`."""
+    """A job to start from, one of those that `agimp new --list` shows and that read no other files; its run is called `name`."""
     program = _program.find(binary)
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "template.toml"
@@ -119,6 +119,12 @@ def template(template: str, name: str | None = None, *, binary: str | os.PathLik
             raise JobError(called.errors.strip())
         if called.exit_code != 0:
             raise AgimpError(f"agimp new: exit code {called.exit_code}: {called.errors.strip()}")
+        files = sorted(each.name for each in Path(directory).iterdir() if each.name not in (path.name, "agimp.schema.json"))
+        if files:
+            raise JobError(
+                f"found the template '{template}', which reads files in {', '.join(files)}/; expected one without: "
+                f"write it with `agimp new {template}` and run it with `agimp run`"
+            )
         return job(path, template if name is None else name)
 
 
