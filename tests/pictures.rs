@@ -126,6 +126,114 @@ fn outputs_know_where_their_job_is() {
     assert!(seen(&image(&here.join("picture.png")), PLATE).0 > 1000);
 }
 
+/// A ball in cells of two sizes.
+const BALL: &str = r#"
+version = 1
+dimension = 3
+[domain]
+size = [1, 1, 1]
+root_edge = 0.25
+[tree]
+regions = [{ level = 1, shape = { kind = "box", min = [0, 0, 0], max = [0.5, 1, 1] } }]
+[boundaries]
+z_min = { kind = "sticky" }
+[[materials]]
+name = "rubber"
+density = 1000
+model = "neo_hookean"
+young = 1e5
+poisson = 0.3
+[[bodies]]
+name = "ball"
+material = "rubber"
+shape = { kind = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.3 }
+[[bodies]]
+name = "cube"
+material = "rubber"
+shape = { kind = "box", min = [0, 0, 0], max = [0.125, 0.125, 0.125] }
+[time]
+end = 1e-5
+[output]
+every = 1
+picture = false
+"#;
+
+/// A mesh of OBJ: corners, normals, triangles.
+type Mesh = (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<[usize; 3]>);
+
+fn obj(text: &str) -> Mesh {
+    let three = |line: &str| -> [f64; 3] {
+        let numbers: Vec<f64> =
+            line.split(' ').skip(1).map(|number| number.parse().expect("a number")).collect();
+        numbers.try_into().expect("three numbers")
+    };
+    let triangle = |line: &str| -> [usize; 3] {
+        let corner = |corner: &str| {
+            corner.split('/').next().expect("a corner").parse::<usize>().expect("a number") - 1
+        };
+        line.split(' ').skip(1).map(corner).collect::<Vec<_>>().try_into().expect("three corners")
+    };
+    let of = |start: &'static str| text.lines().filter(move |line| line.starts_with(start));
+    (of("v ").map(three).collect(), of("vn ").map(three).collect(), of("f ").map(triangle).collect())
+}
+
+#[test]
+fn surface_of_a_ball_is_closed_and_has_its_volume() {
+    let directory = finished("ball", BALL, &[]);
+    let here = directory.path();
+    let export = |options: &[&str]| agimp(here, &[&["export", "out/ball/ball_000000.hdf"], options].concat());
+    let output = export(&["--surface", "obj", "--body", "ball", "--out", "given"]);
+    assert!(output.status.success(), "{}", told(&output));
+    let text = std::fs::read_to_string(here.join("given/ball_000000.surface.obj")).expect("OBJ");
+    let (points, normals, triangles) = obj(&text);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let volume: f64 =
+        triangles.iter().map(|t| dot(points[t[0]], cross(points[t[1]], points[t[2]])) / 6.0).sum();
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.3_f64.powi(3);
+    assert!((volume / ball - 1.0).abs() < 0.03, "{volume} of {ball}");
+    // Each edge belongs to two triangles, which pass it in both ways.
+    let mut edges: Vec<[usize; 2]> =
+        triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]).collect();
+    edges.sort_unstable();
+    assert!(edges.windows(2).all(|pair| pair[0] != pair[1]), "no edge is passed twice");
+    assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "the mesh is closed");
+    for (point, normal) in points.iter().zip(&normals) {
+        let out = point.map(|x| x - 0.5);
+        let radius = dot(out, out).sqrt();
+        assert!((dot(*normal, *normal) - 1.0).abs() < 1e-5 && dot(out, *normal) > 0.0, "outwards: {point:?}");
+        assert!((radius - 0.3).abs() < 0.03, "{radius}");
+    }
+    // All bodies together; as PLY the numbers follow the header.
+    assert!(export(&["--surface", "ply"]).status.success());
+    let ply = std::fs::read(here.join("out/ball/ball_000000.surface.ply")).expect("PLY");
+    let end = ply.windows(11).position(|bytes| bytes == b"end_header\n").expect("a header") + 11;
+    let header = String::from_utf8_lossy(&ply[..end]).into_owned();
+    let count = |what: &str| -> usize {
+        let line = header.lines().find(|line| line.starts_with(&format!("element {what} ")));
+        line.expect("an element").rsplit(' ').next().expect("a number").parse().expect("a number")
+    };
+    assert_eq!(ply.len() - end, 24 * count("vertex") + 13 * count("face"));
+    assert!(count("vertex") > points.len(), "the cube as well");
+    for (options, message) in [
+        (&["--surface", "stl"][..], "expected ply or obj"),
+        (&["--surface", "ply", "--body", "bal"], "found no body bal; expected one of: ball, cube"),
+        (&["--surface", "ply", "--fields", "velocity"], "cannot be used with"),
+    ] {
+        let output = export(options);
+        assert!(output.status.code() == Some(2) && told(&output).contains(message), "{}", told(&output));
+    }
+    let flat = run();
+    let output = agimp(flat.path(), &["export", "--surface", "ply", "out/press/press_000000.hdf"]);
+    assert!(
+        output.status.code() == Some(2) && told(&output).contains("expected the output of a run in 3D"),
+        "{}",
+        told(&output)
+    );
+}
+
 /// Corners of the polygons of a colour in an SVG.
 fn polygons(svg: &str, colour: &str) -> Vec<Vec<[f64; 2]>> {
     let pair = |pair: &str| {

@@ -14,4 +14,5 @@ pub mod progress;
 pub mod raster;
 pub mod series;
 pub mod snapshot;
+pub mod surface;
 pub mod telemetry;

@@ -1,11 +1,12 @@
-//! `agimp export`: particles for other programs.
+//! `agimp export`: particles, or their surface, for other programs.
 use crate::cli::Failure;
 use crate::io::export::{self, Format};
 use crate::io::frame::{Frame, expand, shown_in};
 use crate::io::snapshot::PointField;
+use crate::io::surface::{MeshFormat, Surface};
 use crate::text::{bytes, count};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `agimp export`.
 #[derive(Debug, clap::Args)]
@@ -23,12 +24,26 @@ pub struct Arguments {
     /// XML of VTK for points: for ParaView, PyVista and others.
     #[arg(long, group = "format")]
     vtp: bool,
+    /// The surface of the material as a mesh of triangles with normals, in 3D: PLY or OBJ.
+    #[arg(long, group = "format", value_name = "ply|obj", value_parser = mesh_format)]
+    surface: Option<MeshFormat>,
+    /// With --surface: the body of this name alone.
+    #[arg(long, requires = "surface", value_name = "NAME")]
+    body: Option<String>,
     /// Fields to take along, separated by commas; without it, all that the files show.
-    #[arg(long, value_delimiter = ',', value_parser = super::field)]
+    #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with = "surface")]
     fields: Option<Vec<PointField>>,
     /// Directory to write to; without it, beside each file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+fn mesh_format(text: &str) -> Result<MeshFormat, String> {
+    match text {
+        "ply" => Ok(MeshFormat::Ply),
+        "obj" => Ok(MeshFormat::Obj),
+        _ => Err("expected ply or obj".into()),
+    }
 }
 
 /// Writes a file for each output.
@@ -49,17 +64,31 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             Failure::Usage(format!("{}: cannot make the directory: {error}", directory.display()))
         })?;
     }
+    let place = |file: &Path, ending: &str| {
+        let beside = file.with_extension(ending);
+        match (&arguments.out, beside.file_name()) {
+            (Some(directory), Some(name)) => directory.join(name),
+            _ => beside,
+        }
+    };
     for file in expand(&super::without_trees(&arguments.files)).map_err(failed)? {
+        if let Some(format) = arguments.surface {
+            let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
+            let surface = Surface::of(&frame, arguments.body.as_deref())
+                .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
+            let out = place(&file, format.ending());
+            surface.write(format, &out).map_err(failed)?;
+            let size = std::fs::metadata(&out).map_or(0, |data| data.len());
+            let triangles = count(surface.triangles.len() as u64);
+            writeln!(std::io::stdout(), "{} ({triangles} triangles, {})", out.display(), bytes(size as f64))?;
+            continue;
+        }
         let fields = match &arguments.fields {
             Some(fields) => fields.clone(),
             None => shown_in(&file).map_err(failed)?,
         };
         let frame = Frame::read(&file, &fields, true).map_err(failed)?;
-        let beside = file.with_extension(format.ending());
-        let out = match (&arguments.out, beside.file_name()) {
-            (Some(directory), Some(name)) => directory.join(name),
-            _ => beside,
-        };
+        let out = place(&file, format.ending());
         export::write(&frame, format, &out).map_err(failed)?;
         let size = std::fs::metadata(&out).map_or(0, |data| data.len());
         let particles = count(frame.positions.len() as u64);

@@ -72,7 +72,7 @@ struct Mean {
 }
 
 impl Drawing {
-    /// Draws the arrows of the particles that are seen, and the arrow of the scale.
+    /// Draws the arrows of the particles that are seen.
     pub(super) fn arrows(
         &self,
         canvas: &mut Canvas,
@@ -112,14 +112,26 @@ impl Drawing {
             let way = [0, 1].map(|i| (end[i] - from[i]) / camera.scale * scale);
             arrow(canvas, [from[0] - 0.5 * way[0], from[1] - 0.5 * way[1]], way, [paper.ink, paper.paper]);
         }
-        if longest > 0.0 {
-            let (value, unit) = (nice(longest), &self.vectors.unit);
-            let (x, y) = (canvas.width as f64 - 185.0, canvas.height as f64 - 44.0);
-            arrow(canvas, [x, y], [value * scale, 0.0], [paper.ink, paper.paper]);
-            let text = format!("{} {unit}", short(value));
-            canvas.text((x + LONGEST) as i64 + 10, y as i64 - 7, 2, &text, paper.ink);
-            canvas.text(x as i64, y as i64 + 14, 2, &self.vectors.name, paper.ink);
+    }
+
+    /// The arrow that says how long the others are.
+    pub(super) fn arrow_of_scale(&self, canvas: &mut Canvas, settings: &Settings) {
+        let longest = settings.longest.unwrap_or_else(|| self.vectors.longest());
+        if self.vectors.each.is_empty() || longest <= 0.0 {
+            return;
         }
+        let paper = settings.paper();
+        let (value, unit) = (nice(longest), &self.vectors.unit);
+        let (x, y) = (canvas.width as f64 - 185.0, canvas.height as f64 - 44.0);
+        arrow(canvas, [x, y], [value * LONGEST / longest, 0.0], [paper.ink, paper.paper]);
+        canvas.text(
+            (x + LONGEST) as i64 + 10,
+            y as i64 - 7,
+            2,
+            &format!("{} {unit}", short(value)),
+            paper.ink,
+        );
+        canvas.text(x as i64, y as i64 + 14, 2, &self.vectors.name, paper.ink);
     }
 }
 

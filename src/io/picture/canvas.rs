@@ -153,7 +153,7 @@ impl Canvas {
         let (width, height, png) = (self.width, self.height, BASE64.encode(self.png()?));
         Ok(format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<image width=\"{width}\" height=\"{height}\" \
+             xml:space=\"preserve\" font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<image width=\"{width}\" height=\"{height}\" \
              href=\"data:image/png;base64,{png}\"/>\n{}</svg>\n",
             self.marks.as_deref().unwrap_or_default()
         ))

@@ -39,7 +39,7 @@ pub use camera::View as Direction;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
 pub use colour::Map;
-use scales::{axes, colour_bar, legend, nice};
+use scales::{Plot, axes, colour_bar, legend, nice};
 use scene::{Looks, Raster, Splat};
 pub use settings::{Clip, Look, Settings, place};
 use solids::Layer;
@@ -348,7 +348,8 @@ impl Drawing {
         let [low, high] = self.range(comm, settings.range);
         let (width, height) = (settings.width as f64, settings.height as f64);
         let [left, right, top, bottom] = MARGINS;
-        let left = if self.flat { left + 60.0 } else { left };
+        // Numbers and unit of the axes of a plane picture stand there.
+        let [left, right] = if self.flat { [left + 60.0, right + 45.0] } else { [left, right] };
         let camera = Camera::new(
             (self.flat, settings.view),
             &frame,
@@ -403,7 +404,16 @@ impl Drawing {
             let front = depth + splat.radius + 1.5 / camera.scale;
             inside && is_kept(splat) && (self.flat || raster.is_free(&camera, &solids, at, front))
         });
+        let plot = Plot { columns: [left, width - right], rows: [top, height - bottom] };
+        let is_near = settings.zoom != 1.0 || settings.focus.is_some();
+        let frame = if self.flat && is_near { plot.visible(&camera, &frame) } else { frame };
+        if is_near {
+            // What does not fit makes room for axes and legend.
+            plot.clear_around(&mut canvas, &camera, self.flat.then_some(&frame), paper.paper);
+        }
+        self.arrow_of_scale(&mut canvas, settings);
         if self.flat {
+            let spacing = nice(frame.extent() / 8.0);
             axes(&mut canvas, &camera, &frame, spacing, paper);
         } else {
             let note = format!("grid {}", quantity(spacing, "m"));

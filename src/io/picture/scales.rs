@@ -4,11 +4,49 @@ use std::ops::RangeInclusive;
 use super::Tint;
 use super::camera::{Bounds, Camera};
 use super::canvas::Canvas;
-use super::colour::{Map, Paper, class};
+use super::colour::{Map, Paper, Rgb, class};
 use crate::text::{excerpt, number};
 
 /// No axis has more ticks.
 const MOST_TICKS: f64 = 100.0;
+
+/// Where the drawing has its place, pixels.
+pub(super) struct Plot {
+    pub columns: [f64; 2],
+    pub rows: [f64; 2],
+}
+
+impl Plot {
+    /// What is seen of the frame of a plane picture.
+    pub(super) fn visible(&self, camera: &Camera, frame: &Bounds) -> Bounds {
+        let low = camera.point(self.columns[0], self.rows[1], 0.0);
+        let high = camera.point(self.columns[1], self.rows[0], 0.0);
+        let window = Bounds { low: [low[0], low[1], frame.low[2]], high: [high[0], high[1], frame.high[2]] };
+        let seen = frame.cut(&window);
+        if (0..2).all(|axis| seen.low[axis] < seen.high[axis]) { seen } else { window }
+    }
+
+    /// Clears what is outside: beyond the frame of a plane picture, else below title and legend.
+    pub(super) fn clear_around(
+        &self,
+        canvas: &mut Canvas,
+        camera: &Camera,
+        frame: Option<&Bounds>,
+        paper: Rgb,
+    ) {
+        let (width, height) = (canvas.width as i64, canvas.height as i64);
+        let (mut columns, mut rows) = ([0, self.columns[1] as i64 + 1], [self.rows[0] as i64 - 25, height]);
+        if let Some(frame) = frame {
+            let [low, high] = [camera.project(frame.low), camera.project(frame.high)];
+            columns = [low[0] as i64, high[0] as i64 + 1];
+            rows = [high[1] as i64, low[1] as i64 + 1];
+        }
+        canvas.fill(0, 0, columns[0], height, paper);
+        canvas.fill(columns[1], 0, width - columns[1], height, paper);
+        canvas.fill(0, 0, width, rows[0], paper);
+        canvas.fill(0, rows[1], width, height - rows[1], paper);
+    }
+}
 
 /// Lines and numbers along the lower and the left side of a plane picture.
 pub(super) fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, spacing: f64, paper: &Paper) {

@@ -130,6 +130,8 @@ class Labels {
     context.lineWidth = 1;
     for (let tick = Math.ceil(low / step - 1e-6); tick * step <= meta.domain[1][axis] + 1e-6 * step; tick++) {
       const { x, y } = this.at(from.with(axis, LOW[axis] + tick * step - low));
+      // Title and legend stand there.
+      if (x + 12 * nx < 130 && y > 0 && y < Math.min(340, this.height - 140)) continue;
       context.beginPath();
       context.moveTo(x, y);
       context.lineTo(x + 5 * nx, y + 5 * ny);
@@ -137,6 +139,7 @@ class Labels {
       this.write(text(tick * step), x + 12 * nx, y + 14 * ny, { size: 11.5, align });
     }
     const name = `${"xyz"[axis]}, m`;
+    if ((a.x + b.x) / 2 + 50 * nx < 100 && (a.y + b.y) / 2 < 340) return;
     this.write(name, (a.x + b.x) / 2 + 50 * nx, (a.y + b.y) / 2 + 32 * ny, { size: 12.5, bold: true, align });
   }
 
