@@ -3,8 +3,10 @@
 #[path = "common/runs.rs"]
 mod runs;
 
+use agimp::io::hdf5_file::Reader;
+use agimp::io::snapshot::Header;
 use runs::history::History;
-use runs::launch::{run, succeed};
+use runs::launch::{file, run, succeed};
 use runs::restart;
 
 /// What all jobs here have.
@@ -151,6 +153,44 @@ fn blocks_slide_on_slabs_as_coulomb_says() {
     }
 }
 
+/// A block that rests on a slab between slip walls presses on it with its weight, seen from both sides, also beside a level jump; away from
+/// the joint nothing presses.
+#[test]
+fn the_pressure_of_contact_is_the_weight_above() {
+    let job = format!(
+        "{RUBBER}[domain]\nsize = [0.8, 0.8]\nroot_edge = 0.2\n\
+         [boundaries]\nx_min = {{ kind = 'slip' }}\nx_max = {{ kind = 'slip' }}\ny_min = {{ kind = 'slip' }}\n\
+         [tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = {{ kind = 'box', min = [0.4, 0], max = [0.8, 0.8] }}\n{}{}\
+         [[contact]]\nname = 'joint'\n[time]\nend = 2\n[equilibrium]\nspeed = 1e-4\nacceleration = 0.01\n",
+        body("slab", &cube([0.0, 0.0], [0.8, 0.3]), "[0, 0]"),
+        body("block", &cube([0.0, 0.3], [0.8, 0.7]), "[0, 0]"),
+    )
+    .replace("dimension = 2\n", "dimension = 2\ngravity = [0, -10]\n")
+    .replace("picture = false\n", "picture = false\nfields = ['contact_pressure', 'body']\n");
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("stack.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let output = file(directory.path(), "stack", "_000001.hdf");
+    let output = Reader::open_alone(&output).expect("output");
+    let particles = Header::read(&output).expect("header").particles;
+    let places: Vec<f64> = output.read_slab("VTKHDF/Points", 0, particles).expect("places");
+    let pressures: Vec<f64> =
+        output.read_slab("VTKHDF/PointData/contact_pressure", 0, particles).expect("pressures");
+    let exact = 1000.0 * 10.0 * 0.4;
+    let mut worst: f64 = 0.0;
+    for (x, pressure) in places.chunks(3).zip(pressures) {
+        let from_joint = (x[1] - 0.3).abs();
+        if from_joint < 0.01 {
+            worst = worst.max((pressure / exact - 1.0).abs());
+            assert!((pressure / exact - 1.0).abs() < 0.01, "{pressure} for {exact} at {x:?}");
+        } else if from_joint > 0.15 {
+            assert_eq!(pressure, 0.0, "at {x:?}");
+        }
+    }
+    println!("within {worst}");
+}
+
 /// Blocks that meet obliquely beside a level jump, with splits, on any ranks and across a restart; a third one sticks to the second.
 #[test]
 fn contact_does_not_depend_on_ranks() {
@@ -181,7 +221,7 @@ fn contact_does_not_depend_on_ranks() {
             if dimension == 2 { "" } else { ", 0" },
             0.05 * unit,
         )
-        .replace("[output]\npicture = false\n", "")
+        .replace("picture = false\n", "fields = ['velocity', 'contact_pressure']\n")
         .replace("dimension = 2", &format!("dimension = {dimension}"));
         restart::assert_same_on_any_ranks(&job, "meeting", |directory, _| {
             let history = History::read(directory, "meeting");

@@ -13,6 +13,7 @@ use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
 use agimp::io::snapshot::{self, Header, Limits, Options, Outputs, PointField, Scalars, View};
 use agimp::particle::chunk::{Chunk, Layout, Tag};
+use agimp::particle::followed::Followed;
 use partition::comm::{Comm, World, is_launched};
 use partition::{Brick, Octant};
 
@@ -121,6 +122,7 @@ impl<const D: usize> Run<D> {
         View {
             leaves: &self.leaves,
             chunks: &self.chunks,
+            followed: Followed::default(),
             leaf_fields: &self.leaf_fields,
             maps: &[],
             maxima: &[],

@@ -13,10 +13,11 @@ pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
+use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
-use crate::solver::{Equilibrium, Followed};
+use crate::solver::Equilibrium;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -425,7 +426,7 @@ pub struct OutputSetup {
     pub every: Option<f64>,
     /// Particle fields beside the position.
     pub fields: Vec<Field>,
-    /// What particles carry of their motion.
+    /// What particles carry for the fields.
     pub followed: Followed,
     /// Whether each output file carries the complete state, so that a run can restart from it.
     pub restart: bool,

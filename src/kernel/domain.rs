@@ -66,7 +66,7 @@ pub fn read_ahead<const D: usize>(place: Place, first: usize) {
 }
 
 /// Columns that [`of_batch`] may read, positions among them.
-fn columns<const D: usize>() -> impl Iterator<Item = usize> {
+pub fn columns<const D: usize>() -> impl Iterator<Item = usize> {
     let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
     let position = Layout::<D>::POSITION..Layout::<D>::POSITION + D;
     position.chain(elastic).chain([Layout::<D>::HALF, Layout::<D>::PLASTIC_VOLUME])

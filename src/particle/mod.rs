@@ -1,6 +1,7 @@
 //! Particles: chunks of tiles (arrays of structures of arrays), one per leaf, in a canonical order.
 pub mod chunk;
 mod column;
+pub mod followed;
 pub mod given;
 pub mod group;
 pub mod lanes;

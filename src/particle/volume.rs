@@ -1,5 +1,5 @@
 //! Volume and Cauchy stress of a particle.
-use super::chunk::{Chunk, Layout};
+use super::chunk::{Chunk, Layout, TILE};
 
 /// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
 pub fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
@@ -14,6 +14,17 @@ pub fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     det_f(elastic, chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
 }
 
+/// [`volume_ratio`] of the particles of a tile; what lies behind the last particle is of no use.
+pub fn volume_ratios<const D: usize>(tile: &[[f64; TILE]]) -> [f64; TILE] {
+    let component = |c: usize| &tile[Layout::<D>::LEFT_CAUCHY_GREEN + c];
+    let plastic = &tile[Layout::<D>::PLASTIC_VOLUME];
+    std::array::from_fn(|lane| {
+        let at = |c: usize| component(c)[lane];
+        let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
+        det_f([at(0), at(1), at(2), at(3), yz, xz], plastic[lane])
+    })
+}
+
 /// Volume, m³; in plane strain of one metre of thickness.
 pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     reference_volume(chunk, p) * volume_ratio(chunk, p)
@@ -21,8 +32,12 @@ pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 
 /// Volume of the undeformed particle, m³; in plane strain of one metre of thickness.
 pub fn reference_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    let edge = 2.0 * chunk.column(Layout::<D>::HALF)[p];
-    (0..D).fold(1.0, |product, _| product * edge)
+    box_volume::<D>(chunk.column(Layout::<D>::HALF)[p])
+}
+
+/// Volume of a cube (square) of this half width, m³ (m²).
+pub fn box_volume<const D: usize>(half: f64) -> f64 {
+    (0..D).fold(1.0, |product, _| product * (2.0 * half))
 }
 
 /// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
@@ -30,7 +45,8 @@ pub fn reference_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 pub fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = elastic;
     let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    determinant.sqrt() * libm::exp(plastic_volume)
+    let elastic = determinant.sqrt();
+    if plastic_volume == 0.0 { elastic } else { elastic * libm::exp(plastic_volume) }
 }
 
 /// Cauchy stress σ = τ / det F, Pa, in the order of [`symmetric`].

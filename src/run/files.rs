@@ -126,6 +126,7 @@ fn view<'a, const D: usize>(
     View {
         leaves: solver.forest.leaves(),
         chunks: &solver.chunks,
+        followed: solver.physics.followed,
         leaf_fields: &[],
         maps: &problem.maps,
         maxima: &solver.maxima,

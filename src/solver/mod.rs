@@ -24,7 +24,7 @@ pub mod stage;
 pub mod state;
 pub mod step;
 
-pub use physics::{Equilibrium, Followed, Physics, StepControl};
+pub use physics::{Equilibrium, Physics, StepControl};
 pub use state::{Clock, Requests, Solver, StepError, StepReport};
 
 use partition::Forest;

@@ -1,4 +1,6 @@
 //! What is solved.
+use std::ops::Range;
+
 use crate::adaptivity::Adaptivity;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving};
@@ -6,6 +8,7 @@ use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{self, Gravity, Load};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::followed::Followed;
 use crate::particle::group::Group;
 use crate::particle::strain;
 
@@ -49,33 +52,10 @@ pub struct Physics<const D: usize> {
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
-    /// What particles carry of their motion since they came.
+    /// What particles carry of what has happened to them.
     pub followed: Followed,
     /// Choice of the time step.
     pub control: StepControl,
-}
-
-/// What particles carry of their motion since they came, in columns behind those of loads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Followed {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// The displacement.
-    Displacement,
-    /// Total strain and displacement.
-    Strain,
-}
-
-impl Followed {
-    /// Columns of the total strain (see [`crate::particle::strain`]), then of the displacement.
-    pub fn columns<const D: usize>(self) -> [usize; 2] {
-        match self {
-            Self::Nothing => [0, 0],
-            Self::Displacement => [0, D],
-            Self::Strain => [strain::columns(D), D],
-        }
-    }
 }
 
 /// What a run asks of an equilibrium.
@@ -112,22 +92,33 @@ impl<const D: usize> Physics<D> {
         self.colliders.iter_mut().for_each(|collider| collider.deform(time));
     }
 
-    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of their motion.
+    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of what has happened to them.
     pub fn carried_columns(&self) -> usize {
         self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
     }
 
-    /// First column of what particles carry of their motion.
-    pub(crate) fn followed_column(&self) -> usize {
+    /// First columns of the pressure of contact, of the total strain and of the displacement, as far as particles carry them.
+    fn followed_columns(&self) -> [Option<usize>; 3] {
+        self.followed.first_columns::<D>(self.carried_columns())
+    }
+
+    /// First column of what particles carry of what has happened to them.
+    fn followed_column(&self) -> usize {
         let gaps = self.adaptivity.as_ref().and_then(|adaptivity| adaptivity.split_gap);
         self.load_columns() + if gaps.is_some() { strain::columns(D) } else { 0 }
+    }
+
+    /// Columns of what particles carry of their motion.
+    pub(crate) fn motion_columns(&self) -> Range<usize> {
+        self.followed_column() + self.followed.columns::<D>()[0]..self.carried_columns()
     }
 
     /// First columns of tensors that follow the deformation, where particles carry them: stretch between neighbours, total strain.
     pub(crate) fn tensor_columns(&self) -> Vec<usize> {
         let (loads, followed) = (self.load_columns(), self.followed_column());
         let gaps = (followed > loads).then_some(loads);
-        gaps.into_iter().chain((self.followed == Followed::Strain).then_some(followed)).collect()
+        let [_, strain, _] = self.followed_columns();
+        gaps.into_iter().chain(strain).collect()
     }
 
     /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A power of four.
@@ -143,7 +134,14 @@ impl<const D: usize> Physics<D> {
 
     /// First column of the displacement that particles carry, if they do.
     pub(crate) fn displacement_column(&self) -> Option<usize> {
-        (self.followed != Followed::Nothing).then(|| self.carried_columns() - D)
+        let [.., displacement] = self.followed_columns();
+        displacement
+    }
+
+    /// Column of the pressure of contact that particles carry, if they do.
+    pub(crate) fn contact_pressure_column(&self) -> Option<usize> {
+        let [pressure, ..] = self.followed_columns();
+        pressure
     }
 
     /// Columns of what particles carry for loads.

@@ -51,8 +51,7 @@ impl<const D: usize> Solver<D> {
                     stop(chunk);
                 }
                 if change.reset_displacement {
-                    let columns = self.physics.followed_column()..self.physics.carried_columns();
-                    columns.for_each(|column| chunk.carried_mut(column).fill(0.0));
+                    self.physics.motion_columns().for_each(|column| chunk.carried_mut(column).fill(0.0));
                 }
                 chunk.len()
             })

@@ -4,6 +4,7 @@ use super::*;
 use crate::io::snapshot::Scalars;
 use crate::particle::chunk::Chunk;
 use crate::particle::chunk::Tag;
+use crate::particle::followed::Followed;
 use partition::{Brick, Octant};
 
 /// A cone of particles on the floor of a unit cube.
@@ -34,6 +35,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
     let view = View {
         leaves: &[Octant { level: 0, coord: [0; 3] }],
         chunks,
+        followed: Followed::default(),
         leaf_fields: &[],
         maps: &[],
         maxima: &[],

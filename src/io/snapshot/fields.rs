@@ -55,11 +55,11 @@ fields! {
     /// Velocity, m/s.
     Velocity, "velocity", "m/s", |view| each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p)));
     /// Displacement since the particle came, m; followed only where a job asks for this field.
-    Displacement, "displacement", "m", |view| each(view, 3, |chunk, p, out| out.extend(displacement(chunk, p)));
+    Displacement, "displacement", "m", |view| each(view, 3, |chunk, p, out| out.extend(displacement(view, chunk, p)));
     /// Total logarithmic strain, elastic and plastic, since the particle came; components as those of `stress`; followed only where a job asks for it.
-    Strain, "strain", "", |view| each(view, 6, |chunk, p, out| out.extend(total_strain(chunk, p)));
+    Strain, "strain", "", |view| each(view, 6, |chunk, p, out| out.extend(total_strain(view, chunk, p)));
     /// Equivalent total strain, √(2/3 e : e) of its deviator e; followed only where a job asks for it.
-    EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| equivalent(&total_strain(chunk, p)));
+    EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| equivalent(&total_strain(view, chunk, p)));
     /// Magnitude of the velocity, m/s.
     Speed, "speed", "m/s", |view| scalars(view, speed);
     /// Identifier of the particle.
@@ -102,6 +102,9 @@ fields! {
     Mass, "mass", "kg", |view| scalars(view, |chunk, p| chunk.column(Layout::<D>::MASS)[p]);
     /// Density, kg/m³.
     Density, "density", "kg/m³", |view| scalars(view, density);
+    /// Pressure of contact with other bodies, Pa, at particles within reach of the surface: a mean over the last steps, in which a step counts a twentieth
+    /// less than the next; found only where a job asks for it.
+    ContactPressure, "contact_pressure", "Pa", |view| scalars(view, |chunk, p| contact_pressure(view, chunk, p));
     /// Volume over reference volume, det F.
     VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
 }
@@ -188,19 +191,33 @@ fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
 }
 
-/// Displacement with three components: the last that a particle carries.
-fn displacement<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
-    let first = chunk.carried_columns().saturating_sub(D);
-    let component = |axis: usize| chunk.carried(first + axis).get(p).copied().unwrap_or(0.0);
+/// Of a particle: first columns of the pressure of contact, of the total strain and of the displacement, as far as its leaf has them.
+fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usize>; 3] {
+    view.followed.first_columns::<D>(chunk.carried_columns())
+}
+
+/// What a particle carries in a column; 0 where there is none.
+fn carried<const D: usize>(chunk: &Chunk<D>, column: Option<usize>, p: usize) -> f64 {
+    column.and_then(|column| chunk.carried(column).get(p).copied()).unwrap_or(0.0)
+}
+
+/// Mean pressure of contact with other bodies, Pa.
+fn contact_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
+    let [pressure, ..] = followed(view, chunk);
+    carried(chunk, pressure, p)
+}
+
+/// Displacement with three components.
+fn displacement<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 3] {
+    let [.., first] = followed(view, chunk);
+    let component = |axis: usize| carried(chunk, first.map(|first| first + axis), p);
     std::array::from_fn(|axis| if axis < D { component(axis) } else { 0.0 })
 }
 
-/// Total logarithmic strain: the columns ahead of those of the displacement.
-fn total_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
-    match chunk.carried_columns().checked_sub(D + strain::columns(D)) {
-        None => [0.0; 6],
-        Some(first) => strain::logarithmic(D, &strain::read(chunk, first, p)),
-    }
+/// Total logarithmic strain.
+fn total_strain<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let [_, first, _] = followed(view, chunk);
+    first.map_or([0.0; 6], |first| strain::logarithmic(D, &strain::read(chunk, first, p)))
 }
 
 /// Magnitude of the velocity, m/s.

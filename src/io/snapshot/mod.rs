@@ -11,6 +11,7 @@ use partition::{Brick, Octant};
 
 use super::hdf5_file::{FileError, Reader, Writer};
 use crate::particle::chunk::Chunk;
+use crate::particle::followed::Followed;
 use crate::probe::{Map, Maxima};
 
 pub(crate) mod averages;
@@ -43,6 +44,8 @@ pub struct View<'a, const D: usize> {
     pub leaves: &'a [Octant<D>],
     /// Particles of each leaf.
     pub chunks: &'a [Chunk<D>],
+    /// What particles carry of what has happened to them.
+    pub followed: Followed,
     /// Extra values per leaf; the same names on all ranks.
     pub leaf_fields: &'a [(String, Vec<f64>)],
     /// Rasters in plan.

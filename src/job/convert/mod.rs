@@ -29,8 +29,8 @@ use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::{Gravity, Load};
 use crate::material::parameters::OutOfRange;
+use crate::particle::followed::Motion;
 use crate::quantity::Quantity;
-use crate::solver::Followed;
 use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
@@ -120,8 +120,8 @@ fn problem<const D: usize>(
     let maps = probes::maps(checks, file, &space, &root.key("maps"));
     let mut output = output(checks, file, &name, &root.key("output"));
     let needs_places = loads.as_ref().is_some_and(|loads| loads.iter().any(Load::names_undeformed));
-    if needs_places && output.followed == Followed::Nothing {
-        output.followed = Followed::Displacement;
+    if needs_places && output.followed.motion == Motion::Nothing {
+        output.followed.motion = Motion::Displacement;
     }
     let report = match &file.report {
         Some(written) => Some(report(checks, written, &space, &root.key("report"))?),

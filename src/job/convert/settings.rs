@@ -8,7 +8,7 @@ use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
 use crate::job::schema::output::Output;
-use crate::solver::Followed;
+use crate::particle::followed::{Followed, Motion};
 use crate::text::{number, written};
 
 /// Most output files of one run.
@@ -150,6 +150,12 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
                 "found a field a second time; expected each once".into(),
             );
         }
+        if *field == Field::ContactPressure && file.contact.is_empty() {
+            checks.fault(
+                &path.key("fields").index(i),
+                "found \"contact_pressure\" without contact; expected [[contact]] between bodies".into(),
+            );
+        }
     }
     OutputSetup {
         directory: directory.into(),
@@ -163,13 +169,14 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
     }
 }
 
-/// What particles carry of their motion for the fields of the output.
+/// What particles carry for the fields of the output.
 pub(super) fn followed(output: &Output) -> Followed {
-    match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
-        true => Followed::Strain,
-        false if output.has_any(&[Field::Displacement]) => Followed::Displacement,
-        false => Followed::Nothing,
-    }
+    let motion = match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
+        true => Motion::Strain,
+        false if output.has_any(&[Field::Displacement]) => Motion::Displacement,
+        false => Motion::Nothing,
+    };
+    Followed { motion, contact_pressure: output.has_any(&[Field::ContactPressure]) }
 }
 
 /// The evaluation at the end of the run.

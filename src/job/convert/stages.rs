@@ -5,7 +5,8 @@ use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::{InStages, Stage};
 use crate::job::schema::job_file::{Body, Equilibrium as Written, JobFile};
-use crate::solver::{Equilibrium, Followed};
+use crate::particle::followed::Motion;
+use crate::solver::Equilibrium;
 use crate::text::{excerpt, written as number};
 
 /// All stages, at least one, or faults.
@@ -55,7 +56,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         let message = "found it in the first stage; expected it in a later one: bodies begin with the velocity that they say";
         checks.fault(&path.key("at_rest"), message.into());
     }
-    if written.reset_displacement && settings::followed(&file.output) == Followed::Nothing {
+    if written.reset_displacement && settings::followed(&file.output).motion == Motion::Nothing {
         let message = "found it where displacements are not followed; expected \"displacement\" or \"strain\" among output.fields";
         checks.fault(&path.key("reset_displacement"), message.into());
     }

@@ -2,6 +2,7 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::{Chunk, Layout, TILE, Tag};
+use crate::memory::Block;
 use crate::particle::widest::Widest;
 
 impl<const D: usize> Chunk<D> {
@@ -139,6 +140,37 @@ impl<const D: usize> Chunk<D> {
         (out.len, out.widest) = (source.len(), Widest::UNKNOWN);
         source.iter().enumerate().for_each(|(q, &p)| out.set(q, self, p as usize));
         out
+    }
+
+    /// Makes this chunk the particles `source[q]` of another, of which it has the identifiers, tags and these columns. Other columns keep what
+    /// they hold, which is zero in a chunk that only ever is filled in this way. Keeps its memory from one time to the next. Whole tiles are copied
+    /// fastest.
+    pub fn gather_columns(&mut self, other: &Self, source: &[u32], columns: &[usize]) {
+        if source.len() > self.capacity {
+            let capacity = (source.len() + source.len() / 8).next_multiple_of(TILE);
+            *self = Self::new();
+            self.block = Block::zeroed(capacity / TILE * self.columns());
+            self.capacity = capacity;
+        }
+        (self.len, self.widest, self.revision) = (source.len(), Widest::UNKNOWN, None);
+        let tiles = self.lines_mut().chunks_exact_mut(Layout::<D>::REALS);
+        for (tile, source) in tiles.zip(source.chunks(TILE)) {
+            let is_whole =
+                source[0].is_multiple_of(TILE as u32) && (source[0]..).zip(source).all(|(p, &q)| p == q);
+            if is_whole {
+                let from = other.tile_of(source[0] as usize);
+                columns.iter().for_each(|&column| tile[column] = from[column]);
+                continue;
+            }
+            for (lane, &p) in source.iter().enumerate() {
+                let from = other.tile_of(p as usize);
+                columns.iter().for_each(|&column| tile[column][lane] = from[column][p as usize % TILE]);
+            }
+        }
+        for column in [Self::IDS, Self::TAGS] {
+            let from = other.words(column);
+            self.words_mut(column).iter_mut().zip(source).for_each(|(to, &p)| *to = from[p as usize]);
+        }
     }
 
     /// Makes room for exactly `capacity` particles (rounded up to whole tiles) if there is less.

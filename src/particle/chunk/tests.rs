@@ -122,3 +122,26 @@ fn what_particles_carry_goes_with_them() {
     plain.keep(&[]);
     assert_eq!(plain.carried_columns(), 0);
 }
+
+/// Whole tiles and single particles, from one time to the next; columns that are not gathered stay zero as room grows.
+#[test]
+fn some_columns_are_gathered() {
+    let mut chunk = Chunk::<2>::new();
+    for id in 0..30 {
+        let p = chunk.push_zeroed(id, Tag { material: 0, body: id as u16, level: 0 });
+        (0..Layout::<2>::REALS).for_each(|c| chunk.column_mut(c)[p] = (100 * c) as f64 + id as f64);
+    }
+    let columns = [Layout::<2>::POSITION, Layout::<2>::HALF];
+    let mut copy = Chunk::<2>::new();
+    for source in [vec![3, 9], (8..16).chain(24..30).chain([1, 2, 3]).collect(), vec![], (0..30).collect()] {
+        copy.gather_columns(&chunk, &source, &columns);
+        let expected = chunk.gathered(&source);
+        assert!(copy.ids() == expected.ids() && copy.tags() == expected.tags());
+        for column in 0..Layout::<2>::REALS {
+            match columns.contains(&column) {
+                true => assert_eq!(copy.column(column), expected.column(column)),
+                false => assert!(copy.column(column).iter().all(|value| *value == 0.0)),
+            }
+        }
+    }
+}

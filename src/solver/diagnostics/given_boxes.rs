@@ -13,9 +13,10 @@ use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::Gravity;
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::followed::Followed;
 use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
-use crate::solver::physics::{Followed, Physics, StepControl};
+use crate::solver::physics::{Physics, StepControl};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
 use crate::solver::step::node_update::update_velocity;
@@ -107,7 +108,7 @@ impl<const D: usize> GivenBoxes<D> {
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,
             f_bar: false,
-            followed: Followed::Nothing,
+            followed: Followed::default(),
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
         };
         let chunks = vec![Chunk::new(); forest.leaves().len()];

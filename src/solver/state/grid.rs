@@ -198,12 +198,13 @@ impl<const D: usize> Grid<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let contact = self.contact.as_deref().into_iter();
-        let between = self.between.iter().flat_map(|between| &between.geometry);
+        let solids = self.between.iter().flat_map(|between| &between.solids);
         self.plan.heap_bytes()
             + self.arenas.heap_bytes()
             + self.fields.heap_bytes()
             + self.increments.heap_bytes()
-            + self.others.iter().chain(contact).chain(between).map(VelocityField::heap_bytes).sum::<usize>()
+            + self.others.iter().chain(contact).map(VelocityField::heap_bytes).sum::<usize>()
+            + solids.map(Solids::heap_bytes).sum::<usize>()
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.
@@ -241,8 +242,24 @@ impl<const D: usize> VelocityField<D> {
 pub(in crate::solver) struct BetweenBodies<const D: usize> {
     /// Volumes of the basis functions of real nodes, m³ (in plane strain m²), by node.
     pub(in crate::solver) volumes: Vec<f64>,
-    /// For each velocity field what its particles near those of others scatter: volumes and their gradients.
-    pub(in crate::solver) geometry: Vec<VelocityField<D>>,
+    /// Of each velocity field.
+    pub(in crate::solver) solids: Vec<Solids<D>>,
+}
+
+/// Where the bodies of a velocity field are near those of others.
+pub(in crate::solver) struct Solids<const D: usize> {
+    /// By own leaf, copies of the particles there that have volumes for masses. They keep their memory from step to step.
+    pub(in crate::solver) copies: Vec<Chunk<D>>,
+    /// Of which particles these are copies.
+    pub(in crate::solver) members: Vec<Vec<u32>>,
+    /// What these scatter: volumes and their gradients.
+    pub(in crate::solver) field: VelocityField<D>,
+}
+
+impl<const D: usize> Solids<D> {
+    fn heap_bytes(&self) -> usize {
+        self.field.heap_bytes() + self.copies.iter().map(Chunk::heap_bytes).sum::<usize>()
+    }
 }
 
 /// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.

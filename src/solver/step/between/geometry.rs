@@ -5,14 +5,14 @@ use crate::geometry::Aabb;
 use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
 use crate::grid::plan::{GridPlan, NO_BLOCK};
 use crate::grid::{NodeFields, Window};
-use crate::kernel::{ARENA_EDGE, BLOCK, Row};
+use crate::kernel::{ARENA_EDGE, BLOCK, Row, domain};
 use crate::particle::Chunk;
-use crate::particle::chunk::Layout;
+use crate::particle::chunk::{Layout, TILE};
 use crate::particle::group::Group;
-use crate::particle::volume::{reference_volume, volume_ratio};
+use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
-use crate::solver::state::grid::{BetweenBodies, Grid, VelocityField};
+use crate::solver::state::grid::{BetweenBodies, Grid, Solids, VelocityField};
 use crate::solver::step::p2g::scatter;
 
 impl<const D: usize> Grid<D> {
@@ -56,25 +56,53 @@ fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) ->
     Aabb::of_points(places)
 }
 
-/// Copies of the particles of a group in a box that scatter volumes in place of masses, and gradients of volumes in place of the impulse of stress
-/// over 1 s.
-fn solids<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>, aabb: &Aabb<D>) -> Chunk<D> {
-    let is_near = |p: u32| {
-        let x = chunk.position(p as usize);
-        (0..D).all(|a| aabb.lower[a] <= x[a] && x[a] <= aabb.upper[a])
-    };
-    let of_group = (0..).zip(chunk.tags()).filter(|(_, tag)| group.has(**tag)).map(|(p, _)| p);
-    let members: Vec<u32> = of_group.filter(|&p| is_near(p)).collect();
-    let mut copy = chunk.gathered(&members);
-    for p in 0..copy.len() {
-        let ratio = volume_ratio(&copy, p);
-        copy.write(Layout::<D>::MASS, p, &[reference_volume(&copy, p) * ratio]);
-        copy.write(Layout::<D>::VELOCITY, p, &[0.0; D]);
-        copy.write(Layout::<D>::AFFINE, p, &[0.0; 9][..D * D]);
-        let stress = [-ratio, -ratio, -ratio, 0.0, 0.0, 0.0];
-        copy.write(Layout::<D>::STRESS, p, &stress[..Layout::<D>::SYMMETRIC]);
+/// Makes `copy` the particles of a group in a box, which scatter volumes in place of masses, and gradients of volumes in place of the impulse of
+/// stress over 1 s. Velocities and affine states of a copy are zero. Returns of which particles these are copies.
+fn copy_solids<const D: usize>(
+    copy: &mut Chunk<D>,
+    chunk: &Chunk<D>,
+    group: &Group<'_>,
+    aabb: &Aabb<D>,
+    columns: &[usize],
+) -> Vec<u32> {
+    let members = members_in(chunk, group, aabb);
+    copy.gather_columns(chunk, &members, columns);
+    let (tiles, _) = copy.tiles_mut_and_tags();
+    for tile in tiles.chunks_exact_mut(Layout::<D>::REALS) {
+        let ratios = volume_ratios::<D>(tile);
+        for (lane, ratio) in ratios.into_iter().enumerate() {
+            tile[Layout::<D>::MASS][lane] = box_volume::<D>(tile[Layout::<D>::HALF][lane]) * ratio;
+            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio);
+        }
     }
-    copy
+    members
+}
+
+/// Particles of a group in a box: first whole tiles, if at least half of one is in the box, then the others, each in order.
+fn members_in<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>, aabb: &Aabb<D>) -> Vec<u32> {
+    let (mut whole, mut others) = (Vec::with_capacity(chunk.len()), Vec::new());
+    let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS).zip(chunk.tags().chunks(TILE));
+    for ((tile, tags), first) in tiles.zip((0..).step_by(TILE)) {
+        let mut is_inside = [true; TILE];
+        for axis in 0..D {
+            let x = &tile[Layout::<D>::POSITION + axis];
+            for (is_inside, x) in is_inside.iter_mut().zip(x) {
+                *is_inside &= (aabb.lower[axis] <= *x) & (*x <= aabb.upper[axis]);
+            }
+        }
+        let inside = is_inside.iter().filter(|inside| **inside).count();
+        if inside == 0 {
+            continue;
+        }
+        if 2 * inside >= TILE && tags.len() == TILE && tags.iter().all(|&tag| group.has(tag)) {
+            whole.extend(first..first + TILE as u32);
+            continue;
+        }
+        let members = (first..).zip(tags).zip(is_inside);
+        others.extend(members.filter(|((_, tag), inside)| *inside && group.has(**tag)).map(|((p, _), _)| p));
+    }
+    whole.append(&mut others);
+    whole
 }
 
 impl<const D: usize> Solver<D> {
@@ -91,21 +119,22 @@ impl<const D: usize> Solver<D> {
             let Some(group) = solver.physics.group(field) else { return };
             let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
             let plan = &solver.grid.plan;
-            let chunks: Vec<Chunk<D>> = (solver.chunks.par_iter().zip(near).enumerate().with_min_len(16))
-                .map(|(leaf, (chunk, near))| {
-                    if near.is_empty() {
-                        return Chunk::new();
-                    }
-                    let cell = plan.finest_cell(leaf);
-                    let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
-                    solids(chunk, &group, &near.grown(half * (1.0 + MARGIN)))
-                })
-                .collect();
-            let geometry = &mut between.geometry[field];
+            let columns: Vec<usize> = domain::columns::<D>().collect();
+            let Solids { copies, members, field: geometry } = &mut between.solids[field];
+            let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
+            leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
+                if near.is_empty() {
+                    (*copy, *members) = (Chunk::new(), Vec::new());
+                    return;
+                }
+                let cell = plan.finest_cell(leaf);
+                let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
+                *members = copy_solids(copy, chunk, &group, &near.grown(half * (1.0 + MARGIN)), &columns);
+            });
             solver.grid.swap(geometry);
-            let of_field = solver.grid.sort(&mut solver.phases, &chunks, &widths, None);
-            solver.grid.scatter_and_sum(&mut solver.phases, &chunks, |scratch, bin, arena| {
-                scatter(scratch, bin, &chunks, &scheme, 1.0, arena);
+            let of_field = solver.grid.sort(&mut solver.phases, copies, &widths, None);
+            solver.grid.scatter_and_sum(&mut solver.phases, copies, |scratch, bin, arena| {
+                scatter(scratch, bin, copies, &scheme, 1.0, arena);
             });
             solver.grid.swap(geometry);
             sorted = sorted.and(of_field);
@@ -140,7 +169,12 @@ impl<const D: usize> Solver<D> {
     /// corners, and constrained nodes hand theirs to their parents.
     fn begin_between(&mut self) -> BetweenBodies<D> {
         let fields = self.physics.body_contacts.fields();
-        let geometry = (0..fields).map(|_| VelocityField::new(&self.grid.plan)).collect();
+        let solids = || Solids {
+            copies: vec![Chunk::new(); self.chunks.len()],
+            members: vec![Vec::new(); self.chunks.len()],
+            field: VelocityField::new(&self.grid.plan),
+        };
+        let solids = (0..fields).map(|_| solids()).collect();
         let mut of_cells = VelocityField::new(&self.grid.plan);
         self.grid.swap(&mut of_cells);
         let plan = &self.grid.plan;
@@ -158,7 +192,7 @@ impl<const D: usize> Solver<D> {
         });
         let volumes = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
         self.grid.swap(&mut of_cells);
-        BetweenBodies { volumes, geometry }
+        BetweenBodies { volumes, solids }
     }
 }
 

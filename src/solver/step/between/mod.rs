@@ -9,8 +9,10 @@
 //! |---|---|
 //! | `geometry` | shares of volume and their gradients at the nodes where bodies meet |
 //! | `press` | impulses at these nodes |
+//! | `pressure` | the pressure there, as particles carry it |
 mod geometry;
 mod press;
+mod pressure;
 
 use crate::boundary::bodies::PairLaw;
 use crate::solver::sorting::bins::BinMissing;
@@ -28,6 +30,7 @@ impl<const D: usize> Solver<D> {
         if self.grid.others.is_empty() || dt <= 0.0 {
             return Ok(());
         }
+        self.fade_pressures();
         let meets = self.phases.time(Phase::Nodes, || self.grid.nodes_where_fields_meet());
         let is_any = meets.iter().any(|&nodes| nodes != 0);
         if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
@@ -37,7 +40,10 @@ impl<const D: usize> Solver<D> {
             true => Ok(()),
             false => self.find_geometry(&meets),
         };
-        self.press(&meets, dt);
+        let forces = self.press(&meets, dt);
+        if sorted.is_ok() {
+            self.carry_pressures(&forces);
+        }
         sorted
     }
 

@@ -12,12 +12,31 @@ use crate::solver::state::phases::Phase;
 /// Sweeps over the pairs of a node where more than two bodies meet; one is exact for two.
 const SWEEPS: usize = 8;
 
+/// Least area of surface at a node whose pressure particles take, in faces of its cells. A surface that has less is nearly a cell from the node, where
+/// the mass of one of the bodies, and with it the force, is small and its error is not.
+const LEAST_AREA: f64 = 0.25;
+
 /// What the nodes of one block have got in one step.
+#[derive(Default)]
 struct Pressed<const D: usize> {
     /// New velocities, with the numbers of their nodes and fields.
     velocities: Vec<(usize, usize, [f64; D])>,
     /// Of the nodes that this rank counts.
     booked: Vec<Booked<D>>,
+    /// How bodies press, if particles carry it.
+    forces: Vec<NormalForce>,
+}
+
+/// How others press on a body at a node.
+pub(super) struct NormalForce {
+    /// Number of the node.
+    pub(super) node: usize,
+    /// Number of the body's velocity field.
+    pub(super) field: usize,
+    /// Normal force, N; 0 where the body is near another and does not touch it.
+    pub(super) force: f64,
+    /// Area on which it acts, m² (in plane strain m).
+    pub(super) area: f64,
 }
 
 /// What a pair of bodies gives to the contact of the job that it belongs to.
@@ -35,25 +54,38 @@ struct Body<const D: usize> {
     field: usize,
     mass: f64,
     velocity: [f64; D],
+    /// Normal force of the others, N, and the area on which it acts, m² (in plane strain m).
+    pressed: [f64; 2],
+}
+
+/// What a pair of bodies does to each other at a node.
+struct Exchange<const D: usize> {
+    /// Impulse on the second, kg m/s.
+    impulse: [f64; D],
+    /// Normal force, N, and the area on which it acts, m² (in plane strain m).
+    pressed: [f64; 2],
 }
 
 impl<const D: usize> Solver<D> {
     /// Not collective. Presses the bodies at the real nodes where fields meet, given block by block, and books it from the nodes that
-    /// this rank counts.
-    pub(super) fn press(&mut self, meets: &[u64], dt: f64) {
+    /// this rank counts. Returns the normal forces at these nodes if particles carry their pressure.
+    pub(super) fn press(&mut self, meets: &[u64], dt: f64) -> Vec<NormalForce> {
         let grid = &self.grid;
         let press = Press {
             plan: &grid.plan,
             fields: grid.all_fields().collect(),
             between: grid.between.as_deref(),
             contacts: &self.physics.body_contacts,
+            finds_forces: self.physics.contact_pressure_column().is_some(),
             dt,
         };
         let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {
             let blocks = meets.par_iter().enumerate().filter(|(_, nodes)| **nodes != 0);
             blocks.map(|(block, nodes)| press.block(block, *nodes)).collect()
         });
-        for Pressed { velocities, booked } in pressed {
+        let mut all_forces = Vec::new();
+        for Pressed { velocities, booked, forces } in pressed {
+            all_forces.extend(forces);
             for (node, field, velocity) in velocities {
                 let fields = match field {
                     0 => &mut self.grid.fields,
@@ -67,6 +99,7 @@ impl<const D: usize> Solver<D> {
                 sums[3].add(work);
             }
         }
+        all_forces
     }
 }
 
@@ -78,6 +111,8 @@ struct Press<'a, const D: usize> {
     /// Where the surfaces are.
     between: Option<&'a BetweenBodies<D>>,
     contacts: &'a BodyContacts,
+    /// Whether normal forces are asked for.
+    finds_forces: bool,
     dt: f64,
 }
 
@@ -85,7 +120,7 @@ impl<const D: usize> Press<'_, D> {
     /// These nodes of a block, where bodies meet.
     fn block(&self, block: usize, nodes: u64) -> Pressed<D> {
         let first = block * block_nodes(D);
-        let mut pressed = Pressed { velocities: Vec::new(), booked: Vec::new() };
+        let mut pressed = Pressed::default();
         let mut bodies: Vec<Body<D>> = Vec::new();
         for bit in bits(nodes) {
             let node = first + bit as usize;
@@ -96,11 +131,20 @@ impl<const D: usize> Press<'_, D> {
                 field,
                 mass: row[3],
                 velocity: std::array::from_fn(|a| row[a]),
+                pressed: [0.0; 2],
             }));
             let is_counted = self.plan.blocks[block].owned >> bit & 1 == 1;
             if bodies.len() > 1 && self.node(node, &mut bodies, is_counted, &mut pressed.booked) {
                 let new = bodies.iter().map(|body| (node, body.field, body.velocity));
                 pressed.velocities.extend(new);
+            }
+            if self.finds_forces {
+                let least = LEAST_AREA * self.plan.cell(self.plan.blocks[block].level).powi(D as i32 - 1);
+                let new = bodies.iter().filter(|body| body.pressed[1] >= least);
+                pressed.forces.extend(new.map(|body| {
+                    let [force, area] = body.pressed;
+                    NormalForce { node, field: body.field, force, area }
+                }));
             }
         }
         pressed
@@ -115,12 +159,20 @@ impl<const D: usize> Press<'_, D> {
         booked: &mut Vec<Booked<D>>,
     ) -> bool {
         let mut is_pressed = false;
-        for _ in 0..if bodies.len() > 2 { SWEEPS } else { 1 } {
+        for sweep in 0..if bodies.len() > 2 { SWEEPS } else { 1 } {
             for a in 0..bodies.len() {
                 for b in a + 1..bodies.len() {
                     let pair = self.contacts.pair([bodies[a].field, bodies[b].field]);
-                    let impulse = self.impulse(node, [bodies[a], bodies[b]], pair);
-                    let Some(impulse) = impulse.filter(|impulse| *impulse != [0.0; D]) else { continue };
+                    let exchange = self.exchange(node, [bodies[a], bodies[b]], pair);
+                    let Some(Exchange { impulse, pressed }) = exchange else { continue };
+                    let [force, area] = pressed;
+                    for body in [a, b] {
+                        bodies[body].pressed[0] += force;
+                        bodies[body].pressed[1] += if sweep == 0 { area } else { 0.0 };
+                    }
+                    if impulse == [0.0; D] {
+                        continue;
+                    }
                     for k in 0..D {
                         bodies[a].velocity[k] -= impulse[k] / bodies[a].mass;
                         bodies[b].velocity[k] += impulse[k] / bodies[b].mass;
@@ -138,8 +190,8 @@ impl<const D: usize> Press<'_, D> {
         is_pressed
     }
 
-    /// Impulse on the second of two bodies at a node, kg m/s. `None` where nothing says how they meet.
-    fn impulse(&self, node: usize, bodies: [Body<D>; 2], pair: Option<&Pair>) -> Option<[f64; D]> {
+    /// What two bodies do to each other at a node. `None` where nothing says how they meet.
+    fn exchange(&self, node: usize, bodies: [Body<D>; 2], pair: Option<&Pair>) -> Option<Exchange<D>> {
         let [first, second] = bodies;
         let relative = std::array::from_fn(|a| first.velocity[a] - second.velocity[a]);
         let masses = [first.mass, second.mass];
@@ -148,16 +200,19 @@ impl<const D: usize> Press<'_, D> {
         let cell = plan.cell(plan.blocks[node / block_nodes(D)].level);
         if law == PairLaw::Sticky {
             let anywhere = Meeting { normal: [0.0; D], gap: 0.0, area: 0.0 };
-            return Some(law.impulse(&relative, masses, &anywhere, cell, self.dt));
+            let impulse = law.impulse(&relative, masses, &anywhere, cell, self.dt);
+            return Some(Exchange { impulse, pressed: [0.0; 2] });
         }
         let between = self.between?;
         let sums = bodies.map(|body| {
-            let row = between.geometry[body.field].fields.rows[node].0;
+            let row = between.solids[body.field].field.fields.rows[node].0;
             (std::array::from_fn(|a| row[a]), row[3])
         });
         let on = plan.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
         let on_faces = on.map_or(0, |place| plan.face_nodes[place].1);
         let meeting = Meeting::new(sums, between.volumes[node], cell, on_faces)?;
-        Some(law.impulse(&relative, masses, &meeting, cell, self.dt))
+        let impulse = law.impulse(&relative, masses, &meeting, cell, self.dt);
+        let along = (0..D).fold(0.0, |sum, a| impulse[a].mul_add(meeting.normal[a], sum));
+        Some(Exchange { impulse, pressed: [along / self.dt, meeting.area] })
     }
 }
