@@ -32,6 +32,7 @@ KNOWN: dict[str, Field] = {
     "mass": Field("kg", "mass; per metre of thickness in plane strain"),
     "density": Field("kg/m³", "density"),
     "volume_ratio": Field("", "volume over reference volume, det F"),
+    "contact_pressure": Field("Pa", "pressure of contact with other bodies"),
     "half_width": Field("m", "half of the undeformed edge of the particle's box"),
     "plastic_work": Field("J/m³", "plastic work done so far, per reference volume"),
     "level": Field("", "level of the leaf"),
