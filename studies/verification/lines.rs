@@ -79,16 +79,11 @@ impl Lines {
         &self.found
     }
 
-    /// Those from a number on, which becomes that of all.
-    pub(crate) fn since(&self, number: &mut usize) -> Vec<(String, f64)> {
-        let lines = self.found[*number..].to_vec();
+    /// Those from a number on, which becomes that of all, as rows of the page.
+    pub(crate) fn rows_since(&self, number: &mut usize) -> Vec<Row> {
+        let rows = self.found[*number..].iter().map(|(id, ours)| self.row(id, *ours)).collect();
         *number = self.found.len();
-        lines
-    }
-
-    /// Adds lines that were measured by the same program.
-    pub(crate) fn put(&mut self, lines: Vec<(String, f64)>) {
-        self.found.extend(lines);
+        rows
     }
 
     /// How many there are.
@@ -103,55 +98,88 @@ impl Lines {
         (failing.clone().count(), unknown.map(|(id, _)| id.as_str()).collect())
     }
 
-    /// The table in Markdown, with the analysis of what fails below it.
-    pub(crate) fn table(&self) -> String {
-        let mut text = String::from(
-            "| problem | quantity | reference | ours | error | tolerance | |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-        );
-        let mut rows: Vec<&(String, f64)> = self.found.iter().collect();
-        let order = |id: &str| {
-            let problem = &self.expected[id].problem;
-            problem.split(' ').next().and_then(|number| number.parse::<u32>().ok()).unwrap_or(u32::MAX)
+    fn row(&self, id: &str, ours: f64) -> Row {
+        let Expected { problem, quantity, kind, value, tolerance, .. } = &self.expected[id];
+        let (reference, error, bound) = match kind {
+            Kind::Relative => (
+                short(*value),
+                format!("{:.3} %", 100.0 * (ours / value - 1.0)),
+                format!("{} %", short(100.0 * tolerance)),
+            ),
+            Kind::Absolute => (short(*value), short(ours - value), short(*tolerance)),
+            Kind::Most => (String::new(), String::new(), format!("≤ {}", short(*value))),
+            Kind::Least => (String::new(), String::new(), format!("≥ {}", short(*value))),
         };
-        rows.sort_by_key(|(id, _)| order(id));
-        let mut reasons = String::new();
-        for (id, ours) in rows {
-            let Expected { problem, quantity, kind, value, tolerance, fails, .. } = &self.expected[id];
-            let (reference, error, bound) = match kind {
-                Kind::Relative => (
-                    short(*value),
-                    format!("{:.3} %", 100.0 * (ours / value - 1.0)),
-                    format!("{} %", short(100.0 * tolerance)),
-                ),
-                Kind::Absolute => (short(*value), short(ours - value), short(*tolerance)),
-                Kind::Most => (String::new(), String::new(), format!("≤ {}", short(*value))),
-                Kind::Least => (String::new(), String::new(), format!("≥ {}", short(*value))),
-            };
-            let passes = self.passes(id, *ours);
-            let verdict = if passes { "passes" } else { "**fails**" };
-            text += &format!(
-                "| {problem} | {quantity} | {reference} | {} | {error} | {bound} | {verdict} |\n",
-                short(*ours)
-            );
-            if !passes {
-                let reason = if fails.is_empty() { "Not yet analysed." } else { fails };
-                reasons += &format!("- {problem}, {quantity}: {reason}\n");
-            }
-        }
-        if reasons.is_empty() { text } else { text + "\nWhat fails, and why:\n\n" + &reasons }
+        let verdict = if self.passes(id, ours) { "passes" } else { FAILS };
+        let cells = [problem, quantity, &reference, &short(ours), &error, &bound, verdict].map(str::to_owned);
+        Row(cells)
+    }
+
+    /// What is expected of the quantity of a row.
+    fn expected(&self, row: &Row) -> Option<&Expected> {
+        let [problem, quantity, ..] = &row.0;
+        self.expected.values().find(|expected| expected.problem == *problem && expected.quantity == *quantity)
+    }
+
+    /// Why rows fail, in Markdown.
+    pub(crate) fn reasons(&self, rows: &[Row]) -> String {
+        let failing = rows.iter().filter(|row| row.fails());
+        let reasons = failing.map(|row| {
+            let [problem, quantity, ..] = &row.0;
+            let reason = self.expected(row).map_or("", |expected| &expected.fails);
+            let reason = if reason.is_empty() { "Not yet analysed." } else { reason };
+            format!("- {problem}, {quantity}: {reason}\n")
+        });
+        let reasons: String = reasons.collect();
+        if reasons.is_empty() { reasons } else { format!("\nWhat fails, and why:\n\n{reasons}") }
     }
 
     /// Sources of the references, one line for each problem and source.
-    pub(crate) fn sources(&self) -> String {
+    pub(crate) fn sources(&self, rows: &[Row]) -> String {
         let mut seen = std::collections::BTreeSet::new();
-        let mut text = String::new();
-        for (id, _) in &self.found {
-            let Expected { problem, source, .. } = &self.expected[id];
-            if seen.insert((problem, source)) {
-                text += &format!("- {problem}: {source}\n");
-            }
-        }
-        text
+        let expected = rows.iter().filter_map(|row| self.expected(row));
+        let new = expected.filter(|expected| seen.insert((&expected.problem, &expected.source)));
+        new.map(|Expected { problem, source, .. }| format!("- {problem}: {source}\n")).collect()
+    }
+}
+
+/// The verdict on what is not as expected.
+const FAILS: &str = "**fails**";
+
+/// A row of the table of results: problem, quantity, reference, ours, error, tolerance, verdict.
+pub(crate) struct Row([String; 7]);
+
+impl Row {
+    /// Reads a row of a page; `None` for other lines.
+    pub(crate) fn read(line: &str) -> Option<Self> {
+        let cells: Vec<String> = line
+            .strip_prefix("| ")?
+            .strip_suffix(" |")?
+            .split(" | ")
+            .map(|cell| cell.trim().to_owned())
+            .collect();
+        Some(Self(cells.try_into().ok()?))
+    }
+
+    /// Whether it is of the same quantity as another.
+    pub(crate) fn is_of_same(&self, other: &Self) -> bool {
+        self.0[..2] == other.0[..2]
+    }
+
+    /// Number of the problem, in whose order rows stand.
+    pub(crate) fn order(&self) -> u32 {
+        let number = self.0[0].split(' ').next();
+        number.and_then(|number| number.parse().ok()).unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn fails(&self) -> bool {
+        self.0[6] == FAILS
+    }
+}
+
+impl std::fmt::Display for Row {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "| {} |", self.0.join(" | "))
     }
 }
 

@@ -1,8 +1,9 @@
 //! The page of results.
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::lines::Lines;
+use crate::lines::{Lines, Row};
 use crate::plot::Chart;
 
 /// Markdown text with tables, plots beside it, and the outcome of all checks.
@@ -59,15 +60,9 @@ impl Page {
         self.lines.add(id, ours);
     }
 
-    /// Takes the text and the lines since the last call.
-    pub(crate) fn take(&mut self) -> (String, Vec<(String, f64)>) {
-        (std::mem::take(&mut self.body), self.lines.since(&mut self.taken))
-    }
-
-    /// Adds text and lines that were taken.
-    pub(crate) fn give(&mut self, (text, lines): (String, Vec<(String, f64)>)) {
-        self.body.push_str(&text);
-        self.lines.put(lines);
+    /// Takes the text and the rows since the last call.
+    pub(crate) fn take(&mut self) -> (String, Vec<Row>) {
+        (std::mem::take(&mut self.body), self.lines.rows_since(&mut self.taken))
     }
 
     /// The lines so far.
@@ -75,20 +70,58 @@ impl Page {
         &self.lines
     }
 
-    /// Writes the page.
-    pub(crate) fn finish(&self) {
-        let (failures, _) = self.lines.failures();
-        let head = format!(
+    /// Writes the page with the sections that were measured, by name, and those others of `names` that it has.
+    pub(crate) fn finish(&self, names: &[&str], measured: Vec<(&str, (String, Vec<Row>))>) {
+        let old = std::fs::read_to_string(&self.path).unwrap_or_default();
+        let (mut rows, mut bodies) = (Vec::new(), BTreeMap::new());
+        // A page of which all sections are measured is written anew.
+        if names.iter().any(|name| measured.iter().all(|(new, _)| new != name)) {
+            rows.extend(
+                old.lines()
+                    .skip_while(|line| !line.starts_with("| ---"))
+                    .map_while(
+                        |line| {
+                            if line.starts_with("| ---") { Some(None) } else { Row::read(line).map(Some) }
+                        },
+                    )
+                    .flatten(),
+            );
+            let parts = old.split(REFERENCES).next().unwrap_or_default().split("<!-- section ").skip(1);
+            bodies.extend(parts.filter_map(|part| {
+                let (name, body) = part.split_once(" -->\n")?;
+                Some((name.to_owned(), body.trim_end().to_owned()))
+            }));
+        }
+        for (name, (body, new)) in measured {
+            bodies.insert(name.to_owned(), body.trim_end().to_owned());
+            for row in new {
+                match rows.iter().position(|old: &Row| old.is_of_same(&row)) {
+                    Some(place) => rows[place] = row,
+                    None => rows.push(row),
+                }
+            }
+        }
+        rows.sort_by_key(Row::order);
+        let mut text = format!(
             "# Verification\n\n\
              Written by `studies/verification/run --full`, which runs every case below anew; `--quick` runs the small ones, `--only NAME` one, whose section it replaces. References and tolerances \
              stand in [expected.toml](../studies/verification/expected.toml) and in [tables](../studies/verification/references/README.md) made by other codes.\n\n\
-             {failures} of {} lines fail.\n\n",
-            self.lines.count()
+             {} of {} lines fail.\n\n\
+             | problem | quantity | reference | ours | error | tolerance | |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+            rows.iter().filter(|row| row.fails()).count(),
+            rows.len()
         );
-        let sources = format!("\n## References\n\n{}", self.lines.sources());
-        checked_write(&self.path, &(head + &self.lines.table() + "\n" + &self.body + &sources));
+        rows.iter().for_each(|row| text += &format!("{row}\n"));
+        text += &self.lines.reasons(&rows);
+        for (name, body) in names.iter().filter_map(|name| Some((name, bodies.get(*name)?))) {
+            text += &format!("\n<!-- section {name} -->\n{body}\n");
+        }
+        checked_write(&self.path, &format!("{text}{REFERENCES}{}", self.lines.sources(&rows)));
     }
 }
+
+/// Between the sections and the sources.
+const REFERENCES: &str = "\n## References\n\n";
 
 fn checked_write(path: &Path, text: &str) {
     if let Some(folder) = path.parent() {

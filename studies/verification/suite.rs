@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use agimp::checksum::fnv1a;
 use agimp::job::{AnyProblem, Problem, parse};
 use partition::comm::{Comm, World};
 
@@ -71,34 +70,6 @@ fn arguments() -> Arguments {
     found
 }
 
-/// Sections that are measured, so that those of one problem can be measured anew: they belong to the page of one program.
-struct Store {
-    /// Where they are; `None` where the page is not to be written.
-    folder: Option<PathBuf>,
-}
-
-impl Store {
-    fn new(runs: &Runs) -> Self {
-        let program = checked(std::fs::read(&runs.agimp));
-        let words = program.chunks_exact(8).map(|word| u64::from_le_bytes(std::array::from_fn(|i| word[i])));
-        let folder = runs.top.join("target/verification").join(format!("{:016x}", fnv1a(words)));
-        let is_page = runs.is_full() && runs.set.is_empty();
-        Self { folder: is_page.then_some(folder) }
-    }
-
-    fn put(&self, name: &str, section: (String, Vec<(String, f64)>)) {
-        if let Some(folder) = &self.folder {
-            checked(std::fs::create_dir_all(folder));
-            checked(std::fs::write(folder.join(name), checked(serde_json::to_string(&section))));
-        }
-    }
-
-    fn get(&self, name: &str) -> Option<(String, Vec<(String, f64)>)> {
-        let text = std::fs::read_to_string(self.folder.as_ref()?.join(name)).ok()?;
-        serde_json::from_str(&text).ok()
-    }
-}
-
 fn main() -> ExitCode {
     let Arguments { effort, only, set, page: path } = arguments();
     let world = checked(World::init());
@@ -122,25 +93,22 @@ fn main() -> ExitCode {
     if let Some(other) = only.iter().find(|wanted| !names.clone().any(|name| name == *wanted)) {
         panic!("found --only {other}; expected one of {}", names.collect::<Vec<_>>().join(", "));
     }
-    let store = Store::new(&runs);
+    let mut measured = Vec::new();
     for (name, problem) in problems::ALL.into_iter().filter(|(name, _)| is_wanted(name)) {
         let start = Instant::now();
         problem(&runs, &mut page);
         println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
-        store.put(name, page.take());
+        measured.push((name, page.take()));
     }
     for (name, section) in sections.into_iter().filter(|(name, _)| is_wanted(name) && runs.is_full()) {
         let start = Instant::now();
         section(world.comm(), &mut page);
         println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
-        store.put(name, page.take());
+        measured.push((name, page.take()));
     }
     let _ = std::fs::remove_dir_all(&runs.folder);
-    // A page without some of its sections would not be the page.
-    if let Some(all) = names.map(|name| store.get(name)).collect::<Option<Vec<_>>>() {
-        let mut whole = page::Page::new(&path, &runs.top);
-        all.into_iter().for_each(|section| whole.give(section));
-        whole.finish();
+    if runs.is_full() && runs.set.is_empty() {
+        page.finish(&names.collect::<Vec<_>>(), measured);
         println!("{} written", path.display());
     }
     let (failures, unknown) = page.lines().failures();
