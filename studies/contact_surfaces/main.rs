@@ -18,6 +18,8 @@ const REACH: f64 = 2.0;
 const PENALTY: f64 = 1e-5;
 
 type Point = Vector2<f64>;
+/// Normal and gap of two bodies, as one of the ways finds them.
+type Found = Option<(Point, f64)>;
 
 /// Two bodies around a node at the origin, and what is right.
 struct Scene {
@@ -104,13 +106,13 @@ fn sums(body: &[Point]) -> ([f64; 2], f64) {
 }
 
 /// Normal and gap from shares of volume, by the solver.
-fn from_shares([first, second]: &[Vec<Point>; 2]) -> Option<(Point, f64)> {
+fn from_shares([first, second]: &[Vec<Point>; 2]) -> Found {
     let meeting = Meeting::<2>::new([sums(first), sums(second)], 1.0, 1.0, 0)?;
     Some((Point::from(meeting.normal), meeting.gap))
 }
 
 /// Normal and gap from the plane that separates the particles which reach the node best.
-fn from_regression(bodies: &[Vec<Point>; 2]) -> Option<(Point, f64)> {
+fn from_regression(bodies: &[Vec<Point>; 2]) -> Found {
     let reaches = |x: &&Point| weight(x.x)[0] * weight(x.y)[0] > 0.0;
     let near: [Vec<Point>; 2] = [0, 1].map(|i| bodies[i].iter().filter(reaches).copied().collect());
     let [first, second] = &near;
@@ -143,7 +145,7 @@ fn from_regression(bodies: &[Vec<Point>; 2]) -> Option<(Point, f64)> {
 }
 
 /// Error of the normal (root mean square), mean error of the gap, and its least and greatest.
-fn errors(scene: impl Fn(usize) -> Scene, find: fn(&[Vec<Point>; 2]) -> Option<(Point, f64)>) -> [f64; 4] {
+fn errors(scene: impl Fn(usize) -> Scene, find: fn(&[Vec<Point>; 2]) -> Found) -> [f64; 4] {
     let found = (0..TRIALS).filter_map(|trial| {
         let Scene { bodies, normal, gap } = scene(trial);
         find(&bodies).map(|(n, g)| (n.dot(&normal).clamp(-1.0, 1.0).acos().to_degrees(), g - gap))

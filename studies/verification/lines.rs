@@ -87,6 +87,7 @@ impl Lines {
     }
 
     /// How many there are.
+    #[allow(dead_code, reason = "the suite says it")]
     pub(crate) fn count(&self) -> usize {
         self.found.len()
     }
