@@ -65,7 +65,7 @@ pub fn read_ahead<const D: usize>(place: Place, first: usize) {
     prefetch(place.tags);
 }
 
-/// Columns that [`of_batch`] may read, positions among them.
+/// Columns that the widths of boxes follow from, positions among them.
 pub fn columns<const D: usize>() -> impl Iterator<Item = usize> {
     let elastic = Layout::<D>::LEFT_CAUCHY_GREEN..Layout::<D>::LEFT_CAUCHY_GREEN + Layout::<D>::SYMMETRIC;
     let position = Layout::<D>::POSITION..Layout::<D>::POSITION + D;
