@@ -116,7 +116,10 @@ fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
         files.retain(|file, _| file.contains("hdf"));
         files
     };
-    assert!(outputs(directory) == outputs(reference.path()), "{what}: outputs");
+    let (found, expected) = (outputs(directory), outputs(reference.path()));
+    let differing: Vec<&String> =
+        found.keys().chain(expected.keys()).filter(|file| found.get(*file) != expected.get(*file)).collect();
+    assert!(differing.is_empty(), "{what}: {differing:?}");
 }
 
 /// SplitMix64.

@@ -151,7 +151,6 @@ pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> R
         let mut recorded = Recorded::new(comm, file);
         vtkhdf::write_leaves(file, &mut recorded, comm, view, leaves)?;
         let header = Header::new(view, leaves.total, particles.total, false);
-        place::write(file, path, view.job_file)?;
         Header { checksums: recorded.checksums(), ..header }.write(file)
     });
     written?.finish(comm)
