@@ -220,6 +220,7 @@ fn surface_of_a_ball_is_closed_and_has_its_volume() {
     for (options, message) in [
         (&["--surface", "stl"][..], "expected ply or obj"),
         (&["--surface", "ply", "--body", "bal"], "found no body bal; expected one of: ball, cube"),
+        (&["--ply", "--body", "ball"], "found --body without --surface"),
         (&["--surface", "ply", "--fields", "velocity"], "cannot be used with"),
     ] {
         let output = export(options);

@@ -52,6 +52,12 @@ fn mesh_format(text: &str) -> Result<MeshFormat, String> {
 /// A file cannot be read or does not show a field, or one cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
+    if arguments.body.is_some() && arguments.surface.is_none() {
+        // The parser lets the group of formats pass for --surface.
+        return Err(Failure::Usage(
+            "found --body without --surface; expected both, or --surface alone".into(),
+        ));
+    }
     let format = if arguments.ply {
         Format::Ply
     } else if arguments.csv {
