@@ -91,17 +91,16 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     let has_begun = !matches!(&outcome, Err(RunError::Seed(_) | RunError::Refused(_)));
     let wants_page = problem.output().report && has_begun && comm.rank() == 0;
-    let page = wants_page.then(|| page(&problem, &arguments.job));
     let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
+    let page = wants_page.then(|| page(&results, &arguments.job));
     together(comm, conclude(outcome, page, options.speaks.then_some(&results)))
 }
 
 /// Writes the page of a run that is over. All results are on disk by now, so a failure is only a message.
-fn page(problem: &AnyProblem, job: &Path) -> Result<PathBuf, String> {
-    let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
+fn page(results: &Results, job: &Path) -> Result<PathBuf, String> {
     let path = results.path("report.html");
     let options = report::Options { job: Some(job.to_path_buf()), ..report::Options::default() };
-    report::write(&results, &options, &path).map_err(|error| error.to_string())?;
+    report::write(results, &options, &path).map_err(|error| error.to_string())?;
     Ok(path)
 }
 

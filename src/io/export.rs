@@ -1,11 +1,11 @@
 //! Particles of an output for other programs: PLY, CSV, VTP.
 use std::fmt::Write as _;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use super::frame::Frame;
 use super::hdf5_file::FileError;
-use super::lines::create_new;
+use super::lines::{system, write_in_pieces};
 use super::snapshot::fields::{COMPONENTS, Values};
 
 /// What a file is written as.
@@ -44,18 +44,12 @@ struct Column<'a> {
 /// # Errors
 /// The file cannot be written.
 pub fn write(frame: &Frame, format: Format, path: &Path) -> Result<(), FileError> {
-    let part = path.with_added_extension("part");
-    let save = || -> io::Result<()> {
-        let mut out = BufWriter::new(create_new(&part)?);
-        match format {
-            Format::Ply => ply(&mut out, frame)?,
-            Format::Csv => csv(&mut out, frame)?,
-            Format::Vtp => vtp(&mut out, frame)?,
-        }
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-        std::fs::rename(&part, path)
-    };
-    save().map_err(|source| FileError::System { path: path.into(), action: "write", source })
+    let written = write_in_pieces(path, |out| match format {
+        Format::Ply => ply(out, frame),
+        Format::Csv => csv(out, frame),
+        Format::Vtp => vtp(out, frame),
+    });
+    written.map_err(|source| system(path, "write", source))
 }
 
 fn real<'a>(name: String, unit: &'static str, value: impl Fn(usize) -> f64 + 'a) -> Column<'a> {

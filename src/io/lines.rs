@@ -3,7 +3,7 @@
 //! A machine that loses power may leave a file without its last lines, with half a line, with zero bytes in the place of
 //! lines, or empty. What is whole of it is kept.
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
@@ -84,10 +84,18 @@ impl Lines {
 
 /// Writes a whole file, under a temporary name first, so that a reader never sees half of it.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    write_in_pieces(path, |out| out.write_all(bytes))
+}
+
+/// [`write_whole`] of what `fill` writes, piece by piece.
+pub(crate) fn write_in_pieces(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     let part = path.with_added_extension("part");
-    let mut file = create_new(&part)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
+    let mut out = BufWriter::new(create_new(&part)?);
+    fill(&mut out)?;
+    out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
     std::fs::rename(&part, path)
 }
 

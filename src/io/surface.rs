@@ -2,14 +2,14 @@
 //!
 //! It is a level of the density that the particles make, each with a smooth kernel, cut out by marching cubes (`splashsurf_lib`;
 //! Löschner, Böttcher, Jeske, Bender 2023). All particles of the cut have one size: larger ones are taken as cubes of small ones.
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use splashsurf_lib::{Parameters, nalgebra::Vector3, reconstruct_surface};
 
 use super::frame::Frame;
 use super::hdf5_file::FileError;
-use super::lines::create_new;
+use super::lines::{system, write_in_pieces};
 use super::snapshot::PointField;
 use super::snapshot::fields::Values;
 
@@ -104,17 +104,11 @@ impl Surface {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, format: MeshFormat, path: &Path) -> Result<(), FileError> {
-        let part = path.with_added_extension("part");
-        let save = || -> io::Result<()> {
-            let mut out = BufWriter::new(create_new(&part)?);
-            match format {
-                MeshFormat::Ply => self.ply(&mut out)?,
-                MeshFormat::Obj => self.obj(&mut out)?,
-            }
-            out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-            std::fs::rename(&part, path)
-        };
-        save().map_err(|source| FileError::System { path: path.into(), action: "write", source })
+        let written = write_in_pieces(path, |out| match format {
+            MeshFormat::Ply => self.ply(out),
+            MeshFormat::Obj => self.obj(out),
+        });
+        written.map_err(|source| system(path, "write", source))
     }
 
     fn ply(&self, out: &mut impl Write) -> io::Result<()> {

@@ -3,26 +3,30 @@ use super::chunk::{Chunk, Layout, TILE};
 
 /// Components xx, yy, zz, xy, yz, xz (the order of VTK) of the symmetric tensor at column `first`.
 pub fn symmetric<const D: usize>(chunk: &Chunk<D>, first: usize, p: usize) -> [f64; 6] {
-    let at = |component: usize| chunk.column(first + component)[p];
+    in_tile::<D>(chunk.tile_of(p), first, p % TILE)
+}
+
+/// [`symmetric`] of a lane of a tile.
+fn in_tile<const D: usize>(tile: &[[f64; TILE]], first: usize, lane: usize) -> [f64; 6] {
+    let at = |component: usize| tile[first + component][lane];
     let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
     [at(0), at(1), at(2), at(3), yz, xz]
 }
 
 /// Volume over reference volume, det F.
 pub fn volume_ratio<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
-    let elastic = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
-    det_f(elastic, chunk.column(Layout::<D>::PLASTIC_VOLUME)[p])
+    ratio_in_tile::<D>(chunk.tile_of(p), p % TILE)
+}
+
+/// [`volume_ratio`] of a lane of a tile.
+fn ratio_in_tile<const D: usize>(tile: &[[f64; TILE]], lane: usize) -> f64 {
+    let elastic = in_tile::<D>(tile, Layout::<D>::LEFT_CAUCHY_GREEN, lane);
+    det_f(elastic, tile[Layout::<D>::PLASTIC_VOLUME][lane])
 }
 
 /// [`volume_ratio`] of the particles of a tile; what lies behind the last particle is of no use.
 pub fn volume_ratios<const D: usize>(tile: &[[f64; TILE]]) -> [f64; TILE] {
-    let component = |c: usize| &tile[Layout::<D>::LEFT_CAUCHY_GREEN + c];
-    let plastic = &tile[Layout::<D>::PLASTIC_VOLUME];
-    std::array::from_fn(|lane| {
-        let at = |c: usize| component(c)[lane];
-        let (xz, yz) = if D == 2 { (0.0, 0.0) } else { (at(4), at(5)) };
-        det_f([at(0), at(1), at(2), at(3), yz, xz], plastic[lane])
-    })
+    std::array::from_fn(|lane| ratio_in_tile::<D>(tile, lane))
 }
 
 /// Volume, m³; in plane strain of one metre of thickness.

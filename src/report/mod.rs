@@ -119,14 +119,15 @@ impl Run {
     fn read(results: &Results) -> Self {
         let (outputs, report) = (results.outputs(), results.report());
         // The last one that can be read.
-        let last = outputs.iter().rfind(|output| results::header(output).is_some());
+        let last = outputs.iter().rev().find_map(|output| Some((output, results::header(output)?)));
+        let (last, header) = last.unzip();
         let job_text = last.and_then(|last| snapshot::job_text(last));
         Self {
             history: History::read(&results.path("history.csv")),
             cost: Cost::read(&results.path("telemetry.jsonl")),
             state: results.state(report.is_some()),
             report,
-            header: last.and_then(|last| results::header(last)),
+            header,
             job: job_text.as_deref().and_then(|text| toml::from_str(text).ok()).unwrap_or_default(),
             job_text,
             outputs,

@@ -78,27 +78,28 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     for file in expand(&super::without_trees(&arguments.files)).map_err(failed)? {
-        if let Some(format) = arguments.surface {
-            let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
-            let surface = Surface::of(&frame, arguments.body.as_deref())
-                .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
-            let out = place(&file, format.ending());
-            surface.write(format, &out).map_err(failed)?;
-            let size = std::fs::metadata(&out).map_or(0, |data| data.len());
-            let triangles = count(surface.triangles.len() as u64);
-            writeln!(std::io::stdout(), "{} ({triangles} triangles, {})", out.display(), bytes(size as f64))?;
-            continue;
-        }
-        let fields = match &arguments.fields {
-            Some(fields) => fields.clone(),
-            None => shown_in(&file).map_err(failed)?,
+        let (out, made) = match arguments.surface {
+            Some(format) => {
+                let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
+                let surface = Surface::of(&frame, arguments.body.as_deref())
+                    .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
+                let out = place(&file, format.ending());
+                surface.write(format, &out).map_err(failed)?;
+                (out, format!("{} triangles", count(surface.triangles.len() as u64)))
+            }
+            None => {
+                let fields = match &arguments.fields {
+                    Some(fields) => fields.clone(),
+                    None => shown_in(&file).map_err(failed)?,
+                };
+                let frame = Frame::read(&file, &fields, true).map_err(failed)?;
+                let out = place(&file, format.ending());
+                export::write(&frame, format, &out).map_err(failed)?;
+                (out, format!("{} particles", count(frame.positions.len() as u64)))
+            }
         };
-        let frame = Frame::read(&file, &fields, true).map_err(failed)?;
-        let out = place(&file, format.ending());
-        export::write(&frame, format, &out).map_err(failed)?;
         let size = std::fs::metadata(&out).map_or(0, |data| data.len());
-        let particles = count(frame.positions.len() as u64);
-        writeln!(std::io::stdout(), "{} ({particles} particles, {})", out.display(), bytes(size as f64))?;
+        writeln!(std::io::stdout(), "{} ({made}, {})", out.display(), bytes(size as f64))?;
     }
     Ok(())
 }
