@@ -3,11 +3,9 @@
 #[path = "common/runs.rs"]
 mod runs;
 
-use agimp::io::hdf5_file::Reader;
-use agimp::io::snapshot::Header;
 use runs::history::History;
-use runs::launch::{file, run, succeed};
-use runs::restart;
+use runs::launch::{run, succeed};
+use runs::{particles, restart};
 
 /// What all jobs here have.
 const RUBBER: &str = "version = 1\ndimension = 2\n[output]\npicture = false\n\
@@ -171,12 +169,8 @@ fn the_pressure_of_contact_is_the_weight_above() {
     let path = directory.path().join("stack.toml");
     std::fs::write(&path, job).expect("job");
     succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    let output = file(directory.path(), "stack", "_000001.hdf");
-    let output = Reader::open_alone(&output).expect("output");
-    let particles = Header::read(&output).expect("header").particles;
-    let places: Vec<f64> = output.read_slab("VTKHDF/Points", 0, particles).expect("places");
-    let pressures: Vec<f64> =
-        output.read_slab("VTKHDF/PointData/contact_pressure", 0, particles).expect("pressures");
+    let [places, pressures] =
+        [None, Some("contact_pressure")].map(|field| particles(directory.path(), "stack", 1, field));
     let exact = 1000.0 * 10.0 * 0.4;
     let mut worst: f64 = 0.0;
     for (x, pressure) in places.chunks(3).zip(pressures) {

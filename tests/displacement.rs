@@ -4,11 +4,9 @@ mod runs;
 
 use std::path::Path;
 
-use agimp::io::hdf5_file::Reader;
-use agimp::io::snapshot::Header;
 use runs::history::History;
-use runs::launch::{file, run, succeed, text};
-use runs::restart;
+use runs::launch::{run, succeed, text};
+use runs::{particles, restart};
 
 /// A block falls from a fine part of the tree into a coarse one and back into a fine one.
 const FALL: &str = r#"
@@ -41,11 +39,8 @@ keep = 99
 
 /// Places and displacements, m, in an output of a run.
 fn read(directory: &Path, job: &str, number: usize) -> Vec<([f64; 3], [f64; 3])> {
-    let path = file(directory, job, &format!("_{number:06}.hdf"));
-    let file = Reader::open_alone(&path).expect("output");
-    let particles = Header::read(&file).expect("header").particles;
-    let column = |name: &str| -> Vec<f64> { file.read_slab(name, 0, particles).expect(name) };
-    let (places, displacements) = (column("VTKHDF/Points"), column("VTKHDF/PointData/displacement"));
+    let [places, displacements] =
+        [None, Some("displacement")].map(|field| particles(directory, job, number, field));
     let triple = |values: &[f64]| [values[0], values[1], values[2]];
     places.chunks(3).zip(displacements.chunks(3)).map(|(x, u)| (triple(x), triple(u))).collect()
 }
@@ -124,12 +119,7 @@ fn total_strain_of_drawn_metal_is_the_logarithm_of_its_length() {
            shape = { kind = 'box', min = [0, 0], max = [2, 0.9] }\n\
            [[loads]]\nname = 'draw'\nkind = 'velocity'\nx = '0.5 * x'\ny = '-0.5 * y'\n";
     let strains = |directory: &Path, number: usize| {
-        let path = file(directory, "drawn", &format!("_{number:06}.hdf"));
-        let file = Reader::open_alone(&path).expect("output");
-        let particles = Header::read(&file).expect("header").particles;
-        ["strain", "equivalent_strain"].map(|name| -> Vec<f64> {
-            file.read_slab(&format!("VTKHDF/PointData/{name}"), 0, particles).expect(name)
-        })
+        ["strain", "equivalent_strain"].map(|name| particles(directory, "drawn", number, Some(name)))
     };
     restart::assert_same_on_any_ranks(&job, "drawn", |directory, _| {
         let history = History::read(directory, "drawn");
@@ -173,10 +163,7 @@ fn drawn_layers_keep_no_gaps() {
     };
     // The widest stretch along x without a particle, in the cells of level 1 there.
     let widest_gap = |directory: &Path| {
-        let path = file(directory, "drawn", "_000001.hdf");
-        let file = Reader::open_alone(&path).expect("output");
-        let particles = Header::read(&file).expect("header").particles;
-        let places: Vec<f64> = file.read_slab("VTKHDF/Points", 0, particles).expect("places");
+        let places = particles(directory, "drawn", 1, None);
         let mut x: Vec<f64> = places.chunks(3).map(|x| x[0]).filter(|&x| x > 1.2 && x < 2.4).collect();
         x.sort_by(f64::total_cmp);
         assert!(x.last().expect("particles") - x[0] > 0.9);

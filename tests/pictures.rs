@@ -6,7 +6,7 @@ use std::path::Path;
 
 use agimp::io::frame::Frame;
 use agimp::io::snapshot::PointField;
-use program::{RUBBER_BLOCK, agimp, finished, succeed, told};
+use program::{RUBBER_BLOCK, RUBBER_MATERIAL, agimp, finished, succeed, told};
 
 /// A plate comes down on the block of rubber.
 const JOB: &str = r#"
@@ -137,12 +137,6 @@ root_edge = 0.25
 regions = [{ level = 1, shape = { kind = "box", min = [0, 0, 0], max = [0.5, 1, 1] } }]
 [boundaries]
 z_min = { kind = "sticky" }
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e5
-poisson = 0.3
 [[bodies]]
 name = "ball"
 material = "rubber"
@@ -179,7 +173,7 @@ fn obj(text: &str) -> Mesh {
 
 #[test]
 fn surface_of_a_ball_is_closed_and_has_its_volume() {
-    let directory = finished("ball", BALL, &[]);
+    let directory = finished("ball", &[BALL, RUBBER_MATERIAL].concat(), &[]);
     let here = directory.path();
     let export = |options: &[&str]| agimp(here, &[&["export", "out/ball/ball_000000.hdf"], options].concat());
     let output = export(&["--surface", "obj", "--body", "ball", "--out", "given"]);

@@ -12,7 +12,7 @@ use std::process::Command;
 use agimp::io::frame::{Frame, Leaves};
 use agimp::io::snapshot::PointField;
 use base64::Engine as _;
-use program::{agimp, chromium, finished};
+use program::{RUBBER_MATERIAL, agimp, chromium, finished};
 use serde_json::Value;
 
 /// Half of the lower part of a domain of 1 m by 1 m is rubber that moves to the right; cells of two sizes.
@@ -26,12 +26,6 @@ size = [1, 1]
 root_edge = 0.25
 [tree]
 regions = [{ level = 1, shape = { kind = "box", min = [-0.5, 2.0], max = [0.0, 2.25] } }]
-[[materials]]
-name = "rubber"
-density = 1000
-model = "neo_hookean"
-young = 1e5
-poisson = 0.3
 [[bodies]]
 name = "block"
 material = "rubber"
@@ -46,7 +40,7 @@ picture = false
 
 /// A directory with a finished run of [`JOB`].
 fn run() -> tempfile::TempDir {
-    finished("half", JOB, &[])
+    finished("half", &[JOB, RUBBER_MATERIAL].concat(), &[])
 }
 
 fn outputs(directory: &Path) -> Vec<PathBuf> {

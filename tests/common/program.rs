@@ -3,24 +3,37 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Domain, material and body of a job: a block of rubber at rest on the floor.
-pub(crate) const RUBBER_BLOCK: &str = r#"
-[domain]
-size = [1, 1]
-root_edge = 0.25
-[boundaries]
-y_min = { kind = "sticky" }
+macro_rules! rubber {
+    () => {
+        r#"
 [[materials]]
 name = "rubber"
 density = 1000
 model = "neo_hookean"
 young = 1e5
 poisson = 0.3
+"#
+    };
+}
+
+/// A material of a job.
+pub(crate) const RUBBER_MATERIAL: &str = rubber!();
+
+/// Domain, material and body of a job: a block of rubber at rest on the floor.
+pub(crate) const RUBBER_BLOCK: &str = concat!(
+    r#"
+[domain]
+size = [1, 1]
+root_edge = 0.25
+[boundaries]
+y_min = { kind = "sticky" }
 [[bodies]]
 name = "block"
 material = "rubber"
 shape = { kind = "box", min = [0.25, 0.0], max = [0.75, 0.25] }
-"#;
+"#,
+    rubber!()
+);
 
 /// Runs the program in a directory.
 pub(crate) fn agimp(directory: &Path, arguments: &[&str]) -> Output {
