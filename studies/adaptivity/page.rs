@@ -15,13 +15,8 @@ pub(crate) fn head(floor: f64) -> String {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     format!(
         "# What refinement gains\n\n\
-         Written by `studies/adaptivity/compare`. Each scene runs twice on one rank with {cores} threads: as it is in `jobs/`, and \
-         with cells of the finest level everywhere and no refinement. Where it says so, all levels are one lower than in the \
-         job, so cells are twice as wide, and so are the layers of leaves beside what needs fine ones. All levels make the same time step, that of the finest with particles, so what \
-         refinement can gain is bounded by the ratio of the particle-steps, the sum of the particles over all steps.\n\n\
-         Memory is the greatest resident memory in the telemetry. {:.0} MB of it are the program itself with its \
-         libraries, measured with a job of next to no particles; the row below is without it. Processor \
-         time is that of all threads; on a machine that does other things too it is a better measure than wall time.\n\n",
+         Written by `studies/adaptivity/compare`. Each scene runs twice on one rank with {cores} threads: as it is in `jobs/`, and with cells of the finest level everywhere and no refinement. Where stated, all levels are one lower than in the job, so cells are twice as wide, and so are the layers of leaves around regions that need fine leaves. All levels use the same time step, that of the finest level with particles. The ratio of the particle-steps, the sums of the particles over all steps, therefore bounds what refinement can gain.\n\n\
+         Memory is the greatest resident memory in the telemetry. {:.0} MB of it are the program itself with its libraries, measured with a job of very few particles; the last row excludes it. Processor time is the sum over all threads; on a machine that also runs other programs it is a better measure than wall time.\n\n",
         floor / 1e6
     )
 }

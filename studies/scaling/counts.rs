@@ -227,28 +227,26 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
          per cell. Bytes are those of one exchange of sums; `bytes / surface` divides them by the bytes of the distinct \
          nodes that cross between each pair of ranks. Measured times are in [performance.md](performance.md).\n\n\
          ## One cube on more and more ranks\n\n\
-         4096 leaves and a finer floor; in the last two rows eight times as many.\n\n{}\n\
+         4096 leaves and a finer floor; the last two rows have eight times as many leaves.\n\n{}\n\
          ## A box that grows with the ranks\n\n\
          Boxes one root octant high.\n\n{}\n\
          ![Bytes per step](scaling/bytes.svg)\n\n\
          ## Fits\n\n\
-         With n leaves per rank (own) and P ranks, for the rank with most; fitted to the cube on 8 ranks and more (memory: to \
-         all runs), with the greatest relative error in brackets:\n\n\
+         The fits use n own leaves per rank and P ranks, and describe the rank with the most. They are fitted to the cube on 8 ranks and more (memory: to all runs); the greatest relative error is in brackets:\n\n\
          - ghost leaves: a layer of {:.1} leaves around a cube of n, (n^(1/3) + {:.1})^3 - n\n\
          - bytes per step: {:.0} n^(2/3) + {:.0} n^(1/3) ({:.0} %)\n\
          - messages per step: 2 for each neighbour, one with sums and one with particles, and one reduction \
-         (log2 P messages); at most {:.0} neighbours were seen\n\
+         (log2 P messages); at most {:.0} neighbours occur\n\
          - memory: 272 B per particle + {:.0} MB + {:.1} kB per leaf or ghost leaf ({:.0} %); from 16 to 64 ranks with \
-         the same leaves {:.0} kB more for each rank of the job, which holds MPI's memory shared on one machine too\n\n\
+         the same leaves {:.0} kB more for each rank of the job, which includes MPI's shared memory on one machine\n\n\
          ## 10,000 ranks and 10^10 particles\n\n\
          From the fits, with 8 particles per cell and every second leaf empty:\n\n{}\n\
-         No message and no table grows with the whole tree. What grows with P is 8 bytes per rank and table (the markers \
-         of the curve) and what MPI itself keeps per partner. What would break first, in this order:\n\n\
-         1. **The seams of small pieces.** With a million particles per rank there are {:.1} ghost leaves for each own one, and a \
+         No message and no table grows with the whole tree. Only 8 bytes per rank and table (the markers of the curve) and the memory of MPI itself per partner grow with P. The limits, in the order in which a larger run reaches them:\n\n\
+         1. **The surface of small segments.** With a million particles per rank there are {:.1} ghost leaves for each own one, and a \
          rank beside a change of level sends {:.0} MB per step; 100 such ranks on a node send {:.1} GB per step, which takes longer than \
          a tenth of the step on most networks. Fewer ranks with more threads are the remedy: eight times the leaves per rank \
          have {:.1} ghost leaves for each own one, and the node sends {:.1} GB.\n\
-         2. **A checkpoint.** All ranks write one file collectively; at a parallel file system's 100 GB/s the 2.7 TB of \
+         2. **A checkpoint.** All ranks write their parts of one file; at a parallel file system's 100 GB/s the 2.7 TB of \
          10^10 particles take half a minute, and much longer if stripes and collective buffers are left at their defaults.\n\
          3. **Planning a partition.** Each rank gathers five integers from every rank and reduces two per rank: 400 kB and \
          160 kB at P = 10,000, some milliseconds each, at most once in 20 steps. At P = 10^6 this would have to become a tree.\n\
@@ -256,8 +254,7 @@ fn page_text(page: &Path, counts: &[(&str, Count)]) -> Result<String, Failure> {
          the operating system, costs more than the reduction itself (14 stages at P = 10,000).\n\
          5. **Exact sums for the history.** A row reduces 15 exact accumulators; with `history.every_steps = 1` this is the \
          largest reduction of a step.\n\
-         6. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Nodes of one rank are counted in 32 \
-         bits: 6.7e7 blocks. Identifiers of particles have 64 bits.\n\n",
+         6. **Numbers.** Keys have 64 bits: at most 64 roots along an axis and level 15. Counters of the nodes of one rank have 32 bits: 6.7e7 blocks. Identifiers of particles have 64 bits.\n\n",
         table(&["strong", "fine"]),
         table(&["weak"]),
         fits.thickness,
@@ -335,8 +332,7 @@ fn curves() -> Result<String, Failure> {
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     Ok(format!(
         "## Morton or Hilbert\n\n\
-         The tree of `{}` at its start ({} leaves), cut along both curves into parts of equal weight with families whole \
-         (Morton / Hilbert). Filled ghost leaves are what arenas are sent for:\n\n{}\n\
+         The tree of `{}` at its start ({} leaves), cut along both curves into segments of equal weight with whole families (Morton / Hilbert). Ranks send arenas for filled ghost leaves:\n\n{}\n\
          Along the Hilbert curve there are {:.0} % {} filled ghost leaves on average over these numbers of ranks.\n",
         path.display(),
         leaves.len(),
