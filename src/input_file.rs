@@ -8,11 +8,11 @@ use std::path::Path;
 pub fn read(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
-        return Err(std::io::Error::other("it is not a plain file"));
+        return Err(std::io::Error::other("it is not a regular file"));
     }
     if metadata.len() > most {
         return Err(std::io::Error::other(format!(
-            "it has {} bytes, and at most {most} are read",
+            "it has {} bytes; expected at most {most}",
             metadata.len()
         )));
     }

@@ -439,7 +439,7 @@ fn check_and_run_warn_of_what_is_likely_not_meant() {
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(0), "{message}");
         for part in [
-            "agimp: warning: boundaries: the job names no condition for x_min, x_max, y_min, y_max; the default holds there",
+            "agimp: warning: boundaries: found no condition for x_min, x_max, y_min, y_max; the default applies",
             "agimp: warning: materials[0].match: ",
             "agimp: warning: colliders[15].shape: \"c15\" is 10 mm thick",
         ] {
@@ -461,8 +461,10 @@ fn check_and_run_warn_of_what_is_likely_not_meant() {
     assert_eq!((code, message.matches("agimp: warning: ").count()), (0, 21), "{message}");
     assert!(message.contains("agimp: warning: and 11 more"), "{message}");
     let (_, out, message) = check(&JOB.replace("end = 2e-3", "end = 1e6"));
-    assert!(message.contains("steps; stiffer material"), "{message}");
+    assert!(message.contains("steps; stiff material"), "{message}");
     assert!(out.contains("wall time    about "), "{out}");
+    let (_, out, _) = check(JOB);
+    assert!(out.contains("wall time    less than 1 s on "), "{out}");
 }
 
 #[test]
@@ -500,14 +502,14 @@ fn settings_are_checked_like_the_file() {
         ),
         (
             vec!["--set", "materials.MATERIAL.young=soft"],
-            "found the text \"soft\"; expected a number above 0",
+            "found the string \"soft\"; expected a number above 0",
         ),
         (vec!["--set", "bodies[0].shape.max.0=9"], "--set bodies[0].shape.max.0=9"),
         (vec!["--set", "time.end"], "--set time.end: found no \"=\"; expected KEY=VALUE"),
         (vec!["--end", "0"], "--end 0: time.end: found 0; expected a number above 0"),
         (vec!["--end", "-1"], "--end -1: time.end: found -1; expected a number above 0"),
-        (vec!["--end", "soon"], "--end soon: time.end: found the text \"soon\"; expected a number above 0"),
-        (vec!["--out", ""], "--out : output.directory: found an empty text"),
+        (vec!["--end", "soon"], "--end soon: time.end: found the string \"soon\"; expected a number above 0"),
+        (vec!["--out", ""], "--out : output.directory: found an empty string"),
     ];
     for (arguments, part) in refused {
         for command in ["check", "run"] {

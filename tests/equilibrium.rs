@@ -134,5 +134,5 @@ fn a_run_that_is_not_settled_at_its_end_says_so() {
     let output = run(directory.path(), 2, 1, &path, &[]).output().expect("starts");
     let words =
         [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-    assert!(output.status.success() && words.contains("no equilibrium until the end"), "{words}");
+    assert!(output.status.success() && words.contains("no equilibrium by the end"), "{words}");
 }

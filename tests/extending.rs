@@ -98,7 +98,7 @@ fn materials_and_criteria_are_one_file_and_one_line() {
     let checked = cargo(&["run", "--quiet", "--bin", "agimp", "--", "check", &path.to_string_lossy()]);
     assert!(checked.contains("particles"), "{checked}");
     // The cubes move at 2 m/s, so their leaves are of that level at the start.
-    assert!(checked.contains("speed from 1 m/s on, until below 500 mm/s"), "{checked}");
+    assert!(checked.contains("speed at least 1 m/s, coarsening below 500 mm/s"), "{checked}");
     let filled: Vec<&str> = checked.lines().filter(|line| line.trim_start().starts_with("3 ")).collect();
     assert!(checked.contains("at the start, with the criteria") && !filled.is_empty(), "{checked}");
 

@@ -53,7 +53,7 @@ fn declared_sizes_are_compared_with_the_file() {
         file.close().expect("closed");
         let read = Reader::open_alone(&path).expect("opened").read_slab::<u32>("coord", 0, rows as u64);
         let error = read.expect_err("no file holds so much").to_string();
-        assert!(error.contains("hostile.vtkhdf: coord is in pieces"), "{error}");
+        assert!(error.contains("hostile.vtkhdf: coord is chunked"), "{error}");
     }
 }
 

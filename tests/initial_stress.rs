@@ -220,13 +220,13 @@ fn wrong_stresses_are_refused_with_their_key() {
         (
             ground(2, CLAY, "{ kind = 'geostatic', k0 = 0.5, ocr = 2, preconsolidation = 1e5 }", 0.1, ""),
             "bodies[0].stress.preconsolidation",
-            "one of the two",
+            "found both `preconsolidation` and `ocr`; expected one of them",
         ),
         (no_gravity(ground(2, SAND, k0, 0.1, "")), "bodies[0].stress.kind", "no gravity"),
         (
             ground(2, SAND, "{ kind = 'depth', table = [[1, 0, 0], [0.5, 1, 1]] }", 0.1, ""),
             "bodies[0].stress.table[1][0]",
-            "increase",
+            "increasing",
         ),
         (ground(2, SAND, "{ kind = 'components', xz = 1 }", 0.1, ""), "bodies[0].stress.xz", "2D job"),
     ];

@@ -367,11 +367,11 @@ fn damaged_and_foreign_files_are_refused() {
             refused("format.hdf", None, "written in format 99 by agimp 7.0.0");
             let file = Writer::create(comm, &directory.join("foreign.hdf")).expect("created");
             file.close().expect("closed");
-            refused("foreign.hdf", None, "not a file of agimp");
+            refused("foreign.hdf", None, "not a file written by agimp");
             refused("light.hdf", None, "no restart state");
             refused("good.hdf", Some(7), "belongs to another job");
             let error = snapshot::read::<2>(comm, &path, None, LIMITS).expect_err("dimension").to_string();
-            assert!(error.contains("3D run, the job is 2D"), "{error}");
+            assert!(error.contains("3D run, but the job is 2D"), "{error}");
             snapshot::read::<3>(comm, &path, Some(0xfeed_face_dead_beef), LIMITS)
                 .expect("the whole file is read");
         },

@@ -80,9 +80,13 @@ fn a_finished_run_has_its_pictures_curves_numbers_and_job_on_one_page() {
     assert_eq!((least, most), (end, start));
     let force = numbers(&page, "force_plate_y");
     assert!((force[1] - last(directory.path(), "force_plate_y")).abs() < 1e-4 * force[1].abs(), "{force:?}");
-    for chart in
-        ["Energy", "Momentum", "Extent of top", "Force on plate", "Force on plate along y over its way"]
-    {
+    for chart in [
+        "Energy",
+        "Momentum",
+        "Extent of top",
+        "Force on plate",
+        "Force on plate along y over its displacement",
+    ] {
         assert!(page.contains(&format!("<b>{chart}</b>")), "a chart {chart}");
     }
     assert!(page.matches("<svg").count() >= 8);

@@ -55,7 +55,7 @@ fn settle_dig_fill_and_load_is_one_job() {
         }
         assert!(history.last("force_plate_y") > 1e3, "{}", history.last("force_plate_y"));
         assert!(
-            words.contains("equilibrium at t = ") && words.contains("stage 3 of 3, load, begins at t = "),
+            words.contains("equilibrium at t = ") && words.contains("stage 3 of 3, load, starts at t = "),
             "{words}"
         );
     });
@@ -132,7 +132,7 @@ fn gravity_of_a_stage_acts_from_its_start() {
     let (t, speed) = (history.last("time") - begun, history.last("momentum_y") / history.last("mass"));
     // Gravity is linear in time, and taken in the middle of steps: exact but for rounding.
     assert!((speed + 50.0 * t * t).abs() < 1e-12 * 50.0 * t * t, "{speed} after {t} s");
-    assert!(words.contains("stage 2 of 2, fall, begins at t = "), "{words}");
+    assert!(words.contains("stage 2 of 2, fall, starts at t = "), "{words}");
     let files = contents(&directory.path().join("out/fall"));
     let outputs = files.keys().filter(|file| file.ends_with(".hdf") && !file.contains("checkpoint")).count();
     println!("{:?}", files.keys());

@@ -138,7 +138,7 @@ def test_what_is_not_an_output_is_refused(plane: agimp.Results, tmp_path: Path) 
         agimp.read(part)
     with h5py.File(tmp_path / "other.hdf", "w") as file:
         file["x"] = 1
-    with pytest.raises(agimp.FileRefused, match="not a file of agimp"):
+    with pytest.raises(agimp.FileRefused, match="not a file written by agimp"):
         agimp.read(tmp_path / "other.hdf")
     unfinished = tmp_path / "unfinished.hdf"
     shutil.copy(plane.paths[0], unfinished)

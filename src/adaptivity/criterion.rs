@@ -77,13 +77,13 @@ impl Thresholds {
     /// Words for a distance from something.
     pub(crate) fn near(&self, what: &str) -> String {
         let [refine, coarsen] = [self.refine, self.coarsen].map(|value| quantity(value, "m"));
-        format!("within {refine} of {what}, until {coarsen} from it")
+        format!("within {refine} of {what}, coarsening beyond {coarsen}")
     }
 
     /// Words for a value of something with a unit, which is empty for pure numbers.
     pub(crate) fn above(&self, what: &str, unit: &str) -> String {
         let [refine, coarsen] = [self.refine, self.coarsen].map(|value| quantity(value, unit));
-        format!("{what} from {refine} on, until below {coarsen}")
+        format!("{what} at least {refine}, coarsening below {coarsen}")
     }
 }
 

@@ -16,7 +16,7 @@ use crate::text::count;
 /// Arguments of `agimp bench`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Particles of each job, about.
+    /// Approximate number of particles of each job.
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1000..))]
     pub particles: u64,
     /// Steps of each repeat.
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Print JSON, one object per line: the machine, then each job.
     #[arg(long)]
     pub json: bool,
-    /// Print the file of a job and do nothing.
+    /// Print the file of a job and exit.
     #[arg(long, value_name = "NAME")]
     pub show: Option<String>,
 }

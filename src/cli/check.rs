@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Ranks that share the memory.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
-    /// Values of the job that are set here.
+    /// Values that replace those of the job.
     #[command(flatten)]
     changes: Changes,
 }

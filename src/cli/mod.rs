@@ -22,7 +22,7 @@ pub use self::shared::message::unusable;
 #[derive(Debug, Parser)]
 #[command(name = "agimp", version, about, arg_required_else_help = true)]
 pub struct Arguments {
-    /// What to do.
+    /// Subcommand.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -38,9 +38,9 @@ pub enum Command {
     Check(check::Arguments),
     /// Print the JSON schema of job files.
     Schema(schema::Arguments),
-    /// Write a commented job file to start from.
+    /// Write a commented job file as a starting point.
     New(new::Arguments),
-    /// Show what is in an output or checkpoint file.
+    /// Show the contents of an output or checkpoint file.
     Info(info::Arguments),
     /// Draw the particles of an output file as PNG.
     Plot(plot::Arguments),
@@ -48,11 +48,11 @@ pub enum Command {
     Movie(movie::Arguments),
     /// Write the particles of outputs for other programs: PLY, CSV, VTP.
     Export(export::Arguments),
-    /// Write an HTML page of a run: pictures, curves, numbers, where the time went, the job.
+    /// Write an HTML page of a run: pictures, curves, numbers, time by phase, the job.
     Report(report::Arguments),
-    /// Write an HTML page that shows particles and tree in a browser: turn, zoom, play, cut, read values.
+    /// Write an HTML page that shows particles and tree in a browser: rotate, zoom, play, cut, read values.
     View(view::Arguments),
-    /// Print a number that is equal for equal states, whatever the ranks that wrote the files.
+    /// Print a number that is equal for equal states, for any number of ranks that wrote the files.
     Digest(digest::Arguments),
     /// Show where the states in two files differ.
     Diff(diff::Arguments),
@@ -83,7 +83,7 @@ pub enum Failure {
     #[error("{0}")]
     Run(String),
     /// The run was asked to stop and has written a checkpoint.
-    #[error("stopped on request; go on with --restart {}", .0.display())]
+    #[error("stopped on request; continue with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
     /// The user knows all; what is left is to end with this exit code.
     #[error("a failure that has been reported")]

@@ -68,15 +68,15 @@ pub struct Arguments {
     /// Name of the template; without it, the list of templates.
     #[arg(value_name = "TEMPLATE")]
     first: Option<String>,
-    /// File to write; TEMPLATE.toml by default. A file that exists is left alone.
+    /// File to write; TEMPLATE.toml by default. An existing file remains unchanged.
     file: Option<PathBuf>,
-    /// Name of the template; then the file is the only word.
+    /// Name of the template; then the file is the only argument.
     #[arg(long, value_name = "TEMPLATE", conflicts_with = "file")]
     template: Option<String>,
-    /// List the templates, and write nothing.
+    /// List the templates and write nothing.
     #[arg(long)]
     list: bool,
-    /// Write the job as the project has it, also where it takes longer than a minute.
+    /// Write the full job of the project, even if it takes longer than a minute.
     #[arg(long)]
     full: bool,
 }
@@ -110,7 +110,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let path = file.unwrap_or_else(|| format!("{name}.toml").into());
     let failure = |error: std::io::Error| match error.kind() {
         ErrorKind::AlreadyExists => {
-            Failure::Usage(format!("{}: exists already and is left as it is", path.display()))
+            Failure::Usage(format!("{}: exists already and remains unchanged", path.display()))
         }
         _ => Failure::Run(format!("{}: cannot be written: {error}", path.display())),
     };
@@ -123,7 +123,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         beside(&path, name, contents, "the job reads it")?;
     }
     let schema = serde_json::to_string_pretty(&job::schema()).map_err(std::io::Error::other)?;
-    beside(&path, SCHEMA, &schema, "editors complete and check job files by it")
+    beside(&path, SCHEMA, &schema, "editors use it to complete and check job files")
 }
 
 impl Template {
@@ -138,7 +138,7 @@ impl Template {
         let list = self.quick.join(", ");
         let name = self.name;
         Ok(format!(
-            "# Made to run in under a minute, with {list}.\n# What is said below holds for the full job: agimp new {name} --full\n#\n{text}"
+            "# This job runs in less than a minute, with {list}.\n# The comments below describe the full job: agimp new {name} --full\n#\n{text}"
         ))
     }
 }

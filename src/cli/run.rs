@@ -24,19 +24,19 @@ use crate::text::{count, quantity, wall_time};
 pub struct Arguments {
     /// Job file (TOML).
     pub job: PathBuf,
-    /// Go on from a file of this job, or from its newest complete one (`latest`).
+    /// Continue from a file of this job, or from its newest complete one (`latest`).
     #[arg(long, value_name = "FILE|latest")]
     pub restart: Option<OsString>,
-    /// Start anew even where that replaces checkpoints or the results of another job.
+    /// Start again even if that replaces checkpoints or the results of another job.
     #[arg(long, conflicts_with = "restart")]
     pub overwrite: bool,
-    /// Threads of each rank; by default the cores of the machine shared out to its ranks.
+    /// Threads of each rank; by default the cores of the machine divided by its ranks.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// Print nothing but errors and warnings.
+    /// Print only errors and warnings.
     #[arg(long)]
     pub quiet: bool,
-    /// Values of the job that are set here.
+    /// Values that replace those of the job.
     #[command(flatten)]
     pub changes: Changes,
 }

@@ -5,7 +5,7 @@ use std::io::Write as _;
 /// Arguments of `agimp schema`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Print the reference for people instead, in Markdown.
+    /// Print the reference of job files in Markdown.
     #[arg(long)]
     markdown: bool,
 }

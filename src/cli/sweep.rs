@@ -25,10 +25,10 @@ const NAME: usize = 60;
 pub struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
-    /// A key of the job, as for --set, and its values, separated by commas; with several keys each combination is run.
+    /// A key of the job, as for --set, and its values, separated by commas; with several keys, each combination is run.
     #[arg(long, value_name = "KEY=A,B,C", required = true)]
     over: Vec<String>,
-    /// A value that all runs have, as for `agimp run`; may be given several times.
+    /// A value for all runs, as for `agimp run`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Directory of the sweep: one directory for each run, and `sweep.csv`; out/NAME.sweep by default.
@@ -76,7 +76,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             writeln!(std::io::stderr(), "{place}")?;
             let code = start(arguments, run)?;
             if code == Some(i32::from(STOPPED)) {
-                return Err(Failure::Run("stopped on request; the same command goes on".into()));
+                return Err(Failure::Run("stopped on request; the same command continues".into()));
             }
             if code != Some(0) {
                 (failed, status) = (failed + 1, "failed");

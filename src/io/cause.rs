@@ -14,10 +14,10 @@ pub fn explain(path: &Path, error: &Error) -> String {
         libc::EFBIG => "the file grows beyond the limit of this process (`ulimit -f`) or of the file system",
         libc::EROFS => "the file system is read-only",
         libc::EACCES | libc::EPERM => return permission(path, error),
-        libc::EISDIR => "a directory of that name is in the way",
-        libc::ENOTDIR => "a file is in the way of the directory",
-        libc::ELOOP => "a symbolic link of that name is in the way; results are not written through links",
-        libc::ENOENT if !parent(path).is_dir() => "No such file or directory: the directory is not there",
+        libc::EISDIR => "a directory of that name exists",
+        libc::ENOTDIR => "a file has the name of the directory",
+        libc::ELOOP => "a symbolic link of that name exists; agimp does not write results through links",
+        libc::ENOENT if !parent(path).is_dir() => "No such file or directory: the directory does not exist",
         _ => return error.to_string(),
     };
     format!("{words} (os error {code})")
@@ -35,9 +35,9 @@ fn parent(path: &Path) -> &Path {
 
 fn permission(path: &Path, error: &Error) -> String {
     match path.symlink_metadata() {
-        Ok(data) if data.is_dir() => format!("{error}; a directory of that name is in the way"),
+        Ok(data) if data.is_dir() => format!("{error}; a directory of that name exists"),
         Ok(_) => error.to_string(),
-        Err(_) => format!("{error}; the directory may be written by others only"),
+        Err(_) => format!("{error}; the user has no permission to write to the directory"),
     }
 }
 
@@ -62,13 +62,13 @@ mod tests {
         assert!(words(libc::EROFS).contains("read-only"));
         assert!(words(libc::EIO).contains("os error 5"));
         let nowhere = explain(&path.join("b"), &Error::from_raw_os_error(libc::ENOENT));
-        assert!(nowhere.contains("the directory is not there"), "{nowhere}");
+        assert!(nowhere.contains("the directory does not exist"), "{nowhere}");
     }
 
     #[test]
     fn a_directory_in_the_way_is_named() {
         let directory = tempfile::tempdir().unwrap();
         let error = std::fs::File::create(directory.path()).unwrap_err();
-        assert!(explain(directory.path(), &error).contains("a directory of that name is in the way"));
+        assert!(explain(directory.path(), &error).contains("a directory of that name exists"));
     }
 }

@@ -44,7 +44,7 @@ impl Frame {
                 None if required => {
                     let shown: Vec<&str> = shown(&file).into_iter().map(PointField::name).collect();
                     let (name, shown) = (field.name(), shown.join(", "));
-                    return Err(file.refuse(format!("the file does not show {name}; it shows {shown}")));
+                    return Err(file.refuse(format!("the file does not contain {name}; it contains {shown}")));
                 }
                 None => {}
             }
@@ -78,7 +78,7 @@ pub fn shown_in(path: &Path) -> Result<Vec<PointField>, FileError> {
 fn header_of_particles(file: &Reader) -> Result<Header, FileError> {
     let header = Header::read(file)?;
     if !file.exists("VTKHDF/PointData") || file.exists("VTKHDF/CellData/level") {
-        return Err(file.refuse("the file holds no particles (is it a tree file?)"));
+        return Err(file.refuse("found no particles; expected a file of particles, not of the tree"));
     }
     Ok(header)
 }
@@ -156,9 +156,7 @@ pub fn expand(words: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
         }
         let refused = |reason: &str| FileError::Refused { path: word.clone(), reason: reason.into() };
         let entries = Series::listed(word).ok_or_else(|| {
-            refused(
-                "found no index of outputs; expected a file such as NAME.hdf.series that a run has written",
-            )
+            refused("found no index of outputs; expected a file such as NAME.hdf.series, written by a run")
         })?;
         if entries.is_empty() {
             return Err(refused("the index lists no outputs"));

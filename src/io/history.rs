@@ -69,7 +69,7 @@ impl History {
             Err(_) => None,
         };
         if seen.has_other_columns {
-            let reason = "the columns are not those of this run; move the file away or restart elsewhere";
+            let reason = "found columns that differ from those of this run; move the file or use another output.directory";
             return Err(FileError::Refused { path: path.into(), reason: reason.into() });
         }
         let history = match lines {

@@ -42,7 +42,7 @@ impl Lines {
         let mut file =
             options.read(true).write(true).custom_flags(libc::O_NOFOLLOW).open(path).map_err(failed)?;
         if !file.metadata().map_err(failed)?.is_file() {
-            let reason = "not a plain file; move it away".into();
+            let reason = "not a regular file; move it".into();
             return Err(FileError::Refused { path: path.into(), reason });
         }
         let mut reader = BufReader::new(&file);

@@ -37,7 +37,7 @@ pub enum TableError {
     #[error("it has no particle")]
     Empty,
     /// It has another ending.
-    #[error("its name ends with neither .csv, .ply, .hdf nor .h5")]
+    #[error("its name does not end with .csv, .ply, .hdf or .h5")]
     Kind,
 }
 

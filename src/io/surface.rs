@@ -59,7 +59,9 @@ impl Surface {
     /// The frame is plane, has no such body, does not show bodies, or too many particles; in words.
     pub fn of(frame: &Frame, body: Option<&str>) -> Result<Self, String> {
         if frame.header.dimension != 3 {
-            return Err("a run in 2D has no surface in space; expected the output of a run in 3D".into());
+            return Err(
+                "found an output of a 2D run; expected a 3D run, because surfaces exist in 3D only".into()
+            );
         }
         let is_chosen = chosen(frame, body)?;
         let sizes =
@@ -69,8 +71,7 @@ impl Surface {
         let count: f64 = sizes().map(|size| parts(size).powi(3)).sum();
         if count > MOST {
             return Err(format!(
-                "the particles are as many as {count:.1e} of the smallest, which has a half width of {least:.3e} m; expected at most \
-                 {MOST:.0e}: take one body (--body)"
+                "found the volume of {count:.1e} particles of the smallest half width, {least:.3e} m; expected at most {MOST:.0e}: select one body (--body)"
             ));
         }
         let mut points: Vec<Vector3<f64>> = Vec::with_capacity(count as usize);
@@ -169,6 +170,6 @@ fn chosen<'f>(frame: &'f Frame, body: Option<&str>) -> Result<Box<dyn Fn(usize) 
         _ => None,
     });
     let bodies =
-        bodies.ok_or("the file does not show which body a particle is of; output.fields has to name body")?;
+        bodies.ok_or("the file does not contain the bodies of particles; add \"body\" to output.fields")?;
     Ok(Box::new(move |p| usize::try_from(bodies[p]).is_ok_and(|of| of == number)))
 }

@@ -38,7 +38,7 @@ pub enum NoState {
     Unreachable,
     /// It yields.
     #[error(
-        "the material yields under it, at a shear stress of {} and a pressure of {} for {} and {} asked for",
+        "the material yields, at a shear stress of {} and a pressure of {}; requested {} and {}",
         quantity(found[0], "Pa"),
         quantity(found[1], "Pa"),
         quantity(asked[0], "Pa"),

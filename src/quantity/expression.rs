@@ -49,7 +49,7 @@ impl Expression {
         let plain = with_plain_signs(&tokens(text).map_err(|(at, reason)| fault(at, reason))?)
             .map_err(|(at, reason)| fault(at, reason))?;
         let parsed = FlatEx::<f64, Operators>::parse(&plain)
-            .map_err(|error| fault(0, format!("found no expression that can be read: {error}")))?;
+            .map_err(|error| fault(0, format!("found an invalid expression: {error}")))?;
         let position = |name: &String| VARIABLES.iter().position(|known| known == name);
         let used: Option<Vec<usize>> = parsed.var_names().iter().map(position).collect();
         let used = used.ok_or_else(|| fault(0, format!("expected variables {}", VARIABLES.join(", "))))?;

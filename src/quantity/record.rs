@@ -32,7 +32,7 @@ pub enum RecordError {
         reason: String,
     },
     /// No rows.
-    #[error("it holds no row of numbers")]
+    #[error("it contains no row of numbers")]
     Empty,
 }
 
@@ -83,7 +83,7 @@ fn parse(bytes: &[u8], time: &Column, value: &Column, scale: f64) -> Result<Tabl
             TableError::Order { row, time } => RecordError::Line {
                 line: of_row(row),
                 reason: format!(
-                    "found the time {time} s, which is not after the row above; expected times that increase"
+                    "found the time {time} s, which is not later than the previous row; expected increasing times"
                 ),
             },
             TableError::NotFinite { row } => RecordError::Line {
@@ -187,15 +187,15 @@ mod tests {
         );
         assert_eq!(
             reason(by_number("0,1\n# remark\n0,2\n")),
-            "line 3: found the time 0 s, which is not after the row above; expected times that increase"
+            "line 3: found the time 0 s, which is not later than the previous row; expected increasing times"
         );
         assert_eq!(reason(by_number("0,1\n1\n")), "line 2: found 1 columns; expected a number in column 2");
         assert!(reason(by_number("0,1\n1,inf\n")).starts_with("line 2: found a number that is not finite"));
         assert!(
             reason(by_number("0,1\n1,1,5\n2,nan")).starts_with("line 3: found a number that is not finite")
         );
-        assert_eq!(reason(by_number("t,a\n")), "it holds no row of numbers");
-        assert_eq!(reason(by_number("")), "it holds no row of numbers");
+        assert_eq!(reason(by_number("t,a\n")), "it contains no row of numbers");
+        assert_eq!(reason(by_number("")), "it contains no row of numbers");
         assert_eq!(
             reason(parse(b"# r\nt,a\n0,1\n", &named("t"), &named("acc"), 1.0)),
             "line 2: found no column \"acc\"; this line has \"t\", \"a\""

@@ -16,7 +16,7 @@ pub enum TableError {
     Empty,
     /// Times do not increase.
     #[error(
-        "found the time {time} s in row {row}, which is not after the row above; expected times that increase"
+        "found the time {time} s in row {row}, which is not later than the previous row; expected increasing times"
     )]
     Order {
         /// Row, from 1.

@@ -141,7 +141,7 @@ impl Cost {
         if self.ranks > 1 {
             memory.push(curve("least of a rank", &|r| r.memory.min / 1e6));
             panels.push(Panel::new(
-                "Imbalance: dearest rank over mean",
+                "Imbalance: greatest cost of a rank over the mean",
                 "",
                 vec![curve("present", &|r| r.imbalance), curve("possible", &|r| r.possible_imbalance)],
             ));

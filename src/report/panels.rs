@@ -53,7 +53,7 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
         &[("splits", "splits"), ("merges", "merges"), ("merged_away", "particles merged away")],
     ),
     ("Kinetic energy that splits and merges took", &[("split_energy", "splits"), ("merge_energy", "merges")]),
-    ("Greatest speed on the way to equilibrium", &[("peak_speed", "speed")]),
+    ("Greatest speed before equilibrium", &[("peak_speed", "speed")]),
     ("Unbalanced acceleration", &[("unbalanced_acceleration", "acceleration")]),
     ("Time step", &[("dt", "time step")]),
 ];
@@ -189,11 +189,12 @@ fn over_ways(history: &History) -> Vec<Panel> {
                 way.values.iter().zip(&force.values).skip(1).map(|(x, f)| (x - first, *f)).collect();
             let direction = axis.trim_start_matches('_');
             let panel = Panel::new(
-                &format!("Force on {name} along {direction} over its way"),
+                &format!("Force on {name} along {direction} over its displacement"),
                 &force.unit,
                 vec![(direction.into(), points)],
             );
-            let panel = Panel { across: (format!("way along {direction}"), way.unit.clone()), ..panel };
+            let panel =
+                Panel { across: (format!("displacement along {direction}"), way.unit.clone()), ..panel };
             (range(&way) > 0.0 && panel.changes()).then_some(panel)
         })
         .collect()
@@ -246,7 +247,7 @@ mod tests {
         let titles: Vec<&str> = panels.iter().map(|panel| &*panel.title).collect();
         assert_eq!(
             titles,
-            ["Energy", "Force on punch", "Position of punch", "Force on punch along y over its way"]
+            ["Energy", "Force on punch", "Position of punch", "Force on punch along y over its displacement"]
         );
         assert_eq!(panels[0].curves[2], ("sum".into(), vec![(0.0, 0.0), (1.0, 0.5), (2.0, 1.0)]));
         assert_eq!(panels[3].curves[0].1, [(-0.5, 3.0), (-1.0, 4.0)]);

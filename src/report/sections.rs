@@ -68,8 +68,8 @@ pub(super) fn ending(body: &mut String, run: &Run, results: &Results) {
         State::Finished | State::Running(_) => return,
         State::Told(ending) => (ending.reason.as_str(), ending.advice.as_str()),
         State::Ended => (
-            "The run has left no word: it was killed, or its machine failed.",
-            "Look at the messages of the batch system or the kernel: wall time, memory (see the chart below).",
+            "The run left no message: it was killed, or its machine failed.",
+            "Check the messages of the batch system or the kernel: wall time, memory (see the chart below).",
         ),
     };
     let _ = write!(
@@ -87,7 +87,7 @@ pub(super) fn ending(body: &mut String, run: &Run, results: &Results) {
                 .map_or_else(|| format!("{}.toml", results.name), |job| job.display().to_string());
             let _ = writeln!(
                 body,
-                "<p><b>Last state:</b> <code>{}</code>, t = {}, step {}. To go on from it: <code>agimp run {} --restart \
+                "<p><b>Last state:</b> <code>{}</code>, t = {}, step {}. To continue from it: <code>agimp run {} --restart \
                  latest</code></p>",
                 html(&path.display().to_string()),
                 quantity(time, "s"),
@@ -95,7 +95,7 @@ pub(super) fn ending(body: &mut String, run: &Run, results: &Results) {
                 html(&job)
             );
         }
-        None => body.push_str("<p><b>Last state:</b> none that a run can go on from; start anew.</p>\n"),
+        None => body.push_str("<p><b>Last state:</b> none that a run can continue from; start again.</p>\n"),
     }
     body.push_str("</div>\n");
 }
@@ -115,7 +115,7 @@ pub(super) fn remarks(body: &mut String, run: &Run) {
         body.push_str("</ol>\n");
     }
     if !report.messages.is_empty() {
-        body.push_str("<details><summary>What the run said</summary>\n<ul>\n");
+        body.push_str("<details><summary>Messages of the run</summary>\n<ul>\n");
         report.messages.iter().for_each(|text| {
             let _ = writeln!(body, "<li>{}</li>", html(text));
         });
@@ -152,7 +152,7 @@ pub(super) fn table(body: &mut String, history: &History) {
     }
     body.push_str("</tbody></table>\n");
     if !zero.is_empty() {
-        let _ = writeln!(body, "<p><small>0 all the time: {}</small></p>", zero.join(", "));
+        let _ = writeln!(body, "<p><small>0 throughout: {}</small></p>", zero.join(", "));
     }
 }
 
@@ -188,12 +188,12 @@ pub(super) fn collapse(body: &mut String, run: &Run) {
     body.push_str("</tbody></table>\n");
 }
 
-/// Where the time went.
+/// Time by phase.
 pub(super) fn costs(body: &mut String, run: &Run) {
     if run.cost.records.is_empty() {
         return;
     }
-    section(body, "cost", "Where the time went");
+    section(body, "cost", "Time by phase");
     let whole = run.cost.wall.max(f64::MIN_POSITIVE);
     body.push_str("<table class=\"bars\"><tbody>\n");
     for phase in &run.cost.phases {
@@ -252,7 +252,7 @@ pub(super) fn files(body: &mut String, results: &Results) {
     let series = format!("{}/{}.hdf.series", results.directory.display(), results.name);
     let _ = writeln!(
         body,
-        "</tbody></table>\n<p>Turn and cut the particles in a browser: <code>agimp view {0}</code>; or open <code>{0}</code> in ParaView.</p>",
+        "</tbody></table>\n<p>Rotate and cut the particles in a browser: <code>agimp view {0}</code>; or open <code>{0}</code> in ParaView.</p>",
         html(&series)
     );
 }

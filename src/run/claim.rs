@@ -31,7 +31,7 @@ struct Held {
 #[derive(Debug, thiserror::Error)]
 enum Refusal {
     /// Another run has it.
-    #[error("{}: another run writes here ({holder}); wait until it has ended, or stop it", path.display())]
+    #[error("{}: found another run that writes here ({holder}); wait until it ends, or stop it", path.display())]
     Taken { path: PathBuf, holder: String },
     /// The file cannot be written.
     #[error(transparent)]
@@ -99,7 +99,7 @@ fn lock(path: &Path) -> Result<Held, Refusal> {
             }
             // Some file systems of clusters have no locks.
             Err(TryLockError::Error(error)) if cannot_lock(&error) => warn(&format!(
-                "{}: cannot be locked ({error}); see to it that no other run writes here",
+                "{}: cannot be locked ({error}); make sure that no other run writes here",
                 path.display()
             )),
             Err(TryLockError::Error(error)) => return Err(failed("lock")(error).into()),
@@ -155,13 +155,11 @@ pub(super) fn spare_results<const D: usize>(comm: &Comm, problem: &Problem<D>) -
     let refusal = match comm.agree(found)? {
         None => Ok(()),
         Some(AtStake::Checkpoint(path)) => Err(format!(
-            "{}: a checkpoint of an earlier run; go on from it with --restart latest, or start anew and replace its \
-             results with --overwrite",
+            "{}: found a checkpoint of an earlier run; continue it with --restart latest, or start again and replace its results with --overwrite",
             path.display()
         )),
         Some(AtStake::OtherJob(path)) => Err(format!(
-            "{}: a result of another job (what decides the state has been changed); choose another \
-             output.directory, or replace its results with --overwrite",
+            "{}: found a result of another job (keys that affect the state differ); choose another output.directory, or replace its results with --overwrite",
             path.display()
         )),
     };
@@ -182,7 +180,7 @@ mod tests {
         let told = std::fs::read_to_string(&path).unwrap();
         assert!(told.starts_with(&format!("process {} on host ", std::process::id())), "{told}");
         let refusal = lock(&path).unwrap_err().to_string();
-        assert!(refusal.contains("another run writes here (process "), "{refusal}");
+        assert!(refusal.contains("another run that writes here (process "), "{refusal}");
         assert!(holder(&path).is_some_and(|who| who.starts_with("process ")));
         drop(held);
         assert_eq!(holder(&path), None);

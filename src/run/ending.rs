@@ -22,24 +22,20 @@ pub struct Ending {
 }
 
 /// What helps a run that has become unstable.
-const UNSTABLE: &str = "Look at the last output where the speed is greatest (agimp plot --colour speed, agimp view). If the \
-    material is torn or pressed beyond what its law can bear, mend the job there: a stiffer or plastic material, a slower load, finer \
-    cells. Else try a smaller Courant number (time.cfl, for example half of it), or damping.";
+const UNSTABLE: &str = "Check the last output where the speed is greatest (agimp plot --colour speed, agimp view). If the material is stretched or compressed beyond the range of its law, change the job there: a stiffer or plastic material, a slower load, finer cells. Otherwise try a smaller Courant number (time.cfl, for example half of it), or damping.";
 /// What helps where a file cannot be written.
 const FILE: &str =
-    "Make room on the disk, or permit this user to write there; then go on from the last state.";
+    "Free space on the disk, or give this user permission to write there; then continue from the last state.";
 /// What helps where material has left the domain.
-const LEFT: &str = "Look at the last output where material has come to that face. If it should get there, open the face \
-    (kind outflow) or say what becomes of it (boundaries.leaving); else make the domain larger, or find out why it flies.";
+const LEFT: &str = "Check the last output where material has reached that face. If it is expected there, open the face (kind outflow) or set boundaries.leaving; otherwise use a larger domain, or find out why the material moves so far.";
 /// What helps in all other cases.
-const OTHER: &str =
-    "Mend what the message names; then go on from the last state, or start anew if the job has to change.";
+const OTHER: &str = "Correct what the message names; then continue from the last state, or start again if the job must change.";
 
 impl Ending {
     /// Asked to stop by a signal.
     pub(super) fn stopped(step: u64, time: f64) -> Self {
         let reason = "stopped on request (signal), after a checkpoint".into();
-        Self { reason, advice: "Go on from the last state.".into(), is_stop: true, step, time }
+        Self { reason, advice: "Continue from the last state.".into(), is_stop: true, step, time }
     }
 
     /// By an error.

@@ -146,8 +146,7 @@ impl<'a, const D: usize> Run<'a, D> {
         ));
         if wanted > cores {
             recorder.message(&format!(
-                "warning: {wanted} threads share {cores} cores here; expect less speed (several machines \
-                 count as one here)"
+                "warning: {wanted} threads share {cores} cores here; expect a slower run (several machines count as one here)"
             ));
         }
         Ok(Self {
@@ -220,7 +219,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let (number, all) = (physics.stage() + 1, self.problem.stages.len());
         let name = &self.problem.stages[physics.stage()].name;
         self.recorder
-            .message(&format!("stage {number} of {all}, {name}, begins at t = {time} (step {step})"));
+            .message(&format!("stage {number} of {all}, {name}, starts at t = {time} (step {step})"));
         Ok(())
     }
 
@@ -235,7 +234,7 @@ impl<'a, const D: usize> Run<'a, D> {
             self.recorder.message(&format!("equilibrium at t = {time} (step {step}): {way}"));
         } else {
             let what = if self.problem.stages.len() > 1 { "of the stage" } else { "of the run" };
-            self.recorder.warning(&format!("no equilibrium until the end {what}, t = {time}: {way}"));
+            self.recorder.warning(&format!("no equilibrium by the end {what}, t = {time}: {way}"));
         }
     }
 

@@ -112,7 +112,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 after.map_or_else(|| "the start".into(), |time| format!("t = {}", quantity(time, "s")));
             let to = quantity(before.unwrap_or(time), "s");
             self.warning(&format!(
-                "{}: rows are missing from {from} to t = {to}; the file was damaged, cut or moved",
+                "{}: rows are missing from {from} to t = {to}; the file was damaged, truncated or moved",
                 rows.display()
             ));
         }

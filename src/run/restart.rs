@@ -257,14 +257,14 @@ pub fn solver<const D: usize>(
         From::Latest => latest(comm, problem)?,
     };
     let mut refusal = format!(
-        "no restart file of `{}` in {}; start without --restart or name a file",
+        "found no restart file of `{}` in {}; start without --restart or name a file",
         problem.name,
         problem.output.directory.display()
     );
     let mut is_first = true;
     for path in paths {
         if !is_first && comm.rank() == 0 {
-            warn(&format!("passed over: {refusal}"));
+            warn(&format!("skipped: {refusal}"));
         }
         is_first = false;
         match restored(comm, problem, &path) {
@@ -272,7 +272,10 @@ pub fn solver<const D: usize>(
                 check_end(problem, &path, solver.clock)?;
                 let beside = compare::verify_beside_state(comm, &path);
                 if let (Err(damage), 0) = (beside, comm.rank()) {
-                    warn(&format!("{}; the state is whole, and the run goes on from it", damage.message));
+                    warn(&format!(
+                        "{}; the state is complete, and the run continues from it",
+                        damage.message
+                    ));
                 }
                 return Ok((solver, scalars));
             }
@@ -291,8 +294,7 @@ fn check_end<const D: usize>(problem: &Problem<D>, path: &Path, clock: Clock) ->
         return Ok(());
     }
     Err(RunError::Refused(format!(
-        "{}: the file is of t = {} (step {step}), which lies behind the end of the run; found time.end = {}; expected a \
-         later end, or an earlier file",
+        "{}: the file is of t = {} (step {step}), after the end of the run; found time.end = {}; expected a later end, or an earlier file",
         path.display(),
         quantity(time, "s"),
         written(end)
@@ -318,11 +320,11 @@ fn restored<const D: usize>(
     let expected = setup::physics(problem).carried_columns();
     let follows = expected > load::columns(&problem.loads);
     if comm.any(carried != 0 && carried != expected) {
-        let reason = "particles carry other loads than those of the job, or displacements or strains that output.fields does not ask for";
+        let reason = "particles carry loads that differ from those of the job, or displacements or strains that output.fields does not request";
         return Err(refused(reason));
     }
     if follows && restored.header.step > 0 && !comm.any(carried != 0) {
-        let reason = "particles do not carry the displacements or strains that output.fields, a load or adaptivity.split_gap asks for; a run follows them from its start";
+        let reason = "particles do not carry the displacements or strains that output.fields, a load or adaptivity.split_gap requests; a run follows them from its start only";
         return Err(refused(reason));
     }
     let forest = comm.agree(Forest::from_leaves(comm, problem.brick, restored.leaves));
@@ -353,7 +355,8 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the sums of a contact between bodies are missing"))?;
     // A run without them may have written the file: then they begin here.
     let _ = restore_exact_sums("face", &mut solver.face_sums, rank, scalars);
-    restore_relaxation(&mut solver, scalars).ok_or_else(|| refused("the way to equilibrium is missing"))?;
+    restore_relaxation(&mut solver, scalars)
+        .ok_or_else(|| refused("the state of the relaxation to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
@@ -370,7 +373,7 @@ fn check_counts<const D: usize>(scalars: &Scalars) -> Result<(), String> {
     for (name, count) in &scalars.counts {
         let most = if name == LEDGER[3] { ids::roots(D) } else { MOST };
         if *count > most {
-            return Err(format!("the header says {name} = {count}; no run counts further than {most}"));
+            return Err(format!("the header has {name} = {count}; expected at most {most}"));
         }
     }
     Ok(())
@@ -391,15 +394,14 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
     let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
     match found.len() {
-        0 => reasons.push(
-            "the texts agree, so files that the job names or defaults of the program have changed".into(),
-        ),
+        0 => reasons
+            .push("the texts agree, so files that the job names or defaults of the program differ".into()),
         all if all > MOST_KEYS => reasons.push(format!("and {} more", all - MOST_KEYS)),
         _ => {}
     }
     Some(format!(
         "{}: the file belongs to another job: {} (title, output, checkpoint, history, telemetry, report and time.end \
-         may differ, all else must not)",
+         may differ, but nothing else)",
         path.display(),
         reasons.join("; ")
     ))
@@ -423,7 +425,7 @@ fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathB
     }
     // The reason of a single one becomes the error.
     let only = if paths.is_empty() { damaged.pop() } else { None };
-    damaged.iter().for_each(|error| warn(&format!("passed over: {error}")));
+    damaged.iter().for_each(|error| warn(&format!("skipped: {error}")));
     comm.agree(only.map_or(Ok(()), Err)).map_err(|disagreement| RunError::Refused(disagreement.message))?;
     let mut bytes =
         paths.iter().map(|path| path.as_os_str()).collect::<Vec<_>>().join(OsStr::new("\0")).into_vec();

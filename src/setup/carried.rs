@@ -66,9 +66,11 @@ fn nothing<const D: usize>(problem: &Problem<D>, number: usize, carried: &Carrie
     let (found, expected) = match carried.force.is_on_surface() {
         true => (
             "surface",
-            "a shape that holds part of a body's surface, which is neither on a face of the domain nor against another body",
+            "a shape with part of a body's free surface, away from faces of the domain and other bodies",
         ),
-        false => ("particle", "a shape that holds particles, which lie half their distance inside the body"),
+        false => {
+            ("particle", "a shape that contains particles, which lie half their distance inside the body")
+        }
     };
     SeedError::Load {
         place: format!("{}:{line}:{column}: loads[{number}]", problem.path.display()),

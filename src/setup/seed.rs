@@ -16,8 +16,7 @@ use partition::Octant;
 pub enum SeedError {
     /// A lattice point lies in two bodies.
     #[error(
-        "{place}: found the body \"{second}\" overlapping \"{first}\" at {}; expected bodies that \
-         share no point",
+        "{place}: found the body \"{second}\" overlapping \"{first}\" at {}; expected bodies without a common point",
         crate::text::place(point)
     )]
     Overlap {
@@ -43,7 +42,7 @@ pub enum SeedError {
     },
     /// A body cannot have the stress that the job gives it.
     #[error(
-        "{place}: found a stress at {} that the body \"{body}\" cannot have: {reason}; expected a stress inside the yield surface: \
+        "{place}: found a stress at {} outside the yield surface of the body \"{body}\": {reason}; expected a stress inside the yield surface: \
          another k0, more cohesion, or a higher preconsolidation pressure",
         crate::text::place(point)
     )]

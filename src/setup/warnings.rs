@@ -21,8 +21,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     colliders(problem, &mut all);
     if steps >= MANY_STEPS {
         all.push(format!(
-            "time: the run takes about {} steps; stiffer material and finer cells shorten the step, and often less of both \
-             will do",
+            "time: the run takes about {} steps; stiff material and fine cells shorten the step; use softer material or coarser cells if possible",
             count(steps.min(1e18) as u64)
         ));
     }
@@ -43,7 +42,7 @@ fn faces<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     }
     if let Some(condition) = conditions.first() {
         all.push(format!(
-            "boundaries: the job names no condition for {}; the default holds there: {condition}",
+            "boundaries: found no condition for {}; the default applies: {condition}",
             unnamed.join(", ")
         ));
     }
@@ -57,8 +56,7 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             && parameters.friction_angle > 0.0
         {
             all.push(format!(
-                "materials[{index}].match: \"{}\" has its friction angle in triaxial compression, and a greater one in plane \
-                 strain, as in this 2D job; match = \"plane_strain\" gives it there",
+                "materials[{index}].match: \"{}\" has its friction angle in triaxial compression and a greater one in plane strain, as in this 2D job; use match = \"plane_strain\" for the friction angle in plane strain",
                 excerpt(&material.name, NAME)
             ));
         }
@@ -74,8 +72,7 @@ fn colliders<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             (thickness(&collider.shape), problem.cell_edge(level_at(problem, index, collider)));
         if collider.acts_on == ActsOn::Nodes && thickness < 2.0 * cell {
             all.push(format!(
-                "colliders[{index}].shape: \"{name}\" is {} thick, less than two cells of {}; material may pass through it: \
-                 let it act on particles, make it thicker, or the cells there finer",
+                "colliders[{index}].shape: \"{name}\" is {} thick, less than two cells of {}; material may pass through it: use acts_on = \"particles\", a thicker shape or finer cells",
                 quantity(thickness, "m"),
                 quantity(cell, "m")
             ));
@@ -95,8 +92,7 @@ fn colliders<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             }
             if common_point([&body.shape, &collider.shape], common, slack, &mut boxes).is_some() {
                 all.push(format!(
-                    "bodies[{number}].shape: \"{}\" begins partly inside the collider \"{name}\", which drives it out with force: \
-                     move one of them",
+                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", which pushes it out: move one of them",
                     excerpt(&body.name, NAME)
                 ));
             }
@@ -177,7 +173,7 @@ colliders = [{ name = "plate", shape = { kind = "box", min = [0, 0.5], max = [1,
             ),
             (
                 ("min = [0, 0.5]", "min = [0, 0.4]"),
-                "bodies[0].shape: \"b\" begins partly inside the collider \"plate\"",
+                "bodies[0].shape: \"b\" starts partly inside the collider \"plate\"",
             ),
             (
                 (", match = \"plane_strain\"", ""),
@@ -185,7 +181,7 @@ colliders = [{ name = "plate", shape = { kind = "box", min = [0, 0.5], max = [1,
             ),
             (
                 ("x_max = { kind = \"slip\" }, ", ""),
-                "boundaries: the job names no condition for x_max; the default holds there: ",
+                "boundaries: found no condition for x_max; the default applies: ",
             ),
         ];
         for (change, expected) in cases {

@@ -112,7 +112,7 @@ fn main() -> ExitCode {
     let mut text = checked(std::fs::read_to_string(about), about.display());
     let _ = writeln!(
         text,
-        "| slot, mm | cells, mm | slot in cells | counted from, to | rate, kg/(m s) | greatest difference of a slice | C | in and out are the whole |\n\
+        "| slot, mm | cells, mm | slot in cells | counted from, to | rate, kg/(m s) | greatest difference of a slice | C | mass in + mass out = total |\n\
          |---|---|---|---|---|---|---|---|"
     );
     let (mut mass, mut rates, mut offset) = (Vec::new(), Vec::new(), Vec::new());

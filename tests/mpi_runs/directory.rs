@@ -49,7 +49,7 @@ fn one_run_at_a_time() {
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         assert_eq!(shown.matches("agimp:").count(), 1, "one message: {shown}");
-        for word in ["out/collapse_2d/collapse_2d.lock: another run writes here", &holder] {
+        for word in ["out/collapse_2d/collapse_2d.lock: found another run that writes here", &holder] {
             assert!(shown.contains(word), "'{word}' is missing: {shown}");
         }
     }

@@ -118,7 +118,7 @@ fn a_damaged_state_is_passed_over() {
         (1, &flipped, "wrong checksum of state/"),
         (2, &flipped, "wrong checksum of state/"),
         (2, &cut, "cut short"),
-        (1, &beside, "the state is whole, and the run goes on from it"),
+        (1, &beside, "the state is complete, and the run continues from it"),
         (3, &beside, "wrong checksum of VTKHDF/"),
         (2, &other_text, "wrong checksum of state/job"),
     ] {

@@ -16,7 +16,7 @@ fn stop(mut running: Running, directory: &Path, name: &str, step: u64, stop: imp
     assert_eq!(output.status.code(), Some(STOPPED), "{shown}");
     let named = shown
         .lines()
-        .filter_map(|line| line.strip_prefix("agimp: stopped on request; go on with --restart "));
+        .filter_map(|line| line.strip_prefix("agimp: stopped on request; continue with --restart "));
     let named: Vec<&str> = named.collect();
     assert_eq!(named.len(), 1, "one message: {shown}");
     let checkpoint = directory.join(named[0]);
@@ -142,7 +142,7 @@ fn refused_with_the_reason() {
                 `materials[0].young` is 300000.0 there and 400000.0 here (title, output";
     refused(2, "collapse_2d.toml", &good, keys);
     changed(&[("end = 0.05", "end = 0.03")]);
-    refused(2, "collapse_2d.toml", &good, "lies behind the end of the run; found time.end = 0.03");
+    refused(2, "collapse_2d.toml", &good, "after the end of the run; found time.end = 0.03");
     std::fs::remove_file(directory.join("collapse_2d.toml")).expect("removed");
 
     let output =

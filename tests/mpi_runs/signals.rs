@@ -16,7 +16,7 @@ fn stops_with_a_checkpoint(running: Running, directory: &Path, what: &str) {
     let output = running.finish_within(SOON);
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(3), "{what}: {shown}");
-    let words = "agimp: stopped on request; go on with --restart ";
+    let words = "agimp: stopped on request; continue with --restart ";
     let checkpoint = shown.lines().find_map(|line| line.strip_prefix(words)).expect("message");
     assert!(directory.join(checkpoint).exists(), "{what}: {shown}");
 }
@@ -121,7 +121,7 @@ fn names_that_are_not_utf_8() {
     let output = Running::start(&mut run(home.path(), 2, 1, &bad, &[])).finish_within(SOON);
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(2), "{shown}");
-    assert_eq!(shown.matches("the name of the file is not UTF-8").count(), 1, "{shown}");
+    assert_eq!(shown.matches("found a file name that is not UTF-8").count(), 1, "{shown}");
     assert!(!home.path().join("out").exists());
 
     succeed(&mut run(home.path(), 1, 1, &job("few_leaves"), &["--quiet"]));

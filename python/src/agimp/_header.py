@@ -87,7 +87,7 @@ def opened(path: Path) -> Iterator[Any]:
 def read_header(path: Path, file: Any) -> Header:
     """The header of an open file; refuses files that are not of agimp or not complete."""
     if GROUP not in file or text(file[GROUP].attrs.get("magic", "")) != MAGIC:
-        raise FileRefused(f"{path}: not a file of agimp (no group 'state' with its mark)")
+        raise FileRefused(f"{path}: not a file written by agimp (no group 'state' with its mark)")
     attributes = file[GROUP].attrs
     if "complete" not in attributes:
         raise FileRefused(f"{path}: incomplete; its writer did not finish")

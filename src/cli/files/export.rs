@@ -27,13 +27,13 @@ pub struct Arguments {
     /// The surface of the material as a mesh of triangles with normals, in 3D: PLY or OBJ.
     #[arg(long, group = "format", value_name = "ply|obj", value_parser = mesh_format)]
     surface: Option<MeshFormat>,
-    /// With --surface: the body of this name alone.
+    /// With --surface: only the body of this name.
     #[arg(long, requires = "surface", value_name = "NAME")]
     body: Option<String>,
-    /// Fields to take along, separated by commas; without it, all that the files show.
+    /// Fields to export, separated by commas; by default all fields of the files.
     #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with = "surface")]
     fields: Option<Vec<PointField>>,
-    /// Directory to write to; without it, beside each file.
+    /// Directory to write to; by default that of each file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -67,7 +67,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     if let Some(directory) = &arguments.out {
         std::fs::create_dir_all(directory).map_err(|error| {
-            Failure::Usage(format!("{}: cannot make the directory: {error}", directory.display()))
+            Failure::Usage(format!("{}: cannot create the directory: {error}", directory.display()))
         })?;
     }
     let place = |file: &Path, ending: &str| {

@@ -22,7 +22,7 @@ struct Contents {
     header: Header,
     size: u64,
     fields: Vec<&'static str>,
-    /// Leaves and particles by level, where the file holds the tree.
+    /// Leaves and particles by level, if the file contains the tree.
     levels: BTreeMap<u8, (u64, u64)>,
 }
 
@@ -37,7 +37,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     write(&mut out, &contents)?;
     if arguments.verify {
         let sets = compare::verify(&arguments.file).map_err(failed)?;
-        write!(out, "checksums        all right ({sets} data sets)")?;
+        write!(out, "checksums        correct ({sets} data sets)")?;
         if contents.header.restart {
             let digest = compare::digest(&arguments.file).map_err(failed)?;
             write!(out, "; digest {:016x}", digest.whole)?;

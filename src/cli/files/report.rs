@@ -11,16 +11,17 @@ use std::path::{Path, PathBuf};
 pub struct Arguments {
     /// Directory of the results of a run, or job file that was run without --out.
     run: PathBuf,
-    /// Name of the job, where the directory holds the results of several.
+    /// Name of the job, if the directory contains the results of several jobs.
     #[arg(long)]
     name: Option<String>,
-    /// Quantity that colours the pictures, as for `agimp plot`; without it, plastic strain if there is any, else the speed.
+    /// Quantity that colours the pictures, as for `agimp plot`; by default plastic strain if there is any, otherwise
+    /// the speed.
     #[arg(long, alias = "color")]
     colour: Option<String>,
-    /// Most pictures: times from the first output to the last.
+    /// Maximum number of pictures, from the first output to the last.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(0..=100))]
     pictures: u8,
-    /// Page to write; without it, NAME.report.html in the directory.
+    /// Page to write; by default NAME.report.html in the directory.
     #[arg(long)]
     out: Option<PathBuf>,
 }

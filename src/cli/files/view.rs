@@ -13,16 +13,16 @@ pub struct Arguments {
     /// Output or checkpoint files of one run, in order of time, or the index of its outputs (NAME.hdf.series).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Fields to take along, separated by commas; without it, all that the files show but identifiers and components.
+    /// Fields to include, separated by commas; by default all fields of the files except identifiers and components.
     #[arg(long, value_delimiter = ',', value_parser = super::field)]
     fields: Option<Vec<PointField>>,
-    /// Bits for each real value; more are finer and make a larger page.
+    /// Bits for each real value; more bits give finer values and a larger page.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(4..=16))]
     bits: u8,
-    /// Title; without it, the name of the first file.
+    /// Title; by default the name of the first file.
     #[arg(long)]
     title: Option<String>,
-    /// Page to write; without it, beside the first file with the ending html.
+    /// Page to write; by default beside the first file with the extension html.
     #[arg(long)]
     out: Option<PathBuf>,
 }

@@ -42,7 +42,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub substeps: u32,
 
-    /// A test of the laboratory in place of a path: the material is first brought under --pressure on all sides
+    /// A laboratory test that replaces a path: it starts from an isotropic stress of --pressure
     #[arg(long, value_enum, conflicts_with = "path")]
     pub test: Option<Trial>,
 
@@ -50,7 +50,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1e5, requires = "test", allow_negative_numbers = true)]
     pub pressure: f64,
 
-    /// Where --test ends, since the confined state: logarithmic strain along z, on all axes (isotropic), or shear (simple_shear) [default: -0.1; simple_shear: 0.2]
+    /// End of --test, measured from the confined state: logarithmic strain along z, along all axes (isotropic), or
+    /// shear (simple_shear) [default: -0.1; simple_shear: 0.2]
     #[arg(long, requires = "test", allow_negative_numbers = true)]
     pub range: Option<f64>,
 
@@ -58,7 +59,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 50, requires = "test", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub rows: u32,
 
-    /// Duration of --test, s; 0: nothing flows by its rate
+    /// Duration of --test, s; 0: no effects of rate
     #[arg(long, default_value_t = 0.0, requires = "test", allow_negative_numbers = true)]
     pub duration: f64,
 
@@ -208,8 +209,7 @@ fn deform(
                 Some(step) => point.deform(&step),
                 None => {
                     let reason =
-                        "the straight line from the row before to this deformation gradient passes a \
-                                  singular one; give rows between them"
+                        "the straight line from the previous row to this deformation gradient contains a singular one; add rows in between"
                             .to_string();
                     return Err(MaterialError::Row { path: place.into(), row: i + 1, reason });
                 }
@@ -313,7 +313,9 @@ mod tests {
         let error = |model: &str, path: &str| result(model, "path.csv", path, 1).unwrap_err();
         assert!(error(METAL, "1,2\n").contains("row 1: expected 3 numbers"));
         assert!(error(METAL, "0,0,0\n0,a,0\n").contains("row 2: 'a' is not a number"));
-        assert!(error(METAL, "1,0,0,0,1,0,0,0,-1\n").contains("determinant above 0"));
+        assert!(
+            error(METAL, "1,0,0,0,1,0,0,0,-1\n").contains("with the determinant -1; expected more than 0")
+        );
         let bad = "model = \"hencky\", young = 1e6, poisson = 0.5";
         assert!(
             error(bad, "0,0,0").contains("poisson = 0.5 is out of range: it must be above -1 and below 0.5")
@@ -392,12 +394,13 @@ mod tests {
         assert!((last_row(&text)[3] + 1e6).abs() < 1.0, "{text}");
         let error = |path: &str| result(METAL, "path.csv", path, 1).unwrap_err();
         assert!(
-            error("strain_zx\n0\n").contains("column 'strain_zx' is not known; there are time, shear, and")
+            error("strain_zx\n0\n")
+                .contains("found the unknown column 'strain_zx'; expected time, shear, and")
         );
         assert!(
             error("strain_xx,stress_xx\n0,0\n").contains("'strain_xx' and 'stress_xx' prescribe the same")
         );
-        assert!(error("strain_xx,time\n0,2\n0,1\n").contains("row 2: time 1 is before 2"));
+        assert!(error("strain_xx,time\n0,2\n0,1\n").contains("row 2: found time 1; expected at least 2"));
         assert!(error("strain_xx,time\n0\n").contains("row 1: expected 2 numbers as in the header, found 1"));
         let beyond = error("strain_xx,stress_yy,stress_zz\n0,0,-3e6\n");
         assert!(

@@ -68,7 +68,7 @@ impl Deformation {
                     Ok(Self::Gradient(gradient))
                 } else {
                     Err(format!(
-                        "a deformation gradient has a determinant above 0, this one has {determinant}"
+                        "found a deformation gradient with the determinant {determinant}; expected more than 0"
                     ))
                 }
             }
@@ -174,7 +174,7 @@ impl Column {
         };
         found.ok_or_else(|| {
             format!(
-                "column '{name}' is not known; there are time, shear, and for each of {} either strain_* (logarithmic) or \
+                "found the unknown column '{name}'; expected time, shear, and for each of {} either strain_* (logarithmic) or \
                  stress_* (Cauchy, Pa)",
                 COMPONENTS.join(", ")
             )
@@ -230,7 +230,7 @@ fn control<'a>(
                 Column::Time if number < time => {
                     return Err(failed(
                         i + 1,
-                        format!("time {number} is before {time}, that of the row before"),
+                        format!("found time {number}; expected at least {time}, that of the previous row"),
                     ));
                 }
                 Column::Time => row.time = number,

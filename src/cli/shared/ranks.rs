@@ -46,7 +46,7 @@ pub(in crate::cli) fn load(comm: &Comm, path: &Path, settings: &Settings) -> Res
     let same = own == *first;
     let reason = || {
         format!(
-            "rank {} has read other files (meshes, records) than rank 0; expected the same on all ranks",
+            "rank {} has read files (meshes, records) that differ from those of rank 0; expected the same on all ranks",
             comm.rank()
         )
     };

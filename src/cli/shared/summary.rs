@@ -63,7 +63,7 @@ pub(in crate::cli) fn write<const D: usize>(
         writeln!(out, "contacts     {}, {} velocity fields", contacts.names.len(), contacts.fields())?;
         for (number, (name, _)) in contacts.names.iter().enumerate() {
             let law = contacts.pairs.iter().find(|pair| usize::from(pair.contact) == number);
-            let law = law.map_or("as others say".into(), |pair| pair.law.to_string());
+            let law = law.map_or("covered by other contacts".into(), |pair| pair.law.to_string());
             writeln!(out, "  {:18} {law}", excerpt(name, NAME))?;
         }
     }
@@ -106,7 +106,7 @@ pub(in crate::cli) fn write<const D: usize>(
     if estimate.is_cut {
         writeln!(
             out,
-            "  Not counted to the end: the tree or the surfaces of bodies are too large. There is more than this."
+            "  The count is incomplete, because the tree or the surfaces of bodies are too large; these are lower bounds."
         )?;
     }
     if let Some(adaptivity) = &problem.adaptivity {
@@ -115,7 +115,7 @@ pub(in crate::cli) fn write<const D: usize>(
     let about = if estimate.is_cut { "more than" } else { "about" };
     writeln!(
         out,
-        "memory       {about} {} per rank on {} at the start; outputs and material that spreads add to it",
+        "memory       {about} {} per rank on {} at the start; outputs and spreading material increase it",
         bytes(estimate.memory_per_rank(ranks)),
         plural(ranks)
     )?;
@@ -125,8 +125,11 @@ pub(in crate::cli) fn write<const D: usize>(
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
     writeln!(
         out,
-        "wall time    {about} {} on {} of this machine's kind, while the counts and the step stay",
-        wall_time(estimate.wall_time(cores)),
+        "wall time    {} on {} of this type, if counts and time step remain constant",
+        match (wall_time(estimate.wall_time(cores)), estimate.is_cut) {
+            (time, false) if time.starts_with("less") => time,
+            (time, _) => format!("{about} {time}"),
+        },
         if cores == 1 { "1 core".into() } else { format!("{cores} cores") }
     )?;
     writeln!(
@@ -153,18 +156,19 @@ fn write_refinement<const D: usize>(
     let merging = if adaptivity.merge.is_some() { "split and merge" } else { "split" };
     writeln!(
         out,
-        "refinement   every {} steps, {} leaves around what is wanted, particles {merging}",
-        adaptivity.every, adaptivity.buffer
+        "refinement   every {} steps, buffer of {}, particles {merging}",
+        adaptivity.every,
+        if adaptivity.buffer == 1 { "1 leaf".into() } else { format!("{} leaves", adaptivity.buffer) }
     )?;
     for criterion in &adaptivity.criteria {
         writeln!(out, "  level {:5}        {}", criterion.level, criterion.describe())?;
     }
     writeln!(
         out,
-        "  Counts and memory are those {}; time step and steps are for the finest level",
+        "  Counts and memory are those {}; time step and steps assume the finest level",
         if is_refined { "at the start, with the criteria" } else { "of the job's tree, before the criteria" }
     )?;
-    writeln!(out, "  that criteria want.")
+    writeln!(out, "  that the criteria request.")
 }
 
 fn plural(ranks: u32) -> String {

@@ -23,10 +23,10 @@ pub enum ReadError {
     #[error("it cannot be read: {0}")]
     System(#[from] std::io::Error),
     /// It has another ending.
-    #[error("its name ends with neither .stl, .obj nor .ply")]
+    #[error("its name does not end with .stl, .obj or .ply")]
     Kind,
     /// It is damaged.
-    #[error("it is no {kind} file, or damaged: {reason}")]
+    #[error("it is not a valid {kind} file: {reason}")]
     Damaged {
         /// What it should be.
         kind: &'static str,
@@ -55,7 +55,7 @@ pub fn read(path: &Path) -> Result<Triangles, ReadError> {
     match triangles.indices.iter().flatten().find(|&&corner| corner as usize >= count) {
         Some(corner) => Err(ReadError::Damaged {
             kind: "mesh",
-            reason: format!("a triangle names the vertex {corner}, and there are {count}"),
+            reason: format!("a triangle refers to the vertex {corner}, but there are only {count}"),
         }),
         None => Ok(triangles),
     }
@@ -132,7 +132,7 @@ pub fn ply_columns(bytes: &[u8]) -> Result<Vec<(String, Vec<f64>)>, ReadError> {
     let columns = numbers.map(|(name, _)| {
         let values = vertices.iter().map(|vertex| property(vertex, name).and_then(number));
         let values: Option<Vec<f64>> = values.collect();
-        Ok((name.to_string(), values.ok_or_else(|| damaged("a vertex lacks a number"))?))
+        Ok((name.to_string(), values.ok_or_else(|| damaged("a vertex has too few numbers"))?))
     });
     columns.collect()
 }

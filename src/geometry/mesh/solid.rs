@@ -14,7 +14,7 @@ pub enum NotSolid {
     Empty,
     /// A vertex is not at a place.
     #[error(
-        "found the vertex {0} with a coordinate that is no number below 1e12 m; expected finite coordinates"
+        "found the vertex {0} with a coordinate that is not a number below 1e12 m; expected finite coordinates"
     )]
     Vertex(usize),
     /// Edges with a triangle on one side only.
@@ -31,15 +31,14 @@ pub enum NotSolid {
     },
     /// Neighbours of which one faces in and one out.
     #[error(
-        "found neighbouring triangles near {} of which one faces in and one out; expected one orientation (in a mesh program: \"recalculate \
+        "found neighbouring triangles near {} , one facing inwards and one outwards; expected one orientation (in a mesh program: \"recalculate \
          normals\"), or solid = \"winding\"",
         point(.0)
     )]
     Turned([f64; 3]),
     /// Triangles go through each other.
     #[error(
-        "found {count} pairs of triangles that cross, the first the {}th and the {}th of the file near {}; expected a surface that does not \
-         cross itself, or solid = \"winding\", which fills what overlaps",
+        "found {count} pairs of triangles that intersect, the first the {}th and the {}th of the file near {}; expected a surface that does not intersect itself, or solid = \"winding\", which fills overlaps",
         triangles[0],
         triangles[1],
         point(near)
@@ -56,7 +55,7 @@ pub enum NotSolid {
     #[error("found a surface around a volume of {}; expected one with a volume", quantity(*.0, "m³"))]
     Flat(f64),
     /// The library refuses it.
-    #[error("found a surface that cannot be used: {0}; expected a closed one without crossings")]
+    #[error("found a surface that cannot be used: {0}; expected a closed surface without self-intersections")]
     Refused(String),
 }
 

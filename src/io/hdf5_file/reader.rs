@@ -153,7 +153,9 @@ impl Reader {
             };
             if !is_hard {
                 let link = &object[..end];
-                return Err(self.refuse(format!("{link} is a link to another place, which is not followed")));
+                return Err(
+                    self.refuse(format!("{link} is a link to another location; agimp does not follow it"))
+                );
             }
         }
         Ok(true)
@@ -175,14 +177,13 @@ impl Reader {
                 && H5Pget_external_count(list.id) == 0
                 && H5Pget_nfilters(list.id) == 0;
             if !plain {
-                let reason = "is in pieces, packed or in another file; this program writes none such";
+                let reason =
+                    "is chunked, compressed or external; expected a contiguous data set, as agimp writes it";
                 return Err(self.refuse(format!("{dataset} {reason}")));
             }
             let kind = self.wrap(H5Dget_type(set.id), H5Tclose, dataset)?;
             let Some(kind) = Kind::of_type(kind.id) else {
-                return Err(
-                    self.refuse(format!("{dataset} holds no numbers of a kind that this program writes"))
-                );
+                return Err(self.refuse(format!("{dataset} holds no numbers of a type that agimp writes")));
             };
             let space = self.wrap(H5Dget_space(set.id), H5Sclose, dataset)?;
             let rank = H5Sget_simple_extent_ndims(space.id);
@@ -224,7 +225,7 @@ impl Reader {
         }
         if offset.checked_add(rows).is_none_or(|end| end > stored.rows) {
             let held = stored.rows;
-            let reason = format!("{dataset} has {held} rows; {rows} from row {offset} were asked for");
+            let reason = format!("{dataset} has {held} rows; expected {rows} from row {offset}");
             return Err(self.refuse(reason));
         }
         // Both are at most the bytes of the data set, which lies within the file.

@@ -34,7 +34,7 @@ fn rows_times_width_beyond_64_bits_take_no_memory() {
     for (rows, width) in [(1 << 61, 8), (1 << 62, 4), (1 << 34, 1)] {
         declaring(&path, [rows, width], Some([64, width]), Kind::U8);
         let error = Reader::open_alone(&path).unwrap().read_slab::<u8>("rows", 0, rows).unwrap_err();
-        assert!(error.to_string().contains("wraps.hdf: rows is in pieces"), "{error}");
+        assert!(error.to_string().contains("wraps.hdf: rows is chunked"), "{error}");
     }
 }
 

@@ -56,7 +56,7 @@ impl std::str::FromStr for Clip {
 
     /// `x<0.5` keeps what lies below 0.5 m, `z>1` what lies above 1 m.
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "expected what stays, such as x<0.5 or z>1".to_owned();
+        let expected = || "expected the half space to keep, such as x<0.5 or z>1".to_owned();
         let place = text.find(['<', '>']).ok_or_else(expected)?;
         let (name, at) = (text[..place].trim(), text[place + 1..].trim());
         let axis = ["x", "y", "z"].iter().position(|axis| *axis == name).ok_or_else(expected)?;
@@ -77,7 +77,7 @@ impl Clip {
 /// What was expected.
 pub fn place(text: &str) -> Result<[f64; 3], String> {
     let two = || numbers::<2>(text).map(|[x, y]| [x, y, 0.0]);
-    numbers::<3>(text).or_else(two).ok_or_else(|| "expected a place in m, such as 0.5,0,0.2".into())
+    numbers::<3>(text).or_else(two).ok_or_else(|| "expected a position in m, such as 0.5,0,0.2".into())
 }
 
 /// What a series of pictures shares.

@@ -23,7 +23,7 @@ pub fn particles<const D: usize>(path: &Path, body: &str, origin: &[f64; D]) -> 
                 header.bodies.iter().take(9).map(|name| format!("\"{}\"", crate::text::excerpt(name, 40)));
             let names: Vec<String> = names.collect();
             return Err(file.refuse(format!(
-                "it has the bodies {}, and none with the name of this body, \"{}\"",
+                "it has the bodies {}, but none with the name of this body, \"{}\"",
                 names.join(", "),
                 crate::text::excerpt(body, 40)
             )));
@@ -33,10 +33,12 @@ pub fn particles<const D: usize>(path: &Path, body: &str, origin: &[f64; D]) -> 
         return Err(file.refuse("it holds no restart state (output with `restart = false`, or a tree)"));
     }
     if header.dimension != D {
-        return Err(file.refuse(format!("it is of a {}D run, the job is {D}D", header.dimension)));
+        return Err(file.refuse(format!("it is from a {}D run, but the job is {D}D", header.dimension)));
     }
     if !super::compatible(&header.program) {
-        return Err(file.refuse(format!("it is of agimp {}, whose states are others", header.program)));
+        return Err(
+            file.refuse(format!("it is from agimp {}, which uses another format of states", header.program))
+        );
     }
     let shift: [f64; D] = std::array::from_fn(|a| header.origin.get(a).copied().unwrap_or(0.0) - origin[a]);
     let mut checked = Checked::new(None, &file, &header);

@@ -227,7 +227,7 @@ impl Header {
 
     fn read_here(file: &Reader) -> Result<Self, FileError> {
         if !file.exists(GROUP) || file.text(GROUP, "magic").ok().as_deref() != Some(MAGIC) {
-            return Err(file.refuse("not a file of agimp (no group 'state' with its mark)"));
+            return Err(file.refuse("not a file written by agimp (no group 'state' with its mark)"));
         }
         let one = |name| -> Result<u64, FileError> { only(file, name, file.attribute(GROUP, name)?) };
         let real = |name| -> Result<f64, FileError> { only(file, name, file.attribute(GROUP, name)?) };
@@ -238,13 +238,12 @@ impl Header {
         let (format, program) = (one("format")?, file.text(GROUP, "program")?);
         if format != FORMAT {
             return Err(file.refuse(format!(
-                "written in format {format} by agimp {program}; this is agimp {}, which reads format {FORMAT}: use the \
-                 program that wrote it, or run the job anew",
+                "written in format {format} by agimp {program}; this is agimp {}, which reads format {FORMAT}: use the program that wrote it, or run the job again",
                 env!("CARGO_PKG_VERSION")
             )));
         }
         if !file.has_attribute(GROUP, "complete") {
-            return Err(file.refuse("the file is incomplete: its writer did not finish"));
+            return Err(file.refuse("the file is incomplete: its program did not finish writing"));
         }
         let mut words = file.attribute::<i64>(GROUP, "exact")?.into_iter();
         let lengths = file.attribute::<u64>(GROUP, "exact_lengths")?;
@@ -293,25 +292,25 @@ impl Header {
     fn check(&self) -> Result<(), String> {
         let Self { dimension, origin, root_edge, roots, time, dt, step, .. } = self;
         if !(2..=3).contains(dimension) {
-            return Err(format!("the header says {dimension} dimensions; expected 2 or 3"));
+            return Err(format!("the header has {dimension} dimensions; expected 2 or 3"));
         }
         if origin.len() != *dimension || roots.len() != *dimension {
-            return Err(format!("the header's domain has not {dimension} axes"));
+            return Err(format!("the domain in the header does not have {dimension} axes"));
         }
         let most = u64::from(u32::MAX >> MAX_LEVEL);
         if let Some(count) = roots.iter().find(|&&count| count == 0 || count > most) {
-            return Err(format!("the header says {count} root octants along an axis; expected 1 to {most}"));
+            return Err(format!("the header has {count} root octants along an axis; expected 1 to {most}"));
         }
         if !(origin.iter().all(|x| x.is_finite()) && root_edge.is_finite() && *root_edge > 0.0) {
             return Err(format!("the header's domain is at {origin:?} m with roots of {root_edge:?} m"));
         }
         for (name, value) in [("time", time), ("last step", dt)] {
             if !(value.is_finite() && *value >= 0.0) {
-                return Err(format!("the header says a {name} of {value:?} s; expected 0 or more"));
+                return Err(format!("the header has a {name} of {value:?} s; expected 0 or more"));
             }
         }
         if *step > MOST_STEPS {
-            return Err(format!("the header says {step} steps; no run makes more than {MOST_STEPS}"));
+            return Err(format!("the header has {step} steps; expected at most {MOST_STEPS}"));
         }
         if let Some((name, _)) = self.scalars.reals.iter().find(|(_, value)| value.is_nan()) {
             return Err(format!("the scalar {name} is not a number"));

@@ -170,10 +170,10 @@ pub fn read<const D: usize>(
     let reason = if !header.restart {
         Some("the file holds no restart state (output with `restart = false`, or a tree)".to_owned())
     } else if header.dimension != D {
-        Some(format!("the file is of a {}D run, the job is {D}D", header.dimension))
+        Some(format!("the file is from a {}D run, but the job is {D}D", header.dimension))
     } else if !compatible(&header.program) {
         let (theirs, ours) = (&header.program, env!("CARGO_PKG_VERSION"));
-        Some(format!("written by agimp {theirs}, whose states this version ({ours}) may not continue"))
+        Some(format!("written by agimp {theirs}, whose states this version ({ours}) cannot continue"))
     } else {
         job_digest.filter(|&ours| ours != header.job_digest).map(|ours| {
             format!(

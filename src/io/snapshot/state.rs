@@ -333,7 +333,7 @@ fn bounded(file: &Reader, header: &Header, counts: &[u64]) -> Result<(), FileErr
     match sum {
         Some(sum) if sum <= header.particles && header.particles <= held => Ok(()),
         _ => Err(file.refuse(format!(
-            "the leaves hold more than the {} particles that the header says, or the file's {held}",
+            "the leaves hold more particles than the header ({}) or the file ({held})",
             header.particles
         ))),
     }
@@ -348,7 +348,7 @@ pub(super) fn check_tree<const D: usize>(
 ) -> Result<(), FileError> {
     if particles != header.particles {
         let said = header.particles;
-        return Err(file.refuse(format!("the leaves hold {particles} particles, the header says {said}")));
+        return Err(file.refuse(format!("the leaves hold {particles} particles, but the header has {said}")));
     }
     let inside = |octant: &Octant<D>| {
         let mut axes = octant.coord.iter().zip(&header.roots);

@@ -106,7 +106,7 @@ fn criterion<const D: usize>(
         checks.fault(
             &path.key("coarsen"),
             format!(
-                "found {}; expected at {side} {key} = {}, or leaves would flicker",
+                "found {}; expected at {side} {key} = {}, or leaves would refine and coarsen in turn",
                 number(coarsen),
                 number(refine)
             ),
@@ -152,7 +152,7 @@ fn ways<const D: usize>(checks: &mut Checks, ways: &[Way], path: &Path) -> Optio
         let here = path.index(i);
         if let Some(before) = knots.last().filter(|before| before.time >= way.time) {
             let message = format!(
-                "found {}; expected more than {} of the row before",
+                "found {}; expected more than {} of the previous row",
                 number(way.time),
                 number(before.time)
             );

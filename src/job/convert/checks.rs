@@ -107,7 +107,7 @@ impl Checks<'_> {
         if names.is_empty() {
             self.fault(
                 path,
-                "found an empty array; expected at least one body, or no such key for all".into(),
+                "found an empty array; expected at least one body, or no key for all bodies".into(),
             );
             return None;
         }

@@ -128,7 +128,8 @@ fn law(checks: &mut Checks, written: &BodyContact, path: &Path) -> Option<PairLa
         PairKind::Slip => ("slip", PairLaw::Slip),
     };
     let Some((key, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Some(law) };
-    let message = format!("found {key} with kind = \"{name}\"; expected it with kind = \"separating\" only");
+    let message =
+        format!("found {key} with kind = \"{name}\"; expected `{key}` only with kind = \"separating\"");
     checks.fault(&path.key(*key), message);
     None
 }

@@ -172,7 +172,7 @@ pub(super) fn at_nodes<const D: usize>(
 ) -> Option<Quantity> {
     let quantity = quantity::<D>(checks, written, path)?;
     if quantity.names_undeformed() {
-        let message = "found X, Y or Z, places of the undeformed body, in what acts at places of the domain; expected x, y, z and t";
+        let message = "found X, Y or Z, positions in the undeformed body; expected x, y, z and t, positions in the domain";
         checks.fault(path, message.into());
         return None;
     }

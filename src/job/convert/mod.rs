@@ -183,7 +183,7 @@ fn problem<const D: usize>(
         let point = space.words(&overlap.point);
         checks.fault(
             &root.key("bodies").index(overlap.bodies[1]).key("shape"),
-            format!("found the body \"{second}\" overlapping \"{first}\" at {point}; expected bodies that share no point"),
+            format!("found the body \"{second}\" overlapping \"{first}\" at {point}; expected bodies without a common point"),
         );
     }
     Some(problem)
@@ -197,7 +197,7 @@ pub(super) fn gravity<const D: usize>(
 ) -> Option<Gravity<D>> {
     let components = vector::<D>(checks, written, path)?;
     for (axis, _) in components.iter().enumerate().filter(|(_, component)| component.depends_on_place()) {
-        let message = "found an expression of place; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
+        let message = "found an expression of position; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
         checks.fault(&path.index(axis), message.into());
     }
     Some(Gravity { acceleration: components, start: 0.0 })
@@ -279,7 +279,7 @@ fn tree<const D: usize>(
         if inside.is_empty() {
             checks.fault(
                 &here.key("shape"),
-                "found a region outside the domain; expected one that meets it".into(),
+                "found a region outside the domain; expected one that intersects it".into(),
             );
         }
         regions.push(Region { shape, level: region.level });
@@ -383,7 +383,7 @@ fn body<const D: usize>(
         Written::Particles { file } => {
             if body.stress.is_some() {
                 let message =
-                    "found a stress; expected none beside particles from a file, which has their stress";
+                    "found a stress; expected none with particles from a file, which contains their stress";
                 checks.fault(&path.key("stress"), message.into());
             }
             let setup = material_setup(&file_of.materials[material?]);

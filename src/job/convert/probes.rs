@@ -88,8 +88,7 @@ pub(super) fn fluxes<const D: usize>(
             }
             (None, None, Some(_)) if written.min.is_some() || written.max.is_some() => {
                 let key = if written.min.is_some() { "min" } else { "max" };
-                let message =
-                    "found a box at a face of the domain; expected one at a plane, with point and normal";
+                let message = "found a box at a face of the domain; expected a box at a plane only, with point and normal";
                 checks.fault(&here.key(key), message.into());
                 None
             }
@@ -100,8 +99,11 @@ pub(super) fn fluxes<const D: usize>(
             _ => {
                 let message =
                     "expected either a plane, point = [...] and normal = [...], or face = \"y_min\"";
-                let found =
-                    if written.face.is_some() { "a face and a plane" } else { "no whole plane and no face" };
+                let found = if written.face.is_some() {
+                    "a face and a plane"
+                } else {
+                    "neither a complete plane nor a face"
+                };
                 checks.fault(&here, format!("found {found}; {message}"));
                 None
             }
@@ -214,11 +216,11 @@ pub(super) fn maps<const D: usize>(
         if size[0] < 1.0 || size[1] < 1.0 {
             checks.fault(
                 &here.key("max"),
-                "found a corner that is not above min; expected a larger one".into(),
+                "found a corner that is not above `min`; expected a greater one".into(),
             );
         } else if size[0] * size[1] > MOST_CELLS {
             let message = format!(
-                "found a raster of {} x {} cells; expected at most {MOST_CELLS} cells, so a larger cell",
+                "found a raster of {} x {} cells; expected at most {MOST_CELLS} cells; use a larger cell",
                 size[0], size[1]
             );
             checks.fault(&here.key("cell"), message);

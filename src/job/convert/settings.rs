@@ -80,13 +80,13 @@ pub(in crate::job) fn numerics(
     if let (Some(_), false) = (numerics.flip, numerics.transfer == file::Transfer::Flip) {
         checks.fault(
             &path.key("flip"),
-            "found a share of FLIP; expected it only with transfer = \"flip\"".into(),
+            "found a share of FLIP; expected `flip` only with transfer = \"flip\"".into(),
         );
     }
     if numerics.xpic_order.is_some() && numerics.transfer != file::Transfer::Xpic {
         checks.fault(
             &path.key("xpic_order"),
-            "found an order of XPIC; expected it only with transfer = \"xpic\"".into(),
+            "found an order of XPIC; expected `xpic_order` only with transfer = \"xpic\"".into(),
         );
     }
     let transfer = match numerics.transfer {
@@ -97,7 +97,10 @@ pub(in crate::job) fn numerics(
     };
     let here = path.key("box_stretch");
     if numerics.box_stretch.is_some() && numerics.boxes != file::Boxes::Volume {
-        checks.fault(&here, "found bounds of the stretch; expected them only with boxes = \"volume\"".into());
+        checks.fault(
+            &here,
+            "found bounds of the stretch; expected `box_stretch` only with boxes = \"volume\"".into(),
+        );
     }
     let [min_stretch, max_stretch] = numerics.box_stretch.unwrap_or([0.25, 2.0]);
     if min_stretch <= 0.0 || min_stretch > 1.0 || !(1.0..=8.0).contains(&max_stretch) {
@@ -125,7 +128,7 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
         Some(directory) if directory.trim().is_empty() => {
             checks.fault(
                 &path.key("directory"),
-                "found an empty text; expected the name of a directory".into(),
+                "found an empty string; expected the name of a directory".into(),
             );
             String::new()
         }

@@ -19,7 +19,8 @@ pub(super) fn stages<const D: usize>(
         return Some(vec![Stage::whole_run(equilibrium(file, file.equilibrium.as_ref()))]);
     }
     if file.equilibrium.is_some() {
-        let message = "found [equilibrium] in a job with stages; expected it in the stages that end with it";
+        let message =
+            "found [equilibrium] in a job with stages; expected `equilibrium` in the stages that end with it";
         checks.fault(&root.key("equilibrium"), message.into());
     }
     let here = root.key("stages");
@@ -53,11 +54,11 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         checks.fault(path, message);
     }
     if index == 0 && written.at_rest {
-        let message = "found it in the first stage; expected it in a later one: bodies begin with the velocity that they say";
+        let message = "found `at_rest` in the first stage; expected `at_rest` in a later stage: bodies start with their own `velocity`";
         checks.fault(&path.key("at_rest"), message.into());
     }
     if written.reset_displacement && settings::followed(&file.output).motion == Motion::Nothing {
-        let message = "found it where displacements are not followed; expected \"displacement\" or \"strain\" among output.fields";
+        let message = "found `reset_displacement`, but the job does not follow displacements; expected \"displacement\" or \"strain\" among output.fields";
         checks.fault(&path.key("reset_displacement"), message.into());
     }
     let begins: f64 = file.stages[..index].iter().map(|stage| stage.duration.unwrap_or(0.0)).sum();
@@ -79,7 +80,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
             comes.and_then(|name| file.stages.iter().position(|stage| stage.name == *name)).unwrap_or(0);
         if index <= comes {
             let message = format!(
-                "found the body \"{}\", which is not there before this stage; expected one that is",
+                "found the body \"{}\", which does not exist before this stage; expected an existing body",
                 excerpt(name, QUOTED)
             );
             checks.fault(&here, message);

@@ -41,7 +41,7 @@ pub(super) fn fields<const D: usize>(
 /// A fault for what changes in time.
 fn is_field(checks: &mut Checks, quantity: &Quantity, path: &Path) -> bool {
     if quantity.depends_on_time() {
-        let message = "found a quantity that changes in time; expected a number or an expression of place: it holds at the start";
+        let message = "found a quantity that changes in time; expected a number or an expression of position, for the start";
         checks.fault(path, message.into());
     }
     !quantity.depends_on_time()
@@ -94,7 +94,7 @@ pub(super) fn stress<const D: usize>(
                 let [before, depth] = [pair[0][0], pair[1][0]].map(number);
                 checks.fault(
                     &here.index(row + 1).index(0),
-                    format!("found a depth of {depth} m after {before} m; expected depths that increase"),
+                    format!("found a depth of {depth} m after {before} m; expected increasing depths"),
                 );
             }
             StressKind::Depth { rows: table.clone(), surface: surface_of(checks, surface)? }
@@ -140,7 +140,7 @@ fn consolidation(
         (Some(_), Some(_)) => {
             checks.fault(
                 &path.key("preconsolidation"),
-                "found it beside `ocr`; expected one of the two".into(),
+                "found both `preconsolidation` and `ocr`; expected one of them".into(),
             );
             return None;
         }
@@ -169,7 +169,7 @@ fn needs_vertical_gravity(checks: &mut Checks, file: &JobFile, path: &Path) -> O
     }
     let found = if present == 0 { "no gravity" } else { "gravity along several axes" };
     let message = format!(
-        "found {found}; expected one component of gravity that is not 0, which says where up is, or a stress of kind \"components\""
+        "found {found}; expected one component of gravity that is not 0, which defines the vertical direction, or a stress of kind \"components\""
     );
     checks.fault(&path.key("kind"), message);
     None

@@ -45,7 +45,7 @@ pub enum JobError {
         most: u64,
     },
     /// Files of the run could not be named after the job.
-    #[error("{}: the name of the file is not UTF-8; expected one that is, since results take it over", path.display())]
+    #[error("{}: found a file name that is not UTF-8; expected UTF-8, because results use the name", path.display())]
     Name {
         /// The file.
         path: PathBuf,

@@ -216,11 +216,11 @@ impl Reader {
         let path = asking.path.parent().unwrap_or(Path::new("")).join(name);
         if path.exists() && !path.is_file() {
             return Err(refuse(format!(
-                "found \"{shown}\", which is no plain file; expected a file of TOML"
+                "found \"{shown}\", which is not a regular file; expected a TOML file"
             )));
         }
         let bytes = crate::job::read(&path).map_err(|error| {
-            refuse(format!("found \"{shown}\", which cannot be included: {error}; expected a file of TOML, its name relative to that of this file"))
+            refuse(format!("found \"{shown}\", which cannot be included: {error}; expected a TOML file, its name relative to that of this file"))
         })?;
         let true_name = path.canonicalize().unwrap_or_else(|_| path.clone());
         if self.open.contains(&true_name) {
@@ -230,7 +230,7 @@ impl Reader {
         }
         if self.seen.contains(&true_name) {
             return Err(refuse(format!(
-                "found \"{shown}\" a second time; expected each file once, also among what others include"
+                "found \"{shown}\" a second time; expected each file once, including nested includes"
             )));
         }
         self.bytes += bytes.len();

@@ -37,11 +37,12 @@ impl Settings {
         // Messages about jobs have `materials[0]`.
         let dotted = path.trim().replace('[', ".").replace(']', "");
         let keys = Key::parse(&dotted).map_err(|_| {
-            refuse("found a key that cannot be read; expected one such as time.end or materials.sand.density")
+            refuse("found an invalid key; expected one such as time.end or materials.sand.density")
         })?;
         let keys = keys.iter().map(|key| key.get().to_owned()).collect();
-        let value = read(value.trim())
-            .ok_or_else(|| refuse("found a value that cannot be read; expected one of TOML, such as 0.5, [0, -9.81] or \"text\""))?;
+        let value = read(value.trim()).ok_or_else(|| {
+            refuse("found an invalid value; expected a TOML value, such as 0.5, [0, -9.81] or \"text\"")
+        })?;
         self.0.push(Setting { typed, keys, value });
         Ok(())
     }
@@ -388,9 +389,9 @@ density = 1000
         }
         for (text, message) in [
             ("time.end", "found no \"=\""),
-            ("a..b=1", "found a key"),
-            ("a=[1", "found a value"),
-            ("=1", "found a key"),
+            ("a..b=1", "found an invalid key"),
+            ("a=[1", "found an invalid value"),
+            ("=1", "found an invalid key"),
         ] {
             let error = Settings::default().set(text).expect_err(text);
             assert!(error.contains(message), "{error}");

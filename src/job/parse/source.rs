@@ -108,7 +108,7 @@ impl Node {
     pub(crate) fn describe(&self) -> String {
         let mut words = String::new();
         let written = match &self.value {
-            Value::Text(text) => write!(words, "the text \"{}\"", excerpt(text, QUOTED)),
+            Value::Text(text) => write!(words, "the string \"{}\"", excerpt(text, QUOTED)),
             Value::Integer(number) => write!(words, "{number}"),
             Value::Float(number) => words.write_str(&written(*number)),
             Value::Boolean(flag) => write!(words, "{flag}"),

@@ -216,7 +216,7 @@ impl<'s> Checker<'s> {
             }
             let whole = path.key(key.clone()).to_string();
             if let Some((_, why)) = GONE.iter().find(|(gone, _)| *gone == whole) {
-                let (message, span) = (format!("the key `{key}` is gone: {why}"), inner.key_span.clone());
+                let (message, span) = (format!("the key `{key}` was removed: {why}"), inner.key_span.clone());
                 self.faults.push(Fault {
                     key: whole,
                     message,
@@ -344,7 +344,7 @@ pub(in crate::job) fn plain(limit: f64) -> String {
 fn type_words(name: &str, layers: &Layers<'_>) -> String {
     match name {
         "object" => "a table".into(),
-        "string" => "a text".into(),
+        "string" => "a string".into(),
         "boolean" => "true or false".into(),
         "array" => {
             let kind = layers.keyword("items").and_then(|items| items.get("type")?.as_str());

@@ -105,7 +105,7 @@ pub enum Motion {
         rows: Vec<Row>,
     },
     /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
-    /// touches within a cell of its surface. Unless `collides = false` it meets the faces of the
+    /// touches within a cell of its surface. Unless `collides = false` it collides with the faces of the
     /// domain, other than `symmetric`, `outflow` and `absorbing` ones, and other colliders.
     Free {
         /// Mass, kg; in 2D of one metre of thickness. Either this or `density`.

@@ -291,7 +291,7 @@ pub struct Body {
     /// Name of the stage at whose start it comes, into the cells that the tree then has; it is there from the start by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
-    /// Stress at the start; none by default. With it, `density` is that of the body as it stands, under its stress.
+    /// Stress at the start; none by default. With it, `density` is the initial density of the body, under this stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Stress>,
 }
@@ -354,8 +354,8 @@ pub struct Equilibrium {
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub acceleration: f64,
     /// Whether the material of fine cells moves with more mass than it has, fourfold for each level above `tree.base_level`, so that the
-    /// coarsest cells set the time step. Weight and all other forces are those of its own mass, so the equilibrium is the same; the way
-    /// to it is none of physics.
+    /// coarsest cells set the time step. Weight and all other forces are those of its own mass, so the equilibrium is the
+    /// same; the motion before it is not physical.
     #[serde(default)]
     pub mass_scaling: bool,
 }

@@ -23,6 +23,5 @@ pub mod stress;
 /// Keys that files of earlier versions may have: path, and why the key is gone with what to do.
 pub(super) const GONE: [(&str, &str); 1] = [(
     "adaptivity.travel",
-    "it saved 1 % of the time and let the material outrun the fine leaves; the tree changes every adaptivity.every_steps \
-     steps. Remove it, and raise every_steps where regrids cost too much",
+    "the tree changes every adaptivity.every_steps steps; remove the key, and increase every_steps if regrids take too much time",
 )];

@@ -13,7 +13,7 @@ pub fn reference() -> String {
     let mut out = String::from(
         "# Job file\n\n\
          Made by `agimp schema --markdown`; do not edit. All quantities are in SI units. `agimp new` writes commented\n\
-         examples, `agimp check` says what a job will take.\n\n\
+         examples, `agimp check` estimates the size and the duration of a job.\n\n\
          ## The file\n\n",
     );
     keys(&mut out, &schema);
@@ -88,14 +88,19 @@ fn value(property: &Value) -> String {
     match kind {
         "array" => {
             let count = match (property["minItems"].as_u64(), property["maxItems"].as_u64()) {
-                (Some(least), Some(most)) if least == most => format!("{least} of "),
-                (Some(least), Some(most)) => format!("{least} or {most} of "),
-                _ => "list of ".to_owned(),
+                (Some(least), Some(most)) if least == most => least.to_string(),
+                (Some(least), Some(most)) if most == least + 1 => format!("{least} or {most}"),
+                (Some(least), Some(most)) => format!("{least} to {most}"),
+                _ => "list".to_owned(),
             };
-            format!("{count}{}", value(&property["items"]))
+            match value(&property["items"]).as_str() {
+                "string" if count == "list" => "list of strings".to_owned(),
+                "string" => format!("{count} strings"),
+                items => format!("{count} of {items}"),
+            }
         }
         "boolean" => "`true` or `false`".to_owned(),
-        "string" => "text".to_owned(),
+        "string" => "string".to_owned(),
         kind => {
             let bound = |key: &str, sign: &str| {
                 property[key].as_f64().map(|limit| format!("{sign} {}", plain(limit)))

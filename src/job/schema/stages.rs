@@ -40,7 +40,7 @@ pub struct Stage {
 }
 
 /// A body gets another material. The elastic strain of its particles stays, so stress follows the new elastic constants; so do masses and
-/// volumes. History variables stay between materials that have the same ones, and begin anew otherwise.
+/// volumes. History variables stay between materials that have the same ones, and are reset otherwise.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewMaterial {

@@ -49,8 +49,7 @@ impl Target {
 /// No strain has the stress that is asked for.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error(
-    "no deformation found with {wanted}; the nearest has {found}. Either the material cannot carry \
-     it, as beyond failure, or the row is too far from the one before: give rows between them or more --substeps"
+    "found no deformation with {wanted}; the nearest has {found}. Either the material cannot carry it, as after failure, or the row is too far from the previous one: add rows in between or increase --substeps"
 )]
 pub struct NoSolution {
     wanted: String,

@@ -60,7 +60,7 @@ pub struct OutOfRange {
 #[derive(Debug, thiserror::Error)]
 pub enum NotAModel {
     /// It is no valid TOML, or has not the keys of a model.
-    #[error("the model cannot be understood: {0}")]
+    #[error("the model cannot be read: {0}")]
     Form(#[from] toml::de::Error),
     /// A parameter is out of range.
     #[error("the model cannot be used: {0}")]

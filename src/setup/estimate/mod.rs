@@ -21,8 +21,7 @@ pub enum EstimateError {
     Seed(#[from] SeedError),
     /// The steps cannot be counted.
     #[error(
-        "{}:1:1: time: found a first time step of {time_step:e} s and an end of {end:e} s; expected steps that can be counted: \
-         look at root_edge, young, density, velocities and cfl",
+        "{}:1:1: time: found an initial time step of {time_step:e} s and an end of {end:e} s; expected a countable number of steps: check root_edge, young, density, velocities and cfl",
         path.display()
     )]
     Steps {

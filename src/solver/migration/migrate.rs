@@ -21,8 +21,7 @@ const TAG: u16 = 12;
 pub enum MigrateError {
     /// A particle has left the domain and the job does not allow it.
     #[error(
-        "particle {id} left the domain at {}, {} beyond `{face}`; `boundaries.leaving` says what to do with such particles, \
-         and faces of kind `outflow` let them go",
+        "particle {id} left the domain at {}, {} beyond `{face}`; set `boundaries.leaving` for such particles, or use a face of kind `outflow`",
         place(position),
         quantity(*beyond, "m")
     )]

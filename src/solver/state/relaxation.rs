@@ -81,10 +81,7 @@ impl std::fmt::Display for Relaxation {
         let Self { speed, acceleration, stops, .. } = *self;
         let [speed, acceleration] =
             [(speed, "m/s"), (acceleration, "m/s²")].map(|(v, unit)| quantity(v, unit));
-        write!(
-            f,
-            "peaks passed: {stops}, the last with {speed}; unbalanced {acceleration} (root mean squares)"
-        )
+        write!(f, "peaks: {stops}, the last with {speed}; unbalanced {acceleration} (root mean squares)")
     }
 }
 

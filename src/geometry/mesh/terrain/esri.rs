@@ -12,14 +12,15 @@ pub(super) fn parse(text: &str, placing: &Placing) -> Result<Raster, String> {
     }) {
         let mut words = line.split_whitespace();
         if let (Some(key), Some(value)) = (words.next(), words.next()) {
-            let value: f64 = value.parse().map_err(|_| format!("{key} is {value:?}, no number"))?;
+            let value: f64 =
+                value.parse().map_err(|_| format!("{key} is {value:?}, which is not a number"))?;
             header.insert(key.to_ascii_lowercase(), value);
         }
     }
     let given = |key: &str| header.get(key).copied();
     let count = |key: &str| match given(key) {
         Some(count) if count >= 2.0 && count <= MOST as f64 && count.fract() == 0.0 => Ok(count as u64),
-        Some(count) => Err(format!("{key} is {count}; 2 to {MOST} are possible")),
+        Some(count) => Err(format!("{key} is {count}; expected 2 to {MOST}")),
         None => Err(format!("its header has no {key}")),
     };
     let [columns, rows] = checked_size([count("ncols")?, count("nrows")?])?;

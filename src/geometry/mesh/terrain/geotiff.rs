@@ -62,7 +62,7 @@ fn place(
         (_, _, Some([dx, xy, _, x, yx, dy, _, y, ..])) if *xy == 0.0 && *yx == 0.0 => {
             ([*dx, -*dy], [0.0; 2], [*x, *y])
         }
-        (_, _, Some(_)) => return Err("it is turned; expected rows from west to east".into()),
+        (_, _, Some(_)) => return Err("it is rotated; expected rows from west to east".into()),
         _ => return Ok(None),
     };
     if (cells[0] - cells[1]).abs() > 1e-6 * cells[0].abs() && !cell_is_given {

@@ -70,7 +70,7 @@ impl Terrain {
                 format!("{columns} x {rows} cells of {cell} m from ({x}, {y})")
             };
             return Err(format!(
-                "it has {}, and the terrain {}: both have to be the same",
+                "it has {}, and the terrain {}; expected the same cells in both",
                 words(theirs, thickness.cell, thickness.corner),
                 words(ours, self.cell, self.corner)
             ));
@@ -97,8 +97,7 @@ impl Terrain {
         let (columns, rows) = (finer(self.columns), finer(self.rows));
         if columns * rows > MOST {
             return Err(format!(
-                "a smooth surface over {} x {} cells would have {columns} x {rows} heights; at most {MOST} are possible: cut the raster, or \
-                 leave surface = \"triangles\"",
+                "a smooth surface over {} x {} cells would have {columns} x {rows} heights; expected at most {MOST}: cut the raster, or use surface = \"triangles\"",
                 self.columns, self.rows
             ));
         }
@@ -231,7 +230,7 @@ mod tests {
             ("ncols 6", "ncols 1e9", "ncols is 1000000000"),
             ("ncols 6", "", "no ncols"),
             ("cellsize 1", "cellsize 0", "no cellsize above 0"),
-            ("nrows 4", "nrows x", "nrows is \"x\", no number"),
+            ("nrows 4", "nrows x", "nrows is \"x\", which is not a number"),
         ] {
             let error = parse(&text.replace(from, to)).expect_err(part);
             assert!(error.contains(part), "{error}");

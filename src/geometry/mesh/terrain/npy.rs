@@ -24,12 +24,12 @@ pub(super) fn parse(bytes: &[u8], placing: &Placing) -> Result<Raster, String> {
     };
     let order = file.order();
     let DType::Plain(kind) = file.dtype() else {
-        return Err("its elements have parts; expected numbers".into());
+        return Err("its elements are structures; expected numbers".into());
     };
     let wide = kind.size_field();
     // What the header declares has to be there.
     if wide.saturating_mul((size[0] * size[1]) as u64) > bytes.len() as u64 {
-        return Err(format!("it ends before its {} x {} heights do", size[0], size[1]));
+        return Err(format!("it ends before its {} x {} heights are complete", size[0], size[1]));
     }
     let values: Vec<f64> = match (kind.type_char(), wide) {
         (TypeChar::Float, 8) => file.into_vec::<f64>(),
@@ -86,16 +86,16 @@ pub(super) fn parse_archive(bytes: &[u8], placing: &Placing) -> Result<Raster, S
 /// A header is short and flat: what reads it goes as deep as its brackets.
 fn check_header(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(b"\x93NUMPY") || bytes.len() < 12 {
-        return Err("it does not begin as an array does".into());
+        return Err("it does not start with the header of an array".into());
     }
     let (length, from) = match bytes[6] {
         1 => (usize::from(u16::from_le_bytes([bytes[8], bytes[9]])), 10),
         _ => (u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize, 12),
     };
-    let header = bytes.get(from..from + length.min(HEADER + 1)).ok_or("it ends within its header")?;
+    let header = bytes.get(from..from + length.min(HEADER + 1)).ok_or("it ends inside its header")?;
     let deep = header.iter().filter(|c| b"([{".contains(c)).count();
     if length > HEADER || deep > 20 {
-        return Err("its header is that of no array of numbers".into());
+        return Err("its header does not describe an array of numbers".into());
     }
     Ok(())
 }

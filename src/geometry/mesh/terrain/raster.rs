@@ -61,12 +61,12 @@ impl Raster {
             (None, Some(of_file)) => of_file,
             (None, None) => {
                 return Err(
-                    "it does not say how far its heights are apart; give it in the job: cell, m".into()
+                    "it does not contain the distance of its heights; give `cell`, in m, in the job".into()
                 );
             }
         };
         if !(cell > 0.0 && cell < 1e9 && corner.iter().all(|c| c.abs() < 1e12)) {
-            return Err(format!("its cells of {cell} m from {corner:?} are at no place"));
+            return Err(format!("its cells of {cell} m from {corner:?} have no finite position"));
         }
         let known = |value: f64| if Some(value) == none || value.abs() > GREATEST { f64::NAN } else { value };
         let all = (0..rows).rev().flat_map(|row| &values[row * columns..][..columns]);
@@ -83,7 +83,7 @@ impl Raster {
         let place = [first % self.columns, first / self.columns];
         let [x, y] = [0, 1].map(|a| self.corner[a] + place[a] as f64 * self.cell);
         Some(format!(
-            "{count} of {} cells have no height, the first in row {row}, column {column}, at {}; fill or cut what has none",
+            "{count} of {} cells have no height, the first in row {row}, column {column}, at {}; fill these cells or cut the raster",
             self.values.len(),
             crate::text::place(&[x, y])
         ))
@@ -93,7 +93,7 @@ impl Raster {
 /// Columns and rows that a raster may have, or why not.
 pub(super) fn checked_size([columns, rows]: [u64; 2]) -> Result<[usize; 2], String> {
     if columns.min(rows) < 2 || columns.saturating_mul(rows) > MOST as u64 {
-        return Err(format!("it has {columns} x {rows} heights; 2 x 2 to {MOST} are possible"));
+        return Err(format!("it has {columns} x {rows} heights; expected 2 x 2 to {MOST}"));
     }
     Ok([columns as usize, rows as usize])
 }

@@ -29,7 +29,7 @@ pub(in crate::io) fn numbers(
         Kind::I32 => checked.read_all::<i32>(dataset, n, components)?.into_iter().map(f64::from).collect(),
         Kind::F32 => checked.read_all::<f32>(dataset, n, components)?.into_iter().map(f64::from).collect(),
         Kind::F64 => checked.read_all(dataset, n, components)?,
-        other => return Err(file.refuse(format!("{dataset} holds {other}, which no field does"))),
+        other => return Err(file.refuse(format!("{dataset} holds {other}, which no field has"))),
     };
     Ok((values, components.max(1)))
 }

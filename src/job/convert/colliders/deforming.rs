@@ -19,7 +19,7 @@ pub(super) fn deforming<const D: usize>(
 ) -> Option<Deforming> {
     let here = path.key("frames");
     let (Shape::Mesh(first), Written::Mesh { .. }) = (shape, written) else {
-        checks.fault(&here, "found frames of a shape that is no mesh; expected `kind = \"mesh\"`".into());
+        checks.fault(&here, "found frames for a shape that is not a mesh; expected `kind = \"mesh\"`".into());
         return None;
     };
     let mut meshes = vec![first.clone()];

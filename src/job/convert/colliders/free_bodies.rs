@@ -59,7 +59,7 @@ pub(super) fn free_body<const D: usize>(
     let velocity: [f64; D] = velocity?;
     for a in (0..D).filter(|&a| !along[a] && velocity[a] != 0.0) {
         let message =
-            format!("found {}; expected 0 along an axis that is not in along", written(velocity[a]));
+            format!("found {}; expected 0 along an axis that is not in `along`", written(velocity[a]));
         checks.fault(&path.key("velocity").index(a), message);
     }
     let by_default = D == 3 || inertia.is_some() || density.is_some();
@@ -80,7 +80,7 @@ pub(super) fn free_body<const D: usize>(
     let mut of_shape = |key: &'static str| {
         let moments = *found.get_or_init(|| shape.moments());
         if moments.is_none() {
-            let message = "found a shape without a volume, or without an end; expected `mass` and `inertia`, \
+            let message = "found a shape without a volume, or an unbounded one; expected `mass` and `inertia`, \
                            or `turns = false`, for such a body";
             checks.fault(&path.key(key), message.into());
         }
@@ -172,8 +172,7 @@ pub(super) fn free_body<const D: usize>(
             }
             let moments = of_shape("mass")?;
             if reference.is_some() {
-                let message = "found a reference point; expected none for a body that turns about its centre of mass, or \
-                               `inertia` or `axis` in its motion";
+                let message = "found a reference point; expected none for a body that turns about its centre of mass, or `inertia` or `axis` in `motion`";
                 checks.fault(&collider.key("reference"), message.into());
                 return None;
             }
@@ -198,7 +197,7 @@ fn meeting(
     }
     for (key, given) in [("friction", friction), ("restitution", restitution)] {
         if given.is_some() {
-            let message = "found it for a body that meets no other; expected none, or `collides = true`";
+            let message = "found friction for a body without collisions; expected none, or `collides = true`";
             checks.fault(&path.key(key), message.into());
         }
     }
@@ -223,7 +222,7 @@ fn driven<const D: usize>(
             checks.fault(&path.index(i).key("translation").index(a), message);
         }
         if turns && row.angle != 0.0 {
-            let message = "found a rotation of a body that turns by itself; expected `turns = false`";
+            let message = "found a rotation for a body that turns freely; expected `turns = false`";
             checks.fault(&path.index(i).key("rotation"), message.into());
         }
     }

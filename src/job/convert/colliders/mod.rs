@@ -175,7 +175,7 @@ fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: 
 
 fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Table<D>> {
     if rows.len() < 2 {
-        checks.fault(path, format!("found {} rows; expected at least 2", rows.len()));
+        checks.fault(path, format!("found {} rows; expected at least 2 rows", rows.len()));
         return None;
     }
     let mut knots = Vec::new();
@@ -183,7 +183,7 @@ fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Opti
         let here = path.index(i);
         if i > 0 && row.time <= rows[i - 1].time {
             let message = format!(
-                "found {}; expected more than the {} before",
+                "found {}; expected more than the previous {}",
                 written(row.time),
                 written(rows[i - 1].time)
             );

@@ -251,7 +251,7 @@ impl Checks<'_> {
             Some(_) if D == 2 => {
                 self.fault(
                     path,
-                    "found an axis; expected none in a 2D job, where shapes turn about z".into(),
+                    "found an axis; expected none in a 2D job, where shapes rotate about z".into(),
                 );
                 None
             }
@@ -274,7 +274,8 @@ impl Checks<'_> {
             return None;
         }
         if let Some(i) = first_crossing(&corners) {
-            let message = "found an edge from here that meets another edge; expected a simple polygon";
+            let message =
+                "found an edge from this point that intersects another edge; expected a simple polygon";
             self.fault(&path.index(i), message.into());
             return None;
         }

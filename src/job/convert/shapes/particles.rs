@@ -65,7 +65,7 @@ fn from_state<const D: usize>(from: &File, body: &str, space: &Space<D>) -> Resu
         let numbers: Vec<f64> = (0..Layout::<D>::REALS).map(|column| chunk.read::<1>(column, p)[0]).collect();
         let [mass, half] = [Layout::<D>::MASS, Layout::<D>::HALF].map(|column| numbers[column]);
         if !(numbers.iter().all(|n| n.is_finite()) && mass > 0.0 && half > 0.0) {
-            return Err(format!("its particle {} is broken: mass {mass} kg, half width {half} m", p + 1));
+            return Err(format!("its particle {} is invalid: mass {mass} kg, half width {half} m", p + 1));
         }
     }
     Ok((chunk, true))
@@ -122,7 +122,7 @@ impl Columns {
             let guess = nearest(other, known.iter().copied());
             let guess = guess.map_or(String::new(), |name| format!("; did you mean \"{name}\"?"));
             return Err(format!(
-                "it has a column \"{}\"; possible are {}{guess}",
+                "it has a column \"{}\"; expected {}{guess}",
                 excerpt(other, QUOTED),
                 known.join(", ")
             ));
@@ -179,7 +179,7 @@ impl Columns {
             |columns: &[usize]| -> Vec<f64> { columns.iter().map(|&column| value(column)).collect() };
         let position = values(&self.position);
         if position.iter().any(|x| !x.is_finite()) {
-            return Err("its place is no number".into());
+            return Err("its position is not a number".into());
         }
         chunk.write(
             Layout::<D>::POSITION,

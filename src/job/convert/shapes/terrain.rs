@@ -26,7 +26,7 @@ impl Checks<'_> {
         let placing = Placing { cell: *cell, array: array.clone() };
         if array.is_some() && !file.to_lowercase().ends_with(".npz") {
             let message = format!(
-                "found a name for the file \"{}\"; expected one for a .npz only",
+                "found an array name for the file \"{}\"; expected one for a .npz file only",
                 excerpt(file, QUOTED)
             );
             self.fault(&path.key("array"), message);
