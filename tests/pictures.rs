@@ -223,7 +223,7 @@ fn surface_of_a_ball_is_closed_and_has_its_volume() {
     let flat = run();
     let output = agimp(flat.path(), &["export", "--surface", "ply", "out/press/press_000000.hdf"]);
     assert!(
-        output.status.code() == Some(2) && told(&output).contains("expected the output of a run in 3D"),
+        output.status.code() == Some(2) && told(&output).contains("expected a 3D run"),
         "{}",
         told(&output)
     );
@@ -284,12 +284,21 @@ fn arrows_show_vectors_and_svg_keeps_lines_and_text() {
         );
     }
     assert!(svg.contains(">2 m/s</text>"), "the arrow of the scale says how long it is");
+    // Without --title: that of the job, and without one the name of the file.
+    assert!(plot(&["--out", "untitled.svg"]).status.success());
+    let svg = std::fs::read_to_string(here.join("untitled.svg")).expect("SVG");
+    assert!(svg.contains(">press_000000</text>"), "the name of the file");
+    let job = ["title = \"A block & a plate\"\n", JOB, &block].concat();
+    let titled = finished("titled", &job, &["--end", "1e-4"]);
+    succeed(titled.path(), &["plot", "out/titled/titled_000000.hdf", "--out", "titled.svg"]);
+    let svg = std::fs::read_to_string(titled.path().join("titled.svg")).expect("SVG");
+    assert!(svg.contains(">A block &amp; a plate</text>"), "the title of the job");
     // As pixels too; and what is not there is said.
     assert!(plot(&["--vectors", "velocity", "--out", "c.png"]).status.success());
     assert!(image(&here.join("c.png")).1 != image(&here.join("b.png")).1);
     for (options, message) in [
         (&["--vectors", "pressure"][..], "found no vectors pressure; expected one of: velocity"),
-        (&["--out", "a.jpg"], "a.jpg: found no ending of a picture; expected .png or .svg"),
+        (&["--out", "a.jpg"], "a.jpg: found no extension of a picture; expected .png or .svg"),
         (&["--out", "none/a.svg"], "cannot write the picture"),
     ] {
         let output = plot(options);
@@ -329,9 +338,9 @@ fn looks_can_be_chosen() {
     for (options, message) in [
         (&["--view", "left"][..], "expected iso, front, side, top or a direction"),
         (&["--map", "jet"], "expected one of viridis, magma, coolwarm, grey"),
-        (&["--clip", "w<1"], "expected what stays, such as x<0.5"),
+        (&["--clip", "w<1"], "expected the half space to keep, such as x<0.5"),
         (&["--zoom", "0"], "expected a number from 0.01 to 1000"),
-        (&["--focus", "1"], "expected a place in m"),
+        (&["--focus", "1"], "expected a position in m"),
         (&["--mirror", "a"], "expected axes such as x, y or xy"),
     ] {
         let output = agimp(here, &[&["plot", "out/press/press_000000.hdf"], options].concat());
@@ -424,7 +433,7 @@ fn exported_particles_are_those_of_the_file() {
     assert_eq!(output.status.code(), Some(2), "which format: {}", told(&output));
     let output = agimp(here, &["export", "out/press/press_000004.tree.hdf", "--csv"]);
     assert!(
-        output.status.code() == Some(2) && told(&output).contains("is it a tree file?"),
+        output.status.code() == Some(2) && told(&output).contains("not of the tree"),
         "{}",
         told(&output)
     );

@@ -15,17 +15,17 @@ pub struct Arguments {
     /// Output files of one run, in order of time, or the index of its outputs (NAME.hdf.series).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// How it looks.
+    /// Appearance.
     #[command(flatten)]
     looks: Looks,
-    /// Title; without it, the name of the movie.
+    /// Title; by default the title of the job that wrote the files, or the name of the movie.
     #[arg(long)]
     title: Option<String>,
-    /// Frames a second.
+    /// Frames per second.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=60))]
     fps: u16,
-    /// Movie to write: .png (APNG) or .gif; .mp4 and .webm with ffmpeg on the PATH. Without it, NAME.movie.png beside the
-    /// first file.
+    /// Movie to write: .png (APNG) or .gif; .mp4 and .webm with ffmpeg on the PATH; by default NAME.movie.png beside
+    /// the first file.
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -41,14 +41,15 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.clone().unwrap_or_else(|| super::beside(&given[0], "movie.png"));
     let format = Format::of(&out).ok_or_else(|| {
         Failure::Usage(format!(
-            "{}: found no ending of a movie; expected .png, .gif, .mp4 or .webm",
+            "{}: found no extension of a movie; expected .png, .gif, .mp4 or .webm",
             out.display()
         ))
     })?;
     let name = out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let given_looks = &arguments.looks;
+    let name = name.trim_end_matches(".movie");
     let mut settings =
-        given_looks.settings(arguments.title.as_deref().unwrap_or(name.trim_end_matches(".movie")));
+        given_looks.settings(arguments.title.as_deref(), files.first().map(PathBuf::as_path), name);
     let job = files.first().filter(|file| file.is_file()).and_then(|file| given_looks.job(file));
     let solids = looks::solids(job.as_ref());
     // One look for all frames.

@@ -10,13 +10,14 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Output or checkpoint file.
     file: PathBuf,
-    /// How it looks.
+    /// Appearance.
     #[command(flatten)]
     looks: Looks,
-    /// Title; without it, the name of the file.
+    /// Title; by default the title of the job that wrote the file, or the name of the file.
     #[arg(long)]
     title: Option<String>,
-    /// Picture to write: .png, or .svg with text and lines as such; without it, beside the file with the ending png.
+    /// Picture to write: .png, or .svg with text and lines as vectors; by default beside the file with the extension
+    /// png.
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -27,7 +28,7 @@ pub struct Arguments {
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-    let mut settings = arguments.looks.settings(arguments.title.as_deref().unwrap_or(&name));
+    let mut settings = arguments.looks.settings(arguments.title.as_deref(), Some(&arguments.file), &name);
     let out = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension("png"));
     settings.collect =
         match out.extension().and_then(|ending| ending.to_str()).map(str::to_lowercase).as_deref() {
@@ -36,7 +37,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             _ => {
                 let out = out.display();
                 return Err(Failure::Usage(format!(
-                    "{out}: found no ending of a picture; expected .png or .svg"
+                    "{out}: found no extension of a picture; expected .png or .svg"
                 )));
             }
         };

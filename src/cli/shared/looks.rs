@@ -10,32 +10,32 @@ use crate::run::scene;
 /// Options of subcommands that draw particles.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Looks {
-    /// Quantity that gives the colours: a field of the file or what follows from it, such as speed, pressure,
-    /// stress_xy, stress_1 (greatest principal stress) or max_shear. An unknown name lists what there is.
+    /// Quantity that gives the colours: a field of the file or a derived quantity, such as speed, pressure, stress_xy,
+    /// stress_1 (greatest principal stress) or max_shear. An unknown name lists all quantities.
     #[arg(long, alias = "color", default_value = "leaf_level")]
     pub(in crate::cli) colour: String,
-    /// Value of the first colour; without it, as found.
+    /// Value of the first colour; by default the range of the values without the outermost 0.5 % at each end.
     #[arg(long, requires = "to", allow_negative_numbers = true)]
     from: Option<f64>,
     /// Value of the last colour.
     #[arg(long, requires = "from", allow_negative_numbers = true)]
     to: Option<f64>,
-    /// Colours: viridis, magma, coolwarm (for what has two sides) or grey.
+    /// Colours: viridis, magma, coolwarm (for quantities of both signs) or grey.
     #[arg(long, default_value = "viridis", value_parser = map)]
     map: Map,
-    /// Dark paper.
+    /// Dark background.
     #[arg(long)]
     dark: bool,
-    /// From where to look in 3D: iso, front, side, top, or a direction such as 1,-1,0.5.
+    /// Direction of view in 3D: iso, front, side, top, or a vector such as 1,-1,0.5.
     #[arg(long, default_value = "iso", value_parser = str::parse::<Direction>, allow_hyphen_values = true)]
     view: Direction,
-    /// How much larger than what fits.
+    /// Factor of magnification over the size that fits.
     #[arg(long, default_value_t = 1.0, value_parser = zoom)]
     zoom: f64,
-    /// Place in the middle, m, such as 0.5,0,0.2.
+    /// Position at the centre, m, such as 0.5,0,0.2.
     #[arg(long, value_parser = picture::place, allow_hyphen_values = true)]
     focus: Option<[f64; 3]>,
-    /// What stays, such as x<0.5 or z>1; the rest is cut away.
+    /// Half space to keep, such as x<0.5 or z>1; the rest is cut away.
     #[arg(long, value_parser = str::parse::<Clip>)]
     clip: Option<Clip>,
     /// Mirror at the lower face of the domain across these axes, for models of a half or a quarter: x, y, xy.
@@ -47,16 +47,16 @@ pub(in crate::cli) struct Looks {
     /// Draw vectors as arrows: velocity, or displacement where outputs have it.
     #[arg(long, value_name = "QUANTITY")]
     vectors: Option<String>,
-    /// Leave colliders out.
+    /// Omit colliders.
     #[arg(long)]
     bare: bool,
-    /// Job file of the run, if it is not where the output says.
+    /// Job file of the run, if it is not at the path in the output.
     #[arg(long)]
     job: Option<PathBuf>,
-    /// Pixels across.
+    /// Width in pixels.
     #[arg(long, default_value_t = 1280, value_parser = clap::value_parser!(u32).range(400..=16384))]
     width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     #[arg(long, default_value_t = 800, value_parser = clap::value_parser!(u32).range(300..=16384))]
     height: u32,
 }
@@ -83,8 +83,15 @@ fn zoom(text: &str) -> Result<f64, String> {
 }
 
 impl Looks {
-    /// Settings of a picture with this title.
-    pub(in crate::cli) fn settings(&self, title: &str) -> Settings {
+    /// Settings of a picture of an output. Its title is the given one, else that of the job that wrote the output, else `name`.
+    pub(in crate::cli) fn settings(
+        &self,
+        title: Option<&str>,
+        output: Option<&Path>,
+        name: &str,
+    ) -> Settings {
+        let of_job = || output.filter(|output| output.is_file()).and_then(scene::title_of);
+        let title = title.map(str::to_owned).or_else(of_job).unwrap_or_else(|| name.to_owned());
         Settings {
             width: self.width as usize,
             height: self.height as usize,
@@ -98,7 +105,7 @@ impl Looks {
             mirror: self.mirror.0,
             tree: self.tree,
             vectors: self.vectors.clone(),
-            ..Settings::new(title)
+            ..Settings::new(&title)
         }
     }
 
