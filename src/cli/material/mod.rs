@@ -405,7 +405,7 @@ mod tests {
         let beyond = error("strain_xx,stress_yy,stress_zz\n0,0,-3e6\n");
         assert!(
             beyond.contains(
-                "row 1: no deformation found with stress_yy = 0.0000e0, stress_zz = -3.0000e6 Pa; the nearest"
+                "row 1: found no deformation with stress_yy = 0.0000e0, stress_zz = -3.0000e6 Pa; the nearest"
             ),
             "{beyond}"
         );
