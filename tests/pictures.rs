@@ -438,3 +438,68 @@ fn exported_particles_are_those_of_the_file() {
         told(&output)
     );
 }
+
+/// The tree for other programs keeps levels and particles: in the text, and as VTK reads it where it is installed.
+#[test]
+fn an_exported_tree_is_that_of_the_run() {
+    let levels = "tree.regions=[{level = 2, shape = {kind = 'box', min = [0.3, 0.05], max = [0.45, 0.2]}}]";
+    for dimension in ["2", "3"] {
+        let cube = RUBBER_BLOCK
+            .replace("size = [1, 1]", "size = [1, 1, 0.5]")
+            .replace("min = [0.25, 0.0]", "min = [0.25, 0.0, 0.0]")
+            .replace("max = [0.75, 0.25]", "max = [0.75, 0.25, 0.25]");
+        let [block, levels] = if dimension == "2" {
+            [RUBBER_BLOCK.to_owned(), levels.to_owned()]
+        } else {
+            [cube, levels.replace("0.05]", "0.05, 0.05]").replace("0.2]", "0.2, 0.2]")]
+        };
+        let job = format!(
+            "version = 1\ndimension = {dimension}\n[time]\nend = 0.002\n[output]\nevery = 0.001\n{block}"
+        );
+        let directory = finished("tree", &job, &["--set", &levels]);
+        let here = directory.path();
+        let output = here.join("out/tree/tree_000002.hdf");
+        let leaves = agimp::io::frame::Leaves::of_output(&output).expect("leaves").levels;
+        assert!(leaves.iter().max() > leaves.iter().min(), "{leaves:?}");
+        let frame = Frame::read(&output, &[], true).expect("an output");
+        let particles = frame.positions.len() as f64;
+        let said = succeed(here, &["export", "out/tree/tree_000002.hdf", "--htg"]);
+        assert!(said.contains(&format!("({} leaves", leaves.len())), "{said}");
+        let path = here.join("out/tree/tree_000002.htg");
+        let text = std::fs::read_to_string(&path).expect("XML");
+        let array = |name: &str| -> Vec<f64> {
+            let start = text.find(&format!("Name=\"{name}\"")).expect(name);
+            let values = text[start..].split(['>', '<']).nth(1).expect("values").split_whitespace();
+            values.map(|value| value.parse().expect("a number")).collect()
+        };
+        let (depths, counts) = (array("DepthPerTree"), array("NumberOfVerticesPerDepth"));
+        assert_eq!(depths.iter().sum::<f64>() as usize, counts.len());
+        let cells = counts.iter().sum::<f64>() as usize;
+        let refined = array("Descriptors").iter().sum::<f64>() as usize;
+        assert_eq!(cells - refined, leaves.len());
+        // The roots hold all particles.
+        let firsts = depths.iter().scan([0, 0], |[tree, cell], depth| {
+            let first = *cell;
+            let rows = *tree..*tree + *depth as usize;
+            *cell += counts[rows.clone()].iter().sum::<f64>() as usize;
+            *tree = rows.end;
+            Some(first)
+        });
+        let in_cells = array("particles");
+        assert_eq!(firsts.map(|cell| in_cells[cell]).sum::<f64>(), particles);
+        let pythons = std::env::var("AGIMP_VTK_PYTHON").unwrap_or_default();
+        for python in pythons.split(':').filter(|python| !python.is_empty()) {
+            let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vtk_check.py");
+            let read =
+                std::process::Command::new(python).arg(script).arg(&path).output().expect("python starts");
+            assert!(read.status.success(), "{}", told(&read));
+            let found: serde_json::Value = serde_json::from_slice(&read.stdout).expect("JSON");
+            assert_eq!(found["leaves"], leaves.len(), "{found}");
+            assert_eq!(found["sums_of_leaves"]["particles"], particles, "{found}");
+            let sum: u32 = leaves.iter().map(|level| u32::from(*level)).sum();
+            assert_eq!(found["sums_of_leaves"]["level"], f64::from(sum), "{found}");
+            assert_eq!(found["bounds"][1], 1.0);
+            assert_eq!(found["time"], frame.header.time);
+        }
+    }
+}

@@ -2,6 +2,7 @@
 """Reads output files with VTK's own reader and prints what it found, one JSON object per file.
 
     vtk_check.py FILE.hdf ...
+    vtk_check.py FILE.htg ...
     vtk_check.py NAME.hdf.series    checks that each file of the series opens and has its time
 """
 import json
@@ -55,8 +56,49 @@ def read(path):
     }
 
 
+def read_tree(path):
+    """A HyperTreeGrid: sums of its fields over the leaves, which a cursor finds."""
+    reader = vtk.vtkXMLHyperTreeGridReader()
+    reader.SetFileName(path)
+    reader.Update()
+    grid = reader.GetOutput()
+    data = grid.GetCellData()
+    fields = {data.GetArray(i).GetName(): data.GetArray(i) for i in range(data.GetNumberOfArrays())}
+    sums = dict.fromkeys(fields, 0.0)
+    cursor = vtk.vtkHyperTreeGridNonOrientedCursor()
+    leaves = 0
+
+    def visit():
+        nonlocal leaves
+        if cursor.IsLeaf():
+            leaves += 1
+            for name, array in fields.items():
+                sums[name] += array.GetTuple1(cursor.GetGlobalNodeIndex())
+            return
+        for child in range(cursor.GetNumberOfChildren()):
+            cursor.ToChild(child)
+            visit()
+            cursor.ToParent()
+
+    for tree in range(grid.GetMaxNumberOfTrees()):
+        grid.InitializeNonOrientedCursor(cursor, tree)
+        visit()
+    time = grid.GetFieldData().GetArray("TimeValue")
+    return {
+        "file": path,
+        "vtk": vtk.vtkVersion.GetVTKVersion(),
+        "leaves": leaves,
+        "bounds": list(grid.GetBounds()),
+        "sums_of_leaves": sums,
+        "time": time.GetTuple1(0) if time else None,
+    }
+
+
 def main():
     for path in sys.argv[1:]:
+        if path.endswith(".htg"):
+            print(json.dumps(read_tree(path)))
+            continue
         if not path.endswith(".series"):
             print(json.dumps(read(path)))
             continue

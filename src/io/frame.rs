@@ -29,6 +29,14 @@ pub struct Leaves {
     pub coords: Vec<[u32; 3]>,
 }
 
+/// A number for each leaf.
+pub(crate) struct LeafField {
+    pub name: &'static str,
+    pub values: Vec<f64>,
+    /// Whether leaves together have the sum of their values, or the mean.
+    pub is_sum: bool,
+}
+
 impl Frame {
     /// Reads the particles of a file with those of the fields `wanted` that it shows. Fields that `required` names
     /// must be there.
@@ -113,11 +121,30 @@ impl Leaves {
     /// The leaves that belong to an output: of the tree file beside it, or of its own restart state; none if there is
     /// neither.
     pub fn of_output(path: &Path) -> Result<Self, FileError> {
-        let beside = tree_beside(path);
-        let file = Reader::open_alone(if beside.exists() { &beside } else { path })?;
-        let header = Header::read(&file)?;
+        let (file, header) = with_tree(path)?;
+        Self::read(&file, &header)
+    }
+
+    /// The leaves that belong to an output, the header of their file, and what it says of each leaf.
+    pub(crate) fn with_fields(path: &Path) -> Result<(Header, Self, Vec<LeafField>), FileError> {
+        let (file, header) = with_tree(path)?;
+        let leaves = Self::read(&file, &header)?;
+        let mut fields = Vec::new();
+        for (name, is_sum) in
+            [("particles", true), ("volume_fraction", false), ("pressure", false), ("von_mises", false)]
+        {
+            let shown = format!("VTKHDF/CellData/{name}");
+            if file.exists(&shown) {
+                let values = source::rows(&file, &header, &shown, header.leaves)?.0;
+                fields.push(LeafField { name, values, is_sum });
+            }
+        }
+        Ok((header, leaves, fields))
+    }
+
+    fn read(file: &Reader, header: &Header) -> Result<Self, FileError> {
         let (rows, dimension) = (header.leaves, header.dimension.clamp(1, 3));
-        let mut checked = Checked::new(None, &file, &header);
+        let mut checked = Checked::new(None, file, header);
         if file.exists("VTKHDF/CellData/level") {
             let levels: Vec<u8> = checked.read_all("VTKHDF/CellData/level", rows, 0)?;
             let corners = 1_u64 << dimension;
@@ -137,6 +164,14 @@ impl Leaves {
         let padded = |c: &[u32]| std::array::from_fn(|axis| c.get(axis).copied().unwrap_or(0));
         Ok(Self { coords: coords.chunks_exact(dimension).map(padded).collect(), levels })
     }
+}
+
+/// The file with the tree of an output: beside it, or itself.
+fn with_tree(path: &Path) -> Result<(Reader, Header), FileError> {
+    let beside = tree_beside(path);
+    let file = Reader::open_alone(if beside.exists() { &beside } else { path })?;
+    let header = Header::read(&file)?;
+    Ok((file, header))
 }
 
 /// `a/b_000001.hdf` has its tree in `a/b_000001.tree.hdf`.

@@ -14,5 +14,4 @@ pub mod progress;
 pub mod raster;
 pub mod series;
 pub mod snapshot;
-pub mod surface;
 pub mod telemetry;

@@ -1,9 +1,10 @@
-//! `agimp export`: particles, or their surface, for other programs.
+//! `agimp export`: particles, their surface, or the tree, for other programs.
 use crate::cli::Failure;
-use crate::io::export::{self, Format};
+use crate::io::export::points::{self, Format};
+use crate::io::export::surface::{MeshFormat, Surface};
+use crate::io::export::tree::Tree;
 use crate::io::frame::{Frame, expand, shown_in};
 use crate::io::snapshot::PointField;
-use crate::io::surface::{MeshFormat, Surface};
 use crate::text::{bytes, count};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -27,11 +28,14 @@ pub struct Arguments {
     /// The surface of the material as a mesh of triangles with normals, in 3D: PLY or OBJ.
     #[arg(long, group = "format", value_name = "ply|obj", value_parser = mesh_format)]
     surface: Option<MeshFormat>,
+    /// The leaves of the tree as VTK's HyperTreeGrid (XML), with the hierarchy: for ParaView 5.10 and later.
+    #[arg(long, group = "format")]
+    htg: bool,
     /// With --surface: only the body of this name.
     #[arg(long, requires = "surface", value_name = "NAME")]
     body: Option<String>,
     /// Fields to export, separated by commas; by default all fields of the files.
-    #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with = "surface")]
+    #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with_all = ["surface", "htg"])]
     fields: Option<Vec<PointField>>,
     /// Directory to write to; by default that of each file.
     #[arg(long, value_name = "DIR")]
@@ -79,6 +83,12 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     for file in expand(&super::without_trees(&arguments.files)).map_err(failed)? {
         let (out, made) = match arguments.surface {
+            _ if arguments.htg => {
+                let tree = Tree::read(&file).map_err(failed)?;
+                let out = place(&file, "htg");
+                tree.write(&out).map_err(failed)?;
+                (out, format!("{} leaves", count(tree.len() as u64)))
+            }
             Some(format) => {
                 let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
                 let surface = Surface::of(&frame, arguments.body.as_deref())
@@ -94,7 +104,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
                 };
                 let frame = Frame::read(&file, &fields, true).map_err(failed)?;
                 let out = place(&file, format.ending());
-                export::write(&frame, format, &out).map_err(failed)?;
+                points::write(&frame, format, &out).map_err(failed)?;
                 (out, format!("{} particles", count(frame.positions.len() as u64)))
             }
         };

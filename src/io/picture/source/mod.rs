@@ -19,12 +19,25 @@ pub(in crate::io) fn numbers(
     header: &Header,
     dataset: &str,
 ) -> Result<(Vec<f64>, usize), FileError> {
+    rows(file, header, dataset, header.particles)
+}
+
+/// The numbers of the first `n` rows of a data set, and how many a row has.
+pub(in crate::io) fn rows(
+    file: &Reader,
+    header: &Header,
+    dataset: &str,
+    n: u64,
+) -> Result<(Vec<f64>, usize), FileError> {
     let stored = file.stored(dataset)?;
-    let (n, components) = (header.particles, stored.components);
+    let components = stored.components;
     let mut checked = Checked::new(None, file, header);
     let values = match stored.kind {
         Kind::U64 => {
             checked.read_all::<u64>(dataset, n, components)?.into_iter().map(|value| value as f64).collect()
+        }
+        Kind::I64 => {
+            checked.read_all::<i64>(dataset, n, components)?.into_iter().map(|value| value as f64).collect()
         }
         Kind::I32 => checked.read_all::<i32>(dataset, n, components)?.into_iter().map(f64::from).collect(),
         Kind::F32 => checked.read_all::<f32>(dataset, n, components)?.into_iter().map(f64::from).collect(),

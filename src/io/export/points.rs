@@ -3,10 +3,10 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::frame::Frame;
-use super::hdf5_file::FileError;
-use super::lines::{system, write_in_pieces};
-use super::snapshot::fields::{COMPONENTS, Values};
+use crate::io::frame::Frame;
+use crate::io::hdf5_file::FileError;
+use crate::io::lines::{system, write_in_pieces};
+use crate::io::snapshot::fields::{COMPONENTS, Values};
 
 /// What a file is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

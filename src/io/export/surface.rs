@@ -7,11 +7,11 @@ use std::path::Path;
 
 use splashsurf_lib::{Parameters, nalgebra::Vector3, reconstruct_surface};
 
-use super::frame::Frame;
-use super::hdf5_file::FileError;
-use super::lines::{system, write_in_pieces};
-use super::snapshot::PointField;
-use super::snapshot::fields::Values;
+use crate::io::frame::Frame;
+use crate::io::hdf5_file::FileError;
+use crate::io::lines::{system, write_in_pieces};
+use crate::io::snapshot::PointField;
+use crate::io::snapshot::fields::Values;
 
 /// Reach of the kernel of a particle, in its half widths.
 const REACH: f64 = 4.0;

@@ -1,0 +1,10 @@
+//! Outputs for other programs.
+//!
+//! | file | what it writes |
+//! |---|---|
+//! | [`points`] | particles: PLY, CSV, VTP |
+//! | [`surface`] | the surface of the material as a mesh: PLY, OBJ |
+//! | [`tree`] | the tree as VTK's HyperTreeGrid |
+pub mod points;
+pub mod surface;
+pub mod tree;
