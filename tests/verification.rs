@@ -38,7 +38,7 @@ fn quick_problems_pass_and_do_not_depend_on_ranks() {
                 set: Vec::new(),
             };
             let mut page = page::Page::new(&directory.path().join("page.md"), top);
-            let quick = ["column", "cantilever", "disks", "drivers"];
+            let quick = ["column", "cantilever", "disks", "drivers", "weights"];
             for (_, problem) in problems::ALL.into_iter().filter(|(name, _)| quick.contains(name)) {
                 problem(&runs, &mut page);
             }

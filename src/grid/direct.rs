@@ -35,11 +35,49 @@ pub fn weights<const D: usize>(
     half: [f64; D],
 ) -> Vec<DirectNode<D>> {
     let mut nodes = BTreeMap::new();
-    for leaf in tree.leaves() {
-        for (place, share) in in_leaf(leaf, root_edge, centre, half) {
-            hand_to_real(tree, place, share, &mut nodes);
-        }
+    for (place, share) in on_corners(tree, root_edge, centre, half) {
+        hand_to_real(tree, place, share, &mut nodes);
     }
+    listed(nodes)
+}
+
+/// As [`weights`], but hanging nodes keep what they collect, so that fields are discontinuous beside finer leaves: the control
+/// that shows what the constraints do.
+pub fn unconstrained_weights<const D: usize>(
+    tree: &KnownTree<D>,
+    root_edge: f64,
+    centre: [f64; D],
+    half: [f64; D],
+) -> Vec<DirectNode<D>> {
+    let mut nodes = BTreeMap::new();
+    for (place, share) in on_corners(tree, root_edge, centre, half) {
+        add(place, share, &mut nodes);
+    }
+    listed(nodes)
+}
+
+/// What the corners of all cells get.
+fn on_corners<const D: usize>(
+    tree: &KnownTree<D>,
+    root_edge: f64,
+    centre: [f64; D],
+    half: [f64; D],
+) -> impl Iterator<Item = ([u32; D], Share<D>)> {
+    tree.leaves().iter().flat_map(move |leaf| in_leaf(leaf, root_edge, centre, half))
+}
+
+fn add<const D: usize>(
+    place: [u32; D],
+    (weight, gradient): Share<D>,
+    nodes: &mut BTreeMap<[u32; D], Share<D>>,
+) {
+    let sum = nodes.entry(place).or_insert((0.0, [0.0; D]));
+    sum.0 += weight;
+    (0..D).for_each(|axis| sum.1[axis] += gradient[axis]);
+}
+
+/// The nodes with a weight or gradient.
+fn listed<const D: usize>(nodes: BTreeMap<[u32; D], Share<D>>) -> Vec<DirectNode<D>> {
     nodes
         .into_iter()
         .map(|(place, (weight, gradient))| DirectNode { place, weight, gradient })
@@ -120,10 +158,7 @@ fn hand_to_real<const D: usize>(
     nodes: &mut BTreeMap<[u32; D], Share<D>>,
 ) {
     let Some(level) = coarsest_without_corner(tree, place) else {
-        let sum = nodes.entry(place).or_insert((0.0, [0.0; D]));
-        sum.0 += weight;
-        (0..D).for_each(|axis| sum.1[axis] += gradient[axis]);
-        return;
+        return add(place, (weight, gradient), nodes);
     };
     let size = 1u32 << (MAX_LEVEL - level);
     let inside = place.map(|x| x % size);

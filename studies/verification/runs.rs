@@ -45,17 +45,21 @@ impl Runs {
         self.effort == Effort::Full
     }
 
+    /// The program on so many ranks.
+    pub(crate) fn command(&self, ranks: usize) -> Command {
+        if ranks == 1 {
+            return Command::new(&self.agimp);
+        }
+        let mut mpirun = Command::new("mpirun");
+        mpirun.args(["-n", &ranks.to_string()]).arg(&self.agimp);
+        mpirun
+    }
+
     /// Runs a job of `jobs/` with settings `KEY=VALUE`; the results have a name of their own.
     pub(crate) fn run(&self, job: &str, name: &str, settings: &[String]) -> Results {
         let path = self.top.join("jobs").join(job).with_extension("toml");
         let folder = self.folder.join(name);
-        let mut command = if self.ranks == 1 {
-            Command::new(&self.agimp)
-        } else {
-            let mut mpirun = Command::new("mpirun");
-            mpirun.args(["-n", &self.ranks.to_string()]).arg(&self.agimp);
-            mpirun
-        };
+        let mut command = self.command(self.ranks);
         command.arg("run").arg(&path).args(["--overwrite", "--threads", "1", "--out"]).arg(&folder);
         settings.iter().chain(&self.set).for_each(|setting| _ = command.args(["--set", setting]));
         let before = ticks_of_children();

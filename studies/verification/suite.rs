@@ -72,7 +72,6 @@ fn arguments() -> Arguments {
 
 fn main() -> ExitCode {
     let Arguments { effort, only, set, page: path } = arguments();
-    let world = checked(World::init());
     checked(rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global());
     let mut page = page::Page::new(&path, &checked(std::env::current_dir()));
     // This program lies in `examples/`, beside it the solver.
@@ -100,6 +99,8 @@ fn main() -> ExitCode {
         println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
         measured.push((name, page.take()));
     }
+    // After the runs: `mpirun` does not start from a process that is a rank itself.
+    let world = checked(World::init());
     for (name, section) in sections.into_iter().filter(|(name, _)| is_wanted(name) && runs.is_full()) {
         let start = Instant::now();
         section(world.comm(), &mut page);
