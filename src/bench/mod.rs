@@ -8,7 +8,7 @@ use std::path::Path;
 use partition::comm::Comm;
 
 use self::jobs::BenchJob;
-use crate::io::telemetry::Record;
+use crate::io::log::telemetry::Record;
 use crate::job::{AnyProblem, Problem, parse};
 use crate::particle::chunk::Layout;
 use crate::run::record::Recorder;

@@ -1,6 +1,6 @@
 //! `agimp new`: a commented job file to start from.
 use super::Failure;
-use crate::io::lines::write_whole;
+use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
 use crate::text::{excerpt, nearest};
 use std::fs::OpenOptions;

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use super::Failure;
 use super::shared::message::warn_of;
-use crate::io::lines::write_whole;
+use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
 use crate::run::report::{self, Report};
 use crate::run::stop::STOPPED;

@@ -1,17 +1,27 @@
-//! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, scalar histories,
-//! telemetry, progress, charts and pictures.
+//! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, tables, logs, charts and pictures.
+//!
+//! | file or folder | what it has |
+//! |---|---|
+//! | [`hdf5_file`] | HDF5 files of all ranks; the only folder that calls the library |
+//! | `whole_file.rs` | other files, written whole |
+//! | [`snapshot`] | outputs and checkpoints |
+//! | [`series`] | the index of the outputs of a run |
+//! | [`frame`] | what outputs show, for viewers and exports |
+//! | [`picture`], [`movie`], `chart.rs` | pictures of particles and plots of numbers |
+//! | [`export`] | outputs for other programs |
+//! | [`log`] | history, telemetry, progress |
+//! | [`particles`], [`raster`] | tables of particles and rasters |
+//! | [`cause`] | reasons for what the operating system refuses |
 pub mod cause;
 pub(crate) mod chart;
 pub mod export;
 pub mod frame;
 pub mod hdf5_file;
-pub mod history;
-pub(crate) mod lines;
+pub mod log;
 pub mod movie;
 pub mod particles;
 pub mod picture;
-pub mod progress;
 pub mod raster;
 pub mod series;
 pub mod snapshot;
-pub mod telemetry;
+pub(crate) mod whole_file;

@@ -145,10 +145,10 @@ impl Movie {
         match self.sink {
             Sink::Apng(writer, bytes) => {
                 writer.finish()?;
-                super::lines::write_whole(path, &bytes.0.borrow())
+                super::whole_file::write_whole(path, &bytes.0.borrow())
             }
             Sink::Gif(encoder) => {
-                super::lines::write_whole(path, &encoder.into_inner().map_err(io::Error::other)?)
+                super::whole_file::write_whole(path, &encoder.into_inner().map_err(io::Error::other)?)
             }
             Sink::Ffmpeg(mut child) => {
                 drop(child.stdin.take());

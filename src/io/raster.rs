@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::hdf5_file::FileError;
-use super::lines::write_whole;
+use super::whole_file::write_whole;
 
 /// What stands where a raster has no value.
 const NO_VALUE: &str = "-9999";

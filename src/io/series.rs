@@ -63,7 +63,7 @@ impl Series {
         self.entries.push(Entry { name: name.into(), time });
         let contents = Contents { version: "1.0".into(), files: self.entries.clone() };
         let text = serde_json::to_string_pretty(&contents).map_err(std::io::Error::other);
-        text.and_then(|text| super::lines::write_whole(&self.path, text.as_bytes()))
+        text.and_then(|text| super::whole_file::write_whole(&self.path, text.as_bytes()))
             .map_err(|source| FileError::System { path: self.path.clone(), action: "write", source })
     }
 }

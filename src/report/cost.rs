@@ -2,7 +2,7 @@
 use std::path::Path;
 
 use super::panels::Panel;
-use crate::io::telemetry::Record;
+use crate::io::log::telemetry::Record;
 
 /// What a phase has cost.
 #[derive(Debug)]

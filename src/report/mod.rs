@@ -17,8 +17,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::write_whole;
 use crate::io::snapshot::{self, Header};
+use crate::io::whole_file::write_whole;
 use crate::text::{count, html, quantity};
 
 mod along;

@@ -9,7 +9,7 @@ use partition::comm::Comm;
 
 use super::RunError;
 use crate::io::hdf5_file::FileError;
-use crate::io::progress::warn;
+use crate::io::log::progress::warn;
 use crate::io::snapshot::directory::{AtStake, at_stake};
 use crate::job::Problem;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use crate::io::lines::write_whole;
+use crate::io::whole_file::write_whole;
 
 /// Why a run has ended ahead of its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

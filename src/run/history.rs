@@ -3,7 +3,7 @@ use crate::adaptivity::resample::ledger::LedgerTotals;
 use crate::boundary::motion::Motion;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
-use crate::io::history::Column;
+use crate::io::log::history::Column;
 use crate::job::Problem;
 use crate::probe;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};

@@ -23,7 +23,7 @@ use self::record::Recorder;
 use self::restart::From;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
-use crate::io::history::Kept;
+use crate::io::log::history::Kept;
 use crate::io::snapshot::Outputs;
 use crate::job::Problem;
 use crate::setup::{self, stages};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::collapse::Collapse;
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::write_whole;
+use crate::io::whole_file::write_whole;
 
 /// What a finished run says of itself. Quantities are in SI units.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use crate::adaptivity::resample::ids;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
-use crate::io::progress::warn;
+use crate::io::log::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
 use crate::io::snapshot::{self, Header, Scalars, compare};
 use crate::job::{self, Problem};

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use agimp::io::telemetry::Record;
+use agimp::io::log::telemetry::Record;
 
 use crate::checked;
 

@@ -6,7 +6,7 @@ use partition::comm::{Comm, World, is_launched};
 
 use super::quote::Quote;
 use crate::cli::Failure;
-use crate::io::progress::warn;
+use crate::io::log::progress::warn;
 use crate::job::{FaultList, JobError};
 use crate::text::{excerpt, printable};
 

@@ -9,9 +9,9 @@ use splashsurf_lib::{Parameters, nalgebra::Vector3, reconstruct_surface};
 
 use crate::io::frame::Frame;
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::{system, write_in_pieces};
 use crate::io::snapshot::PointField;
 use crate::io::snapshot::fields::Values;
+use crate::io::whole_file::{system, write_in_pieces};
 
 /// Reach of the kernel of a particle, in its half widths.
 const REACH: f64 = 4.0;

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use crate::io::frame::{LeafField, Leaves};
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::{system, write_in_pieces};
 use crate::io::snapshot::Header;
+use crate::io::whole_file::{system, write_in_pieces};
 
 /// Level and place of a cell, counted in cells of its level from the lower corner of the domain.
 type Cell = (u8, [u32; 3]);

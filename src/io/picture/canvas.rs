@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use super::colour::Rgb;
 use super::font;
 use crate::io::hdf5_file::FileError;
-use crate::io::lines::write_whole;
+use crate::io::whole_file::write_whole;
 use crate::text::html;
 
 /// A colour as SVG has it.

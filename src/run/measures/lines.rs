@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use crate::io::hdf5_file::FileError;
-use crate::io::history::{Column, Gap, History, Kept};
+use crate::io::log::history::{Column, Gap, History, Kept};
 use crate::job::Problem;
 use crate::probe::Line;
 use crate::probe::line::Sample;

@@ -3,11 +3,12 @@
 //! A machine that loses power may leave a file without its last lines, with half a line, with zero bytes in the place of
 //! lines, or empty. What is whole of it is kept.
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-use super::hdf5_file::FileError;
+use crate::io::hdf5_file::FileError;
+use crate::io::whole_file::{create_new, system};
 
 /// What becomes of a line of a file that a run goes on with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,35 +81,6 @@ impl Lines {
     pub(super) fn sync(&self) -> Result<(), FileError> {
         self.file.sync_data().map_err(|source| system(&self.path, "bring to disk", source))
     }
-}
-
-/// Writes a whole file, under a temporary name first, so that a reader never sees half of it.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    write_in_pieces(path, |out| out.write_all(bytes))
-}
-
-/// [`write_whole`] of what `fill` writes, piece by piece.
-pub(crate) fn write_in_pieces(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let part = path.with_added_extension("part");
-    let mut out = BufWriter::new(create_new(&part)?);
-    fill(&mut out)?;
-    out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
-    std::fs::rename(&part, path)
-}
-
-/// Creates a file in the place of an old one. A symbolic link is replaced, not followed.
-pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
-        _ => OpenOptions::new().write(true).create_new(true).open(path),
-    }
-}
-
-pub(super) fn system(path: &Path, action: &'static str, source: std::io::Error) -> FileError {
-    FileError::System { path: path.into(), action, source }
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::hdf5_file::FileError;
 use super::lines::{Lines, Verdict};
+use crate::io::hdf5_file::FileError;
 
 /// A column of the history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,10 @@ use partition::comm::{Comm, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use serde::{Deserialize, Serialize};
 
-use super::hdf5_file::FileError;
-use super::lines::{Lines, Verdict, system};
+use super::lines::{Lines, Verdict};
 use crate::grid::sums::statistics::Statistics;
+use crate::io::hdf5_file::FileError;
+use crate::io::whole_file::system;
 use crate::particle::chunk::Chunk;
 
 /// A quantity over the ranks.

@@ -1,0 +1,12 @@
+//! What a run says as it goes: text files that grow line by line, and the terminal.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | `lines.rs` | files of lines, mended after a crash |
+//! | [`history`] | tables over time |
+//! | [`telemetry`] | where the time of each step went, one JSON object per line |
+//! | [`progress`] | the live lines of the terminal, warnings |
+pub mod history;
+mod lines;
+pub mod progress;
+pub mod telemetry;
