@@ -11,7 +11,7 @@ use super::Failure;
 use super::shared::message::warn_of;
 use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
-use crate::run::report::{self, Report};
+use crate::run::at_end::report::{self, Report};
 use crate::run::stop::STOPPED;
 use crate::text::excerpt;
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use super::hdf5_file::{FileError, Reader};
 use super::picture::source;
 use super::series::Series;
-use super::snapshot::checked::Checked;
-use super::snapshot::fields::Values;
+use super::snapshot::content::fields::Values;
+use super::snapshot::intact::checked::Checked;
 use super::snapshot::{Header, PointField};
 
 /// Particles of an output or checkpoint file.

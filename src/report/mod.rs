@@ -104,7 +104,7 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
 struct Run {
     history: History,
     cost: Cost,
-    report: Option<crate::run::report::Report>,
+    report: Option<crate::run::at_end::report::Report>,
     state: State,
     /// Outputs in order of time.
     outputs: Vec<PathBuf>,

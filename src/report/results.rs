@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::io::hdf5_file::Reader;
 use crate::io::snapshot::Header;
 use crate::io::snapshot::directory::{self, listed, series_path};
+use crate::run::at_end::ending::Ending;
+use crate::run::at_end::report::{self, Report};
 use crate::run::claim;
-use crate::run::ending::Ending;
-use crate::run::report::{self, Report};
 
 /// The results of a run in a directory.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,13 +1,23 @@
 //! A whole run: from a checked job to its last file.
+//!
+//! | file or folder | what it has |
+//! |---|---|
+//! | this | the main loop |
+//! | `outcome.rs` | options of a run, its results, and why it cannot go on |
+//! | [`claim`] | the directory of a run belongs to one run at a time |
+//! | [`restart`] | states from files |
+//! | [`schedule`], [`stop`] | when files are due; requests to stop |
+//! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; what pictures show beside particles |
+//! | [`record`], [`history`] | history, telemetry and progress |
+//! | `measures/` | files of lines and maps |
+//! | [`at_end`] | what a run leaves when it ends |
+pub mod at_end;
 pub mod claim;
-pub mod collapse;
-pub mod ending;
 mod files;
 pub mod history;
 mod measures;
 mod outcome;
 pub mod record;
-pub mod report;
 pub mod restart;
 pub mod scene;
 pub mod schedule;
@@ -15,8 +25,9 @@ pub mod stop;
 
 use partition::comm::{Comm, Disagreement};
 
+use self::at_end::ending::Ending;
+use self::at_end::{collapse, ending, report};
 use self::claim::Claim;
-use self::ending::Ending;
 use self::files::Names;
 pub use self::outcome::{Effort, Options, Outcome, RunError, Summary};
 use self::record::Recorder;

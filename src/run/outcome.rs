@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use partition::comm::Disagreement;
 
 use crate::io::hdf5_file::FileError;
-use crate::run::collapse::Collapse;
+use crate::run::at_end::collapse::Collapse;
 use crate::run::restart::From;
 use crate::solver::Clock;
 

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use partition::comm::{Comm, Traffic};
 
+use super::at_end::report::{self, Report};
 use super::measures::lines;
-use super::report::{self, Report};
 use super::{Effort, Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
 use crate::io::log::history::{Column, Gap, History, Kept};

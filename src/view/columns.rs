@@ -4,8 +4,8 @@ use std::path::Path;
 use crate::io::frame::{Frame, is_integer};
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::PointField;
-use crate::io::snapshot::fields::COMPONENTS;
-use crate::io::snapshot::fields::Values;
+use crate::io::snapshot::content::fields::COMPONENTS;
+use crate::io::snapshot::content::fields::Values;
 
 /// One number for each particle.
 #[derive(Clone, Debug, PartialEq, Eq)]

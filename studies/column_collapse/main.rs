@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use agimp::io::hdf5_file::{FileError, Reader};
 use agimp::io::snapshot::Header;
 use agimp::job::problem::CollapseLaw;
-use agimp::run::collapse::{Published, published};
+use agimp::run::at_end::collapse::{Published, published};
 
 #[path = "../common.rs"]
 mod common;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::io::frame::Frame;
 use crate::io::hdf5_file::FileError;
-use crate::io::snapshot::fields::{COMPONENTS, Values};
+use crate::io::snapshot::content::fields::{COMPONENTS, Values};
 use crate::io::whole_file::{system, write_in_pieces};
 
 /// What a file is written as.

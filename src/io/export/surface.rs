@@ -10,7 +10,7 @@ use splashsurf_lib::{Parameters, nalgebra::Vector3, reconstruct_surface};
 use crate::io::frame::Frame;
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::PointField;
-use crate::io::snapshot::fields::Values;
+use crate::io::snapshot::content::fields::Values;
 use crate::io::whole_file::{system, write_in_pieces};
 
 /// Reach of the kernel of a particle, in its half widths.

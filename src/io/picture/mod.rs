@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use partition::comm::Comm;
 
 use super::hdf5_file::{FileError, Reader};
-use super::snapshot::fields::Values;
+use super::snapshot::content::fields::Values;
 use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
 use crate::text::quantity;

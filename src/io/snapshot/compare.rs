@@ -4,10 +4,12 @@ use std::path::Path;
 
 use partition::comm::{Comm, Disagreement};
 
-use super::checked::{self, Checked};
+use super::content::state::{
+    self, CARRIED, carried_columns, carried_components, check_tree, columns, octants, path,
+};
 use super::header::Header;
-use super::sane::{self, Limits};
-use super::state::{self, CARRIED, carried_columns, carried_components, check_tree, columns, octants, path};
+use super::intact::checked::{self, Checked};
+use super::intact::sane::{self, Limits};
 use crate::checksum::fnv1a;
 use crate::io::hdf5_file::{Element, FileError, Reader};
 

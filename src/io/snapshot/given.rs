@@ -1,9 +1,9 @@
 //! Particles of a file as those of another job.
 use std::path::Path;
 
-use super::checked::Checked;
+use super::content::state::columns;
 use super::header::{GROUP, Header};
-use super::state::columns;
+use super::intact::checked::Checked;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::particle::chunk::{Chunk, Tag};
 

@@ -3,6 +3,16 @@
 //! One HDF5 file per output: the group `/VTKHDF` opens in ParaView, the group `/state` holds a header
 //! and, where asked for, all that a restart needs, bit by bit. A file is written under a temporary
 //! name and gets its own when it is whole and on disk. Nothing in it depends on the number of ranks.
+//!
+//! | file or folder | what it has |
+//! |---|---|
+//! | this | files written and read |
+//! | [`header`], `place.rs` | what a file says of itself, and where its job file lies |
+//! | `content/` | what is in a file: particle fields, groups for viewers and restarts |
+//! | `intact/` | checksums, limits, and the way to disk |
+//! | [`outputs`], [`directory`] | the numbered files of a run; finding and keeping them |
+//! | [`compare`] | digests and differences |
+//! | `given.rs` | particles of a file as those of another job |
 
 use std::path::Path;
 
@@ -14,28 +24,24 @@ use crate::particle::chunk::Chunk;
 use crate::particle::followed::Followed;
 use crate::probe::{Map, Maxima};
 
-pub(crate) mod averages;
-pub(in crate::io) mod checked;
-pub mod commit;
 pub mod compare;
+pub(crate) mod content;
 pub mod directory;
-pub(crate) mod fields;
 mod given;
 pub mod header;
+pub mod intact;
 pub mod outputs;
 mod place;
-mod sane;
-mod state;
-mod vtkhdf;
 
-use checked::{Checked, Recorded, Rows};
-use commit::Unnamed;
-pub use fields::PointField;
+pub use content::fields::PointField;
+use content::{state, vtkhdf};
 pub use given::particles;
 pub use header::{Header, Scalars};
+use intact::checked::{Checked, Recorded, Rows};
+use intact::commit::Unnamed;
+pub use intact::sane::Limits;
 pub use outputs::Outputs;
 pub use place::job_files;
-pub use sane::Limits;
 
 /// The run as a file shows it: borrowed, this rank's part.
 #[derive(Clone, Copy, Debug)]
@@ -124,7 +130,8 @@ pub fn start_write<const D: usize>(
     view: &View<D>,
     options: &Options,
 ) -> Result<Unnamed, FileError> {
-    let finite = sane::finite(view).map_err(|reason| FileError::Refused { path: path.into(), reason });
+    let finite =
+        intact::sane::finite(view).map_err(|reason| FileError::Refused { path: path.into(), reason });
     comm.agree(finite)?;
     Unnamed::write(comm, path, |file| {
         let (leaves, particles) = totals(comm, file, view)?;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use partition::comm::Comm;
 
-use super::commit::Unnamed;
 use super::directory::{
     checkpoint_path, listed, output_path, remove_old_checkpoints, series_path, tree_path, tree_series_path,
 };
+use super::intact::commit::Unnamed;
 use super::{Options, View, start_write, write, write_tree};
 use crate::io::hdf5_file::FileError;
 use crate::io::series::Series;

@@ -3,9 +3,9 @@
 use super::super::Tint;
 use super::numbers;
 use crate::io::hdf5_file::{FileError, Reader};
-use crate::io::snapshot::averages::{principal, third_invariant};
-use crate::io::snapshot::checked::Checked;
-use crate::io::snapshot::fields::{COMPONENTS, mean, von_mises};
+use crate::io::snapshot::content::averages::{principal, third_invariant};
+use crate::io::snapshot::content::fields::{COMPONENTS, mean, von_mises};
+use crate::io::snapshot::intact::checked::Checked;
 use crate::io::snapshot::{Header, PointField};
 use crate::material::{PLASTIC_STRAIN, PLASTIC_VOLUME};
 use crate::particle::chunk::Tag;

@@ -8,7 +8,7 @@ pub(super) mod derived;
 
 use crate::io::hdf5_file::{FileError, Kind, Reader};
 use crate::io::snapshot::Header;
-use crate::io::snapshot::checked::Checked;
+use crate::io::snapshot::intact::checked::Checked;
 
 /// Cells of a leaf along an axis.
 const CELLS: f64 = 4.0;

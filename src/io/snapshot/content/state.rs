@@ -3,16 +3,16 @@
 use partition::comm::Comm;
 use partition::{MAX_LEVEL, Octant};
 
-use super::checked::{Checked, Recorded, Rows};
 use super::fields::PointField;
-use super::header::{GROUP, Header};
-use super::sane::{self, Limits};
-use super::{Restored, View};
 use crate::io::hdf5_file::{FileError, Reader, Writer};
+use crate::io::snapshot::header::{GROUP, Header};
+use crate::io::snapshot::intact::checked::{Checked, Recorded, Rows};
+use crate::io::snapshot::intact::sane::{self, Limits};
+use crate::io::snapshot::{Restored, View};
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
 /// One data set of particle columns.
-pub(super) struct Columns {
+pub(in crate::io::snapshot) struct Columns {
     /// Name of the data set.
     pub name: &'static str,
     /// Unit, empty for pure numbers.
@@ -27,13 +27,13 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Components as [`Writer::write_slab`] counts them: 0 for a plain list.
-    pub(super) fn components(&self) -> usize {
+    pub(in crate::io::snapshot) fn components(&self) -> usize {
         if self.count == 1 { 0 } else { self.count }
     }
 }
 
 /// The data sets that hold the columns of [`Layout`], in its order.
-pub(super) fn columns<const D: usize>() -> [Columns; 9] {
+pub(in crate::io::snapshot) fn columns<const D: usize>() -> [Columns; 9] {
     let (mut first, symmetric) = (0, Layout::<D>::SYMMETRIC);
     let columns = [
         ("position", D, "m", "Position relative to the domain's lower corner."),
@@ -65,18 +65,18 @@ pub(super) fn columns<const D: usize>() -> [Columns; 9] {
 }
 
 /// Name of the data set of what particles carry for loads, which a state has where any does.
-pub(super) const CARRIED: &str = "carried";
+pub(in crate::io::snapshot) const CARRIED: &str = "carried";
 
 /// The data set with the text of the job file.
-pub(super) const JOB: &str = "state/job";
+pub(in crate::io::snapshot) const JOB: &str = "state/job";
 
 /// Path of a data set of the state.
-pub(super) fn path(kind: &str, name: &str) -> String {
+pub(in crate::io::snapshot) fn path(kind: &str, name: &str) -> String {
     format!("{GROUP}/{kind}/{name}")
 }
 
 /// Collective. Writes the text of the job, all of it by rank 0.
-pub(super) fn write_job<const D: usize>(
+pub(in crate::io::snapshot) fn write_job<const D: usize>(
     recorded: &mut Recorded,
     comm: &Comm,
     view: &View<D>,
@@ -86,12 +86,12 @@ pub(super) fn write_job<const D: usize>(
 }
 
 /// The data set of the largest values of a map.
-pub(super) fn map(name: &str, what: &str) -> String {
+pub(in crate::io::snapshot) fn map(name: &str, what: &str) -> String {
     format!("maps/{name}/{what}")
 }
 
 /// Collective. Writes the largest values of maps, all of them by rank 0.
-pub(super) fn write_maps<const D: usize>(
+pub(in crate::io::snapshot) fn write_maps<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
     comm: &Comm,
@@ -122,7 +122,7 @@ pub(super) fn write_maps<const D: usize>(
 }
 
 /// Collective. Writes tree and particles below the header's group.
-pub(super) fn write<const D: usize>(
+pub(in crate::io::snapshot) fn write<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
     comm: &Comm,
@@ -191,12 +191,12 @@ fn write_carried<const D: usize>(
 }
 
 /// Components of the data set of what particles carry as [`Writer::write_slab`] counts them.
-pub(super) fn carried_components(columns: usize) -> usize {
+pub(in crate::io::snapshot) fn carried_components(columns: usize) -> usize {
     if columns == 1 { 0 } else { columns }
 }
 
 /// Columns of what particles carry in a file; 0 if no particle carries anything.
-pub(super) fn carried_columns(file: &Reader, header: &Header) -> Result<usize, FileError> {
+pub(in crate::io::snapshot) fn carried_columns(file: &Reader, header: &Header) -> Result<usize, FileError> {
     let name = path("particles", CARRIED);
     if header.checksum(&name).is_none() {
         return Ok(0);
@@ -213,7 +213,7 @@ const MOST_CARRIED: usize = 3 * 27;
 
 /// Collective. Reads tree and particles; each rank gets a contiguous share of the curve with about
 /// the same number of particles. Refuses a state that no run can have written.
-pub(super) fn read<const D: usize>(
+pub(in crate::io::snapshot) fn read<const D: usize>(
     file: &Reader,
     comm: &Comm,
     header: &Header,
@@ -320,7 +320,7 @@ fn balanced_share(
 }
 
 /// Leaves by their levels and coordinates.
-pub(super) fn octants<const D: usize>(levels: &[u8], coords: &[u32]) -> Vec<Octant<D>> {
+pub(in crate::io::snapshot) fn octants<const D: usize>(levels: &[u8], coords: &[u32]) -> Vec<Octant<D>> {
     let octant =
         |(&level, coord): (&u8, &[u32])| Octant { level, coord: std::array::from_fn(|axis| coord[axis]) };
     levels.iter().zip(coords.chunks_exact(D)).map(octant).collect()
@@ -340,7 +340,7 @@ fn bounded(file: &Reader, header: &Header, counts: &[u64]) -> Result<(), FileErr
 }
 
 /// Octants inside the brick, and the number of particles that the header says.
-pub(super) fn check_tree<const D: usize>(
+pub(in crate::io::snapshot) fn check_tree<const D: usize>(
     file: &Reader,
     header: &Header,
     octants: &[Octant<D>],

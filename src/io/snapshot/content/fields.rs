@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::View;
 use super::averages::{self, principal};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
+use crate::io::snapshot::View;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};

@@ -30,7 +30,10 @@ impl Sum {
 }
 
 /// Cauchy stress of the cell of each particle of a leaf with these cells.
-pub(super) fn over_cells<const D: usize>(cells: &LeafCells<D>, chunk: &Chunk<D>) -> Vec<[f64; 6]> {
+pub(in crate::io::snapshot) fn over_cells<const D: usize>(
+    cells: &LeafCells<D>,
+    chunk: &Chunk<D>,
+) -> Vec<[f64; 6]> {
     let cells: Vec<usize> = (0..chunk.len()).map(|p| cells.cell_of(&chunk.position(p))).collect();
     let mut sums = vec![Sum::default(); BLOCK.pow(D as u32)];
     cells.iter().enumerate().for_each(|(p, &cell)| sums[cell].add(chunk, p));
@@ -38,7 +41,7 @@ pub(super) fn over_cells<const D: usize>(cells: &LeafCells<D>, chunk: &Chunk<D>)
 }
 
 /// What the file of the tree shows of the stress in a leaf.
-pub(super) struct LeafAverage {
+pub(in crate::io::snapshot) struct LeafAverage {
     /// Volume of the material over that of the leaf.
     pub volume_fraction: f64,
     /// Mean Cauchy stress by volume, Pa: xx, yy, zz, xy, yz, xz; 0 without material.
@@ -46,7 +49,7 @@ pub(super) struct LeafAverage {
 }
 
 /// The average over a leaf of the edge `edge`, m.
-pub(super) fn over_leaf<const D: usize>(edge: f64, chunk: &Chunk<D>) -> LeafAverage {
+pub(in crate::io::snapshot) fn over_leaf<const D: usize>(edge: f64, chunk: &Chunk<D>) -> LeafAverage {
     let mut sum = Sum::default();
     (0..chunk.len()).for_each(|p| sum.add(chunk, p));
     LeafAverage { volume_fraction: sum.volume / edge.powi(D as i32), stress: sum.mean() }

@@ -2,11 +2,11 @@
 
 use partition::{MAX_LEVEL, Octant};
 
-use super::View;
-use super::fields::{PointField, Values};
-use super::header::Header;
-use super::state::{CARRIED, columns};
 use crate::grid::leaf_geometry::position_key;
+use crate::io::snapshot::View;
+use crate::io::snapshot::content::fields::{PointField, Values};
+use crate::io::snapshot::content::state::{CARRIED, columns};
+use crate::io::snapshot::header::Header;
 use crate::particle::chunk::{TILE, Tag};
 use crate::text::{number, place};
 
@@ -20,7 +20,7 @@ pub struct Limits {
 }
 
 /// This rank's particles have finite numbers only; says which one has not.
-pub(super) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
+pub(in crate::io::snapshot) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
     for chunk in view.chunks {
         for p in 0..chunk.len() {
             let tile = chunk.tile_of(p);
@@ -41,7 +41,7 @@ pub(super) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
 }
 
 /// Values of a field that is to be written are finite; `width` for each particle.
-pub(super) fn finite_field<const D: usize>(
+pub(in crate::io::snapshot) fn finite_field<const D: usize>(
     view: &View<D>,
     field: PointField,
     values: &Values,
@@ -79,7 +79,7 @@ const WIDEST: f64 = 1e9;
 const GREATEST: f64 = 1e30;
 
 /// Finite numbers that a run can have; masses and half widths above 0. `values` has `width` numbers for each particle.
-pub(super) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), String> {
+pub(in crate::io::snapshot) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), String> {
     let positive = ["mass", "half_width"].contains(&name);
     let most = if name == "half_width" { WIDEST } else { GREATEST };
     let is_wrong = |value: &f64| !value.is_finite() || value.abs() > most || (positive && *value <= 0.0);
@@ -97,7 +97,7 @@ pub(super) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), Stri
 }
 
 /// Every particle in its leaf: the first leaves have the first rows, as many as `counts` says.
-pub(super) fn positions<const D: usize>(
+pub(in crate::io::snapshot) fn positions<const D: usize>(
     header: &Header,
     octants: &[Octant<D>],
     counts: &[u64],
@@ -126,7 +126,7 @@ pub(super) fn positions<const D: usize>(
 }
 
 /// Materials and bodies of the job, levels of a tree.
-pub(super) fn tags(tags: &[u64], limits: Limits) -> Result<(), String> {
+pub(in crate::io::snapshot) fn tags(tags: &[u64], limits: Limits) -> Result<(), String> {
     let is_wrong = |tag: &u64| {
         let Tag { material, body, level } = Tag::unpack(*tag);
         usize::from(material) >= limits.materials || usize::from(body) >= limits.bodies || level > MAX_LEVEL
@@ -145,7 +145,7 @@ pub(super) fn tags(tags: &[u64], limits: Limits) -> Result<(), String> {
 }
 
 /// No identifier twice among these.
-pub(super) fn identifiers(ids: &[u64]) -> Result<(), String> {
+pub(in crate::io::snapshot) fn identifiers(ids: &[u64]) -> Result<(), String> {
     let mut sorted = ids.to_vec();
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {

@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::RunError;
 use crate::io::whole_file::write_whole;
+use crate::run::RunError;
 
 /// Why a run has ended ahead of its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,13 +33,13 @@ const OTHER: &str = "Correct what the message names; then continue from the last
 
 impl Ending {
     /// Asked to stop by a signal.
-    pub(super) fn stopped(step: u64, time: f64) -> Self {
+    pub(in crate::run) fn stopped(step: u64, time: f64) -> Self {
         let reason = "stopped on request (signal), after a checkpoint".into();
         Self { reason, advice: "Continue from the last state.".into(), is_stop: true, step, time }
     }
 
     /// By an error.
-    pub(super) fn failed(error: &RunError, step: u64, time: f64) -> Self {
+    pub(in crate::run) fn failed(error: &RunError, step: u64, time: f64) -> Self {
         let reason = error.to_string();
         let is_unstable =
             ["unstable", "not finite", "NaN", "reaches beyond"].iter().any(|word| reason.contains(word));
@@ -56,7 +56,7 @@ impl Ending {
     }
 
     /// Not collective. Writes it, under a temporary name first.
-    pub(super) fn write(&self, path: &Path) -> std::io::Result<()> {
+    pub(in crate::run) fn write(&self, path: &Path) -> std::io::Result<()> {
         let mut text = serde_json::to_string_pretty(self).map_err(std::io::Error::other)?;
         text.push('\n');
         write_whole(path, text.as_bytes())

@@ -5,12 +5,12 @@
 
 use partition::comm::Comm;
 
-use super::header::Header;
 use crate::io::hdf5_file::{Element, FileError, Reader, Stored, Writer};
+use crate::io::snapshot::header::Header;
 
 /// The rows of this rank among those of all ranks, in rank order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rows {
+pub(in crate::io::snapshot) struct Rows {
     /// First row of this rank.
     pub offset: u64,
     /// Rows of this rank.
@@ -21,19 +21,19 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Collective. Places `count` rows behind those of the lower ranks.
-    pub(super) fn place(comm: &Comm, count: u64) -> Self {
+    pub(in crate::io::snapshot) fn place(comm: &Comm, count: u64) -> Self {
         let mut total = [count];
         comm.sum_u64(&mut total);
         Self { offset: comm.exclusive_sum_u64(count), count, total: total[0] }
     }
 
     /// As many rows per row; for example the corners of each leaf.
-    pub(super) fn times(self, n: u64) -> Self {
+    pub(in crate::io::snapshot) fn times(self, n: u64) -> Self {
         Self { offset: self.offset * n, count: self.count * n, total: self.total * n }
     }
 
     /// One more row at the end, on the last rank with rows (the first rank if none has).
-    pub(super) fn and_one(self, comm: &Comm) -> Self {
+    pub(in crate::io::snapshot) fn and_one(self, comm: &Comm) -> Self {
         let last = comm.rank() + 1 == comm.size();
         Self { count: self.count + u64::from(last), total: self.total + 1, ..self }
     }
@@ -60,7 +60,7 @@ fn combine(comm: Option<&Comm>, parts: &[[u64; 2]]) -> Vec<u32> {
 }
 
 /// Writes the data sets of a new file and collects their checksums.
-pub(super) struct Recorded<'a> {
+pub(in crate::io::snapshot) struct Recorded<'a> {
     comm: &'a Comm,
     file: &'a Writer,
     names: Vec<String>,
@@ -71,12 +71,12 @@ pub(super) struct Recorded<'a> {
 
 impl<'a> Recorded<'a> {
     /// Starts to collect.
-    pub(super) fn new(comm: &'a Comm, file: &'a Writer) -> Self {
+    pub(in crate::io::snapshot) fn new(comm: &'a Comm, file: &'a Writer) -> Self {
         Self { comm, file, names: Vec::new(), parts: Vec::new(), links: Vec::new() }
     }
 
     /// Collective. Writes this rank's rows of a new data set.
-    pub(super) fn write<T: Element>(
+    pub(in crate::io::snapshot) fn write<T: Element>(
         &mut self,
         dataset: &str,
         rows: Rows,
@@ -90,13 +90,13 @@ impl<'a> Recorded<'a> {
     }
 
     /// Collective. Gives a data set a second name.
-    pub(super) fn link(&mut self, dataset: &str, new: &str) -> Result<(), FileError> {
+    pub(in crate::io::snapshot) fn link(&mut self, dataset: &str, new: &str) -> Result<(), FileError> {
         self.links.push((dataset.to_owned(), new.to_owned()));
         self.file.hard_link(dataset, new)
     }
 
     /// Collective. The checksums of all data sets, under all their names.
-    pub(super) fn checksums(self) -> Vec<(String, u32)> {
+    pub(in crate::io::snapshot) fn checksums(self) -> Vec<(String, u32)> {
         let crcs = combine(Some(self.comm), &self.parts);
         let mut sums: Vec<(String, u32)> = self.names.into_iter().zip(crcs).collect();
         for (dataset, new) in self.links {
@@ -123,7 +123,7 @@ impl<'a> Checked<'a> {
 
     /// Collective on a shared file. Reads this rank's rows. The ranks' parts must follow each other
     /// and cover the data set, or its checksum cannot be compared.
-    pub(super) fn read<T: Element>(
+    pub(in crate::io::snapshot) fn read<T: Element>(
         &mut self,
         dataset: &str,
         rows: Rows,
@@ -177,7 +177,7 @@ fn compare(file: &Reader, header: &Header, dataset: &str, crc: u32) -> Result<()
 
 /// Not collective. Compares the checksums of those data sets in the header's list that `is_meant` by number and name.
 /// Returns how many they are.
-pub(super) fn verify(
+pub(in crate::io::snapshot) fn verify(
     file: &Reader,
     header: &Header,
     is_meant: impl Fn(usize, &str) -> bool,

@@ -5,11 +5,12 @@ use partition::Octant;
 use partition::comm::Comm;
 
 use super::averages::{LeafAverage, over_leaf, principal};
-use super::checked::{Recorded, Rows};
 use super::fields::{PointField, Values, mean, von_mises};
 use super::state::path;
-use super::{Options, View, sane};
 use crate::io::hdf5_file::{Element, FileError, Writer};
+use crate::io::snapshot::intact::checked::{Recorded, Rows};
+use crate::io::snapshot::intact::sane;
+use crate::io::snapshot::{Options, View};
 use crate::particle::chunk::Chunk;
 
 const GROUP: &str = "VTKHDF";
@@ -81,7 +82,7 @@ fn field(recorded: &mut Recorded, name: &str, rows: Rows, values: &Values) -> Re
 }
 
 /// Collective. Writes the particles with the chosen fields.
-pub(super) fn write_particles<const D: usize>(
+pub(in crate::io::snapshot) fn write_particles<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
     comm: &Comm,
@@ -154,7 +155,7 @@ fn positions<const D: usize>(view: &View<D>) -> Vec<f64> {
 }
 
 /// Collective. Writes the leaves of the tree as cells with their level and number of particles.
-pub(super) fn write_leaves<const D: usize>(
+pub(in crate::io::snapshot) fn write_leaves<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
     comm: &Comm,

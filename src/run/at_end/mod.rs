@@ -1,0 +1,10 @@
+//! What a run leaves when it ends.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | [`report`] | `JOB.report.json`: the results of a finished run |
+//! | [`ending`] | `JOB.ended.json`: why a run ended early, and what to do |
+//! | [`collapse`] | evaluation of a column of sand |
+pub mod collapse;
+pub mod ending;
+pub mod report;
