@@ -10,7 +10,7 @@ pub mod problem;
 pub mod schema;
 
 pub use difference::{Difference, differences};
-pub use parse::error::{Fault, FaultList, JobError};
+pub use parse::error::{Fault, FaultList, JobError, Position};
 pub use parse::include::Included;
 pub use parse::settings::Settings;
 pub use problem::{AnyProblem, Problem};
@@ -142,7 +142,7 @@ fn parse_edited(
     let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
     let lines = Lines::of(original);
-    convert::convert(&file, &tree, text, &|byte| whole.position(edited.original(byte), &lines), path)
+    convert::convert(&file, &tree, text, &|byte| whole.position(edited.original(byte), path, &lines), path)
 }
 
 /// The schema that all jobs are checked against, made once.

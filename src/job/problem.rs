@@ -9,6 +9,7 @@ use crate::boundary::absorbing::AbsorbingFaces;
 pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
+use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::initial::Consolidation;
@@ -123,8 +124,8 @@ pub struct Problem<const D: usize> {
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
-    /// Line and column of each load in the job file, both from 1; for messages.
-    pub load_places: Vec<(usize, usize)>,
+    /// Place of each load in the files of the job, for messages.
+    pub load_places: Vec<Position>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
     /// What is beyond those that absorb waves.
@@ -285,8 +286,8 @@ pub struct Body<const D: usize> {
     pub name: String,
     /// Region that it fills.
     pub shape: Shape<D>,
-    /// Line and column of the shape in the job file, both from 1; for messages.
-    pub place: (usize, usize),
+    /// Place of the shape in the files of the job, for messages.
+    pub place: Position,
     /// Index into [`Problem::materials`].
     pub material: usize,
     /// Velocity without that of rotation, m/s; it may depend on the place.
@@ -373,8 +374,8 @@ impl InStages {
 /// Stress of a body at the start.
 #[derive(Clone, Debug)]
 pub struct InitialStress {
-    /// Line and column of its table in the job file, both from 1; for messages.
-    pub place: (usize, usize),
+    /// Place of its table in the files of the job, for messages.
+    pub place: Position,
     /// What it is.
     pub kind: StressKind,
     /// Consolidation, in place of that of the material.

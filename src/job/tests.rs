@@ -88,6 +88,15 @@ fn faults_of_included_files_name_these() {
     assert!(wrong.contains(&format!("column_collapse.toml:{}:1: time.edn", line + 1)), "{wrong}");
     let wrong = text(&job, &[&materials, "[time]\nend = 2\n"].concat()).unwrap_err();
     assert!(wrong.contains("materials.toml:") && wrong.contains("a second time"), "{wrong}");
+    // What only the first state shows is said of the file too.
+    let start = JOB.find("[[bodies]]").unwrap();
+    let end = start + JOB[start..].find("[time]").unwrap();
+    write("bodies.toml", &format!("# A column.\n{}", &JOB[start..end]));
+    let cut = [&JOB[..start], &JOB[end..]].concat();
+    write("column_collapse.toml", &cut.replace("version = 1", "version = 1\ninclude = [\"bodies.toml\"]"));
+    let AnyProblem::Three(problem) = load(&path).unwrap() else { panic!("3D") };
+    let place = &problem.bodies[0].place;
+    assert!(place.file.ends_with("bodies.toml") && place.line > 2 && place.line < 12, "{place}");
     // Settings hold for what is included too.
     let mut settings = Settings::default();
     settings.set("materials.0.density=-1").unwrap();

@@ -62,7 +62,6 @@ pub(super) fn carry<const D: usize>(
 }
 
 fn nothing<const D: usize>(problem: &Problem<D>, number: usize, carried: &Carried<D>) -> SeedError {
-    let (line, column) = problem.load_places[number];
     let (found, expected) = match carried.force.is_on_surface() {
         true => (
             "surface",
@@ -73,7 +72,7 @@ fn nothing<const D: usize>(problem: &Problem<D>, number: usize, carried: &Carrie
         }
     };
     SeedError::Load {
-        place: format!("{}:{line}:{column}: loads[{number}]", problem.path.display()),
+        place: format!("{}: loads[{number}]", problem.load_places[number]),
         load: excerpt(&problem.loads[number].name, 60).into_owned(),
         found,
         expected,

@@ -69,9 +69,8 @@ fn fault<const D: usize>(
     x: &[f64; D],
     reason: NoState,
 ) -> SeedError {
-    let (line, column) = initial.place;
     SeedError::Stress {
-        place: format!("{}:{line}:{column}: bodies[{index}].stress", problem.path.display()),
+        place: format!("{}: bodies[{index}].stress", initial.place),
         body: problem.bodies[index].name.clone(),
         point: problem.place(x)[..D].to_vec(),
         reason,

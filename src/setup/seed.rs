@@ -233,8 +233,7 @@ pub fn check_counts<const D: usize>(
 }
 
 fn place<const D: usize>(problem: &Problem<D>, body: usize) -> String {
-    let (line, column) = problem.bodies[body].place;
-    format!("{}:{line}:{column}: bodies[{body}].shape", problem.path.display())
+    format!("{}: bodies[{body}].shape", problem.bodies[body].place)
 }
 
 /// Distance of lattice points of a body in leaves of a level, m.

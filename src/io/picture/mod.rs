@@ -195,7 +195,7 @@ pub fn survey(
     let mut all: Option<Look> = None;
     for file in files {
         let (drawing, _) = drawing(file, name, settings, solids)?;
-        let (Bounds { low, high }, [from, to]) = (drawing.frame(None), drawing.range(None, None));
+        let (Bounds { low, high }, [from, to]) = (drawing.frame(None), drawing.range(None, None).0);
         let longest = drawing.vectors.longest();
         let seen = all.get_or_insert(Look { range: [from, to], frame: [low, high], longest });
         seen.longest = seen.longest.max(longest);
@@ -311,16 +311,20 @@ impl Drawing {
         frame
     }
 
-    /// Collective on a shared drawing. The values between which the colours run.
-    fn range(&self, comm: Option<&Comm>, given: Option<[f64; 2]>) -> [f64; 2] {
-        const BINS: usize = 1000;
-        let classes = self.tint.classes;
+    /// Collective on a shared drawing. The values between which the colours run, and whether there are values below and above.
+    fn range(&self, comm: Option<&Comm>, given: Option<[f64; 2]>) -> ([f64; 2], [bool; 2]) {
         let values = || self.splats.iter().map(|splat| splat.value).filter(|value| value.is_finite());
         let low = min(comm, values().fold(f64::INFINITY, f64::min));
         let high = max(comm, values().fold(f64::NEG_INFINITY, f64::max));
-        if let Some(range) = given {
-            return range;
-        }
+        let [from, to] = given.unwrap_or_else(|| self.most([low, high], comm));
+        ([from, to], [low < from, high > to])
+    }
+
+    /// Collective on a shared drawing. The range `low` to `high` of all values without its outermost half percents.
+    fn most(&self, [low, high]: [f64; 2], comm: Option<&Comm>) -> [f64; 2] {
+        const BINS: usize = 1000;
+        let classes = self.tint.classes;
+        let values = || self.splats.iter().map(|splat| splat.value).filter(|value| value.is_finite());
         if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) || classes {
             return if low.is_finite() { [low, high] } else { [0.0, 0.0] };
         }
@@ -345,7 +349,7 @@ impl Drawing {
         let paper = settings.paper();
         let frame = settings.frame.map_or_else(|| self.frame(comm), |[low, high]| Bounds { low, high });
         let frame = self.mirror(settings, frame);
-        let [low, high] = self.range(comm, settings.range);
+        let ([low, high], beyond) = self.range(comm, settings.range);
         let (width, height) = (settings.width as f64, settings.height as f64);
         let [left, right, top, bottom] = MARGINS;
         // Numbers and unit of the axes of a plane picture stand there.
@@ -425,7 +429,7 @@ impl Drawing {
             legend(&mut canvas, &self.tint, low as usize..=high as usize, paper);
         } else {
             let room = if self.vectors.each.is_empty() { 0 } else { 60 };
-            colour_bar(&mut canvas, &self.tint, [low, high], (settings.map, paper), room);
+            colour_bar(&mut canvas, &self.tint, ([low, high], beyond), (settings.map, paper), room);
         }
         canvas
     }

@@ -108,7 +108,7 @@ pub(super) fn lines(name: &str, width: i64) -> Vec<String> {
 pub(super) fn colour_bar(
     canvas: &mut Canvas,
     tint: &Tint,
-    [low, high]: [f64; 2],
+    ([low, high], [is_below, is_above]): ([f64; 2], [bool; 2]),
     (map, paper): (Map, &Paper),
     room: i64,
 ) {
@@ -122,7 +122,13 @@ pub(super) fn colour_bar(
         let part = f64::from(tick) / 4.0;
         let row = top + ((1.0 - part) * (length - 1) as f64) as i64;
         canvas.fill(x + 24, row, 6, 1, paper.ink);
-        canvas.text(x + 34, row - 7, 2, &short(low + part * (high - low)), paper.ink);
+        let sign = match tick {
+            0 if is_below => "≤ ",
+            4 if is_above => "≥ ",
+            _ => "",
+        };
+        let value = short(low + part * (high - low));
+        canvas.text(x + 34, row - 7, 2, &format!("{sign}{value}"), paper.ink);
     }
 }
 

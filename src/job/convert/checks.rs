@@ -1,6 +1,6 @@
 //! What all conversions need: faults with their places, and the domain.
 use crate::geometry::written::Vector;
-use crate::job::parse::error::{Fault, MOST, QUOTED, names};
+use crate::job::parse::error::{Fault, MOST, Position, QUOTED, names};
 use crate::job::parse::source::{Node, Path};
 use crate::text::{excerpt, nearest, number};
 
@@ -10,8 +10,8 @@ pub(in crate::job) struct Checks<'t> {
     pub tree: &'t Node,
     /// Text of the job.
     pub text: &'t str,
-    /// Line and column, both from 1, of a byte of the text.
-    pub position: &'t dyn Fn(usize) -> (usize, usize),
+    /// Place of a byte of the text in the files of the job.
+    pub position: &'t dyn Fn(usize) -> Position,
     /// Directory of the job file, from which names of files in it go.
     pub directory: &'t std::path::Path,
     /// Checksum of the files that the job names, as far as they have been read; 0 without.
@@ -44,8 +44,8 @@ impl Checks<'_> {
         });
     }
 
-    /// Line and column of the value at `path`, both from 1.
-    pub(crate) fn place(&self, path: &Path) -> (usize, usize) {
+    /// Place of the value at `path`.
+    pub(crate) fn place(&self, path: &Path) -> Position {
         (self.position)(self.tree.locate(path).start)
     }
 

@@ -20,7 +20,7 @@ use self::colliders::colliders;
 use self::contact::body_contacts;
 use self::loads::{loads, vector};
 use self::settings::{digest, faces, numerics, output, report};
-use super::parse::error::{Fault, QUOTED};
+use super::parse::error::{Fault, Position, QUOTED};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::common::FASTEST;
@@ -55,7 +55,7 @@ pub(super) fn convert(
     file: &JobFile,
     tree: &Node,
     text: &str,
-    position: &dyn Fn(usize) -> (usize, usize),
+    position: &dyn Fn(usize) -> Position,
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
     let directory = path.parent().unwrap_or(std::path::Path::new(""));

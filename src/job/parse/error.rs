@@ -7,6 +7,23 @@ use std::sync::Arc;
 use super::include::Included;
 use crate::text::{excerpt, printable};
 
+/// A place in a file of a job, as messages name it: `FILE:LINE:COLUMN`, both from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Position {
+    /// The file.
+    pub file: PathBuf,
+    /// Line.
+    pub line: usize,
+    /// Column, in characters.
+    pub column: usize,
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
+    }
+}
+
 /// One fault of a job file: where it is, what was found and what would be right.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}{}{message}", if key.is_empty() { "" } else { ": " })]

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::error::{Fault, Lines, QUOTED};
+use super::error::{Fault, Lines, Position, QUOTED};
 use super::source::{Node, Value};
 use crate::text::excerpt;
 
@@ -33,8 +33,6 @@ pub(in crate::job) struct Whole {
     sources: Vec<Arc<Included>>,
     /// Where each piece begins in `text`, its source, and where it begins there.
     pieces: Vec<(usize, usize, usize)>,
-    /// Where the job says what it includes.
-    key: usize,
 }
 
 /// What stands between two headers, in pieces of sources.
@@ -58,14 +56,16 @@ impl Whole {
     /// # Errors
     /// A file cannot be read or is no TOML, or files include each other.
     pub(in crate::job) fn of(text: &str, path: &Path) -> Result<Self, Vec<Fault>> {
-        let alone = || Self { text: text.to_owned(), sources: Vec::new(), pieces: Vec::new(), key: 0 };
+        let alone = || Self { text: text.to_owned(), sources: Vec::new(), pieces: Vec::new() };
         let Ok(tree) = Node::parse(text) else { return Ok(alone()) };
-        let Some((key, _)) = names(&tree) else { return Ok(alone()) };
+        if names(&tree).is_none() {
+            return Ok(alone());
+        }
         let job = Arc::new(Included { path: path.to_path_buf(), text: text.to_owned() });
         let true_name = path.canonicalize().into_iter().collect::<Vec<_>>();
         let mut reader =
             Reader { sources: vec![job], open: true_name.clone(), seen: true_name, bytes: text.len() };
-        let mut whole = Self { text: String::new(), sources: Vec::new(), pieces: Vec::new(), key: key.start };
+        let mut whole = Self { text: String::new(), sources: Vec::new(), pieces: Vec::new() };
         for section in reader.sections(0, &tree)? {
             for (source, range) in section.pieces {
                 whole.append(&reader.sources[source].text[range.clone()], source, range.start);
@@ -92,12 +92,16 @@ impl Whole {
         }
     }
 
-    /// Line and column in the text of the job, `lines`, of a byte of the whole; for what is included, of the key that says so.
-    pub(in crate::job) fn position(&self, byte: usize, lines: &Lines<'_>) -> (usize, usize) {
-        match self.origin(byte) {
-            (0, byte) => lines.position(byte),
-            _ => lines.position(self.key),
-        }
+    /// Place of a byte of the whole in the job at `path`, with the text `lines`, or in the file that is included there.
+    pub(in crate::job) fn position(&self, byte: usize, path: &Path, lines: &Lines<'_>) -> Position {
+        let (file, (line, column)) = match self.origin(byte) {
+            (0, byte) => (path, lines.position(byte)),
+            (source, byte) => {
+                let Included { path, text } = &*self.sources[source];
+                (path.as_path(), Lines::of(text).position(byte))
+            }
+        };
+        Position { file: file.into(), line, column }
     }
 
     /// A fault of the whole as one of the file in which it stands.

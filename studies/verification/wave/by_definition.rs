@@ -57,7 +57,7 @@ impl Bar {
         for chunk in &solver.chunks {
             for p in 0..chunk.len() {
                 let value = |column: usize| chunk.column(column)[p];
-                let half = [value(Layout::<2>::HALF), value(Layout::<2>::HALF + 1)];
+                let half = [value(Layout::<2>::HALF); 2];
                 let found = weights(&tree, root_edge, chunk.position(p), half);
                 let mine = found.into_iter().map(|node| {
                     let number = *numbers.entry(node.place).or_insert_with(|| {
