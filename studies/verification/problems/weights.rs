@@ -11,12 +11,14 @@ use crate::runs::Runs;
 const POSITIONS: usize = 1024;
 const IN_A_CELL: f64 = 64.0;
 
+/// Position (root edges) of a node, its weight, and the gradient of the weight.
+type NodeWeight = (Vec<f64>, f64, Vec<f64>);
+
 /// A box with the weights of its nodes.
 struct Weights {
     centre: Vec<f64>,
     half: Vec<f64>,
-    /// Position (root edges), weight and its gradient, by node.
-    nodes: Vec<(Vec<f64>, f64, Vec<f64>)>,
+    nodes: Vec<NodeWeight>,
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -70,7 +72,7 @@ impl Weights {
     /// Errors of the sum of the weights, of the interpolated x, of its gradient (times the finest cell), and of the interpolated product of
     /// all coordinates.
     fn sums(&self, cell: f64) -> [f64; 4] {
-        let sum = |of: &dyn Fn(&(Vec<f64>, f64, Vec<f64>)) -> f64| self.nodes.iter().map(of).sum::<f64>();
+        let sum = |of: &dyn Fn(&NodeWeight) -> f64| self.nodes.iter().map(of).sum::<f64>();
         let axes = 0..self.centre.len();
         let place = axes.clone().map(|a| (sum(&|node| node.1 * node.0[a]) - self.centre[a]).abs());
         let slopes = axes.clone().flat_map(|a| axes.clone().map(move |b| (a, b))).map(|(a, b)| {
