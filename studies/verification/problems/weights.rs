@@ -183,7 +183,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
     page.text(
         "## 12 Weights\n\n\
          Weights and gradients of boxes of many shapes on graded and non-graded trees (jumps of up to five levels), in 2D and 3D, against exact rational arithmetic by independent code: \
-         [data](../tests/data/golden/README.md). *Kernels* are the weights with which a run transfers, *definition* the integral cell by cell (`agimp weights`, with and without `--direct`). \
+         `tests/data/golden`. *Kernels* are the weights with which a run transfers, *definition* the integral cell by cell (`agimp weights`, with and without `--direct`). \
          Errors are in units of eps kappa, the error of double arithmetic for a box of its size and place. Exact are 1 for the sum of the weights, the centre for the interpolated \
          position, the unit matrix for its gradient, and the product of the centre's coordinates for that of the nodes. As a box of half a fine cell moves through a jump of levels, \
          gradients are Lipschitz continuous; with *linear hats* (boxes of a millionth) they jump. *Face neighbours*: boxes whose nodes do not all belong to the leaf that holds the \
