@@ -100,6 +100,7 @@ fn page_holds_positions_values_and_leaves_of_the_files() {
         .map(|c| c["name"].as_str().expect("name"))
         .collect();
     assert_eq!(columns, ["id", "velocity_x", "velocity_y", "velocity_z", "speed", "pressure", "material"]);
+    assert_eq!(meta["title"], "Half <full>", "that of the job");
     assert_eq!(meta["columns"][5]["unit"], "Pa");
     assert_eq!(meta["columns"][6]["names"], serde_json::json!(["rubber"]));
     let resolution = real(&meta["resolution"]);

@@ -2,6 +2,7 @@
 use crate::cli::Failure;
 use crate::io::frame::expand;
 use crate::io::snapshot::PointField;
+use crate::run::scene;
 use crate::text::bytes;
 use crate::view::{self, Options};
 use std::io::Write;
@@ -19,7 +20,7 @@ pub struct Arguments {
     /// Bits for each real value; more bits give finer values and a larger page.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(4..=16))]
     bits: u8,
-    /// Title; by default the name of the first file.
+    /// Title; by default the title of the job that wrote the first file, or the name of the page.
     #[arg(long)]
     title: Option<String>,
     /// Page to write; by default beside the first file with the extension html.
@@ -38,7 +39,8 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let (first, out) = (&given[0], arguments.out.as_deref());
     let out = out.map_or_else(|| super::beside(first, "html"), Path::to_path_buf);
     let name = out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let title = arguments.title.clone().unwrap_or(name);
+    let of_job = || files.first().and_then(|first| scene::title_of(first));
+    let title = arguments.title.clone().or_else(of_job).unwrap_or(name);
     let options = Options { title, fields: arguments.fields.clone(), bits: arguments.bits };
     let size = view::write(&files, &options, &out).map_err(failed)?;
     let times = if files.len() == 1 { "one time".into() } else { format!("{} times", files.len()) };
