@@ -477,6 +477,7 @@ fn an_exported_tree_is_that_of_the_run() {
         let cells = counts.iter().sum::<f64>() as usize;
         let refined = array("Descriptors").iter().sum::<f64>() as usize;
         assert_eq!(cells - refined, leaves.len());
+        assert_eq!(array("TimeValue"), [frame.header.time]);
         // The roots hold all particles.
         let firsts = depths.iter().scan([0, 0], |[tree, cell], depth| {
             let first = *cell;
@@ -499,7 +500,8 @@ fn an_exported_tree_is_that_of_the_run() {
             let sum: u32 = leaves.iter().map(|level| u32::from(*level)).sum();
             assert_eq!(found["sums_of_leaves"]["level"], f64::from(sum), "{found}");
             assert_eq!(found["bounds"][1], 1.0);
-            assert_eq!(found["time"], frame.header.time);
+            // VTK 9.2 reads no field data of such files.
+            assert!(found["time"].is_null() || found["time"] == frame.header.time, "{found}");
         }
     }
 }
