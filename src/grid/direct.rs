@@ -34,11 +34,7 @@ pub fn weights<const D: usize>(
     centre: [f64; D],
     half: [f64; D],
 ) -> Vec<DirectNode<D>> {
-    let mut nodes = BTreeMap::new();
-    for (place, share) in on_corners(tree, root_edge, centre, half) {
-        hand_to_real(tree, place, share, &mut nodes);
-    }
-    listed(nodes)
+    collected(tree, root_edge, centre, half, hand_to_real)
 }
 
 /// As [`weights`], but hanging nodes keep what they collect, so that fields are discontinuous beside finer leaves: the control
@@ -49,21 +45,28 @@ pub fn unconstrained_weights<const D: usize>(
     centre: [f64; D],
     half: [f64; D],
 ) -> Vec<DirectNode<D>> {
-    let mut nodes = BTreeMap::new();
-    for (place, share) in on_corners(tree, root_edge, centre, half) {
-        add(place, share, &mut nodes);
-    }
-    listed(nodes)
+    collected(tree, root_edge, centre, half, |_, place, share, nodes| add(place, share, nodes))
 }
 
-/// What the corners of all cells get.
-fn on_corners<const D: usize>(
+/// What nodes collect if `hand` says who gets the shares of the corners of all cells.
+fn collected<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
     centre: [f64; D],
     half: [f64; D],
-) -> impl Iterator<Item = ([u32; D], Share<D>)> {
-    tree.leaves().iter().flat_map(move |leaf| in_leaf(leaf, root_edge, centre, half))
+    hand: impl Fn(&KnownTree<D>, [u32; D], Share<D>, &mut BTreeMap<[u32; D], Share<D>>),
+) -> Vec<DirectNode<D>> {
+    let mut nodes = BTreeMap::new();
+    for leaf in tree.leaves() {
+        for (place, share) in in_leaf(leaf, root_edge, centre, half) {
+            hand(tree, place, share, &mut nodes);
+        }
+    }
+    nodes
+        .into_iter()
+        .map(|(place, (weight, gradient))| DirectNode { place, weight, gradient })
+        .filter(|node| node.weight != 0.0 || node.gradient.iter().any(|&g| g != 0.0))
+        .collect()
 }
 
 fn add<const D: usize>(
@@ -74,15 +77,6 @@ fn add<const D: usize>(
     let sum = nodes.entry(place).or_insert((0.0, [0.0; D]));
     sum.0 += weight;
     (0..D).for_each(|axis| sum.1[axis] += gradient[axis]);
-}
-
-/// The nodes with a weight or gradient.
-fn listed<const D: usize>(nodes: BTreeMap<[u32; D], Share<D>>) -> Vec<DirectNode<D>> {
-    nodes
-        .into_iter()
-        .map(|(place, (weight, gradient))| DirectNode { place, weight, gradient })
-        .filter(|node| node.weight != 0.0 || node.gradient.iter().any(|&g| g != 0.0))
-        .collect()
 }
 
 /// One cell along one axis.

@@ -82,31 +82,27 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     for file in expand(&super::without_trees(&arguments.files)).map_err(failed)? {
-        let (out, made) = match arguments.surface {
-            _ if arguments.htg => {
-                let tree = Tree::read(&file).map_err(failed)?;
-                let out = place(&file, "htg");
-                tree.write(&out).map_err(failed)?;
-                (out, format!("{} leaves", count(tree.len() as u64)))
-            }
-            Some(format) => {
-                let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
-                let surface = Surface::of(&frame, arguments.body.as_deref())
-                    .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
-                let out = place(&file, format.ending());
-                surface.write(format, &out).map_err(failed)?;
-                (out, format!("{} triangles", count(surface.triangles.len() as u64)))
-            }
-            None => {
-                let fields = match &arguments.fields {
-                    Some(fields) => fields.clone(),
-                    None => shown_in(&file).map_err(failed)?,
-                };
-                let frame = Frame::read(&file, &fields, true).map_err(failed)?;
-                let out = place(&file, format.ending());
-                points::write(&frame, format, &out).map_err(failed)?;
-                (out, format!("{} particles", count(frame.positions.len() as u64)))
-            }
+        let (out, made) = if arguments.htg {
+            let tree = Tree::read(&file).map_err(failed)?;
+            let out = place(&file, "htg");
+            tree.write(&out).map_err(failed)?;
+            (out, format!("{} leaves", count(tree.leaf_count() as u64)))
+        } else if let Some(format) = arguments.surface {
+            let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
+            let surface = Surface::of(&frame, arguments.body.as_deref())
+                .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
+            let out = place(&file, format.ending());
+            surface.write(format, &out).map_err(failed)?;
+            (out, format!("{} triangles", count(surface.triangles.len() as u64)))
+        } else {
+            let fields = match &arguments.fields {
+                Some(fields) => fields.clone(),
+                None => shown_in(&file).map_err(failed)?,
+            };
+            let frame = Frame::read(&file, &fields, true).map_err(failed)?;
+            let out = place(&file, format.ending());
+            points::write(&frame, format, &out).map_err(failed)?;
+            (out, format!("{} particles", count(frame.positions.len() as u64)))
         };
         let size = std::fs::metadata(&out).map_or(0, |data| data.len());
         writeln!(std::io::stdout(), "{} ({made}, {})", out.display(), bytes(size as f64))?;

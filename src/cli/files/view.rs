@@ -1,8 +1,8 @@
 //! `agimp view`: particles and tree of outputs as a page for a browser.
 use crate::cli::Failure;
+use crate::cli::shared::looks;
 use crate::io::frame::expand;
 use crate::io::snapshot::PointField;
-use crate::run::scene;
 use crate::text::bytes;
 use crate::view::{self, Options};
 use std::io::Write;
@@ -38,9 +38,8 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let files = expand(&given).map_err(failed)?;
     let (first, out) = (&given[0], arguments.out.as_deref());
     let out = out.map_or_else(|| super::beside(first, "html"), Path::to_path_buf);
-    let name = out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let of_job = || files.first().and_then(|first| scene::title_of(first));
-    let title = arguments.title.clone().or_else(of_job).unwrap_or(name);
+    let name = out.file_stem().unwrap_or_default().to_string_lossy();
+    let title = looks::title(arguments.title.as_deref(), files.first().map(PathBuf::as_path), &name);
     let options = Options { title, fields: arguments.fields.clone(), bits: arguments.bits };
     let size = view::write(&files, &options, &out).map_err(failed)?;
     let times = if files.len() == 1 { "one time".into() } else { format!("{} times", files.len()) };

@@ -82,16 +82,21 @@ fn zoom(text: &str) -> Result<f64, String> {
     zoom.ok_or_else(|| "expected a number from 0.01 to 1000".into())
 }
 
+/// Title of what shows an output: the given one, else that of the job that wrote the output, else `name`.
+pub(in crate::cli) fn title(given: Option<&str>, output: Option<&Path>, name: &str) -> String {
+    let of_job = || output.filter(|output| output.is_file()).and_then(scene::title_of);
+    given.map(str::to_owned).or_else(of_job).unwrap_or_else(|| name.to_owned())
+}
+
 impl Looks {
-    /// Settings of a picture of an output. Its title is the given one, else that of the job that wrote the output, else `name`.
+    /// Settings of a picture of an output, with its [`title`].
     pub(in crate::cli) fn settings(
         &self,
         title: Option<&str>,
         output: Option<&Path>,
         name: &str,
     ) -> Settings {
-        let of_job = || output.filter(|output| output.is_file()).and_then(scene::title_of);
-        let title = title.map(str::to_owned).or_else(of_job).unwrap_or_else(|| name.to_owned());
+        let title = self::title(title, output, name);
         Settings {
             width: self.width as usize,
             height: self.height as usize,

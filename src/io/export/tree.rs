@@ -55,13 +55,8 @@ impl Tree {
     }
 
     /// Number of leaves.
-    pub fn len(&self) -> usize {
+    pub fn leaf_count(&self) -> usize {
         self.leaves.levels.len()
-    }
-
-    /// Whether there is no leaf.
-    pub fn is_empty(&self) -> bool {
-        self.leaves.levels.is_empty()
     }
 
     /// Not collective. Writes the tree, under a temporary name first.

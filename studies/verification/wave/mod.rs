@@ -13,7 +13,7 @@ mod by_definition;
 mod oblique;
 
 use agimp::job::Problem;
-use agimp::particle::chunk::Layout;
+use agimp::particle::chunk::{Chunk, Layout};
 use agimp::setup;
 use partition::comm::Comm;
 
@@ -28,6 +28,9 @@ const CUT: f64 = 2.8;
 const ENVELOPE: f64 = 1.5;
 /// Velocity of the packet, m/s: strains of 1e-6 are linear.
 const AMPLITUDE: f64 = 1e-6;
+
+/// Mass, velocity and stress along the bar.
+const ALONG: [usize; 3] = [Layout::<2>::MASS, Layout::<2>::VELOCITY, Layout::<2>::STRESS];
 
 /// One run.
 #[derive(Clone, Copy)]
@@ -54,15 +57,19 @@ struct Outcome {
     amplitude: f64,
 }
 
-/// The packet at distance `x` from its centre.
-fn packet(x: f64, length: f64) -> f64 {
-    let place = x / (ENVELOPE * length);
-    if place.abs() >= CUT {
+/// Velocity of a packet at a place along its path and at a distance from its centre, in standard deviations of its envelope.
+fn packet(along: f64, distance: f64, length: f64) -> f64 {
+    let place = distance.abs();
+    if place >= CUT {
         return 0.0;
     }
     // The window ends the packet smoothly.
     let window = 1.0 - (place / CUT) * (place / CUT);
-    AMPLITUDE * window * window * (-0.5 * place * place).exp() * (std::f64::consts::TAU * x / length).cos()
+    AMPLITUDE
+        * window
+        * window
+        * (-0.5 * place * place).exp()
+        * (std::f64::consts::TAU * along / length).cos()
 }
 
 /// Half length of the packet in roots, rounded up.
@@ -86,16 +93,21 @@ fn job(case: &Case, dt: f64) -> (String, f64) {
     let mut regions = String::new();
     for (level, [from, to]) in levels.into_iter().zip([[0.0, jump], [jump, size]]) {
         if level > base {
-            regions = format!(
-                "regions = [{{ level = {level}, shape = {{ kind = \"box\", min = [{}, 0.5], max = [{}, {}] }} }}]",
-                from + 0.5,
-                to - 0.5,
-                edge - 0.5
-            );
+            regions = fine(level, [from, to], edge);
         }
     }
     let text = elastic([size, edge], edge, base, &regions, dt);
     (text, jump)
+}
+
+/// Setting of leaves of a level between two places along the bar, all over its height.
+fn fine(level: u8, [from, to]: [f64; 2], height: f64) -> String {
+    format!(
+        "regions = [{{ level = {level}, shape = {{ kind = \"box\", min = [{}, 0.5], max = [{}, {}] }} }}]",
+        from + 0.5,
+        to - 0.5,
+        height - 0.5
+    )
 }
 
 /// A job of an elastic medium (E = 1 Pa, nu = 0, 1 kg/m3) that fills a domain of `size` m with roots of `root_edge` m, on leaves of level
@@ -119,53 +131,71 @@ fn energy([mass, v, stress]: [f64; 3]) -> f64 {
     0.5 * mass * (v * v + stress * stress)
 }
 
-/// Mass, velocity and stress along the bar, with identifiers, of particles where `side` holds.
-fn motion(solver: &Solver<2>, side: impl Fn(f64) -> bool) -> Vec<(u64, [f64; 3])> {
+/// Columns of the particles where `side` holds of the place along the bar, in the order of their identifiers.
+fn motion<const N: usize>(
+    solver: &Solver<2>,
+    columns: [usize; N],
+    side: impl Fn(f64) -> bool,
+) -> Vec<[f64; N]> {
     let mut all = Vec::new();
     for chunk in &solver.chunks {
-        let columns =
-            [Layout::<2>::MASS, Layout::<2>::VELOCITY, Layout::<2>::STRESS].map(|c| chunk.column(c));
+        let columns = columns.map(|column| chunk.column(column));
         let chosen = (0..chunk.len()).filter(|&p| side(chunk.position(p)[0]));
         all.extend(chosen.map(|p| (chunk.ids()[p], columns.map(|column| column[p]))));
     }
     all.sort_by_key(|(id, _)| *id);
-    all
+    all.into_iter().map(|(_, state)| state).collect()
+}
+
+/// The medium of a job with particles that `set` has changed.
+fn started(comm: &Comm, job: &str, set: impl Fn(&mut Chunk<2>, usize)) -> Solver<2> {
+    let problem: Problem<2> = crate::problem(job);
+    let mut solver = crate::checked(setup::solver(comm, &problem));
+    let mut chunks = std::mem::take(&mut solver.chunks);
+    for chunk in &mut chunks {
+        (0..chunk.len()).for_each(|p| set(chunk, p));
+    }
+    Solver::new(comm, setup::physics(&problem), solver.forest, chunks, Clock::default())
 }
 
 /// The bar with the packet on its way to the jump, and the place of the jump.
 fn at_start(comm: &Comm, case: &Case, dt: f64) -> (Solver<2>, f64) {
     let (text, jump) = job(case, dt);
-    let problem: Problem<2> = crate::problem(&text);
-    let mut solver = crate::checked(setup::solver(comm, &problem));
-    let mut chunks = std::mem::take(&mut solver.chunks);
-    for chunk in &mut chunks {
-        for p in 0..chunk.len() {
-            let v = packet(chunk.position(p)[0] - 0.5 * jump, case.length);
-            let stretch = 1.0 - v;
-            chunk.column_mut(Layout::<2>::VELOCITY)[p] = v;
-            chunk.column_mut(Layout::<2>::LEFT_CAUCHY_GREEN)[p] = stretch * stretch;
-            chunk.column_mut(Layout::<2>::STRESS)[p] = -v * stretch;
-        }
-    }
-    (Solver::new(comm, setup::physics(&problem), solver.forest, chunks, Clock::default()), jump)
+    let solver = started(comm, &text, |chunk, p| {
+        let x = chunk.position(p)[0] - 0.5 * jump;
+        let v = packet(x, x / (ENVELOPE * case.length), case.length);
+        let stretch = 1.0 - v;
+        chunk.column_mut(Layout::<2>::VELOCITY)[p] = v;
+        chunk.column_mut(Layout::<2>::LEFT_CAUCHY_GREEN)[p] = stretch * stretch;
+        chunk.column_mut(Layout::<2>::STRESS)[p] = -v * stretch;
+    });
+    (solver, jump)
 }
 
-/// Root of the reflected over the incident energy: what the left part holds beside what it holds without the jump.
-fn reflection(left: &[[f64; 3]], uniform: &[[f64; 3]], incident: f64) -> f64 {
+/// Root of the reflected over the incident energy: what the left part holds beside what it holds without the jump. Masses stand first.
+fn reflection<const N: usize>(
+    left: &[[f64; N]],
+    uniform: &[[f64; N]],
+    energy: impl Fn([f64; N]) -> f64,
+    incident: f64,
+) -> f64 {
     assert_eq!(left.len(), uniform.len());
-    let difference = left.iter().zip(uniform).map(|(a, b)| energy([a[0], a[1] - b[1], a[2] - b[2]]));
+    let difference = left
+        .iter()
+        .zip(uniform)
+        .map(|(a, b)| energy(std::array::from_fn(|i| if i == 0 { a[0] } else { a[i] - b[i] })));
     (difference.sum::<f64>() / incident).sqrt()
 }
 
 fn run(comm: &Comm, case: &Case, dt: f64) -> Outcome {
     let (mut solver, jump) = at_start(comm, case, dt);
-    let incident = motion(&solver, |_| true).iter().map(|(_, state)| energy(*state)).sum();
+    let incident = motion(&solver, ALONG, |_| true).into_iter().map(energy).sum();
     // The centre of the packet goes to the jump and back.
     while solver.clock.time < jump {
         crate::checked(solver.step(jump, Requests::default()));
     }
-    let left = motion(&solver, |x| x < jump).into_iter().map(|(_, state)| state).collect();
-    let right = motion(&solver, |x| x >= jump).iter().map(|(_, state)| energy(*state)).sum();
+    let left = motion(&solver, ALONG, |x| x < jump);
+    let right = motion(&solver, ALONG, |x| x >= jump).into_iter().map(energy).sum();
     let mut profile = Vec::new();
     for chunk in &solver.chunks {
         for p in 0..chunk.len() {
@@ -197,7 +227,7 @@ fn reflection_by_definition(comm: &Comm, case: &Case, dt: f64, hanging: HangingN
         (bar.before(jump), incident)
     };
     let (left, incident) = of(case.levels);
-    reflection(&left, &of([case.levels[0]; 2]).0, incident)
+    reflection(&left, &of([case.levels[0]; 2]).0, energy, incident)
 }
 
 /// Reflection between linear elements with lumped mass, continuous in time.
@@ -245,7 +275,7 @@ pub(crate) fn section(comm: &Comm, page: &mut Page) {
         let dt = 0.2 * ratio;
         let outcome = run(comm, &Case { length, levels }, dt);
         let uniform = run(comm, &Case { length, levels: [levels[0]; 2] }, dt);
-        let reflected = reflection(&outcome.left, &uniform.left, outcome.incident);
+        let reflected = reflection(&outcome.left, &uniform.left, energy, outcome.incident);
         // A finer grid than that is a matter of minutes.
         let by_jump = (ratio == 0.5).then(|| {
             let behind = run(comm, &Case { length, levels: [levels[1]; 2] }, dt).behind;
