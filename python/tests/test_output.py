@@ -125,6 +125,46 @@ def test_damage_is_found(plane: agimp.Results, tmp_path: Path) -> None:
         agimp.read(damaged).verify()
 
 
+def _read_all(path: Path) -> None:
+    """All that can be asked of a file."""
+    out = agimp.read(path)
+    assert repr(out) and out.header.domain
+    for name in out.fields:
+        out.field(name)
+    out.positions()
+    out.particles()
+    assert repr(out.tree) and len(out.tree.leaves())
+    out.state("left_cauchy_green")
+    out.verify()
+
+
+def test_whatever_is_damaged_the_error_is_one_of_this_package(plane: agimp.Results, tmp_path: Path) -> None:
+    whole = plane.paths[-1]
+    damaged = tmp_path / "damaged_000000.hdf"
+    with h5py.File(whole) as file:
+        sets: list[str] = []
+        file.visititems(lambda name, entry: sets.append(name) if isinstance(entry, h5py.Dataset) else None)
+        attributes = [name for name in file["state"].attrs if name not in ("job_file", "job_file_relative", "title")]
+    put: list[tuple[str, object]] = [(name, value) for name in sets for value in (None, np.float64(1), b"text", np.zeros((2, 5)))]
+    put += [(f"state@{name}", value) for name in attributes for value in (None, b"text", np.zeros(0), -1)]
+    for name, value in put:
+        shutil.copy(whole, damaged)
+        with h5py.File(damaged, "r+") as file:
+            group, _, attribute = name.partition("@")
+            place = file[group].attrs if attribute else file
+            del place[attribute or name]
+            if value is not None:
+                place[attribute or name] = value
+        try:
+            _read_all(damaged)
+        except agimp.AgimpError as error:
+            assert str(damaged) in str(error), f"{name} = {value}: {error}"
+        except FileNotFoundError as error:
+            assert "no tree file beside it" in str(error), f"{name} = {value}: {error}"
+        except KeyError as error:
+            assert value is None and "has no 'left_cauchy_green'" in str(error), f"{name} = {value}: {error}"
+
+
 def test_what_is_not_an_output_is_refused(plane: agimp.Results, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no such file"):
         agimp.read(tmp_path / "a.hdf")

@@ -24,13 +24,19 @@ def test_one_version() -> None:
 def test_example_of_the_readme_runs(
     needs_program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    example = re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.DOTALL)[0]
+    example, meshes, *_ = re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.DOTALL)
     assert len([line for line in example.splitlines() if line]) <= 10
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
     printed = capsys.readouterr().out
     assert "Pa " in printed and "J" in printed
     assert len(agimp.open("out/steep")) == 3
+    pyvista = pytest.importorskip("pyvista")
+    shown: list[int] = []
+    monkeypatch.setattr(pyvista, "OFF_SCREEN", True)
+    monkeypatch.setattr(pyvista.Plotter, "show", lambda plotter: shown.append(len(plotter.actors)))
+    exec(compile(meshes, "README.md", "exec"), {})
+    assert len(shown) == 1 and shown[0] >= 2, "particles and leaves"
 
 
 def test_types() -> None:

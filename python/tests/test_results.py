@@ -143,3 +143,18 @@ def test_files_written_since_are_seen_by_reload(plane: agimp.Results, tmp_path: 
     index.write_text(json.dumps(whole))
     assert len(early) == 2 and len(early.reload()) == 5
     assert np.allclose(early.times, plane.times[:2])
+
+
+def test_a_damaged_table_is_refused_with_its_line(plane: agimp.Results, tmp_path: Path) -> None:
+    run = copy(plane, tmp_path / "run", "hdf")
+    history = run.directory / "plane.history.csv"
+    text = history.read_bytes()
+    lines = text.count(b"\n")
+    for damage, told in ((b"12,what\n", rf"line {lines + 1} has no number in column 2"), (b"\xff\xfe\n", "damaged")):
+        history.write_bytes(text + damage)
+        with pytest.raises(agimp.FileRefused, match=told):
+            run.history()
+    telemetry = run.directory / "plane.telemetry.jsonl"
+    telemetry.write_text("{\n")
+    with pytest.raises(agimp.FileRefused, match="line 1 is no JSON"):
+        run.telemetry()

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ._errors import FileRefused
+from ._errors import AgimpError, FileRefused
 
 MAGIC = "agimp state"
 GROUP = "state"
@@ -70,9 +70,14 @@ def text(value: Any) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
+_OF_DAMAGE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, MemoryError)
+"""What h5py and numpy raise where a file is not as a program wrote it."""
+
+
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """The HDF5 file, for reading. A file that has its name is complete, so no lock is needed."""
+    """The HDF5 file, for reading. A file that has its name is complete, so no lock is needed. Whatever goes wrong while it
+    is read is raised as `FileRefused`."""
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
     try:
@@ -81,7 +86,12 @@ def opened(path: Path) -> Iterator[Any]:
         kind = "is still being written, or its writer failed" if path.suffix == ".part" else "is not a whole HDF5 file"
         raise FileRefused(f"{path}: {kind} ({error})") from error
     with file:
-        yield file
+        try:
+            yield file
+        except AgimpError:
+            raise
+        except _OF_DAMAGE as error:
+            raise FileRefused(f"{path}: the file is damaged: {type(error).__name__}: {error}") from error
 
 
 def read_header(path: Path, file: Any) -> Header:
@@ -92,37 +102,50 @@ def read_header(path: Path, file: Any) -> Header:
     if "complete" not in attributes:
         raise FileRefused(f"{path}: incomplete; its writer did not finish")
 
-    def one(name: str) -> Any:
+    def numbers(name: str, kind: type) -> list[Any]:
         if name not in attributes:
             raise FileRefused(f"{path}: the header has no '{name}'")
-        return np.ravel(attributes[name])[0].item()
+        found: list[Any] = np.ravel(attributes[name]).tolist()
+        if not found or not all(isinstance(number, kind) for number in found):
+            raise FileRefused(f"{path}: the file is damaged: the header holds {found} as '{name}'")
+        return found
 
-    def several(name: str) -> Any:
-        return np.ravel(attributes[name]).tolist()
+    def whole(name: str) -> int:
+        number: int = numbers(name, int)[0]
+        if number < 0:
+            raise FileRefused(f"{path}: the file is damaged: the header holds {number} as '{name}'")
+        return number
+
+    def real(name: str) -> float:
+        number: float = numbers(name, float)[0]
+        return number
 
     def names(name: str) -> tuple[str, ...]:
         joined = text(attributes.get(name, ""))
         return tuple(joined.split("\n")) if joined else ()
 
-    return Header(
+    header = Header(
         program=text(attributes["program"]),
-        format=one("format"),
-        dimension=one("dimension"),
-        job_digest=one("job_digest"),
-        origin=tuple(several("origin")),
-        root_edge=one("root_edge"),
-        roots=tuple(several("roots")),
-        step=one("step"),
-        time=one("time"),
-        dt=one("dt"),
-        leaves=one("leaves"),
-        particles=one("particles"),
-        restart=bool(one("restart")),
+        format=whole("format"),
+        dimension=whole("dimension"),
+        job_digest=whole("job_digest"),
+        origin=tuple(numbers("origin", float)),
+        root_edge=real("root_edge"),
+        roots=tuple(numbers("roots", int)),
+        step=whole("step"),
+        time=real("time"),
+        dt=real("dt"),
+        leaves=whole("leaves"),
+        particles=whole("particles"),
+        restart=bool(whole("restart")),
         materials=names("materials"),
         bodies=names("bodies"),
         job=_job_text(file),
         title=text(attributes.get("title", "")),
     )
+    if header.dimension not in (2, 3) or not len(header.origin) == len(header.roots) == header.dimension:
+        raise FileRefused(f"{path}: the file is damaged: its header has {header.dimension} dimensions, {len(header.roots)} roots")
+    return header
 
 
 def checksums(path: Path, file: Any) -> list[tuple[str, int]]:

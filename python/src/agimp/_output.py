@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pyvista
 
 _POINTS = "VTKHDF/PointData"
+_PLACES = "VTKHDF/Points"
 _STATE = "state/particles"
 _OF_STATE = ("id", "mass", "half_width", "plastic_work")
 """Data sets of the restart state that are fields of their own, whatever the job asked for."""
@@ -90,12 +91,12 @@ class Output:
         """Values of a field, one row per particle. Velocities have as many components as the job has dimensions;
         stress has xx, yy, zz, xy, yz, xz."""
         self._known(name)
-        values = self._read(self._sets[name])
+        values = self._read(self._sets[name], 3 if name == "velocity" else None)
         return values[:, : self.dimension] if name == "velocity" else values
 
     def positions(self) -> NDArray[np.float64]:
         """Positions, m: particles x dimensions."""
-        return self._read("VTKHDF/Points")[:, : self.dimension].astype(np.float64)
+        return self._read(_PLACES, 3)[:, : self.dimension].astype(np.float64)
 
     def state(self, name: str) -> NDArray[Any]:
         """A data set of the restart state as it is (see docs/guide/files.md), for example `left_cauchy_green`."""
@@ -103,9 +104,10 @@ class Output:
             group = file.get(_STATE)
             if group is None:
                 raise FileRefused(f"{self.path}: the file holds no restart state")
-            if name not in group:
-                raise KeyError(f"{self.path}: the state has no '{name}'; it has {', '.join(group)}")
-            return np.asarray(group[name][()])
+            known = list(group)
+            if name in known:
+                return np.asarray(group[name][()])
+        raise KeyError(f"{self.path}: the state has no '{name}'; it has {', '.join(known)}")
 
     def select(self, *, material: str | None = None, body: str | None = None) -> NDArray[np.bool_]:
         """A mask of the particles of a material or body, by name."""
@@ -141,9 +143,10 @@ class Output:
     def mesh(self, fields: Iterable[str] | None = None) -> pyvista.PolyData:
         """The particles as points of a pyvista mesh, with the given fields, by default all. Needs pyvista."""
         chosen = self.fields if fields is None else tuple(fields)
-        with opened(self.path) as file:
-            points = np.asarray(file["VTKHDF/Points"][()])
-            arrays = {name: np.asarray(file[self._sets[name]][()]) for name in chosen if self._known(name)}
+        for name in chosen:
+            self._known(name)
+        points = self._read(_PLACES, 3)
+        arrays = {name: self._read(self._sets[name]) for name in chosen}
         return _meshes.points(points, arrays, self.header)
 
     @cached_property
@@ -170,9 +173,15 @@ class Output:
             raise KeyError(f"{self.path}: the file does not show '{field}'; it shows {', '.join(self.fields)}")
         return self._info[field]
 
-    def _read(self, dataset: str) -> NDArray[Any]:
+    def _read(self, dataset: str, components: int | None = None) -> NDArray[Any]:
+        """A data set with a row for each particle, of so many numbers if that is known."""
         with opened(self.path) as file:
-            return np.asarray(file[dataset][()])
+            values = np.asarray(file[dataset][()])
+        rows, *rest = values.shape or (0,)
+        if rows != len(self) or len(rest) > 1 or (components is not None and rest != [components]):
+            found = " x ".join(map(str, values.shape)) or "one"
+            raise FileRefused(f"{self.path}: the file is damaged: {dataset} holds {found} numbers for {len(self)} particles")
+        return values
 
 
 def read(path: str | PathLike[str]) -> Output:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _frames, _paths
+from ._errors import FileRefused
 from ._output import Output
 
 if TYPE_CHECKING:
@@ -95,15 +96,12 @@ class Results(Sequence[Output]):
     def history(self) -> pandas.DataFrame:
         """The table of scalars (`NAME.history.csv`), a row for each step recorded; `attrs["units"]` has the units."""
         path = self.directory / f"{self.name}.history.csv"
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        if lines and not lines[-1].endswith("\n"):
-            lines.pop()  # the run is writing it
-        rows = list(csv.reader(lines))
+        rows = list(csv.reader(_lines(path)))
         columns = _frames.Columns()
         for number, heading in enumerate(rows[0] if rows else []):
             match = _HEADING.fullmatch(heading)
             name, unit = (match["name"], match["unit"] or "") if match else (heading, "")
-            values = np.array([float(row[number]) for row in rows[1:]])
+            values = np.array([_number(path, line, row, number) for line, row in enumerate(rows[1:], 2)])
             if not unit and np.all(values == np.round(values)):
                 values = values.astype(np.int64)
             columns.add(name, values, unit, name.replace("_", " "))
@@ -113,8 +111,7 @@ class Results(Sequence[Output]):
         """Measurements of the run itself (`NAME.telemetry.jsonl`), a row for each record; nested entries have
         columns with dots, such as `per_rank.particles.max`, and phases such as `phases.gather.seconds.mean`."""
         path = self.directory / f"{self.name}.telemetry.jsonl"
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        records = [json.loads(line) for line in lines if line.endswith("\n")]
+        records = [_record(path, number, line) for number, line in enumerate(_lines(path), 1)]
         for record in records:
             if isinstance(record.get("phases"), list):
                 record["phases"] = {entry.pop("phase"): entry for entry in record["phases"]}
@@ -138,6 +135,32 @@ class Results(Sequence[Output]):
         joined: pandas.DataFrame = _frames.library().concat(tables).set_index(["time", "id"]).sort_index()
         joined.attrs.update({key: attributes[key] for key in ("units", "descriptions")})
         return joined
+
+
+def _lines(path: Path) -> list[str]:
+    """The whole lines of a file of text; the last one may just be written."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    except UnicodeDecodeError as error:
+        raise FileRefused(f"{path}: the file is damaged: {error}") from error
+    return [line for line in lines if line.endswith("\n")]
+
+
+def _number(path: Path, line: int, row: list[str], column: int) -> float:
+    try:
+        return float(row[column])
+    except (ValueError, IndexError) as error:
+        raise FileRefused(f"{path}: the file is damaged: line {line} has no number in column {column + 1}") from error
+
+
+def _record(path: Path, number: int, line: str) -> dict[str, Any]:
+    try:
+        record = json.loads(line)
+    except ValueError as error:
+        raise FileRefused(f"{path}: the file is damaged: line {number} is no JSON: {error}") from error
+    if not isinstance(record, dict):
+        raise FileRefused(f"{path}: the file is damaged: line {number} is no record")
+    return record
 
 
 def open(path: str | PathLike[str], name: str | None = None) -> Results:

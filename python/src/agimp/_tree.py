@@ -52,6 +52,8 @@ class Tree:
             else:
                 corners = 1 << header.dimension
                 lower = np.asarray(file["VTKHDF/Points"][()])[::corners, : header.dimension]
+            if any(len(values) != header.leaves for values in (lower, edge, *fields.values())):
+                raise FileRefused(f"{path}: the file is damaged: data of leaves do not have the {header.leaves} rows of the header")
         return cls(header, lower, edge, fields)
 
     def __len__(self) -> int:
