@@ -4,3 +4,4 @@ pub(super) mod include;
 pub(super) mod settings;
 pub(super) mod source;
 pub(super) mod structure;
+mod unclosed;

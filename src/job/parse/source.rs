@@ -1,5 +1,6 @@
 //! The text of a job file as a tree of values that know where they stand.
 use super::error::QUOTED;
+use super::unclosed;
 use crate::text::{excerpt, written};
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -69,11 +70,12 @@ impl std::fmt::Display for Path {
 }
 
 impl Node {
-    /// Parses the text of a file; the error has the place and the parser's words.
+    /// Parses the text of a file; the error has the place and the parser's words, or names what is not closed.
     pub(crate) fn parse(text: &str) -> Result<Self, (Range<usize>, String)> {
         let table = DeTable::parse(text).map_err(|error| {
             let end = text.len();
-            (error.span().unwrap_or(end..end), error.message().to_owned())
+            let span = error.span().unwrap_or(end..end);
+            unclosed::find(text, span.start).unwrap_or_else(|| (span, error.message().to_owned()))
         })?;
         let value = from_table(table.into_inner())?;
         Ok(Self { span: 0..0, key_span: 0..0, value })
