@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use partition::comm::Comm;
 
 use super::RunError;
+use super::restart::differing_keys;
 use crate::io::hdf5_file::FileError;
 use crate::io::log::progress::warn;
 use crate::io::snapshot::directory::{AtStake, at_stake};
@@ -159,8 +160,9 @@ pub(super) fn spare_results<const D: usize>(comm: &Comm, problem: &Problem<D>) -
             path.display()
         )),
         Some(AtStake::OtherJob(path)) => Err(format!(
-            "{}: found a result of another job (keys that affect the state differ); choose another output.directory, or replace its results with --overwrite",
-            path.display()
+            "{}: found a result of another job: {}; choose another output.directory, or replace its results with --overwrite",
+            path.display(),
+            differing_keys(problem, &path).unwrap_or_else(|| "keys that affect the state differ".into())
         )),
     };
     comm.agree(refusal).map_err(|disagreement| RunError::Refused(disagreement.message))

@@ -391,6 +391,17 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
     if !header.restart || !snapshot::compatible(&header.program) || header.job_digest == problem.digest {
         return None;
     }
+    Some(format!(
+        "{}: the file belongs to another job: {} (title, output, checkpoint, history, telemetry, report and time.end \
+         may differ, but nothing else)",
+        path.display(),
+        differing_keys(problem, path)?
+    ))
+}
+
+/// The first keys that decide the state and differ between the job of a file and this one, in words. `None` if the file does not hold its job
+/// in a form that can be read.
+pub(super) fn differing_keys<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<String> {
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
     let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
     match found.len() {
@@ -399,16 +410,11 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
         all if all > MOST_KEYS => reasons.push(format!("and {} more", all - MOST_KEYS)),
         _ => {}
     }
-    Some(format!(
-        "{}: the file belongs to another job: {} (title, output, checkpoint, history, telemetry, report and time.end \
-         may differ, but nothing else)",
-        path.display(),
-        reasons.join("; ")
-    ))
+    Some(reasons.join("; "))
 }
 
 /// Keys that a message names.
-const MOST_KEYS: usize = 8;
+const MOST_KEYS: usize = 3;
 
 /// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and sends the list to the others. If
 /// there is none, a file of another job takes their place: the error says why it cannot be used.

@@ -116,6 +116,8 @@ fn results_of_another_job_are_not_replaced_unasked() {
     // The same job may be run again: its results are the same.
     succeed(&mut run(directory, 1, 1, &first, &["--quiet"]));
     let words = ["another job", "output.directory", "--overwrite"];
+    let which = ["another job: `materials[0].young` is 300000.0 there and 400000.0 here; choose another"];
+    refused(directory, 2, &other, &[], &which);
     refused(directory, 2, &other, &[], &words);
     succeed(&mut run(directory, 2, 1, &other, &["--quiet", "--overwrite"]));
     refused(directory, 1, &first, &[], &words);

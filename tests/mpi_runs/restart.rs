@@ -141,6 +141,17 @@ fn refused_with_the_reason() {
     let keys = "another job: `materials[0].friction_angle` is 29.5 there and 35.0 here; \
                 `materials[0].young` is 300000.0 there and 400000.0 here (title, output";
     refused(2, "collapse_2d.toml", &good, keys);
+    // Of many the first three.
+    changed(&[
+        ("friction_angle = 29.5", "friction_angle = 35"),
+        ("young = 3e5", "young = 4e5"),
+        ("density = 1600", "density = 1700"),
+        ("poisson = 0.2", "poisson = 0.25"),
+    ]);
+    let keys = "another job: `materials[0].density` is 1600.0 there and 1700.0 here; \
+                `materials[0].friction_angle` is 29.5 there and 35.0 here; \
+                `materials[0].poisson` is 0.2 there and 0.25 here; and 1 more (title, output";
+    refused(2, "collapse_2d.toml", &good, keys);
     changed(&[("end = 0.05", "end = 0.03")]);
     refused(2, "collapse_2d.toml", &good, "after the end of the run; found time.end = 0.03");
     std::fs::remove_file(directory.join("collapse_2d.toml")).expect("removed");
