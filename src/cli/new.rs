@@ -3,6 +3,8 @@ use super::Failure;
 use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
 use crate::text::{excerpt, nearest};
+use std::borrow::Cow;
+use std::ffi::OsStr;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -115,6 +117,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         _ => Failure::Run(format!("{}: cannot be written: {error}", path.display())),
     };
     let text = template.text(arguments.full)?;
+    let text = renamed(&text, name, &path);
     let mut file = OpenOptions::new().write(true).create_new(true).open(&path).map_err(failure)?;
     // Editors look for the schema beside the job.
     file.write_all(format!("#:schema ./{SCHEMA}\n{text}").as_bytes()).map_err(failure)?;
@@ -141,6 +144,20 @@ impl Template {
             "# This job runs in less than a minute, with {list}.\n# The comments below describe the full job: agimp new {name} --full\n#\n{text}"
         ))
     }
+}
+
+/// The text of a template with the name of its new file, and those of the results, in the commands of its comments.
+fn renamed(text: &str, name: &str, path: &Path) -> String {
+    let path_in_words = path.display().to_string();
+    let stem = path.file_stem().map_or(Cow::from(name), OsStr::to_string_lossy);
+    let (job, results) = (format!("jobs/{name}.toml"), format!("out/{name}/{name}."));
+    let line = |line: &str| match line.starts_with('#') {
+        true => line
+            .replace(&job, &excerpt(&path_in_words, 200))
+            .replace(&results, &format!("out/{stem}/{stem}.")),
+        false => line.to_owned(),
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 /// Writes a file that belongs to a job, unless it exists.

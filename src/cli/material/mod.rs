@@ -68,8 +68,8 @@ pub struct Arguments {
     pub plot: Option<PathBuf>,
 
     /// The path: CSV or JSON. A CSV whose header names strain_xx (logarithmic) or stress_xx (Cauchy, Pa), and so on for yy, zz,
-    /// xy, xz and yz, prescribes these since the start; other components have no strain; time (s) and shear (of
-    /// x over y) may stand beside. Otherwise each row is the total deformation since the start: 3 numbers are
+    /// xy, xz and yz, the shear (of x over y) or the time (s), prescribes these since the start; other components have no
+    /// strain. Otherwise each row is the total deformation since the start: 3 numbers are
     /// logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a list of
     /// rows, alone or under the key "path" or "rows"; a row is a list of numbers (the 9 may be nested) or
     /// an object that holds one under "F" or "eps_log"; its other keys do not matter.

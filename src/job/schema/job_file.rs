@@ -127,10 +127,11 @@ pub struct Domain {
     /// Lower corner, m; the coordinate origin by default.
     #[serde(default)]
     pub min: Option<Vector>,
-    /// Edge lengths, m; whole multiples of the root edge.
+    /// Edge lengths, m; 1 to 64 times the root edge, whole multiples of it.
     pub size: Vector,
     /// Edge of a root octant (level 0), m. A leaf of level L has the edge `root_edge / 2^L` and 4 cells
-    /// along it.
+    /// along it. A domain has at most 64 root octants along each axis: for finer cells in a large domain, a greater root
+    /// edge and a higher `tree.base_level` give the same cells.
     #[schemars(range(min = 1e-9, max = 1e7))]
     pub root_edge: f64,
 }
