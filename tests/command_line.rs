@@ -121,6 +121,31 @@ fn material_drives_plastic_models_along_paths_of_logarithmic_strain() {
     }
 }
 
+/// Simple shear of an elastic solid, `b_xy = γ`: a path of time and shear alone is one.
+#[test]
+fn material_is_sheared_along_a_path_of_time_and_shear_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("path.csv");
+    for header in ["time,shear", "shear,time"] {
+        let of = |time, shear| {
+            if header == "time,shear" { format!("{time},{shear}") } else { format!("{shear},{time}") }
+        };
+        std::fs::write(&path, format!("{header}\n{}\n{}\n", of(0.5, 0.1), of(1.0, 0.2))).unwrap();
+        let model = "model = \"neo_hookean\", young = 3e6, poisson = 0.5e-9";
+        let (names, rows) = drive(model, path.to_str().unwrap());
+        let at = |row: usize, name: &str| rows[row][names.iter().position(|other| other == name).unwrap()];
+        for (row, time, shear) in [(1, 0.5, 0.1), (2, 1.0, 0.2)] {
+            assert_eq!(at(row, "time"), time);
+            let expected = 3e6 / (2.0 * (1.0 + 0.5e-9)) * shear;
+            assert!(
+                (at(row, "tau_xy") - expected).abs() < 1e-9 * expected,
+                "{header}: {} {expected}",
+                at(row, "tau_xy")
+            );
+        }
+    }
+}
+
 #[test]
 fn material_refuses_what_it_cannot_use_with_exit_code_2() {
     let directory = tempfile::tempdir().unwrap();
@@ -234,6 +259,12 @@ fn templates_run_as_they_are() {
         assert_eq!(agimp(here, &["new", "--template", name, &file]).status.code(), Some(0), "{name}");
         let text = std::fs::read_to_string(here.join(&file)).unwrap();
         assert!(text.starts_with("#:schema ./agimp.schema.json\n"), "{name}");
+        // The commands of its comments are those for the new file.
+        assert!(text.contains(&format!("agimp run {file}")), "{name}");
+        assert!(
+            !text.contains(&format!("jobs/{name}.toml")) && !text.contains(&format!("out/{name}/")),
+            "{name}"
+        );
         let end = format!("{:e}", 3.5 * time_step(&printed(&agimp(here, &["check", &file]))));
         let run = ["run", &file, "--end", &end, "--quiet", "--set", "output.picture=false"];
         let output = agimp(here, &run);
@@ -565,4 +596,42 @@ fn settings_decide_what_is_run() {
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(2), "{message}");
     assert!(message.contains("`materials[0].young` is 3000000.0 there and 1000000.0 here"), "{message}");
+}
+
+/// `srun` is told the cores of a rank and how to start it; arguments of the script reach the program; after a requeue it goes on from the
+/// checkpoint, whatever they were.
+#[test]
+fn the_script_for_slurm_passes_arguments_on() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let stand_in = |name: &str, script: &str| {
+        let path = here.join(name);
+        std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    stand_in("srun", "echo srun \"$@\"; exit ${CODE:-0}");
+    stand_in("scontrol", "echo scontrol \"$@\"");
+    let run = |arguments: &[&str], restarts: &str, code: &str| {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/slurm/collapse.sbatch");
+        let path = format!("{}:{}", here.display(), std::env::var("PATH").unwrap());
+        let mut command = Command::new("bash");
+        command.arg(script).args(arguments).current_dir(here).env("PATH", path).env("AGIMP", "agimp");
+        command.envs([("SLURM_CPUS_PER_TASK", "4"), ("SLURM_JOB_ID", "7"), ("CODE", code)]);
+        let output = command.env("SLURM_RESTART_COUNT", restarts).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap())
+    };
+    let given = ["my job.toml", "--restart", "latest", "--set", "time.end=2"];
+    let (code, out) = run(&given, "0", "0");
+    assert_eq!(code, Some(0));
+    assert!(out.contains("--mpi=pmix --cpus-per-task=4 --cpu-bind=cores"), "{out}");
+    assert!(out.contains("agimp run my job.toml --threads 4 --restart latest --set time.end=2\n"), "{out}");
+    std::fs::create_dir_all(here.join("out/my job")).unwrap();
+    std::fs::write(here.join("out/my job/my job.checkpoint_000000020.hdf"), "").unwrap();
+    let (code, out) = run(&["my job.toml", "--restart", "old.hdf", "--overwrite", "--quiet"], "1", "3");
+    assert_eq!(code, Some(3));
+    assert!(out.contains("agimp run my job.toml --threads 4 --quiet --restart latest\n"), "{out}");
+    assert!(out.contains("scontrol requeue 7\n"), "{out}");
+    let (_, out) = run(&["my job.toml", "--restart=old.hdf"], "2", "0");
+    assert!(out.contains("--threads 4 --restart latest\n"), "{out}");
 }

@@ -13,6 +13,7 @@ use crate::io::cause::tell_size_limits;
 use crate::job::problem::AnyProblem;
 use crate::job::{Problem, Settings};
 use crate::report::{self, Results};
+use crate::run::cores::Cores;
 use crate::run::stop::StopRequest;
 use crate::run::{self, Effort, Options, Outcome, RunError, Summary, restart};
 use crate::setup::estimate::steps;
@@ -30,7 +31,7 @@ pub struct Arguments {
     /// Start again even if that replaces checkpoints or the results of another job.
     #[arg(long, conflicts_with = "restart")]
     pub overwrite: bool,
-    /// Threads of each rank; by default the cores of the machine divided by its ranks.
+    /// Threads of each rank; by default the cores of its machine divided by the ranks there.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// Print only errors and warnings.
@@ -205,10 +206,10 @@ fn shell_word(path: &Path) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
-/// Starts the threads of this rank.
+/// Collective. Starts the threads of this rank.
 pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = wanted.map_or_else(|| (cores / comm.size()).max(1), usize::from);
+    let cores = Cores::survey(comm);
+    let threads = wanted.map_or_else(|| cores.threads(), usize::from);
     // The main thread works too; handing each small loop to another thread would cost more than the loop.
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

@@ -5,6 +5,7 @@
 //! | this | the main loop |
 //! | `outcome.rs` | options of a run, its results, and why it cannot go on |
 //! | [`claim`] | the directory of a run belongs to one run at a time |
+//! | [`cores`] | cores of the machines, and how many threads fit |
 //! | [`restart`] | states from files |
 //! | [`schedule`], [`stop`] | when files are due; requests to stop |
 //! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; what pictures show beside particles |
@@ -13,6 +14,7 @@
 //! | [`at_end`] | what a run leaves when it ends |
 pub mod at_end;
 pub mod claim;
+pub mod cores;
 mod files;
 pub mod history;
 mod measures;
@@ -28,6 +30,7 @@ use partition::comm::{Comm, Disagreement};
 use self::at_end::ending::Ending;
 use self::at_end::{collapse, ending, report};
 use self::claim::Claim;
+use self::cores::Cores;
 use self::files::Names;
 pub use self::outcome::{Effort, Options, Outcome, RunError, Summary};
 use self::record::Recorder;
@@ -147,18 +150,16 @@ impl<'a, const D: usize> Run<'a, D> {
             let _ = std::fs::remove_file(report::path(&problem.output.directory, &problem.name));
             let _ = std::fs::remove_file(ending::path(&problem.output.directory, &problem.name));
         }
-        let (cores, wanted) = (available_cores(), comm.size() * options.threads);
+        let cores = Cores::survey(comm);
         recorder.message(&format!(
-            "{}: {} ranks x {} threads on {cores} cores, {} leaves",
+            "{}: {} ranks x {} threads on {cores}, {} leaves",
             problem.name,
             comm.size(),
             options.threads,
             solver.forest.global_len()
         ));
-        if wanted > cores {
-            recorder.message(&format!(
-                "warning: {wanted} threads share {cores} cores here; expect a slower run (several machines count as one here)"
-            ));
+        if let Some(warning) = cores.shared(comm, options.threads) {
+            recorder.message(&format!("warning: {warning}"));
         }
         Ok(Self {
             comm,
@@ -335,9 +336,4 @@ impl<'a, const D: usize> Run<'a, D> {
         self.recorder.report(&self.solver, &summary);
         Ok(summary)
     }
-}
-
-/// Cores that this process may use; `mpirun` binds it to some of them.
-fn available_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }

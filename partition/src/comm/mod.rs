@@ -5,6 +5,7 @@
 //!   [`Comm::agree`] (`agree.rs`) and [`Comm::sparse_exchange`] (`sparse.rs`),
 //! * [`NeighbourExchange`] sends one message to each of a fixed set of neighbours, with a begin
 //!   and a finish between which other work can be done (`neighbour.rs`),
+//! * `host.rs` asks the ranks of one machine,
 //! * `environment.rs` has what differs between MPI libraries,
 //! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for environment variables that are set before MPI starts.
 //!
@@ -13,6 +14,7 @@
 //! ranks times a message: the only O(P) data are the scalars of [`Comm::all_gather_u64`].
 mod agree;
 mod environment;
+mod host;
 mod neighbour;
 mod reduce;
 mod request;

@@ -67,10 +67,12 @@ impl World {
         }
         // Our own copy of the communicator: messages of other libraries cannot be mistaken for ours.
         let communicator = universe.world().duplicate();
+        let host = communicator.split_shared(0);
         let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
         std::panic::set_hook(Box::new(move |panic| end_by_panic(rank, size, panic)));
         let shared = Shared {
             communicator,
+            host,
             sparse_parity: Cell::new(0),
             largest_message: Cell::new(LARGEST_MESSAGE),
             _universe: universe,
@@ -95,9 +97,11 @@ pub struct Comm {
     size: usize,
 }
 
-/// What clones of a [`Comm`] share. Fields drop in this order: the communicator before MPI.
+/// What clones of a [`Comm`] share. Fields drop in this order: the communicators before MPI.
 struct Shared {
     communicator: SimpleCommunicator,
+    /// Of the ranks that share the memory of this machine.
+    host: SimpleCommunicator,
     /// Number of sparse exchanges so far, modulo 2.
     sparse_parity: Cell<usize>,
     largest_message: Cell<usize>,
@@ -144,6 +148,10 @@ impl Comm {
 
     pub(super) fn communicator(&self) -> &SimpleCommunicator {
         &self.shared.communicator
+    }
+
+    pub(super) fn host(&self) -> &SimpleCommunicator {
+        &self.shared.host
     }
 
     /// Items of `T` in the largest single message: the same on all ranks, at least 1.
