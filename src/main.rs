@@ -5,6 +5,9 @@ use clap::Parser as _;
 use partition::comm::is_launched;
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: agimp::memory::Allocator = agimp::memory::Allocator;
+
 fn main() -> ExitCode {
     // First of all, since a batch queue may send its signal while a run starts. An error is reported when the run begins.
     if std::env::args_os().nth(1).is_some_and(|command| command == "run") {

@@ -490,7 +490,7 @@ fn check_and_run_warn_of_what_is_likely_not_meant() {
         .collect();
     let (code, _, message) = check(&format!("{many}{sands}"));
     assert_eq!((code, message.matches("agimp: warning: ").count()), (0, 21), "{message}");
-    assert!(message.contains("agimp: warning: and 11 more"), "{message}");
+    assert!(message.contains("agimp: warning: and 12 more"), "{message}");
     let (_, out, message) = check(&JOB.replace("end = 2e-3", "end = 1e6"));
     assert!(message.contains("steps; stiff material"), "{message}");
     assert!(out.contains("wall time    about "), "{out}");

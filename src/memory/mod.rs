@@ -1,9 +1,13 @@
-//! Settings of the system's allocator, and arrays that do without it.
+//! Settings of the system's allocator, arrays that do without it, and how much memory there is.
 #![allow(unsafe_code)]
 
 pub mod block;
+pub mod exhausted;
+pub mod limits;
 
 pub use block::Block;
+pub use exhausted::{Allocator, may_fail};
+pub use limits::Limits;
 
 /// Blocks of at least this many bytes go back to the system as soon as they are freed: far above what steps allocate, and
 /// below the columns that a file is written from.

@@ -7,6 +7,7 @@
 //! | [`claim`] | the directory of a run belongs to one run at a time |
 //! | [`cores`] | cores of the machines, and how many threads fit |
 //! | [`restart`] | states from files |
+//! | `room.rs` | whether a run fits into the memory of its machines |
 //! | [`schedule`], [`stop`] | when files are due; requests to stop |
 //! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; what pictures show beside particles |
 //! | [`record`], [`history`] | history, telemetry and progress |
@@ -21,6 +22,7 @@ mod measures;
 mod outcome;
 pub mod record;
 pub mod restart;
+mod room;
 pub mod scene;
 pub mod schedule;
 pub mod stop;
@@ -35,6 +37,7 @@ use self::files::Names;
 pub use self::outcome::{Effort, Options, Outcome, RunError, Summary};
 use self::record::Recorder;
 use self::restart::From;
+use self::room::Room;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::log::history::Kept;
@@ -89,7 +92,10 @@ impl<'a, const D: usize> Run<'a, D> {
         if !options.overwrite {
             claim::spare_results(comm, problem)?;
         }
-        let mut solver = setup::solver(comm, problem).map_err(RunError::Seed)?;
+        let room = Room::of_machines(comm, options.speaks);
+        room.check(comm, problem)?;
+        let solver = setup::solver_within(comm, problem, |size| room.fits(problem, size));
+        let mut solver = solver.map_err(RunError::Seed)?.map_err(RunError::Refused)?;
         measures::begin(problem, &mut solver);
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;

@@ -85,7 +85,10 @@ pub fn solver_within<const D: usize, R>(
     problem: &Problem<D>,
     fits: impl Fn(Size) -> Result<(), R>,
 ) -> Result<Result<Solver<D>, R>, Disagreement> {
-    let mut forest = first_forest(comm, problem);
+    let mut forest = match first_forest(comm, problem, &fits) {
+        Ok(forest) => forest,
+        Err(refusal) => return Ok(Err(refusal)),
+    };
     if let Err(refusal) = fits(comm.agree(partition_by_seeds(comm, problem, &mut forest))?) {
         return Ok(Err(refusal));
     }
@@ -154,14 +157,22 @@ fn new_particles<const D: usize>(
     Ok(chunks)
 }
 
-/// Collective. The tree that the job asks for before its criteria are looked at.
-fn first_forest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Forest<D> {
+/// Collective. The tree that the job asks for before its criteria are looked at; level by level, so that `fits` may refuse it before it is
+/// there.
+fn first_forest<const D: usize, R>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    fits: &impl Fn(Size) -> Result<(), R>,
+) -> Result<Forest<D>, R> {
     let mut forest = Forest::uniform(comm, problem.brick, problem.tree.base_level);
-    forest.refine_where(comm, |leaf| problem.wants_refinement(leaf));
+    for level in problem.tree.base_level..problem.finest_level() {
+        forest.refine_where(comm, |leaf| leaf.level == level && problem.wants_refinement(leaf));
+        fits([0, forest.global_len(), 0])?;
+    }
     if problem.tree.graded {
         forest.balance(comm);
     }
-    forest
+    Ok(forest)
 }
 
 /// Collective. Partitions a tree by the particles that its leaves will hold. Returns its size.

@@ -20,6 +20,7 @@ use hdf5_sys::h5t::H5Tclose;
 use partition::comm::Comm;
 
 use super::{Complaint, Element, FileError, Handle, Kind, agreed, c_path, c_text, check, library};
+use crate::memory::may_fail;
 
 /// No data set of this program has more numbers in a row.
 const MOST_COMPONENTS: u64 = 1 << 10;
@@ -232,7 +233,7 @@ impl Reader {
         let row = stored.components.max(1);
         let mut values = Vec::new();
         let numbers = rows as usize * row;
-        if values.try_reserve_exact(numbers).is_err() {
+        if may_fail(|| values.try_reserve_exact(numbers)).is_err() {
             let bytes = numbers * size_of::<T>();
             return Err(self.refuse(format!("no memory for {bytes} bytes of {dataset}")));
         }

@@ -203,6 +203,11 @@ pub fn warn(text: &str) {
     let _ = std::io::stderr().write_all(format!("agimp: warning: {text}\n").as_bytes());
 }
 
+/// Tells the user something while no progress is shown. To be called on one rank.
+pub fn tell(text: &str) {
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
+}
+
 /// Columns of the terminal, as far as it says so.
 fn console_columns() -> usize {
     let asked = rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| usize::from(size.ws_col));

@@ -65,7 +65,7 @@ pub struct Estimate {
 const PARTICLE_STEPS_PER_SECOND: [f64; 2] = [12e6, 5.5e6];
 
 /// Bytes that each rank takes with next to no particles: the program itself and its libraries.
-const PROGRAM: f64 = 37e6;
+pub const PROGRAM: f64 = 37e6;
 
 /// Leaves of one level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -229,6 +229,17 @@ fn memory<const D: usize>(particles: u64, levels: &[LevelCount]) -> f64 {
         1.6 * level.leaves as f64 + 52.0 * level.filled as f64 + 105.0 * level.filled_jumps as f64
     });
     particles as f64 * state_bytes::<D>() + rows * levels.sum::<f64>()
+}
+
+/// Bytes of memory of all ranks that no tree of the job without criteria exceeds: leaves and particles of the finest level in the whole domain.
+pub fn greatest_memory<const D: usize>(problem: &Problem<D>) -> f64 {
+    let edge = problem.leaf_edge(problem.finest_level());
+    let leaves = problem.size().iter().map(|size| (size / edge).ceil()).product::<f64>();
+    let given = problem.bodies.iter().filter_map(|body| body.given.as_ref()).map(|given| given.chunk().len());
+    let along = problem.bodies.iter().map(|body| 4.0 * body.particles_per_cell).fold(0.0, f64::max);
+    let particles = leaves * along.powi(D as i32) + given.sum::<usize>() as f64;
+    let [leaves, particles] = [leaves, particles].map(|count| count.min(1e18) as u64);
+    memory::<D>(particles, &[LevelCount { leaves, filled: leaves, filled_jumps: leaves, particles }])
 }
 
 /// Bytes of memory of a tree of some size if half of its leaves with particles lie where levels meet; about.

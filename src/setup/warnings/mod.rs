@@ -1,15 +1,22 @@
-//! What is allowed in a job and likely not meant.
-use crate::boundary::{ActsOn, Collider};
-use crate::geometry::{Aabb, Shape, Side, common_point};
+//! Likely mistakes in a job: what is allowed in it and hardly meant.
+//!
+//! | file | what it looks at |
+//! |---|---|
+//! | `mod.rs` | faces, angles of friction, long runs |
+//! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
+//! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
+//! | `units.rs` | numbers that no matter has |
 use crate::job::Problem;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
-use crate::text::{count, excerpt, quantity};
+use crate::text::{count, excerpt};
+
+mod colliders;
+mod stretch;
+mod units;
 
 /// Steps from which a run is called long.
 const MANY_STEPS: f64 = 1e6;
-/// Boxes looked at for bodies inside colliders.
-const BOXES: usize = 50_000;
 /// Longest name that is quoted, in characters.
 const NAME: usize = 60;
 
@@ -18,7 +25,9 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     let mut all = Vec::new();
     faces(problem, &mut all);
     materials(problem, &mut all);
-    colliders(problem, &mut all);
+    colliders::look(problem, &mut all);
+    stretch::look(problem, &mut all);
+    units::look(problem, steps, &mut all);
     if steps >= MANY_STEPS {
         all.push(format!(
             "time: the run takes about {} steps; stiff material and fine cells shorten the step; use softer material or coarser cells if possible",
@@ -60,73 +69,6 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
                 excerpt(&material.name, NAME)
             ));
         }
-    }
-}
-
-/// Colliders that material may pass through, and bodies that begin inside one.
-fn colliders<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    let mut boxes = BOXES;
-    for (index, collider) in problem.colliders.iter().enumerate() {
-        let name = excerpt(&collider.name, NAME);
-        let (thickness, cell) =
-            (thickness(&collider.shape), problem.cell_edge(level_at(problem, index, collider)));
-        if collider.acts_on == ActsOn::Nodes && thickness < 2.0 * cell {
-            all.push(format!(
-                "colliders[{index}].shape: \"{name}\" is {} thick, less than two cells of {}; material may pass through it: use acts_on = \"particles\", a thicker shape or finer cells",
-                quantity(thickness, "m"),
-                quantity(cell, "m")
-            ));
-        }
-        // Where it is in the job is where it begins, unless a table says otherwise.
-        let start = collider.state_at(0.0).pose;
-        if start.translation != [0.0; D] || start.angle != 0.0 {
-            continue;
-        }
-        let slack = 0.5 * problem.cell_edge(problem.finest_level());
-        for (number, body) in problem.bodies.iter().enumerate() {
-            let domain = Aabb::new([0.0; D], problem.size());
-            let bounds = collider.shape.bounds().intersection(&domain);
-            let common = body.shape.bounds().intersection(&bounds);
-            if boxes == 0 || common.is_empty() || body.given.is_some() {
-                continue;
-            }
-            if common_point([&body.shape, &collider.shape], common, slack, &mut boxes).is_some() {
-                all.push(format!(
-                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", which pushes it out: move one of them",
-                    excerpt(&body.name, NAME)
-                ));
-            }
-        }
-    }
-}
-
-/// Level of the leaves at a collider where it begins: the coarsest that may lie there.
-fn level_at<const D: usize>(problem: &Problem<D>, index: usize, collider: &Collider<D>) -> u8 {
-    let domain = Aabb::new([0.0; D], problem.size());
-    let bounds = collider.shape.bounds().intersection(&domain);
-    let regions = problem.tree.regions.iter();
-    let regions =
-        regions.filter(|region| region.shape.classify(&bounds) == Side::Inside).map(|region| region.level);
-    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
-    let criteria =
-        criteria.filter(|criterion| criterion.collider() == Some(index)).map(|criterion| criterion.level);
-    regions.chain(criteria).fold(problem.tree.base_level, u8::max)
-}
-
-/// The least width of a shape, m; of unions that of the thickest part, of other booleans an upper bound.
-fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
-    let least_edge =
-        |bounds: &Aabb<D>| (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(f64::INFINITY, f64::min);
-    match shape {
-        Shape::Box(bounds) => least_edge(bounds),
-        Shape::Sphere { radius, .. } => 2.0 * radius,
-        Shape::Frustum(frustum) => frustum.height.min(2.0 * frustum.lower_radius.max(frustum.upper_radius)),
-        Shape::HalfSpace { .. } => f64::INFINITY,
-        Shape::Polygon(_) | Shape::Mesh(_) => least_edge(&shape.bounds()),
-        Shape::Rotated(inner, _) => thickness(inner),
-        Shape::Union(parts) => parts.iter().map(thickness).fold(0.0, f64::max),
-        Shape::Intersection(parts) => parts.iter().map(thickness).fold(f64::INFINITY, f64::min),
-        Shape::Difference(from, _) => thickness(from),
     }
 }
 
@@ -197,10 +139,10 @@ colliders = [{ name = "plate", shape = { kind = "box", min = [0, 0.5], max = [1,
     #[test]
     fn fine_cells_at_a_collider_count() {
         let thin = ("max = [1, 0.7]", "max = [1, 0.56]");
-        assert_eq!(of(&[thin], 1.0).len(), 1);
+        assert_eq!(of(&[thin], 1e5).len(), 1);
         let region = "tree = { base_level = 2, regions = [{ level = 4, shape = { kind = \"box\", min = [0, 0.4], max = [1, 0.8] } }] }";
-        assert_eq!(of(&[thin, ("tree.base_level = 2", region)], 1.0), [""; 0]);
+        assert_eq!(of(&[thin, ("tree.base_level = 2", region)], 1e5), [""; 0]);
         let criterion = "tree.base_level = 2\nadaptivity = { criteria = [{ kind = \"collider\", collider = \"plate\", level = 4 }] }";
-        assert_eq!(of(&[thin, ("tree.base_level = 2", criterion)], 1.0), [""; 0]);
+        assert_eq!(of(&[thin, ("tree.base_level = 2", criterion)], 1e5), [""; 0]);
     }
 }

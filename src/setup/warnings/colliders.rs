@@ -1,0 +1,119 @@
+//! Colliders that do not do what they are for.
+use super::NAME;
+use crate::boundary::motion::{Pose, length};
+use crate::boundary::{ActsOn, Collider, Contact};
+use crate::geometry::{Aabb, Shape, Side, common_point};
+use crate::job::Problem;
+use crate::text::{excerpt, quantity};
+
+/// Boxes looked at for bodies inside colliders.
+const BOXES: usize = 50_000;
+
+/// Warns of colliders that material may pass through or never meets, and of bodies that begin inside one.
+pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
+    let mut boxes = BOXES;
+    for (index, collider) in problem.colliders.iter().enumerate() {
+        let name = excerpt(&collider.name, NAME);
+        let (thickness, cell) =
+            (thickness(&collider.shape), problem.cell_edge(level_at(problem, index, collider)));
+        if collider.acts_on == ActsOn::Nodes && thickness < 2.0 * cell {
+            all.push(format!(
+                "colliders[{index}].shape: \"{name}\" is {} thick, less than two cells of {}; material may pass through it: use acts_on = \"particles\", a thicker shape or finer cells",
+                quantity(thickness, "m"),
+                quantity(cell, "m")
+            ));
+        }
+        if stays_outside(problem, collider) {
+            all.push(format!(
+                "colliders[{index}].shape: \"{name}\" lies outside the domain from start to end and meets no material: move it, or enlarge the domain"
+            ));
+            continue;
+        }
+        // As a grip it holds the material inside it.
+        if collider.contact == Contact::Sticky && collider.acts_on == ActsOn::Nodes {
+            continue;
+        }
+        // Where it is in the job is where it begins, unless a table says otherwise.
+        let start = collider.state_at(0.0).pose;
+        if start.translation != [0.0; D] || start.angle != 0.0 {
+            continue;
+        }
+        let slack = 0.5 * problem.cell_edge(problem.finest_level());
+        for (number, body) in problem.bodies.iter().enumerate() {
+            let domain = Aabb::new([0.0; D], problem.size());
+            let bounds = collider.shape.bounds().intersection(&domain);
+            let common = body.shape.bounds().intersection(&bounds);
+            if boxes == 0 || common.is_empty() || body.given.is_some() {
+                continue;
+            }
+            if common_point([&body.shape, &collider.shape], common, slack, &mut boxes).is_some() {
+                all.push(format!(
+                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", which pushes it out: move one of them",
+                    excerpt(&body.name, NAME)
+                ));
+            }
+        }
+    }
+}
+
+/// Level of the leaves at a collider where it begins: the coarsest that may lie there.
+fn level_at<const D: usize>(problem: &Problem<D>, index: usize, collider: &Collider<D>) -> u8 {
+    let domain = Aabb::new([0.0; D], problem.size());
+    let bounds = collider.shape.bounds().intersection(&domain);
+    let regions = problem.tree.regions.iter();
+    let regions =
+        regions.filter(|region| region.shape.classify(&bounds) == Side::Inside).map(|region| region.level);
+    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
+    let criteria =
+        criteria.filter(|criterion| criterion.collider() == Some(index)).map(|criterion| criterion.level);
+    regions.chain(criteria).fold(problem.tree.base_level, u8::max)
+}
+
+/// The least width of a shape, m; of unions that of the thickest part, of other booleans an upper bound.
+fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
+    let least_edge =
+        |bounds: &Aabb<D>| (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(f64::INFINITY, f64::min);
+    match shape {
+        Shape::Box(bounds) => least_edge(bounds),
+        Shape::Sphere { radius, .. } => 2.0 * radius,
+        Shape::Frustum(frustum) => frustum.height.min(2.0 * frustum.lower_radius.max(frustum.upper_radius)),
+        Shape::HalfSpace { .. } => f64::INFINITY,
+        Shape::Polygon(_) | Shape::Mesh(_) => least_edge(&shape.bounds()),
+        Shape::Rotated(inner, _) => thickness(inner),
+        Shape::Union(parts) => parts.iter().map(thickness).fold(0.0, f64::max),
+        Shape::Intersection(parts) => parts.iter().map(thickness).fold(f64::INFINITY, f64::min),
+        Shape::Difference(from, _) => thickness(from),
+    }
+}
+
+/// Times of a run at which the place of a moving collider is looked at.
+const TIMES: u32 = 256;
+
+/// Whether a collider is outside the domain, by more than a cell, at all times of a run. Nothing is said of free bodies.
+fn stays_outside<const D: usize>(problem: &Problem<D>, collider: &Collider<D>) -> bool {
+    let edge = problem.cell_edge(problem.tree.base_level);
+    let size = problem.size();
+    let domain = Aabb::new([-edge; D], size.map(|c| c + edge));
+    if collider.free().is_some() || collider.deforming.is_some() {
+        return false;
+    }
+    let bounds = collider.shape.bounds();
+    let is_outside = |time: f64| {
+        let (way, angle) = collider.motion.place(time);
+        if angle == 0.0 {
+            let moved = |corner: &[f64; D]| std::array::from_fn(|a| corner[a] + way[a]);
+            let back = Aabb::new(
+                std::array::from_fn(|a| domain.lower[a] - way[a]),
+                std::array::from_fn(|a| domain.upper[a] - way[a]),
+            );
+            let meets = Aabb::new(moved(&bounds.lower), moved(&bounds.upper)).intersection(&domain);
+            return meets.is_empty() || collider.shape.classify(&back) == Side::Outside;
+        }
+        // Turned: by the ball about its bounding box.
+        let centre = collider.to_space(&bounds.centre(), &Pose::new(way, angle, collider.axis));
+        let near: [f64; D] = std::array::from_fn(|a| centre[a].clamp(domain.lower[a], domain.upper[a]));
+        let gap: [f64; D] = std::array::from_fn(|a| centre[a] - near[a]);
+        length(&gap) > bounds.half_diagonal()
+    };
+    (0..=TIMES).all(|part| is_outside(problem.time.end * f64::from(part) / f64::from(TIMES)))
+}

@@ -1,0 +1,163 @@
+//! Numbers that no matter has, or under which it collapses at once: mostly units that were mistaken.
+use serde_json::Value;
+
+use super::NAME;
+use crate::geometry::Aabb;
+use crate::job::Problem;
+use crate::job::problem::{Body, MaterialSetup};
+use crate::material::{self, Material};
+use crate::setup::seed::{greatest_speed, raster};
+use crate::text::{count, excerpt, number, quantity};
+
+/// Keys of models that are strengths, Pa.
+const STRENGTHS: [&str; 3] = ["yield_stress", "cohesion", "preconsolidation_pressure"];
+/// Greatest strength over stiffness: metals, soils and rocks have up to 0.05, polymers 0.1.
+const STRENGTH: f64 = 0.2;
+/// Densities from gases to the heaviest metals, kg/m³.
+const DENSITIES: [f64; 2] = [1.0, 23_000.0];
+/// Speeds of waves from the softest gels to beyond diamond, m/s.
+const WAVES: [f64; 2] = [0.2, 20_000.0];
+/// Least number of steps of a run that shows anything.
+const STEPS: f64 = 100.0;
+/// Greatest pressure of a body's weight at its foot over the stiffness of its material.
+const WEIGHT: f64 = 0.2;
+/// Greatest speed of a tool over that of waves in the material. A blow strains the material by about this.
+const TOOL: f64 = 0.5;
+/// Greatest speed of a body over that of waves in it.
+const BODY: f64 = 2.0;
+/// Bodies that are looked at.
+const BODIES: usize = 1000;
+
+/// Warns of what no material is, and of loads that no material bears.
+pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut Vec<String>) {
+    let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
+    for (index, (setup, material)) in problem.materials.iter().zip(&materials).enumerate() {
+        of_material(index, setup, material.wave_speed(), all);
+    }
+    for (index, body) in problem.bodies.iter().enumerate().take(BODIES) {
+        of_body(problem, index, body, &*materials[body.material], all);
+    }
+    tools(problem, &materials, all);
+    if steps < STEPS {
+        all.push(format!(
+            "time: the run takes about {} steps; expected at least {STEPS}: check time.end, and the units of stiffness and density (Pa, kg/m³)",
+            count(steps.max(1.0) as u64)
+        ));
+    }
+}
+
+fn of_material(index: usize, setup: &MaterialSetup, wave: f64, all: &mut Vec<String>) {
+    let name = excerpt(&setup.name, NAME);
+    let values = serde_json::to_value(&setup.model).unwrap_or_default();
+    let young = values.get("young").and_then(Value::as_f64);
+    let (stiffness, word) = match young {
+        Some(young) => (young, "young"),
+        None => (setup.density * wave * wave, "stiffness"),
+    };
+    for key in STRENGTHS {
+        let Some(strength) = values.get(key).and_then(Value::as_f64) else { continue };
+        if strength > STRENGTH * stiffness {
+            all.push(format!(
+                "materials[{index}].{key}: found {} for \"{name}\", {} times its {word} of {}; expected at most {STRENGTH} of it: check the units of both (Pa)",
+                quantity(strength, "Pa"),
+                number(strength / stiffness, 2),
+                quantity(stiffness, "Pa")
+            ));
+        }
+    }
+    let [least, most] = DENSITIES;
+    if !(least..=most).contains(&setup.density) {
+        all.push(format!(
+            "materials[{index}].density: found {} kg/m³ for \"{name}\"; expected {least} (a gas) to {most} (the heaviest metals): check its unit",
+            number(setup.density, 4)
+        ));
+    }
+    let [least, most] = WAVES;
+    if !(least..=most).contains(&wave) {
+        all.push(format!(
+            "materials[{index}]: found a wave speed of {} in \"{name}\"; expected {least} (a gel) to {most} m/s (diamond): check the units of stiffness and density (Pa, kg/m³)",
+            quantity(wave, "m/s")
+        ));
+    }
+}
+
+/// The weight of a body, and its speed.
+fn of_body<const D: usize>(
+    problem: &Problem<D>,
+    index: usize,
+    body: &Body<D>,
+    material: &dyn Material,
+    all: &mut Vec<String>,
+) {
+    let (wave, density) = (material.wave_speed(), problem.materials[body.material].density);
+    let name = excerpt(&body.name, NAME);
+    let speed = greatest_speed(problem, body);
+    if speed > BODY * wave {
+        all.push(format!(
+            "bodies[{index}].velocity: \"{name}\" moves at {}, {} times the speed of waves in its material; expected at most {BODY} times: check the units of speed, stiffness and density",
+            quantity(speed, "m/s"),
+            number(speed / wave, 2)
+        ));
+    }
+    let stiffness = density * wave * wave;
+    let pressure = density * greatest_fall(problem, body, WEIGHT * wave * wave);
+    if pressure > WEIGHT * stiffness {
+        all.push(format!(
+            "bodies[{index}].material: the weight of \"{name}\" is a pressure of {} at its foot, {} of the stiffness of its material ({}); expected at most {WEIGHT}, beyond which it strains by its own size: check the units of stiffness, density and gravity",
+            quantity(pressure, "Pa"),
+            number(pressure / stiffness, 2),
+            quantity(stiffness, "Pa")
+        ));
+    }
+}
+
+/// Greatest acceleration of gravity times the height of a body along it, m²/s²; roughly, and only as exact as it takes to compare it with `limit`.
+fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f64) -> f64 {
+    if body.given.is_some() {
+        return 0.0;
+    }
+    let mut greatest = [0.0_f64; D];
+    for gravity in (0..problem.stages.len()).map(|stage| problem.gravity_of_stage(stage)) {
+        for part in 0..=8 {
+            let now = gravity.at(gravity.start + problem.time.end * f64::from(part) / 8.0);
+            (0..D).for_each(|a| greatest[a] = greatest[a].max(now[a].abs()));
+        }
+    }
+    let bounds = body.shape.bounds().intersection(&Aabb::new([0.0; D], problem.size()));
+    let falls = (0..D).map(|a| greatest[a] * (bounds.upper[a] - bounds.lower[a]).max(0.0));
+    let Some((axis, fall)) = falls.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { return 0.0 };
+    if fall <= limit {
+        return fall;
+    }
+    // A sheet on a slope is thinner than its bounding box: points of the raster one above the other.
+    let mut columns: Vec<([u64; D], u32)> = Vec::new();
+    for x in raster(problem, body) {
+        let mut column = x.map(f64::to_bits);
+        column[axis] = 0;
+        match columns.iter_mut().find(|(other, _)| *other == column) {
+            Some((_, points)) => *points += 1,
+            None => columns.push((column, 1)),
+        }
+    }
+    let points = columns.iter().map(|(_, points)| *points).max().unwrap_or(0);
+    fall * f64::from(points) / 9.0
+}
+
+/// Colliders with a motion of their own that run into the softest material faster than it can give way.
+fn tools<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
+    let bodies = problem.bodies.iter().map(|body| (materials[body.material].wave_speed(), body.material));
+    let Some((wave, material)) = bodies.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+    for (index, collider) in problem.colliders.iter().enumerate().filter(|(_, c)| c.free().is_none()) {
+        let speed = collider.greatest_speed(&collider.state_at(0.0), &problem.size(), 0.0);
+        if speed > TOOL * wave {
+            all.push(format!(
+                "colliders[{index}].motion: \"{}\" moves at {}, {} times the speed of waves in \"{}\" ({}); expected at most {TOOL} of it, beyond which it crushes the material: check the units of speed, stiffness and density",
+                excerpt(&collider.name, NAME),
+                quantity(speed, "m/s"),
+                number(speed / wave, 2),
+                excerpt(&problem.materials[material].name, NAME),
+                quantity(wave, "m/s")
+            ));
+        }
+    }
+}
