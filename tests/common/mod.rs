@@ -1,8 +1,34 @@
-//! What tests on several ranks share.
-#![allow(dead_code, reason = "each test uses its part")]
+//! What tests share.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`mpirun`] | the one place where ranks start |
+//! | [`scenarios`], [`relaunch`] | this binary again, under `mpirun` |
+//! | [`launch`] | the program, as a user starts it |
+//! | [`runs`], [`history`], [`restart`] | whole runs: what they leave; the same on any ranks and across a restart |
+//! | [`program`] | subcommands, a browser, a body for a job |
+//! | [`papers`] | fenced blocks of the documentation |
+//! | [`boxes`], [`exact`], [`tree`], [`random`], [`damage`], [`spinning`] | input: boxes, exact weights, trees, numbers, damaged files, rotating bodies |
+#![allow(dead_code, reason = "each test crate uses its part")]
 pub(crate) mod boxes;
+pub(crate) mod damage;
 pub(crate) mod exact;
+pub(crate) mod history;
 pub(crate) mod launch;
 pub(crate) mod mpirun;
+pub(crate) mod papers;
+pub(crate) mod program;
 pub(crate) mod random;
+pub(crate) mod relaunch;
+pub(crate) mod restart;
+pub(crate) mod runs;
+pub(crate) mod scenarios;
+pub(crate) mod spinning;
 pub(crate) mod tree;
+
+/// Runs share few cores and some tests measure time, so they take turns.
+pub(crate) fn in_turn() -> std::sync::MutexGuard<'static, ()> {
+    static TURN: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    // A failed test must not fail the others.
+    TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

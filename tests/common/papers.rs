@@ -2,7 +2,6 @@
 //!
 //! An HTML comment before a block says what differs from its words: `<!-- test: needs: PROGRAMS -->` passes over the block where
 //! one of them is missing, `<!-- test: quick: OLD => NEW; REASON -->` replaces words, `<!-- test: skip: REASON -->` leaves it out.
-#![allow(dead_code, reason = "each test uses its part")]
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

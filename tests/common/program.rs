@@ -1,5 +1,4 @@
 //! What tests of subcommands share: the program, what it says, a browser, and a body for a job.
-#![allow(dead_code, reason = "each test uses its part")]
 use std::path::Path;
 use std::process::{Command, Output};
 

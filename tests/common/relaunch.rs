@@ -20,8 +20,10 @@ pub(crate) fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
     true
 }
 
-/// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it printed.
-pub(crate) fn relaunch(test: &str, ranks: usize, seconds: u32) -> String {
+/// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it printed. `module` is the
+/// `module_path!()` of the test.
+pub(crate) fn relaunch(module: &str, test: &str, ranks: usize, seconds: u32) -> String {
+    let test = &full_name(module, test);
     let mut command = mpirun::command(ranks, seconds);
     command.arg(std::env::current_exe().expect("own path")).args([
         "--exact",
@@ -35,4 +37,12 @@ pub(crate) fn relaunch(test: &str, ranks: usize, seconds: u32) -> String {
     assert!(output.status.success(), "{test} on {ranks} ranks:\n{text}");
     assert!(text.contains(STARTED), "no test is called {test}:\n{text}");
     text
+}
+
+/// The name by which `--exact` knows a test of a module: its path without the crate.
+pub(crate) fn full_name(module: &str, test: &str) -> String {
+    match module.split_once("::") {
+        Some((_, inside)) => format!("{inside}::{test}"),
+        None => test.to_owned(),
+    }
 }

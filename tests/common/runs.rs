@@ -1,19 +1,10 @@
 //! What tests of whole runs share: how a run is started, and what it leaves.
-#![allow(dead_code, reason = "each test uses its part")]
-#[path = "history.rs"]
-pub(crate) mod history;
-#[path = "../mpi_runs/launch.rs"]
-pub(crate) mod launch;
-#[path = "mpirun.rs"]
-pub(crate) mod mpirun;
-#[path = "restart.rs"]
-pub(crate) mod restart;
 
 use std::path::Path;
 
+use super::launch::{self, Outcome};
 use agimp::io::hdf5_file::Reader;
 use agimp::io::snapshot::Header;
-use launch::Outcome;
 
 /// Runs a job on one rank in a directory, as `block.toml`, over what an earlier run has left. Returns what it leaves.
 pub(crate) fn outcome(directory: &Path, job: &str) -> Outcome {

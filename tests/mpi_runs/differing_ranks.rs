@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use crate::in_turn;
-use crate::launch::{Outcome, Running, by_rank, job, mpirun, run, succeed, text};
+use crate::common::in_turn;
+use crate::common::launch::{Outcome, Running, by_rank, job, mpirun, run, succeed, text};
 
 /// A run that waits for ever would take longer.
 const SOON: Duration = Duration::from_secs(60);

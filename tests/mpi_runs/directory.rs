@@ -2,8 +2,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::in_turn;
-use crate::launch::{Outcome, Running, contents, file, job, last_step, run, signal, succeed, text, variant};
+use crate::common::in_turn;
+use crate::common::launch::{
+    Outcome, Running, contents, file, job, last_step, run, signal, succeed, text, variant,
+};
 
 const NAME: &str = "collapse_2d";
 /// A refused run has ended by then, on a busy machine.

@@ -3,8 +3,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::in_turn;
-use crate::launch::{
+use crate::common::in_turn;
+use crate::common::launch::{
     Outcome, Running, agimp, contents, file, is_alive, job, last_step, mpirun, results, run, signal, succeed,
     text, variant,
 };

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use agimp::text::quantity;
 
-use crate::in_turn;
-use crate::launch::{Outcome, Running, agimp, file, job, run, signal, succeed, text};
+use crate::common::in_turn;
+use crate::common::launch::{Outcome, Running, agimp, file, job, run, signal, succeed, text};
 
 const NAME: &str = "collapse_2d";
 

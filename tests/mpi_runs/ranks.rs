@@ -3,8 +3,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::in_turn;
-use crate::launch::{agimp, file, job, run, succeed, text};
+use crate::common::in_turn;
+use crate::common::launch::{agimp, file, job, run, succeed, text};
 
 /// The records of a run.
 fn telemetry(directory: &Path, name: &str) -> Vec<Value> {

@@ -1,8 +1,10 @@
 //! Runs that are stopped and go on elsewhere, and files that no run may go on from.
 use std::path::{Path, PathBuf};
 
-use crate::in_turn;
-use crate::launch::{Outcome, Running, agimp, contents, file, job, results, run, signal, succeed, text};
+use crate::common::in_turn;
+use crate::common::launch::{
+    Outcome, Running, agimp, contents, file, job, results, run, signal, succeed, text,
+};
 
 /// Exit code of a run that stopped on request.
 const STOPPED: i32 = 3;

@@ -1,8 +1,8 @@
 //! One job, many ways to run it, the same bits; and what each way has to conserve.
 use std::path::Path;
 
-use crate::in_turn;
-use crate::launch::{Outcome, file, job, run, succeed, text};
+use crate::common::in_turn;
+use crate::common::launch::{Outcome, file, job, run, succeed, text};
 
 /// Ranks and threads; the first is the reference, started without `mpirun`.
 const WAYS: [(usize, usize); 7] = [(1, 1), (1, 2), (2, 1), (3, 1), (4, 1), (2, 2), (7, 1)];

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::in_turn;
-use crate::launch::{Running, agimp, job, run, signal, succeed, text};
-use crate::mpirun::{environment, is_mpich};
+use crate::common::in_turn;
+use crate::common::launch::{Running, agimp, job, run, signal, succeed, text};
+use crate::common::mpirun::{environment, is_mpich};
 
 const NAME: &str = "collapse_2d";
 const SOON: Duration = Duration::from_secs(60);

@@ -4,16 +4,16 @@
 //! hidden test `worker` runs the scenario that an environment variable names.
 
 mod comm;
-#[path = "../../../tests/common/launch.rs"]
-mod launch;
 #[path = "../../../tests/common/mpirun.rs"]
 mod mpirun;
 mod oracle;
 mod random;
+#[path = "../../../tests/common/scenarios.rs"]
+mod scenarios;
 mod search;
 mod tree;
 
-use launch::{Scenario, agrees_for, fails};
+use scenarios::{Scenario, agrees_for, fails};
 
 /// Everything that can be run on several ranks, by name.
 const SCENARIOS: &[(&str, Scenario)] = &[
@@ -37,12 +37,12 @@ const SCENARIOS: &[(&str, Scenario)] = &[
 #[test]
 #[ignore = "started by the other tests under mpirun"]
 fn worker() {
-    launch::work(SCENARIOS);
+    scenarios::work(&[SCENARIOS]);
 }
 
 #[test]
 fn one_rank_without_mpirun() {
-    launch::alone("tree_2d");
+    scenarios::alone("tree_2d");
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use partition::{Brick, Comm, CutAt, Forest, MAX_LEVEL, Octant, Region};
 
-use crate::launch::report;
 use crate::oracle::all_leaves;
 use crate::random::{Random, hash};
+use crate::scenarios::report;
 use crate::tree::random_brick;
 
 /// Boxes of any size, also flat, empty or outside; many with faces on octant boundaries.

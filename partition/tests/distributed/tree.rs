@@ -2,9 +2,9 @@
 
 use partition::{Brick, Comm, CutAt, Forest, ForestError, MAX_LEVEL, Mark, Octant, Region, correspondence};
 
-use crate::launch::report;
 use crate::oracle::{Oracle, all_leaves, assert_same};
 use crate::random::{Random, hash};
+use crate::scenarios::report;
 
 /// A small brick with random numbers of roots; one of a single root now and then.
 pub(crate) fn random_brick<const D: usize>(random: &mut Random) -> Brick<D> {

@@ -40,7 +40,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
          `agimp material` drives one particle; the answers are closed forms. J2 with Hencky elasticity and linear hardening: uniaxial logarithmic strain a gives the plastic strain \
          (2 mu |a| - s_y) / (3 mu + H) and tau_1 = K a -/+ (2/3) (s_y + H kappa). Drucker-Prager matched to triaxial compression: drained triaxial compression ends at sigma_1 / sigma_3 = \
          tan^2(45 + phi / 2). Oedometer on the same sand, loaded plastically: K0 is the greater of nu / (1 - nu) and (1 - sin phi) / (1 + sin phi). Weakly compressible fluid: p = \
-         (K / 7) (J^-7 - 1). All 17 models are driven along 20 files of paths by independent integrators in `tests/materials`.\n",
+         (K / 7) (J^-7 - 1). All 17 models are driven along 20 files of paths by independent integrators in `tests/all/materials`.\n",
     );
     let (young, poisson, yielding, hardening): (f64, f64, f64, f64) = (1e6, 0.3, 2e4, 1e5);
     let (mu, bulk) = (young / 2.0 / (1.0 + poisson), young / 3.0 / (1.0 - 2.0 * poisson));

@@ -188,7 +188,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
          position, the unit matrix for its gradient, and the product of the centre's coordinates for that of the nodes. As a box of half a fine cell moves through a jump of levels, \
          gradients are Lipschitz continuous; with *linear hats* (boxes of a millionth) they jump. *Face neighbours*: boxes whose nodes do not all belong to the leaf that holds the \
          box and to its neighbours across faces; a ghost layer of face neighbours alone would lose their mass. Transfers of many particles on these trees are compared in \
-         `tests/golden.rs`, on 1 to 4 ranks.\n",
+         `tests/all/golden.rs`, on 1 to 4 ranks.\n",
     );
     checked(std::fs::create_dir_all(&runs.folder));
     let mut rows = Vec::new();

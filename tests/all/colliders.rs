@@ -1,0 +1,183 @@
+//! Colliders through the whole program: exact solutions of sliding, resting, pushing and falling, and the same bits
+//! on any ranks and threads and across restarts.
+
+use std::path::Path;
+
+use crate::common::history::History;
+use crate::common::launch::{Outcome, agimp, job, run, succeed};
+use crate::common::restart;
+
+/// Runs a 2D job on one rank: an elastic body of 1000 kg/m³ and what `rest` adds.
+fn elastic(young: f64, gravity: f64, body: &str, end: f64, rest: &str) -> History {
+    let text = format!(
+        "version = 1\ndimension = 2\ngravity = [0, {gravity}]\n\
+         [boundaries]\nx_min = {{ kind = 'slip' }}\nx_max = {{ kind = 'slip' }}\n\
+         y_min = {{ kind = 'slip' }}\ny_max = {{ kind = 'slip' }}\n\
+         [domain]\nsize = [1.6, 0.8]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n\
+         [[materials]]\nname = 'rubber'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = {young}\npoisson = 0.2\n\
+         [[bodies]]\nname = 'body'\nmaterial = 'rubber'\n{body}\n\
+         [time]\nend = {end}\n[output]\npicture = false\n{rest}\n"
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("body.toml");
+    std::fs::write(&path, text).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    History::read(directory.path(), "body")
+}
+
+/// A block on a plane that descends by 30 degrees along x, off the lattice.
+fn slide(friction: f64, young: f64) -> History {
+    let block = "shape = { kind = 'rotated', centre = [0.2, 0.6], angle = -30, \
+                 shape = { kind = 'box', min = [0.2, 0.6], max = [0.5, 0.7] } }";
+    let plane = format!(
+        "[[colliders]]\nname = 'plane'\n\
+         shape = {{ kind = 'half_space', point = [0.2, 0.6], normal = [0.5, 0.8660254037844386] }}\n\
+         contact = {{ kind = 'separating', friction = {friction} }}"
+    );
+    elastic(young, -9.81, block, 0.3, &plane)
+}
+
+#[test]
+fn blocks_slide_down_a_slope_as_coulomb_says() {
+    let (sine, cosine) = (0.5, 0.75_f64.sqrt());
+    for friction in [0.0, 0.2, 0.4] {
+        let history = slide(friction, 1e6);
+        let mass = history.last("mass");
+        let speed = |start| {
+            let (time, x) = history.at("momentum_x", start);
+            let (_, y) = history.at("momentum_y", start);
+            (time, (cosine * x - sine * y) / mass)
+        };
+        let ((t0, v0), (t1, v1)) = (speed(0.05), speed(0.299));
+        let (found, exact) = ((v1 - v0) / (t1 - t0), 9.81 * (sine - friction * cosine));
+        println!("friction {friction}: {found:.4} m/s², exact {exact:.4}");
+        // Of the acceleration without friction: the block vibrates, and friction follows the momentary pressure.
+        assert!((found - exact).abs() < 0.01 * 9.81 * sine, "friction {friction}: {found} against {exact}");
+    }
+    // It holds above tan(30 degrees) = 0.577. Near to that the block creeps while its vibrations unload it, the more the
+    // softer it is.
+    let history = slide(1.0, 1e7);
+    let speed = history.last("momentum_x") / history.last("mass");
+    println!("friction 1: {speed:.2e} m/s after 0.3 s, free fall along the slope 1.27");
+    assert!(speed.abs() < 0.001, "{speed}");
+}
+
+#[test]
+fn weight_is_the_mean_reaction_and_momentum_balances() {
+    let support =
+        "[[colliders]]\nname = 'table'\nshape = { kind = 'box', min = [0, -1], max = [1.6, 0.31] }\n";
+    let history =
+        elastic(4e6, -9.81, "shape = { kind = 'box', min = [0.6, 0.31], max = [0.9, 0.41] }", 0.5, support);
+    let (weight, time) = (9.81 * history.last("mass"), history.last("time"));
+    let (start, _) = history.at("time", 0.1);
+    let mean = history.integral("force_table_y", start) / (time - start);
+    println!("mean force {mean:.4} N, weight {:.4} N", -weight);
+    assert!((mean / -weight - 1.0).abs() < 0.01, "{mean} against {}", -weight);
+    // No other force acts: exact but for rounding.
+    let error = history.last("momentum_y") + weight * time + history.integral("force_table_y", 0.0);
+    println!("balance off by {:.1e} of the impulse", error / (weight * time));
+    assert!(error.abs() < 1e-12 * weight * time, "{error:e}");
+}
+
+#[test]
+fn pistons_give_the_momentum_that_they_report() {
+    let piston = "[[colliders]]\nname = 'piston'\ncontact = { kind = 'separating', friction = 0.5 }\n\
+                  shape = { kind = 'box', min = [0.1, 0.1], max = [0.3, 0.7] }\n\
+                  motion = { kind = 'table', rows = [{ time = 0.01 }, { time = 0.04, translation = [0.2, 0.02] }, \
+                  { time = 0.05, translation = [0.25, 0.02] }] }";
+    let block = "shape = { kind = 'box', min = [0.36, 0.3], max = [0.56, 0.47] }";
+    let history = elastic(1e5, 0.0, block, 0.06, piston);
+    let gained = [history.last("momentum_x"), history.last("momentum_y")];
+    for (axis, gained) in ["x", "y"].into_iter().zip(gained) {
+        let error = gained + history.integral(&format!("force_piston_{axis}"), 0.0);
+        println!("momentum {axis} {gained:.4}, off by {error:.1e}");
+        assert!(error.abs() < 1e-12 * gained.abs(), "{axis}: {gained} off by {error:e}");
+    }
+    assert!(gained[0] > 0.9 * 5.0 * history.last("mass"), "{gained:?}");
+    assert!((history.last("position_piston_x") - 0.45).abs() < 1e-15);
+}
+
+/// The top of a disc that turns counter-clockwise moves towards -x and takes the body along, which brakes it.
+#[test]
+fn turning_discs_are_braked_by_what_they_carry() {
+    let disc = |spin: f64| {
+        format!(
+            "[[colliders]]\nname = 'disc'\ncontact = {{ kind = 'separating', friction = 0.3 }}\n\
+             shape = {{ kind = 'circle', centre = [0.8, 0.2], radius = 0.2 }}\n\
+             motion = {{ kind = 'steady', angular_velocity = {spin} }}"
+        )
+    };
+    let block = "shape = { kind = 'box', min = [0.7, 0.4], max = [0.9, 0.5] }";
+    for spin in [10.0, -10.0] {
+        let history = elastic(1e6, -9.81, block, 0.1, &disc(spin));
+        let torque = history.integral("torque_disc", 0.0);
+        let (push, weight) = (history.last("momentum_x"), 9.81 * history.last("mass") * 0.1);
+        println!(
+            "spin {spin}: angular impulse {torque:.4}, momentum {push:.4}, impulse of weight {weight:.4}"
+        );
+        assert!(torque * spin < 0.0 && push * spin < 0.0, "{torque} {push}");
+        // Friction along the surface at radius 0.2 is the torque; it is at most 0.3 of the weight.
+        assert!((0.5..1.1).contains(&(push.abs() / (0.3 * weight))), "{push} {weight}");
+        assert!((torque.abs() / (0.2 * push.abs()) - 1.0).abs() < 0.25, "{torque} {push}");
+        // The run ends with the first step that reaches 0.1 s.
+        let turned = history.last("time") * spin;
+        assert!((history.last("angle_disc") - turned).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn free_bodies_fall_exactly_and_take_what_they_give() {
+    let ball = "[[colliders]]\nname = 'ball'\nshape = { kind = 'circle', centre = [0.4, 0.6], radius = 0.05 }\n\
+                motion = { kind = 'free', mass = 3, velocity = [1, 0.5] }";
+    let far = elastic(1e6, -9.81, "shape = { kind = 'box', min = [1.2, 0], max = [1.4, 0.1] }", 0.2, ball);
+    let t = far.last("time");
+    let exact = [0.4 + t, 0.6 + 0.5 * t - 0.5 * 9.81 * t * t];
+    let found = [far.last("position_ball_x"), far.last("position_ball_y")];
+    println!("falls to {found:?}, exact {exact:?}");
+    assert!((0..2).all(|a| (found[a] - exact[a]).abs() < 1e-13), "{found:?} {exact:?}");
+
+    let hit = "[[colliders]]\nname = 'ball'\nshape = { kind = 'circle', centre = [0.4, 0.4], radius = 0.1 }\n\
+               motion = { kind = 'free', mass = 50, velocity = [5, 0] }";
+    let block = "shape = { kind = 'box', min = [0.51, 0.3], max = [0.71, 0.5] }";
+    let history = elastic(1e5, 0.0, block, 0.04, hit);
+    let (given, taken) = (history.last("momentum_x"), 50.0 * (5.0 - history.last("velocity_ball_x")));
+    println!("ball gives {taken:.6}, block has {given:.6}");
+    assert!(given > 20.0 && (given - taken).abs() < 1e-11 * given, "{given} {taken}");
+    assert!((given + history.integral("force_ball_x", 0.0)).abs() < 1e-12 * given);
+}
+
+#[test]
+fn same_bits_in_all_ways_and_across_restart() {
+    let name = "collider_drop";
+    let mut reference: Option<Outcome> = None;
+    for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1), (4, 1), (2, 2)] {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        succeed(&mut run(directory.path(), ranks, threads, &job(name), &["--quiet"]));
+        let result = Outcome::read(directory.path(), name);
+        match &reference {
+            Some(first) => first.assert_same(&result, &format!("{ranks} ranks x {threads} threads")),
+            None => {
+                restart_gives_the_same(directory.path(), name, &result);
+                reference = Some(result);
+            }
+        }
+    }
+}
+
+/// Goes on from a checkpoint between two rows of the history, on other ranks.
+fn restart_gives_the_same(done: &Path, name: &str, whole: &Outcome) {
+    let history = History::read(done, name);
+    let fall = history.last("velocity_cylinder_y");
+    assert!(fall > -1.9 && fall < 1.0, "the cylinder is braked by sand: {fall} m/s");
+    assert!(history.column("force_paddle_x").iter().any(|force| force.abs() > 1.0));
+    restart::assert_middle_gives(whole, done, &job(name), name);
+}
+
+#[test]
+fn check_lists_colliders() {
+    let output = succeed(agimp(Path::new(".")).arg("check").arg(job("collider_drop")));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["colliders    3", "free, 25 kg", "by a table of 3 rows", "slip, fixed"] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+}

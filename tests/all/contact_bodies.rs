@@ -1,0 +1,224 @@
+//! Contact between bodies that deform, through the whole program: closed forms of impact and friction, a reference of finite elements, and
+//! the same results on any ranks and across restarts.
+
+use crate::common::history::History;
+use crate::common::launch::{run, succeed};
+use crate::common::restart;
+use crate::common::runs::particles;
+
+/// What all jobs here have.
+const RUBBER: &str = "version = 1\ndimension = 2\n[output]\npicture = false\n\
+    [[materials]]\nname = 'rubber'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e6\npoisson = 0.3\n";
+
+fn body(name: &str, shape: &str, velocity: &str) -> String {
+    format!(
+        "[[bodies]]\nname = '{name}'\nmaterial = 'rubber'\nshape = {{ {shape} }}\nvelocity = {velocity}\n"
+    )
+}
+
+fn cube(min: [f64; 2], max: [f64; 2]) -> String {
+    format!("kind = 'box', min = {min:?}, max = {max:?}")
+}
+
+fn history(job: &str) -> History {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("block.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    History::read(directory.path(), "block")
+}
+
+/// A block that falls between two others, half a cell from each, falls freely; so does one above a slab until the gap of a
+/// third of a cell has closed.
+#[test]
+fn nothing_is_felt_before_a_gap_closes() {
+    let slot = format!(
+        "{RUBBER}[domain]\nsize = [1.6, 1.6]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n{}{}{}\
+         [[contact]]\nfriction = 0.5\n\
+         [[loads]]\nname = 'hold'\nkind = 'velocity'\nx = 0\ny = 0\nshape = {{ kind = 'box', min = [0, 0], max = [0.6, 1.6] }}\n\
+         [[loads]]\nname = 'hold2'\nkind = 'velocity'\nx = 0\ny = 0\nshape = {{ kind = 'box', min = [1.03, 0], max = [1.6, 1.6] }}\n\
+         [[probes]]\nname = 'block'\nbodies = ['block']\nquantities = ['velocity']\n\
+         [time]\nend = 0.25\n[history]\nevery_steps = 10\n",
+        body("left", &cube([0.2, 0.2], [0.6, 1.0]), "[0, 0]"),
+        body("right", &cube([1.025, 0.2], [1.4, 1.0]), "[0, 0]"),
+        body("block", &cube([0.6125, 0.9], [1.0125, 1.3]), "[0, 0]"),
+    )
+    .replace("dimension = 2\n", "dimension = 2\ngravity = [0, -10]\n");
+    let history = history(&slot);
+    for (t, v) in history.column("time").iter().zip(history.column("velocity_block_y")) {
+        assert!((v + 10.0 * t).abs() < 1e-8, "{v} at {t}");
+    }
+}
+
+/// Two equal bars meet at 2 × 0.1 m/s: the stress between them is ρ c v, they part at 2 L / c with their velocities exchanged.
+#[test]
+fn equal_bars_exchange_their_velocities() {
+    let (sound, height) = (10.0, 0.0625);
+    let job = format!(
+        "{RUBBER}[domain]\nmin = [-1.25, 0]\nsize = [2.5, 0.0625]\nroot_edge = 0.0625\n\
+         [tree]\nbase_level = 1\n[boundaries]\ny_min = {{ kind = 'slip' }}\ny_max = {{ kind = 'slip' }}\n{}{}\
+         [[contact]]\nname = 'ends'\nbetween = ['first', 'second']\n\
+         [[probes]]\nname = 'first'\nbodies = ['first']\nquantities = ['velocity']\n\
+         [numerics]\ntransfer = 'flip'\n\
+         [time]\nend = 0.5\ncfl = 0.3\n[history]\nevery_steps = 1\n",
+        body("first", &cube([-1.015625, 0.0], [-0.015625, height]), "[0.1, 0]"),
+        body("second", &cube([0.015625, 0.0], [1.015625, height]), "[-0.1, 0]"),
+    )
+    .replace(
+        "model = 'neo_hookean'\nyoung = 1e6\npoisson = 0.3",
+        "model = 'fixed_corotated'\nyoung = 1e5\npoisson = 0",
+    );
+    let history = history(&job);
+    let (time, force) = (history.column("time"), history.column("contact_ends_x"));
+    let meet = 0.03125 / 0.2;
+    let stress: Vec<f64> = (time.iter().zip(force))
+        .filter(|(t, _)| **t > meet + 0.06 && **t < meet + 0.16)
+        .map(|(_, f)| -f / height)
+        .collect();
+    let mean = stress.iter().sum::<f64>() / stress.len() as f64;
+    let exact = 1000.0 * sound * 0.1;
+    println!("stress {mean}, exact {exact}");
+    assert!((mean / exact - 1.0).abs() < 0.01, "{mean}");
+    let pressed = |f: &f64| -f / height > 0.5 * exact;
+    let first = time[force.iter().position(pressed).expect("contact")];
+    let last = time[force.iter().rposition(pressed).expect("contact")];
+    println!("from {first} to {last}, which is {} s, exact {}", last - first, 0.2);
+    assert!(first >= meet && first - meet < 0.016, "{first} against {meet}");
+    assert!(((last - first) / 0.2 - 1.0).abs() < 0.03, "{}", last - first);
+    let velocity = history.last("velocity_first_x");
+    println!("velocity {velocity}");
+    assert!((velocity + 0.1).abs() < 0.02 * 0.2, "{velocity}");
+}
+
+/// Two disks collide obliquely with friction 0.3, against finite elements: both momenta stay, and the disks leave with velocity and
+/// spin of the reference.
+#[test]
+fn oblique_disks_leave_as_finite_elements_say() {
+    let disk = |name: &str, x: f64, y: f64, v: f64| {
+        body(name, &format!("kind = 'circle', centre = [{x}, {y}], radius = 0.2"), &format!("[{v}, 0]"))
+    };
+    let job = format!(
+        "{RUBBER}[domain]\nmin = [-0.7, -0.5]\nsize = [1.4, 1.0]\nroot_edge = 0.1\n[tree]\nbase_level = 1\n{}{}\
+         [[contact]]\nbetween = ['first', 'second']\nfriction = 0.3\n\
+         [[probes]]\nname = 'first'\nbodies = ['first']\nquantities = ['velocity']\n\
+         [numerics]\ntransfer = 'apic'\n\
+         [time]\nend = 1.6\n[history]\nevery_steps = 10\n",
+        disk("first", -0.217737, 0.03, 0.1),
+        disk("second", 0.217737, -0.03, -0.1),
+    )
+    .replace("young = 1e6", "young = 1000");
+    let history = history(&job);
+    for name in ["momentum_x", "momentum_y"] {
+        let greatest = history.column(name).iter().fold(0.0_f64, |all, p| all.max(p.abs()));
+        assert!(greatest < 1e-12 * 25.0, "{name}: {greatest}");
+    }
+    let turning = history.column("angular_momentum_z");
+    assert!((turning[0] - history.last("angular_momentum_z")).abs() < 1e-12 * turning[0].abs());
+    let found = [history.last("velocity_first_x"), history.last("velocity_first_y")];
+    let exact = [-0.089376, 0.025711];
+    println!("{found:?} against {exact:?}");
+    for (found, exact) in found.iter().zip(exact) {
+        assert!((found - exact).abs() < 0.01 * 0.1, "{found} against {exact}");
+    }
+    assert!(history.last("contact_work_1") < 0.0);
+}
+
+/// A block slides down a slab that deforms, with `a = g (sin α - μ cos α)`, or stays where friction holds it.
+#[test]
+fn blocks_slide_on_slabs_as_coulomb_says() {
+    for (friction, slides) in [(0.3, true), (0.7, false)] {
+        let job = format!(
+            "{RUBBER}[domain]\nsize = [2, 0.8]\nroot_edge = 0.2\n[boundaries]\ny_min = {{ kind = 'sticky' }}\n\
+             [tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = {{ kind = 'box', min = [0.4, 0], max = [0.8, 0.4] }}\n{}{}\
+             [[contact]]\nbetween = ['slab', 'block']\nfriction = {friction}\n\
+             [[probes]]\nname = 'block'\nbodies = ['block']\nquantities = ['velocity', 'centre']\n\
+             [time]\nend = 0.4\ncfl = 0.5\n[history]\nevery_steps = 20\n",
+            body("slab", &cube([0.0, 0.0], [2.0, 0.2125]), "[0, 0]"),
+            body("block", &cube([0.2, 0.2125], [0.6, 0.5125]), "[0, 0]"),
+        )
+        .replace("dimension = 2\n", "dimension = 2\ngravity = ['4.905 * min(t / 0.1, 1)', '-8.4957 * min(t / 0.1, 1)']\n")
+        .replace("young = 1e6", "young = 5e6");
+        let history = history(&job);
+        let acceleration = 4.905 - friction * 8.4957;
+        let exact = acceleration * (history.last("time") - 0.05);
+        let found = history.last("velocity_block_x");
+        println!("friction {friction}: {found} against {exact}");
+        match slides {
+            true => assert!((found / exact - 1.0).abs() < 0.01, "{found} against {exact}"),
+            false => assert!(found.abs() < 0.01 * 4.905 * 0.35, "{found}"),
+        }
+    }
+}
+
+/// A block that rests on a slab between slip walls presses on it with its weight, seen from both sides, also beside a level jump; away from
+/// the joint nothing presses.
+#[test]
+fn the_pressure_of_contact_is_the_weight_above() {
+    let job = format!(
+        "{RUBBER}[domain]\nsize = [0.8, 0.8]\nroot_edge = 0.2\n\
+         [boundaries]\nx_min = {{ kind = 'slip' }}\nx_max = {{ kind = 'slip' }}\ny_min = {{ kind = 'slip' }}\n\
+         [tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = {{ kind = 'box', min = [0.4, 0], max = [0.8, 0.8] }}\n{}{}\
+         [[contact]]\nname = 'joint'\n[time]\nend = 2\n[equilibrium]\nspeed = 1e-4\nacceleration = 0.01\n",
+        body("slab", &cube([0.0, 0.0], [0.8, 0.3]), "[0, 0]"),
+        body("block", &cube([0.0, 0.3], [0.8, 0.7]), "[0, 0]"),
+    )
+    .replace("dimension = 2\n", "dimension = 2\ngravity = [0, -10]\n")
+    .replace("picture = false\n", "picture = false\nfields = ['contact_pressure', 'body']\n");
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("stack.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let [places, pressures] =
+        [None, Some("contact_pressure")].map(|field| particles(directory.path(), "stack", 1, field));
+    let exact = 1000.0 * 10.0 * 0.4;
+    let mut worst: f64 = 0.0;
+    for (x, pressure) in places.chunks(3).zip(pressures) {
+        let from_joint = (x[1] - 0.3).abs();
+        if from_joint < 0.01 {
+            worst = worst.max((pressure / exact - 1.0).abs());
+            assert!((pressure / exact - 1.0).abs() < 0.01, "{pressure} for {exact} at {x:?}");
+        } else if from_joint > 0.15 {
+            assert_eq!(pressure, 0.0, "at {x:?}");
+        }
+    }
+    println!("within {worst}");
+}
+
+/// Blocks that meet obliquely beside a level jump, with splits, on any ranks and across a restart; a third one sticks to the second.
+#[test]
+fn contact_does_not_depend_on_ranks() {
+    for (transfer, dimension) in [("apic", 2), ("flip", 2), ("apic", 3)] {
+        let (size, corner) = if dimension == 2 { ("[1.6, 0.8]", "") } else { ("[0.8, 0.4, 0.4]", ", 0.1") };
+        let unit = if dimension == 2 { 1.0 } else { 0.5 };
+        let (far, rest) = if dimension == 2 { ("", "") } else { (", 0.3", ", 0.1") };
+        let cube = |min: [f64; 2], max: [f64; 2]| {
+            let [a, b] = min.map(|x| unit * x);
+            let [c, d] = max.map(|x| unit * x);
+            format!("kind = 'box', min = [{a}, {b}{corner}], max = [{c}, {d}{far}]")
+        };
+        let job = format!(
+            "{RUBBER}[domain]\nsize = {size}\nroot_edge = {}\n\
+             [[tree.regions]]\nlevel = 1\nshape = {{ kind = 'half_space', point = [{}, 0{rest}], normal = [-1, 0{}] }}\n{}{}{}\
+             [[contact]]\nbetween = ['first', ['second', 'third']]\nfriction = 0.2\ncohesion = 10\n\
+             [[colliders]]\nname = 'wall'\nacts_on = 'particles'\nshape = {{ kind = 'half_space', point = [{}, 0{rest}], normal = [-1, 0{}] }}\n\
+             [numerics]\ntransfer = '{transfer}'\n\
+             [checkpoint]\nevery_steps = 30\nkeep = 9\n\
+             [time]\nend = {}\n[history]\nevery_steps = 7\n",
+            0.4 * unit,
+            0.8 * unit,
+            if dimension == 2 { "" } else { ", 0" },
+            body("first", &cube([0.5, 0.2], [0.775, 0.5]), if dimension == 2 { "[2, 0.3]" } else { "[2, 0.3, 0.1]" }),
+            body("second", &cube([0.8, 0.3], [1.0, 0.6]), if dimension == 2 { "[-1, 0]" } else { "[-1, 0, 0]" }),
+            body("third", &cube([1.0, 0.3], [1.2, 0.6]), if dimension == 2 { "[-1, 0]" } else { "[-1, 0, 0]" }),
+            1.3 * unit,
+            if dimension == 2 { "" } else { ", 0" },
+            0.05 * unit,
+        )
+        .replace("picture = false\n", "fields = ['velocity', 'contact_pressure']\n")
+        .replace("dimension = 2", &format!("dimension = {dimension}"));
+        restart::assert_same_on_any_ranks(&job, "meeting", |directory, _| {
+            let history = History::read(directory, "meeting");
+            assert!(history.last("contact_1_x").abs() + history.last("contact_work_1").abs() > 0.0);
+        });
+    }
+}

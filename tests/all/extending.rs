@@ -1,0 +1,108 @@
+//! The examples of `docs/extending.md`, followed word by word on a copy of the sources: the new material and the new criterion are in
+//! the schema, a job with them is checked, and the tests of the material pass with those of the other models.
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const PAGE: &str = include_str!("../../docs/extending.md");
+
+/// The block of code that follows a marker in the page.
+fn block(marker: &str) -> &'static str {
+    let after = PAGE.split_once(marker).unwrap_or_else(|| panic!("no {marker} in docs/extending.md")).1;
+    let (_, code) = after.split_once("```").expect("a block of code");
+    let (_, code) = code.split_once('\n').expect("a line with the language");
+    code.split_once("```").expect("the end of the block").0
+}
+
+fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        std::fs::create_dir_all(to).expect("directory");
+        for entry in std::fs::read_dir(from).expect("directory") {
+            let entry = entry.expect("entry");
+            copy(&entry.path(), &to.join(entry.file_name()));
+        }
+    } else {
+        std::fs::copy(from, to).expect("copy");
+    }
+}
+
+/// A copy of what the build needs, with the file and the lines of the example.
+fn extended(root: &Path) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    for part in [
+        "Cargo.toml",
+        "Cargo.lock",
+        ".cargo",
+        "src",
+        "partition",
+        "benches",
+        "jobs",
+        "studies",
+        "tests",
+        "docs",
+        "examples",
+    ] {
+        copy(&root.join(part), &directory.path().join(part));
+    }
+    let root = directory.path();
+    add(root, "src/material/laws", "gel", "pub mod hencky;", "materials!");
+    add(root, "src/adaptivity/criteria", "speed", "pub mod stretch;", "criteria!");
+    directory
+}
+
+/// Adds the file of an example to a folder, its module ahead of another one, and its line to the end of the list.
+fn add(root: &Path, folder: &str, name: &str, next: &str, list: &str) {
+    let file = format!("{folder}/{name}.rs");
+    std::fs::write(root.join(&file), block(&format!("<!-- file: {file} -->"))).expect("file");
+    let path = root.join(folder).join("mod.rs");
+    let text = std::fs::read_to_string(&path).expect("list");
+    let end = text.rfind('}').expect("the end of the list");
+    let line = block(&format!("<!-- line: {folder}/mod.rs: {list} {{ -->"));
+    let text = format!("{}{line}{}", &text[..end], &text[end..]);
+    std::fs::write(&path, text.replacen(next, &format!("pub mod {name};\n{next}"), 1)).expect("list");
+}
+
+#[test]
+#[ignore = "nightly: compiles the crate twice"]
+fn materials_and_criteria_are_one_file_and_one_line() {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let copy = extended(&root);
+    let cargo = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO"))
+            .args(arguments)
+            .current_dir(copy.path())
+            // Dependencies are those that are built already.
+            .env("CARGO_TARGET_DIR", root.join("target"))
+            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+            .output()
+            .expect("cargo starts");
+        let (stdout, stderr) = (
+            String::from_utf8_lossy(&output.stdout).into_owned(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        );
+        assert!(output.status.success(), "cargo {arguments:?}\n{stdout}\n{stderr}");
+        stdout
+    };
+    let schema = cargo(&["run", "--quiet", "--bin", "agimp", "--", "schema"]);
+    assert!(schema.contains("\"gel\"") && schema.contains("Bulk modulus, Pa; above 0."), "{schema}");
+    assert!(schema.contains("\"speed\"") && schema.contains("Where a particle is fast."), "{schema}");
+
+    let job = std::fs::read_to_string(root.join("jobs/elastic_cubes.toml")).expect("job");
+    let (head, rest) = job.split_once("[[materials]]").expect("materials");
+    let (_, tail) = rest.split_once("\n[[").expect("the next table");
+    let name =
+        rest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"')).expect("a name");
+    let material = block("<!-- job -->").replace("jelly", name);
+    let path = copy.path().join("jelly.toml");
+    let criterion = block("<!-- criterion -->");
+    std::fs::write(&path, format!("{head}{material}\n[[{tail}\n{criterion}")).expect("job");
+    let checked = cargo(&["run", "--quiet", "--bin", "agimp", "--", "check", &path.to_string_lossy()]);
+    assert!(checked.contains("particles"), "{checked}");
+    // The cubes move at 2 m/s, so their leaves are of that level at the start.
+    assert!(checked.contains("speed at least 1 m/s, coarsening below 500 mm/s"), "{checked}");
+    let filled: Vec<&str> = checked.lines().filter(|line| line.trim_start().starts_with("3 ")).collect();
+    assert!(checked.contains("at the start, with the criteria") && !filled.is_empty(), "{checked}");
+
+    let tests = cargo(&["test", "--quiet", "--lib", "material::"]);
+    assert!(tests.contains("test result: ok"), "{tests}");
+}

@@ -1,0 +1,225 @@
+//! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is counted; material
+//! lets go of faces that pull; states that no material can have end the run.
+
+use crate::common::history::History;
+use crate::common::launch::{run, succeed};
+use crate::common::relaunch::{ran_if_launched, relaunch};
+use crate::common::{launch, restart};
+use agimp::job::{Problem, parse};
+use agimp::particle::chunk::Layout;
+use agimp::setup;
+use agimp::solver::{Requests, Solver};
+use partition::comm::Comm;
+
+/// A block at rest in a domain whose lower corner lies at (10, 20) m.
+fn block_far_from_the_origin(comm: &Comm) -> Solver<2> {
+    let text = "version = 1\ndimension = 2\n[domain]\nmin = [10, 20]\nsize = [1, 1]\nroot_edge = 1\n[tree]\nbase_level = 2\n\
+                [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+                [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = { kind = 'box', min = [10, 20.25], max = [10.25, 20.5] }\n\
+                [time]\nend = 1e3\n[output]\nevery = 1e3\n";
+    let problem = parse(text, "faces.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+    let problem = Problem::<2>::try_from(problem).unwrap_or_else(|_| panic!("another dimension"));
+    setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A particle that rounding took through a wall is put back and counted, and the run goes on; further away it has left the
+/// domain, and the message has its place in the coordinates of the job.
+#[test]
+fn rounding_takes_no_particle_out_of_the_domain() {
+    let is_test = ran_if_launched(|comm| {
+        let mut solver = block_far_from_the_origin(comm);
+        let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+        chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-15;
+        solver.step(1e3, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((solver.crossings.put_back, solver.crossings.deleted), (1, 0));
+        let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+        assert!((0.0..1e-12).contains(&chunk.position(0)[0]), "{:?}", chunk.position(0));
+        chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-3;
+        let error = solver.step(1e3, Requests::default()).expect_err("a particle has left").to_string();
+        assert!(error.contains("left the domain at (9.99") && error.contains(", 20."), "{error}");
+        assert!(error.contains("1 mm beyond `x_min`"), "{error}");
+    });
+    if !is_test {
+        relaunch(module_path!(), "rounding_takes_no_particle_out_of_the_domain", 1, 60);
+    }
+}
+
+/// A state that no material can have ends the run in the step in which it arises, with particle, place and quantity.
+#[test]
+fn a_broken_state_is_named() {
+    let is_test = ran_if_launched(|comm| {
+        let cases = [
+            (Layout::<2>::LEFT_CAUCHY_GREEN, -1.0, "squared elastic volume ratio"),
+            (Layout::<2>::LEFT_CAUCHY_GREEN, f64::INFINITY, "left Cauchy-Green tensor"),
+        ];
+        for (column, value, quantity) in cases {
+            let mut solver = block_far_from_the_origin(comm);
+            let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+            let id = chunk.ids()[5];
+            chunk.column_mut(column)[5] = value;
+            let error = solver.step(1e3, Requests::default()).expect_err("it is broken").to_string();
+            assert!(error.contains(&format!("particle {id} at (10.")), "{error}: not particle {id}");
+            assert!(error.contains(&format!(" has {quantity} ")), "{error}: not {quantity}");
+        }
+    });
+    if !is_test {
+        relaunch(module_path!(), "a_broken_state_is_named", 1, 60);
+    }
+}
+
+/// A 2D job with a block of 64 particles of 1 kg, which are numbers without rounding, and what `rest` adds.
+fn text(end: f64, velocity: &str, rest: &str) -> String {
+    format!(
+        "version = 1\ndimension = 2\n[domain]\nmin = [-3.0, 7.0]\nsize = [1.0, 1.0]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+         [[materials]]\nname = 'rubber'\ndensity = 1024\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+         [[bodies]]\nname = 'body'\nmaterial = 'rubber'\nvelocity = {velocity}\n\
+         shape = {{ kind = 'box', min = [-2.5, 7.5], max = [-2.25, 7.75] }}\n\
+         [time]\nend = {end}\ndt_max = 1e-3\n[output]\npicture = false\n[history]\nevery_steps = 5\n{rest}\n"
+    )
+}
+
+/// A block that flies out of the domain through a face of outflow: it keeps its velocity and stays without stress, what is inside and
+/// what has left make up the whole at every time, and nothing is left in the end. The same on any ranks and across a
+/// restart, which goes on counting.
+#[test]
+fn a_body_leaves_through_an_outflow() {
+    let rest = "[checkpoint]\nevery_steps = 60\nkeep = 9\n[boundaries]\nx_max = { kind = 'outflow' }\n";
+    let job = text(0.25, "[4.0, 0.5]", rest).replace("picture = false", "");
+    // Some particles have left by the second checkpoint.
+    restart::assert_same_on_any_ranks(&job, "body", |directory, told| {
+        assert!(told.contains("64 left through outflow faces (64 kg)"), "{told}");
+        let telemetry = std::fs::read_to_string(launch::file(directory, "body", ".telemetry.jsonl"));
+        assert!(!telemetry.expect("telemetry").contains("null"), "a number is none");
+        let history = History::read(directory, "body");
+        let column = |name| history.column(name);
+        let (mass, left_mass) = (column("mass"), column("left_mass"));
+        let (inside, left) = (column("particles"), column("left"));
+        let momenta = [column("momentum_x"), column("momentum_y")];
+        let (elastic, kinetic) = (column("elastic_energy"), column("kinetic_energy"));
+        for row in 0..mass.len() {
+            assert_eq!((mass[row] + left_mass[row], inside[row] + left[row]), (64.0, 64.0), "row {row}");
+            for (momentum, velocity) in momenta.iter().zip([4.0, 0.5]) {
+                assert!((momentum[row] - velocity * mass[row]).abs() <= 1e-11 * mass[row], "row {row}");
+            }
+            assert!(elastic[row] <= 1e-12 * kinetic[row], "row {row}: {} of {}", elastic[row], kinetic[row]);
+        }
+        assert!(inside.iter().any(|&n| n > 0.0 && n < 64.0) && inside.last() == Some(&0.0), "{inside:?}");
+    });
+}
+
+/// Faces let go of what pulls unless the job says otherwise: a block that touches the ceiling falls freely, and one between slip faces
+/// hangs there.
+#[test]
+fn a_block_does_not_hang_from_the_ceiling() {
+    let fall = |rest: &str| {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("body.toml");
+        let job = text(0.1, "[0, 0]", rest).replace("max = [-2.25, 7.75]", "max = [-2.25, 8.0]");
+        std::fs::write(&path, job.replace("dimension = 2", "dimension = 2\ngravity = [0, -10]"))
+            .expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "body");
+        let last = |name| history.last(name);
+        last("momentum_y") / (last("mass") * -10.0 * last("time"))
+    };
+    assert!((fall("") - 1.0).abs() < 1e-9, "{}", fall(""));
+    let held = fall("[boundaries]\ny_max = { kind = 'slip' }\n");
+    assert!(held.abs() < 0.2, "{held}");
+}
+
+/// An outflow comes before `leaving`, which holds at the other faces.
+#[test]
+fn other_faces_keep_their_policy() {
+    let rest =
+        "[boundaries]\nleaving = 'delete'\nx_max = { kind = 'outflow' }\ny_max = { kind = 'outflow' }\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("body.toml");
+    std::fs::write(&path, text(0.2, "[4.0, 4.0]", rest)).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let history = History::read(directory.path(), "body");
+    let last = |name| history.last(name);
+    assert_eq!((last("left"), last("deleted"), last("deleted_mass")), (64.0, 0.0, 0.0));
+}
+
+/// A bar of rubber, 8 m long, between two faces that absorb waves.
+fn bar(motion: &str, more: &str) -> String {
+    let face = "{ kind = 'absorbing', p_speed = 10, s_speed = 7.0710678, density = 1000, pressure = 100 }";
+    format!(
+        "version = 1\ndimension = 2\n[domain]\nsize = [8, 0.5]\nroot_edge = 0.5\n[boundaries]\nx_min = {face}\nx_max = {face}\n\
+         y_min = {{ kind = 'slip' }}\ny_max = {{ kind = 'slip' }}\n[[materials]]\nname = 'm'\ndensity = 1000\n\
+         model = 'hencky'\nyoung = 1e5\npoisson = 0\n[[bodies]]\nname = 'bar'\nmaterial = 'm'\n\
+         shape = {{ kind = 'box', min = [0, 0], max = [8, 0.5] }}\nvelocity = {motion}\n\
+         [bodies.stress]\nkind = 'components'\nxx = -100\n{more}"
+    )
+}
+
+/// A push in the middle runs out at both ends: after the waves have passed, next to nothing of their energy is left.
+#[test]
+fn waves_leave_through_absorbing_faces() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("bar.toml");
+    let job = bar(
+        "['0.01 * exp(-2 * (x - 4)^2)', 0]",
+        "[time]\nend = 1\n[numerics]\ntransfer = 'flip'\nflip = 1.0\n",
+    );
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let kinetic = History::read(directory.path(), "bar").column("kinetic_energy").to_vec();
+    let left = kinetic[kinetic.len() - 1] / kinetic[0];
+    println!("{left:e} of the kinetic energy is left");
+    assert!(left < 1e-3, "{left}");
+}
+
+/// Under a lasting stress an absorbing face does not creep, if its pressure is that of the material.
+#[test]
+fn the_pressure_of_an_absorbing_face_holds() {
+    let job = bar(
+        "[0, 0]",
+        "[time]\nend = 0.5\n[history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 20\nkeep = 99\n",
+    );
+    restart::assert_same_on_any_ranks(&job, "bar", |directory, _| {
+        let history = History::read(directory, "bar");
+        let speed = (2.0 * history.last("kinetic_energy") / history.last("mass")).sqrt();
+        println!("{speed:e} m/s");
+        assert!(speed < 1e-14, "{speed} m/s");
+    });
+}
+
+/// The silo of `jobs/silo.toml` in cells twice as large: sand runs out at the same rate for more than half of the discharge, as no liquid
+/// does, near the rate of Beverloo's law for slots, W = 1.03 ρ √g B^(3/2) per length (R. M. Nedderman, Statics and Kinematics of Granular
+/// Materials, 1992); what is inside and what has left are the whole, to the last bit.
+#[test]
+fn a_silo_discharges_at_a_constant_rate() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let job = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/silo.toml");
+    let options = ["--quiet", "--set", "tree.base_level=1", "--set", "output.every=9", "--end", "2.6"];
+    succeed(&mut run(directory.path(), 1, 2, &job, &options));
+    let history = History::read(directory.path(), "silo");
+    let (time, mass) = (history.column("time"), history.column("mass"));
+    let (out, slot) = (history.column("passed_out"), history.column("passed_slot"));
+    let whole = mass[0];
+    for row in 0..time.len() {
+        assert_eq!(mass[row] + out[row], whole, "row {row}");
+    }
+    assert!(out.iter().zip(slot).all(|(out, slot)| out <= slot));
+    // The silo has two such halves.
+    let when = |part: f64| {
+        let row = slot.iter().position(|&passed| passed >= part * whole).expect("so much has passed");
+        (time[row], 2.0 * slot[row])
+    };
+    let rate = |from: f64, to: f64| {
+        let ((start, before), (end, after)) = (when(from), when(to));
+        (after - before) / (end - start)
+    };
+    let (mean, width) = (rate(0.1, 0.6), 2.0 * 0.021_484_375_f64);
+    let law = 1500.0 * 9.81_f64.sqrt() * width.powf(1.5);
+    println!("{mean} kg/(m s), C = {}", mean / law);
+    for tenth in 1..6 {
+        let part = 0.1 * f64::from(tenth);
+        let slice = rate(part, part + 0.1);
+        println!("{part:.1}: {slice}");
+        assert!((slice / mean - 1.0).abs() < 0.06, "{slice} against {mean} from {part}");
+    }
+    // The edge of the slot is as sharp as a cell, and the slot has five and a half of them.
+    assert!((0.7..1.3).contains(&(mean / law)), "C = {}", mean / law);
+}

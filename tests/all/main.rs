@@ -1,0 +1,57 @@
+//! Tests of results: the library and the program against closed forms, independent data and conservation laws. One crate, so that the
+//! library is linked once; a module for each topic.
+#[path = "../common/mod.rs"]
+mod common;
+
+mod adaptivity;
+mod bad_jobs;
+mod colliders;
+mod command_line;
+mod contact;
+mod contact_bodies;
+mod displacement;
+mod documentation;
+mod equilibrium;
+mod extending;
+mod faces;
+mod fluids;
+mod footing;
+mod free_bodies;
+mod golden;
+mod hostile_files;
+mod initial_stress;
+mod io_files;
+mod loads;
+mod materials;
+mod meshes;
+mod mutations;
+mod paraview;
+mod particles;
+mod pictures;
+mod probes;
+mod report;
+mod rigid_contact;
+mod soak;
+mod softening;
+mod spin;
+mod stages;
+mod surface_loads;
+mod sweep;
+mod tutorials;
+mod view;
+mod walls_and_origin;
+mod warnings;
+mod weights_exact;
+mod weights_properties;
+
+/// What [`common::scenarios`] launches: the scenarios of all modules.
+#[test]
+#[ignore = "started by other tests"]
+fn worker() {
+    common::scenarios::work(&[
+        golden::SCENARIOS,
+        walls_and_origin::SCENARIOS,
+        weights_exact::SCENARIOS,
+        weights_properties::SCENARIOS,
+    ]);
+}

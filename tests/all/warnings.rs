@@ -1,0 +1,278 @@
+//! What `agimp check` and `agimp run` warn of, and what they refuse since the machine is too small.
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::Instant;
+
+fn agimp(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().unwrap()
+}
+
+/// The program with at most so many kB of addresses.
+fn confined(directory: &Path, kilobytes: u64, arguments: &[&str]) -> Output {
+    let script = format!("ulimit -v {kilobytes}; exec \"$0\" \"$@\"");
+    let mut command = Command::new("bash");
+    command.args(["-c", &script, env!("CARGO_BIN_EXE_agimp")]).args(arguments).current_dir(directory);
+    command.output().unwrap()
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The warnings of `agimp check` about a text.
+fn warnings(text: &str) -> Vec<String> {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("job.toml"), text).unwrap();
+    let output = agimp(directory.path(), &["check", "job.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", words(&output));
+    let lines = words(&output);
+    lines.lines().filter_map(|line| line.strip_prefix("agimp: warning: ")).map(str::to_owned).collect()
+}
+
+/// A block of rubber between grips, with a tool beside.
+const SOUND: &str = r#"
+version = 1
+dimension = 2
+gravity = [0, -9.81]
+[domain]
+size = [4, 1]
+root_edge = 0.5
+[boundaries]
+x_min = { kind = "separating" }
+x_max = { kind = "separating" }
+y_min = { kind = "separating" }
+y_max = { kind = "separating" }
+[[materials]]
+name = "rubber"
+density = 1100
+model = "neo_hookean"
+young = 1e6
+poisson = 0.3
+[[materials]]
+name = "clay"
+density = 2000
+model = "tresca"
+young = 5e7
+poisson = 0.3
+yield_stress = 20e3
+[[bodies]]
+name = "bar"
+material = "rubber"
+shape = { kind = "box", min = [1, 0.375], max = [2, 0.625] }
+[[bodies]]
+name = "ground"
+material = "clay"
+shape = { kind = "box", min = [3, 0], max = [4, 0.5] }
+[[colliders]]
+name = "left"
+shape = { kind = "box", min = [0.5, 0.25], max = [1.125, 0.75] }
+contact = { kind = "sticky" }
+[[colliders]]
+name = "right"
+shape = { kind = "box", min = [1.875, 0.25], max = [2.5, 0.75] }
+contact = { kind = "sticky" }
+motion = { kind = "steady", velocity = [0.1, 0] }
+[[colliders]]
+name = "tool"
+shape = { kind = "box", min = [3, 0.5], max = [4, 0.9] }
+motion = { kind = "steady", velocity = [0, -0.02] }
+[time]
+end = 2
+"#;
+
+fn changed(changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(SOUND.to_owned(), |text, (from, to)| {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text.replace(from, to)
+    })
+}
+
+/// Grips hold what is inside them, and that is no overlap.
+#[test]
+fn a_sound_job_with_grips_has_no_warnings() {
+    assert_eq!(warnings(SOUND), [""; 0]);
+}
+
+#[test]
+fn mistaken_units_are_warned_of() {
+    /// Changes of a sound job, and words of the warning.
+    type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
+    let cases: &[Case] = &[
+        // MPa and GPa for Pa, t/m³ and kN/m³ for kg/m³, km/h and mm for m.
+        (&[("young = 5e7", "young = 50")], &["materials[1].yield_stress", "20 kPa", "50 Pa", "at most 0.2"]),
+        (
+            &[("yield_stress = 20e3", "yield_stress = 20e6")],
+            &["materials[1].yield_stress", "20 MPa", "50 MPa"],
+        ),
+        (
+            &[
+                ("model = \"tresca\"", "model = \"mohr_coulomb\""),
+                ("yield_stress = 20e3", "friction_angle = 20\ncohesion = 2e7"),
+            ],
+            &["materials[1].cohesion", "20 MPa"],
+        ),
+        (&[("young = 1e6", "young = 1")], &["materials[0]", "wave speed", "mm/s"]),
+        (&[("density = 2000", "density = 2e-6")], &["materials[1].density", "check its unit"]),
+        (&[("density = 2000", "density = 5e4")], &["materials[1].density", "50000 kg/m³"]),
+        (&[("end = 2", "end = 2e-3")], &["time: the run takes about", "expected at least 100"]),
+        (
+            &[("gravity = [0, -9.81]", "gravity = [0, -9.81e4]")],
+            &["bodies[0].material: the weight of \"bar\""],
+        ),
+        (&[("gravity = [0, -9.81]", "gravity = [0, \"-9.81e4 * min(t, 1)\"]")], &["the weight of \"bar\""]),
+        (
+            &[("velocity = [0, -0.02]", "velocity = [0, -200]")],
+            &["colliders[2].motion: \"tool\" moves at 200 m/s"],
+        ),
+    ];
+    for (changes, parts) in cases {
+        let found = warnings(&changed(changes));
+        let is_named = found.iter().any(|line| parts.iter().all(|part| line.contains(part)));
+        assert!(is_named, "{changes:?}: {parts:?} are not in {found:#?}");
+    }
+}
+
+#[test]
+fn colliders_that_never_come_into_the_domain_are_warned_of() {
+    let at = |shape: &str, motion: &str| {
+        warnings(&changed(&[
+            ("shape = { kind = \"box\", min = [3, 0.5], max = [4, 0.9] }", shape),
+            ("motion = { kind = \"steady\", velocity = [0, -0.02] }", motion),
+        ]))
+    };
+    let beside = "shape = { kind = \"box\", min = [5, 0], max = [6, 1] }";
+    let outside = "colliders[2].shape: \"tool\" lies outside the domain from start to end";
+    for (shape, motion, is_outside) in [
+        (beside, "", true),
+        (beside, "motion = { kind = \"steady\", velocity = [1, 0] }", true),
+        (beside, "motion = { kind = \"steady\", velocity = [-1, 0] }", false),
+        (
+            beside,
+            "motion = { kind = \"steady\", velocity = [0, 0], angular_velocity = 3 }\nreference = [6, 0.5]",
+            true,
+        ),
+        (
+            beside,
+            "motion = { kind = \"steady\", velocity = [0, 0], angular_velocity = 3 }\nreference = [4.5, 0.5]",
+            false,
+        ),
+        ("shape = { kind = \"circle\", centre = [2, -9], radius = 2 }", "", true),
+        // A wall that ends where the domain ends.
+        ("shape = { kind = \"box\", min = [4, 0], max = [5, 1] }", "", false),
+    ] {
+        let found = at(shape, motion);
+        assert_eq!(
+            found.iter().any(|line| line.contains(outside)),
+            is_outside,
+            "{shape} {motion}: {found:#?}"
+        );
+    }
+}
+
+/// By grips, by its own motion, between a face and a grip, by a prescribed velocity, and by tractions.
+#[test]
+fn elastic_bodies_stretched_further_than_boxes_follow_are_warned_of() {
+    let fast = ("velocity = [0.1, 0]", "velocity = [1, 0]");
+    let bar = "name = \"bar\"\nmaterial = \"rubber\"";
+    let thrown = format!("{bar}\nvelocity = [\"80 * (x - 1.5)\", 0]");
+    let tied = [
+        ("x_min = { kind = \"separating\" }", "x_min = { kind = \"sticky\" }"),
+        ("min = [1, 0.375]", "min = [0, 0.375]"),
+        ("min = [0.5, 0.25], max = [1.125, 0.75]", "min = [3, 0.9], max = [3.25, 1]"),
+        ("velocity = [0.1, 0]", "velocity = [2, 0]"),
+    ];
+    let load = "[[loads]]\nname = \"pull\"\nkind = \"velocity\"\nx = 2\nshape = { kind = \"box\", min = [1.9, 0], max = [2, 1] }\n[time]";
+    let traction = |force: &str| {
+        format!(
+            "[[loads]]\nname = \"pull\"\nkind = \"traction\"\ntraction = [{force}, 0]\nfacing = [1, 0]\nshape = {{ kind = \"box\", min = [1.99, 0], max = [2.01, 1] }}\n[time]"
+        )
+    };
+    let cases: Vec<(Vec<(&str, String)>, &str)> = vec![
+        (
+            vec![(fast.0, fast.1.into())],
+            "bodies[0]: \"bar\" is stretched about 3.7 times by the grips \"left\" and \"right\"",
+        ),
+        (vec![(bar, thrown)], "by its own velocity"),
+        (tied.iter().map(|(a, b)| (*a, (*b).to_owned())).collect(), "by the grips \"right\" and x_min"),
+        (
+            vec![
+                (
+                    "name = \"right\"\nshape = { kind = \"box\", min = [1.875, 0.25], max = [2.5, 0.75] }",
+                    "name = \"right\"\nshape = { kind = \"box\", min = [3, 0.9], max = [3.25, 1] }".into(),
+                ),
+                ("[time]", load.into()),
+            ],
+            "by the grips \"left\" and \"pull\"",
+        ),
+        (
+            vec![("[time]", traction("\"300e3 * min(t, 1)\""))],
+            "loads[0]: \"pull\" pulls with up to 300 kPa, 0.3 of the young of \"bar\"",
+        ),
+    ];
+    for (changes, expected) in cases {
+        let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (*a, b.as_str())).collect();
+        let found = warnings(&changed(&changes));
+        assert!(found.iter().any(|line| line.contains(expected)), "{expected} is not in {found:#?}");
+    }
+    let found = warnings(&changed(&[("[time]", &traction("100e3"))]));
+    assert_eq!(found, [""; 0]);
+}
+
+/// The jobs of the project, and the templates, have the warnings that they are known to have: none.
+#[test]
+fn jobs_of_the_project_have_no_warnings() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut jobs: Vec<_> =
+        std::fs::read_dir(root.join("jobs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    jobs.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    assert!(jobs.len() >= 25);
+    let directory = tempfile::tempdir().unwrap();
+    let list = String::from_utf8(agimp(directory.path(), &["new", "--list"]).stdout).unwrap();
+    for name in list.lines().filter_map(|line| line.split_whitespace().next()) {
+        let path = directory.path().join(format!("{name}.toml"));
+        assert_eq!(agimp(directory.path(), &["new", name]).status.code(), Some(0), "{name}");
+        jobs.push(path);
+    }
+    for job in jobs {
+        let output = agimp(root, &["check", job.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(0), "{}", words(&output));
+        assert!(!words(&output).contains("warning"), "{}: {}", job.display(), words(&output));
+    }
+}
+
+const REFUSED: &str = "job.toml:1:1: tree: found a job that takes ";
+
+/// Trees that cannot be, by their regions or by their criteria: nothing is written.
+#[test]
+fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let criteria = "[adaptivity]\n[[adaptivity.criteria]]\nkind = \"free_surface\"\nlevel = 12\n[time]";
+    let region =
+        "[tree]\nregions = [{ level = 12, shape = { kind = \"box\", min = [0, 0], max = [4, 1] } }]\n[time]";
+    for (name, tree, limit) in [("region", region, 8_000_000), ("criteria", criteria, 900_000)] {
+        std::fs::write(here.join("job.toml"), changed(&[("[time]", tree)])).unwrap();
+        let start = Instant::now();
+        let run = confined(here, limit, &["run", "job.toml", "--quiet"]);
+        let message = words(&run);
+        assert_eq!(run.status.code(), Some(2), "{name}: {message}");
+        assert!(
+            message.contains(REFUSED) && message.contains("what this machine has: coarser cells"),
+            "{name}: {message}"
+        );
+        assert!(!here.join("out").exists(), "{name}");
+        // Three seconds on an idle machine.
+        assert!(start.elapsed().as_secs() < 120, "{name}: {:?}", start.elapsed());
+    }
+}
+
+/// No abort, which would have MPI print a backtrace.
+#[test]
+fn memory_that_is_not_there_ends_the_program_with_a_message() {
+    let directory = tempfile::tempdir().unwrap();
+    let model = "model = \"hencky\", young = 1e6, poisson = 0.3";
+    let arguments = ["material", "--model", model, "--test", "oedometer", "--rows", "1000000"];
+    let output = confined(directory.path(), 200_000, &arguments);
+    assert_eq!(output.status.code(), Some(1), "{:?} {}", output.status, words(&output));
+    assert!(words(&output).starts_with("agimp: no memory left: found no room for "), "{}", words(&output));
+}
