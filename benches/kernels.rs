@@ -4,6 +4,7 @@
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of their leaf's
 //! particles, whose stencils touch constrained nodes.
 use agimp::kernel::constrained_nodes::ConstrainedNodes;
+use agimp::kernel::fill::Shifted;
 use agimp::kernel::hanging::HangingNodes;
 use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
@@ -120,12 +121,23 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
     let (mut scratch, mut leavers) = (g2p::Scratch::default(), Leavers::default());
     bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
         let scheme = setting.scheme();
-        let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments: None };
+        let fields = g2p::Fields { velocity: &setting.velocity, increment: None, fill: None, moments: None };
         (0..blocks::<D>()).fold(0.0, |greatest: f64, i| {
             let chunk = &mut chunks[i % distinct.min(blocks::<D>())];
             let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
             let (scratch, leavers) = (&mut scratch, &mut leavers);
-            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers, dilation: &[] };
+            let bin = g2p::Gather {
+                scratch,
+                chunk,
+                frame,
+                scheme,
+                dt: DT,
+                fields,
+                leavers,
+                dilation: &[],
+                filling: None,
+                shifted: &mut Shifted::default(),
+            };
             greatest.max(bin.whole_boxes(Select::All, Place::default()))
         })
     });
@@ -175,11 +187,22 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
     bencher.counter(ItemsCount::new(blocks::<3>() * list.len())).bench_local(|| {
         let scheme = setting.scheme();
         let moments = jump.then_some(g2p::Moments { nodes: &nodes, first: &[] });
-        let fields = g2p::Fields { velocity: &setting.velocity, increment: None, moments };
+        let fields = g2p::Fields { velocity: &setting.velocity, increment: None, fill: None, moments };
         chunks.iter_mut().fold(0.0, |greatest: f64, chunk| {
             let (frame, scheme, fields) = (&setting.frame, &scheme, &fields);
             let (scratch, leavers) = (&mut scratch, &mut leavers);
-            let bin = g2p::Gather { scratch, chunk, frame, scheme, dt: DT, fields, leavers, dilation: &[] };
+            let bin = g2p::Gather {
+                scratch,
+                chunk,
+                frame,
+                scheme,
+                dt: DT,
+                fields,
+                leavers,
+                dilation: &[],
+                filling: None,
+                shifted: &mut Shifted::default(),
+            };
             greatest.max(bin.whole_boxes(Select::List(&list), Place::default()))
         })
     });

@@ -9,7 +9,8 @@
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches, Tile};
 use super::domain::AtWall;
-pub use super::gathered::{Fields, Gathered, Moments};
+use super::fill::{Filling, Shifted};
+pub use super::gathered::{FILL_MORE, Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
 use super::weights::{NodeWeights, Weights};
@@ -51,6 +52,10 @@ pub struct Gather<'a, const D: usize> {
     pub leavers: &'a mut Leavers<D>,
     /// By particle, what is added to each diagonal component of its velocity gradient where that strains it, 1/s; empty for nothing.
     pub dilation: &'a [f64],
+    /// What keeps fluids in their volume, where there are any; the nodes then say how full they are.
+    pub filling: Option<&'a Filling<'a>>,
+    /// Sums up how that shifts particles.
+    pub shifted: &'a mut Shifted<D>,
 }
 
 impl<const D: usize> Gather<'_, D> {
@@ -86,7 +91,8 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
     fn advance_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
-        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation } = self.bin;
+        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation, filling, shifted } =
+            self.bin;
         let batches = Batches::new(self.select, chunk, self.next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
         let (cell, extent) = (frame.cell, &frame.extent);
@@ -107,8 +113,8 @@ impl<const D: usize> WholeBoxes<'_, D> {
                 weights.soften(&factors);
             }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
-            let update = Advance { scheme, dt, cell, dilation };
-            let speed = update.batch(tile, tags, &batch, &position, sums, wall, leavers);
+            let update = Advance { scheme, dt, cell, dilation, filling };
+            let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, shifted));
             greatest = speed.max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
@@ -154,7 +160,7 @@ pub fn advance_gathered<const D: usize>(
     gathered: &[Gathered<D>],
     update: &Advance,
     extent: &[f64; D],
-    leavers: &mut Leavers<D>,
+    (leavers, shifted): (&mut Leavers<D>, &mut Shifted<D>),
 ) -> f64 {
     let &Advance { scheme, cell, .. } = update;
     let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -170,7 +176,7 @@ pub fn advance_gathered<const D: usize>(
         let whole = domain::whole_of_batch(tile, tags, &batch, f64::INFINITY, scheme);
         let half = domain::cut_at_walls(&whole, &position, cell, extent);
         let wall = Some(AtWall { whole, half, cell, extent });
-        let speed = update.batch(tile, tags, &batch, &position, sums, wall, leavers);
+        let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, shifted));
         greatest = speed.max(greatest);
         batch.put_back::<D>(tiles, spare);
     }
@@ -245,6 +251,8 @@ pub struct Advance<'a> {
     pub cell: f64,
     /// As [`Gather::dilation`].
     pub dilation: &'a [f64],
+    /// As [`Gather::filling`].
+    pub filling: Option<&'a Filling<'a>>,
 }
 
 impl Advance<'_> {
@@ -258,9 +266,9 @@ impl Advance<'_> {
         position: &[V; D],
         sums: &Sums<D>,
         wall: Option<AtWall<V, D>>,
-        leavers: &mut Leavers<D>,
+        (leavers, shifted): (&mut Leavers<D>, &mut Shifted<D>),
     ) -> V {
-        let &Self { scheme, dt, cell, dilation } = self;
+        let &Self { scheme, dt, cell, dilation, filling } = self;
         let zero = V::splat(0.0);
         let step = V::splat(dt);
         let velocity = V::columns(&sums.velocity);
@@ -277,7 +285,6 @@ impl Advance<'_> {
         let mut moved = *position;
         for i in 0..D {
             moved[i] = velocity[i].mul_add(step, position[i]);
-            batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
             let new = match scheme.transfer {
                 Transfer::Apic | Transfer::Tpic => velocity[i],
                 Transfer::Flip { blend } => {
@@ -288,6 +295,20 @@ impl Advance<'_> {
             };
             batch.store(tile, Layout::<D>::VELOCITY + i, new);
             square = new.mul_add(new, square);
+        }
+        // Jobs with one material need not read tags.
+        let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
+        let mut elastic = [zero; 6];
+        for c in 0..Layout::<D>::SYMMETRIC {
+            elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
+        }
+        let filled =
+            filling.and_then(|filling| filling.of_batch::<V, D>(batch, || index, sums, &elastic, cell));
+        if let Some(filled) = &filled {
+            filled.shift(batch, tile, &mut moved, wall.map(|wall| wall.extent), shifted);
+        }
+        for i in 0..D {
+            batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
         }
         leavers.look(batch, &moved);
         let kept = match (scheme.transfer, wall) {
@@ -308,18 +329,15 @@ impl Advance<'_> {
                 batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
             }
         }
-        // Jobs with one material need not read tags.
-        let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
         let plastic = domain::plastic_lanes(|| index, scheme) != 0;
-        let mut elastic = [zero; 6];
-        for c in 0..Layout::<D>::SYMMETRIC {
-            elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
-        }
         if !dilation.is_empty() {
             let added: V = batch.values(dilation);
             (0..D).for_each(|i| gradient[i][i] += added);
         }
-        let trial = strained(&elastic, &gradient, step);
+        let mut trial = strained(&elastic, &gradient, step);
+        if let Some(filled) = &filled {
+            filled.settle(&mut trial);
+        }
         let mut state = State::new([Lanes::splat(0.0); 6]);
         for c in 0..6 {
             trial[c].store(state.elastic[c].as_array_mut());

@@ -1,9 +1,9 @@
 //! What particles gather from the nodes of their stencils; see [`super::g2p`].
-use super::Row;
 use super::batch::{Batch, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, dot, pencils};
+use super::{ARENA_EDGE, Row};
 use crate::simd::{F64x4, LANES, Vector};
 
 /// Constrained nodes of an arena, and first moments of those that have them.
@@ -23,9 +23,14 @@ pub struct Fields<'a> {
     /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`] the velocities that
     /// particles take on.
     pub increment: Option<&'a [Row]>,
+    /// How full nodes are (see [`super::fill`]), with [`FILL_MORE`] values behind the last; where there are fluids.
+    pub fill: Option<&'a [f64]>,
     /// Where the block touches constrained nodes.
     pub moments: Option<Moments<'a>>,
 }
+
+/// Values behind those of the nodes of an arena, since they are read four at a time.
+pub const FILL_MORE: usize = 1;
 
 /// Sums over the stencils of one particle. Additive: a box in parts is the sum of its parts.
 #[derive(Clone, Copy, Debug)]
@@ -38,12 +43,14 @@ pub struct Gathered<const D: usize> {
     affine: [F64x4; D],
     /// `Σ w Δv_j`.
     increment: F64x4,
+    /// `Σ e_j ∂w/∂x_k`, then `Σ w φ_j`.
+    fill: F64x4,
 }
 
 impl<const D: usize> Default for Gathered<D> {
     fn default() -> Self {
         let zero = F64x4::splat(0.0);
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero, fill: zero }
     }
 }
 
@@ -72,6 +79,7 @@ impl<const D: usize> Gathered<D> {
         let add = |to: &mut F64x4, from: F64x4| *to = from.mul_add(share, *to);
         add(&mut self.velocity, other.velocity);
         add(&mut self.increment, other.increment);
+        add(&mut self.fill, other.fill);
         for k in 0..D {
             add(&mut self.gradient[k], other.gradient[k]);
             add(&mut self.affine[k], other.affine[k]);
@@ -87,12 +95,13 @@ pub(super) struct Sums<const D: usize> {
     pub gradient: [[F64x4; LANES]; D],
     pub affine: [[F64x4; LANES]; D],
     pub increment: [F64x4; LANES],
+    pub fill: [F64x4; LANES],
 }
 
 impl<const D: usize> Sums<D> {
     pub(super) fn new() -> Self {
         let zero = [F64x4::splat(0.0); LANES];
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero }
+        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero, fill: zero }
     }
 
     pub(super) fn row(&self, lane: usize) -> Gathered<D> {
@@ -101,12 +110,14 @@ impl<const D: usize> Sums<D> {
             gradient: std::array::from_fn(|k| self.gradient[k][lane]),
             affine: std::array::from_fn(|k| self.affine[k][lane]),
             increment: self.increment[lane],
+            fill: self.fill[lane],
         }
     }
 
     pub(super) fn set(&mut self, lane: usize, row: &Gathered<D>) {
         self.velocity[lane] = row.velocity;
         self.increment[lane] = row.increment;
+        self.fill[lane] = row.fill;
         for k in 0..D {
             self.gradient[k][lane] = row.gradient[k];
             self.affine[k][lane] = row.affine[k];
@@ -134,6 +145,12 @@ impl<const D: usize> Sums<D> {
                 self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
             }
         }
+        if let Some(fill) = fields.fill {
+            for lane in batch.members() {
+                let first = weights.first(lane);
+                self.contract_fill::<V>(weights, lane, &fill[first..first + span + FILL_MORE]);
+            }
+        }
         if let Some(moments) = &fields.moments {
             let hanging = &moments.nodes.hanging;
             let touched = hanging.touched(weights, batch);
@@ -145,6 +162,38 @@ impl<const D: usize> Sums<D> {
                 self.add_moments(weights, nodes, touched, moments);
             }
         }
+    }
+
+    /// How full the nodes are, and the gradient of what is over: a value of a node at a time, three nodes along x together.
+    #[inline(always)]
+    fn contract_fill<V: Vector>(&mut self, weights: &Weights<D>, lane: usize, nodes: &[f64]) {
+        let nodes = &nodes[..super::stencil_span(D) + FILL_MORE];
+        let zero = F64x4::splat(0.0);
+        let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
+        let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
+        let (mut fill, mut over, mut along_y, mut along_z) = (zero, zero, zero, zero);
+        for c in 0..if D == 3 { 3 } else { 1 } {
+            V::keep_wide();
+            for b in 0..3 {
+                let at = ARENA_EDGE * (b + ARENA_EDGE * c);
+                let row = F64x4::new([nodes[at], nodes[at + 1], nodes[at + 2], nodes[at + 3]]);
+                let excess = (row - F64x4::splat(1.0)).max(zero);
+                let weight = if D == 3 { of(&weights.product[b][c]) } else { of(&y.weight[b]) };
+                fill = weight.mul_add(row, fill);
+                over = weight.mul_add(excess, over);
+                if D == 3 {
+                    along_y = (of(&y.slope[b]) * of(&z.weight[c])).mul_add(excess, along_y);
+                    along_z = (of(&y.weight[b]) * of(&z.slope[c])).mul_add(excess, along_z);
+                } else {
+                    along_y = of(&y.slope[b]).mul_add(excess, along_y);
+                }
+            }
+        }
+        let along_x = |of: &[[f64; LANES]; 3]| F64x4::new([of[0][lane], of[1][lane], of[2][lane], 0.0]);
+        let (weight, slope) = (along_x(&x.weight), along_x(&x.slope));
+        let [first, second, third, _] =
+            F64x4::transpose([over * slope, along_y * weight, along_z * weight, fill * weight]);
+        self.fill[lane] = first + second + third;
     }
 
     #[inline(never)]

@@ -13,6 +13,7 @@ use crate::simd::{F64x4, LANES, Lanes, Vector};
 mod batch;
 pub mod constrained_nodes;
 pub mod domain;
+pub mod fill;
 pub mod g2p;
 mod gathered;
 pub mod hanging;

@@ -126,6 +126,16 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// See [`Material::is_fluid`].
+    fn is_fluid(&self) -> bool {
+        false
+    }
+
+    /// See [`Material::bears_tension`].
+    fn bears_tension(&self) -> bool {
+        true
+    }
+
     /// The elastic part of the law, where it is that of Hencky.
     fn solid(&self) -> Option<&Hencky> {
         None
@@ -175,6 +185,12 @@ pub trait Material: std::fmt::Debug + Send + Sync {
 
     /// Whether it asks for the size of cells ([`Step::size`]).
     fn softens(&self) -> bool;
+
+    /// Whether it is a fluid: its particles go where they will among each other, and its elastic state is its volume alone.
+    fn is_fluid(&self) -> bool;
+
+    /// Whether a fluid bears tension.
+    fn bears_tension(&self) -> bool;
 
     /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None` where there are none. The
     /// volume is that of these strains and of the plastic volume in `history`, which holds the initial values; a law that is
@@ -227,6 +243,14 @@ impl<L: Law> Material for L {
 
     fn softens(&self) -> bool {
         Law::softens(self)
+    }
+
+    fn is_fluid(&self) -> bool {
+        Law::is_fluid(self)
+    }
+
+    fn bears_tension(&self) -> bool {
+        Law::bears_tension(self)
     }
 
     fn strain_under(

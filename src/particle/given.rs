@@ -1,5 +1,6 @@
 //! Particles that a job gives one by one.
 use super::chunk::{Chunk, Layout};
+use super::volume::reference_volume;
 use crate::geometry::Aabb;
 
 /// Particles in the order of their file, found by place.
@@ -48,6 +49,16 @@ impl<const D: usize> Given<D> {
     /// The particles.
     pub fn chunk(&self) -> &Chunk<D> {
         &self.chunk
+    }
+
+    /// Whether mass over undeformed volume of all is this density, kg/m³ (with D = 2 per metre of thickness).
+    pub fn has_density(&self, density: f64) -> bool {
+        let masses = self.chunk.column(Layout::<D>::MASS);
+        let close = |p: usize| {
+            let mass = density * reference_volume(&self.chunk, p);
+            (masses[p] - mass).abs() <= 1e-9 * mass
+        };
+        (0..self.chunk.len()).all(close)
     }
 
     /// A box that holds their undeformed boxes, m.

@@ -6,6 +6,7 @@ use crate::exact_sum::ExactSum;
 use crate::io::log::history::Column;
 use crate::job::Problem;
 use crate::probe;
+use crate::setup;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{ForceAndWork, Reaction};
@@ -40,13 +41,16 @@ const COLUMNS: [Column<'static>; 20] = [
 ];
 
 /// Names and units of the columns after the step. What a job has adds its own in this order: splits and merges of dynamic
-/// refinement; the way to equilibrium; the number of the stage, from 1; loads; contacts between bodies; probes; tracks;
+/// refinement; the work of the shift of fluids; the way to equilibrium; the number of the stage, from 1; loads; contacts between bodies; probes; tracks;
 /// fluxes; faces of the domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
     if problem.adaptivity.is_some() {
         columns.extend(LEDGER.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    if setup::physics(problem).has_fluids() {
+        columns.push(("shift_work".to_owned(), "J"));
     }
     if problem.has_equilibrium() {
         columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));

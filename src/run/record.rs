@@ -218,12 +218,14 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let faces = solver.face_forces();
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
+        let shift_work = solver.shift_work();
         let mut written = Ok(());
         if let Some(history) = &mut self.history {
             let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
             if let Some(ledger) = &ledger {
                 values.extend(history::ledger_values(ledger));
             }
+            values.extend(shift_work);
             if self.problem.has_equilibrium() {
                 values.extend(history::relaxation_values(&solver.relaxation));
             }

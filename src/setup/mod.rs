@@ -45,6 +45,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
         equilibrium: None,
+        fill_densities: Vec::new(),
         transfer: problem.transfer,
         boxes: problem.boxes,
         f_bar: problem.f_bar,

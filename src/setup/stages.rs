@@ -34,7 +34,33 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     for (collider, stages) in physics.colliders.iter_mut().zip(&problem.collider_stages) {
         collider.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
     }
+    if physics.has_fluids() {
+        let fields = 0..physics.body_contacts.fields();
+        physics.fill_densities =
+            fields.map(|field| density_of_field(problem, &physics, field as u8)).collect();
+    }
     physics
+}
+
+/// Density of all undeformed material that has moved with a velocity field so far, kg/m³; `None` where it differs from body to body or, for particles that a
+/// file gives, from particle to particle.
+fn density_of_field<const D: usize>(problem: &Problem<D>, physics: &Physics<D>, field: u8) -> Option<f64> {
+    let field_of_body = &physics.body_contacts.field_of_body;
+    let mut all = Vec::new();
+    for (number, body) in problem.bodies.iter().enumerate() {
+        let is_there = body.stage <= physics.stage();
+        if is_there && field_of_body.get(number).is_none_or(|of| *of == field) {
+            for stage in body.stage..=physics.stage() {
+                let density = physics.materials[material_of(problem, number, stage)].density();
+                if body.given.as_ref().is_some_and(|given| !given.has_density(density)) {
+                    return None;
+                }
+                all.push(density);
+            }
+        }
+    }
+    let first = *all.first()?;
+    all.iter().all(|density| *density == first).then_some(first)
 }
 
 /// What the particles of a body are made of in a stage.

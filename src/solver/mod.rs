@@ -67,6 +67,7 @@ impl<const D: usize> Solver<D> {
             load_sums: ExactSums::new(physics.loads.len(), clock.time),
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
             body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
+            shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
             pushes: Vec::new(),
             near: Vec::new(),
             relaxation: Relaxation::default(),
@@ -138,6 +139,7 @@ impl<const D: usize> Solver<D> {
         self.particles_to_nodes(dt);
         let (mut impulses, held) = self.update_node_velocities(dt, &rates);
         self.prolong_velocities();
+        self.fill_nodes();
         let departed = self.nodes_to_particles(&rates, to, dt);
         self.book_pushes(dt);
         self.book_met(&mut impulses);

@@ -46,6 +46,8 @@ pub struct Physics<const D: usize> {
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
+    /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where materials differ.
+    pub fill_densities: Vec<Option<f64>>,
     /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
@@ -130,6 +132,16 @@ impl<const D: usize> Physics<D> {
     /// Whether material moves with other masses than its own.
     pub(crate) fn has_scaled_masses(&self) -> bool {
         self.mass_scale(0).is_some()
+    }
+
+    /// Whether any material is a fluid.
+    pub(crate) fn has_fluids(&self) -> bool {
+        self.materials.iter().any(|material| material.is_fluid())
+    }
+
+    /// Whether fluids are kept in their volume: not with mass scaling, as the masses of nodes then say nothing of volumes.
+    pub(in crate::solver) fn keeps_volumes(&self) -> bool {
+        self.has_fluids() && !self.has_scaled_masses()
     }
 
     /// First column of the displacement that particles carry, if they do.

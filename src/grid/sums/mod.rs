@@ -6,6 +6,7 @@
 //! | `block_sum`, `irregular` | the sum of one block, by regions of nodes; terms outside the fixed pattern |
 //! | [`exchange`] | sums for other ranks, and theirs |
 //! | `restrict_prolong` | restriction and prolongation |
+//! | [`volumes`] | volumes of basis functions |
 //! | [`statistics`] | counts for telemetry |
 mod block_sum;
 pub mod exchange;
@@ -13,3 +14,4 @@ mod irregular;
 pub mod node_fields;
 mod restrict_prolong;
 pub mod statistics;
+pub mod volumes;

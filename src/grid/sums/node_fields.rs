@@ -268,6 +268,24 @@ pub fn load_rows<const D: usize>(
     }
 }
 
+/// Not collective. Copies the nodes of `window` around a bin from values of all nodes into those of an arena.
+pub fn load_values<const D: usize>(
+    plan: &GridPlan<D>,
+    bin: usize,
+    window: &Window<D>,
+    values: &[f64],
+    arena: &mut [f64],
+) {
+    window.for_each_run(|run| arena[run].fill(0.0));
+    let nodes = block_nodes(D);
+    for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {
+        let block = &values[block * nodes..][..nodes];
+        shared.for_each_run(|run| {
+            arena[run.arena..][..run.len].copy_from_slice(&block[run.block..][..run.len])
+        });
+    }
+}
+
 /// The blocks around a bin that share nodes of `window`: offset number, block, and the nodes.
 #[inline(always)]
 fn shared_blocks<const D: usize>(

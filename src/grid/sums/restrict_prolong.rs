@@ -62,6 +62,34 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
+    /// Not collective. Gives the constrained nodes that the gather reads the values `Σ c f_i` of their parents, once [`NodeFields::prolong`]
+    /// has found them. One value for each node.
+    pub fn prolong_values(&self, plan: &GridPlan<D>, values: &mut [f64]) {
+        let nodes = block_nodes(D);
+        for level in 1..plan.levels() {
+            let first = plan.level_start[level];
+            let (from, to) = values.split_at_mut(first * nodes);
+            let mut to = DisjointSlices::new(to, first * nodes);
+            let fine = plan.links[level].fine.iter().filter(|fine| self.needed[fine.block as usize]);
+            let tasks = fine.map(|fine| {
+                let block = fine.block as usize;
+                (fine, to.cut(block * nodes..(block + 1) * nodes))
+            });
+            let tasks: Vec<_> = tasks.collect();
+            tasks.into_par_iter().with_min_len(4).for_each(|(fine, to)| {
+                let block = &plan.blocks[fine.block as usize];
+                let (table, parity) = (ParentTable::of::<D>(), parity(block.coord));
+                for bit in bits(block.needs_velocity & block.constrained) {
+                    to[bit as usize] = table.of_node::<D>(parity, bit).iter().fold(0.0, |sum, parent| {
+                        let of = fine.parents[usize::from(parent.corner) % 8];
+                        let value = from.get(of as usize * nodes + usize::from(parent.bit)).copied();
+                        weight_of(offset::<D>(parent.offset.into())).mul_add(value.unwrap_or(0.0), sum)
+                    });
+                }
+            });
+        }
+    }
+
     /// Marks the blocks that occupied bins touch, and the blocks of their constraint parents.
     fn mark_needed(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         let needed = self.needed.par_iter_mut().enumerate().with_min_len(1024);

@@ -74,7 +74,7 @@ fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
     let first: Vec<Row> = listed.iter().flat_map(|&node| moments[node][..D].to_vec()).collect();
     let gathered = |moments: Moments| {
         let mut chunk = start.clone();
-        let fields = Fields { velocity: &velocity, increment: None, moments: Some(moments) };
+        let fields = Fields { velocity: &velocity, increment: None, fill: None, moments: Some(moments) };
         gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
         chunk
     };

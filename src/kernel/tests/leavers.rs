@@ -7,7 +7,7 @@ fn leavers_are_found<const D: usize>() {
     let scheme = scheme(&materials, Transfer::Apic);
     let start = particles::<D>(53, 33, 5);
     let velocity = vec![Row([300.0, -200.0, if D == 3 { 100.0 } else { 0.0 }, 0.0]); arena_nodes(D)];
-    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let fields = Fields { velocity: &velocity, increment: None, fill: None, moments: None };
     let bounds = ([4.5 * CELL; D], [7.5 * CELL; D]);
     let odd: Vec<u32> = (1..53).step_by(2).collect();
     for select in [Select::All, Select::List(&odd), Select::List(&[7, 20]), Select::List(&[])] {
@@ -23,6 +23,8 @@ fn leavers_are_found<const D: usize>() {
             fields: &fields,
             leavers: &mut leavers,
             dilation: &[],
+            filling: None,
+            shifted: &mut Shifted::default(),
         };
         bin.whole_boxes(select, Place::default());
         let moved: Vec<u32> = match select {

@@ -1,5 +1,6 @@
 //! Scatter and gather together, against a plain scalar definition.
 use super::constrained_nodes::{ConstrainedNodes, MomentNode};
+use super::fill::Shifted;
 use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
 use super::leavers::Leavers;
@@ -23,8 +24,19 @@ fn gather<const D: usize>(
     next: Place,
 ) -> f64 {
     let (scratch, leavers) = (&mut Default::default(), &mut Leavers::default());
-    g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation: &[] }
-        .whole_boxes(select, next)
+    g2p::Gather {
+        scratch,
+        chunk,
+        frame,
+        scheme,
+        dt,
+        fields,
+        leavers,
+        dilation: &[],
+        filling: None,
+        shifted: &mut Shifted::default(),
+    }
+    .whole_boxes(select, next)
 }
 
 /// As [`super::p2g::Scatter::whole_boxes`], with memory of its own.
@@ -211,7 +223,7 @@ fn affine_field<const D: usize>() {
         .collect();
     let before = particles::<D>(45, 9, 1);
     let mut chunk = before.clone();
-    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let fields = Fields { velocity: &velocity, increment: None, fill: None, moments: None };
     let speed = gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
     assert!(speed > materials[0].wave_speed() * 0.8 && speed < materials[0].wave_speed() * 1.5);
     let mut half = Vec::new();
@@ -330,7 +342,7 @@ fn steps_conserve<const D: usize>() {
         assert!((arena.iter().map(|row| row.0[3]).sum::<f64>() - mass).abs() < 1e-13 * mass);
         assert!(close(&momenta_of_nodes(&arena), &before, 1e-12));
         divide_by_mass(&mut arena);
-        let fields = Fields { velocity: &arena, increment: None, moments: None };
+        let fields = Fields { velocity: &arena, increment: None, fill: None, moments: None };
         gather(&mut chunk, Select::All, &frame, &scheme, 10.0 * DT, &fields, Place::default());
         // A particle moves along its new velocity, which changes no angular momentum.
         let after = momenta(&chunk);
@@ -359,7 +371,7 @@ fn batches_do_not_matter<const D: usize>() {
     let velocity: Vec<Row> = (0..arena_nodes(D))
         .map(|_| Row(std::array::from_fn(|i| if i < D { 200.0 * (numbers.next() - 0.5) } else { 0.0 })))
         .collect();
-    let fields = Fields { velocity: &velocity, increment: None, moments: None };
+    let fields = Fields { velocity: &velocity, increment: None, fill: None, moments: None };
     let mut all = start.clone();
     gather(&mut all, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut split = start.clone();

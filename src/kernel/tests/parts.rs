@@ -62,7 +62,7 @@ fn parts_equal_the_whole<const D: usize>() {
             assert!((a.0[i] - b.0[i]).abs() < 1e-14, "{a:?} {b:?}");
         }
     }
-    let fields = Fields { velocity: &arena, increment: None, moments: None };
+    let fields = Fields { velocity: &arena, increment: None, fill: None, moments: None };
     gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
     g2p::gather_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &fields, &mut gathered);
@@ -72,9 +72,9 @@ fn parts_equal_the_whole<const D: usize>() {
         &mut parted,
         &list,
         &gathered,
-        &g2p::Advance { scheme: &scheme, dt: DT, cell: CELL, dilation: &[] },
+        &g2p::Advance { scheme: &scheme, dt: DT, cell: CELL, dilation: &[], filling: None },
         &frame.extent,
-        &mut Leavers::default(),
+        (&mut Leavers::default(), &mut Shifted::default()),
     );
     for column in 0..Layout::<D>::REALS {
         for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
@@ -160,7 +160,7 @@ fn moments_follow<const D: usize>() {
     let constrained = constrained(&vec![Row::default(); nodes]);
     let run = |moments: Option<Moments>| {
         let mut chunk = start.clone();
-        let fields = Fields { velocity: &plain, increment: None, moments };
+        let fields = Fields { velocity: &plain, increment: None, fill: None, moments };
         gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default());
         chunk
     };
@@ -246,7 +246,7 @@ fn flip_and_tpic() {
     let start = particles::<3>(11, 31, 1);
     let velocity = vec![Row([1.0, 2.0, 3.0, 0.0]); arena_nodes(3)];
     let increment = vec![Row([0.1, 0.2, 0.3, 0.0]); arena_nodes(3)];
-    let fields = Fields { velocity: &velocity, increment: Some(&increment), moments: None };
+    let fields = Fields { velocity: &velocity, increment: Some(&increment), fill: None, moments: None };
     let mut chunk = start.clone();
     let flip = Transfer::Flip { blend: 0.75 };
     gather(&mut chunk, Select::All, &frame, &scheme(&materials, flip), DT, &fields, Place::default());
@@ -289,7 +289,7 @@ fn checksum<const D: usize>() -> u64 {
             let inverse = if row.0[3] > 0.0 { 1.0 / row.0[3] } else { 0.0 };
             row.0 = row.0.map(|x| x * inverse);
         }
-        let fields = Fields { velocity: &arena, increment: None, moments: None };
+        let fields = Fields { velocity: &arena, increment: None, fill: None, moments: None };
         add(gather(&mut chunk, Select::All, &frame, &scheme, DT, &fields, Place::default()));
     }
     // History variables that no material here uses stay 0.
@@ -326,10 +326,21 @@ fn bits_do_not_depend_on_earlier_bins() {
             let (scratch, rows) = (&mut to_nodes, &mut arena[..]);
             p2g::Scatter { scratch, chunk, frame, scheme, dt, arena: rows, moments: None }
                 .whole_boxes(Select::All, place);
-            let fields = &Fields { velocity, increment: None, moments: None };
+            let fields = &Fields { velocity, increment: None, fill: None, moments: None };
             let (scratch, leavers) = (&mut to_particles, &mut leavers);
-            g2p::Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation: &[] }
-                .whole_boxes(Select::All, place);
+            g2p::Gather {
+                scratch,
+                chunk,
+                frame,
+                scheme,
+                dt,
+                fields,
+                leavers,
+                dilation: &[],
+                filling: None,
+                shifted: &mut Shifted::default(),
+            }
+            .whole_boxes(Select::All, place);
             arena
         };
         if used {

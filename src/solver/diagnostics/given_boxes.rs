@@ -90,6 +90,7 @@ impl<const D: usize> GivenBoxes<D> {
         let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
         let physics = Physics {
             equilibrium: None,
+            fill_densities: Vec::new(),
             origin: [0.0; D],
             root_edge,
             graded: forest.is_balanced(comm),

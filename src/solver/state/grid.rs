@@ -17,6 +17,7 @@ use crate::solver::physics::Physics;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::bins::{BinLists, BinMissing, BoxWidths};
 use crate::solver::state::inside::InsideStill;
+use crate::solver::state::node_fill::NodeFill;
 use crate::solver::state::phases::{Phase, Phases};
 
 /// Plan, arenas, fields and exchanges.
@@ -37,6 +38,8 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) contact: Option<Box<VelocityField<D>>>,
     /// For contact between bodies; made when it is first needed.
     pub(in crate::solver) between: Option<Box<BetweenBodies<D>>>,
+    /// How full nodes are; made when it is first needed.
+    pub(in crate::solver) fill: Option<Box<NodeFill>>,
     /// Nodes inside colliders that never move, as far as they have been asked for.
     pub(in crate::solver) inside_still: InsideStill<D>,
     /// Bytes of the last exchange of sums.
@@ -75,6 +78,7 @@ impl<const D: usize> Grid<D> {
             seam: exchange.seam(&plan),
             contact: None,
             between: None,
+            fill: None,
             inside_still: Vec::new(),
             sum_bytes: 0,
             exchange,
@@ -92,6 +96,7 @@ impl<const D: usize> Grid<D> {
         self.others.clear();
         self.contact = None;
         self.between = None;
+        self.fill = None;
         self.inside_still = Vec::new();
     }
 
@@ -205,6 +210,7 @@ impl<const D: usize> Grid<D> {
             + self.increments.heap_bytes()
             + self.others.iter().chain(contact).map(VelocityField::heap_bytes).sum::<usize>()
             + solids.map(Solids::heap_bytes).sum::<usize>()
+            + self.fill.as_ref().map_or(0, |fill| fill.heap_bytes())
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.

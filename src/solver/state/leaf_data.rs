@@ -19,6 +19,8 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) signal: Vec<f64>,
     /// Bounds on the particles, noted in the last step; none where it is not that of these leaves.
     pub(in crate::solver) maxima: Vec<LeafMaxima<D>>,
+    /// Mass times the shift that keeps fluids in their volume, summed over particles in the last step, kg m.
+    pub(in crate::solver) shifts: Vec<[f64; D]>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,
     /// Time that the particles took.
@@ -31,6 +33,7 @@ impl<const D: usize> LeafData<D> {
         self.signal.clear();
         self.signal.resize(leaves, 0.0);
         self.maxima.clear();
+        self.shifts.clear();
         self.places.clear();
         self.times.reset(leaves);
     }
@@ -49,6 +52,7 @@ impl<const D: usize> LeafData<D> {
     pub(in crate::solver) fn begin_gather(&mut self, chunks: &[Chunk<D>]) {
         self.signal.resize(chunks.len(), 0.0);
         self.maxima.resize(chunks.len(), LeafMaxima::default());
+        self.shifts.resize(chunks.len(), [0.0; D]);
         self.places.clear();
         self.places.extend(chunks.iter().map(Chunk::place));
     }

@@ -6,6 +6,7 @@
 //! | `inside` | nodes inside colliders |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
 //! | [`leaf_data`] | what is noted of each leaf |
+//! | `node_fill` | how full nodes are |
 //! | `regrid_cache` | what regrids remember |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
 //! | [`relaxation`] | the way to equilibrium |
@@ -37,6 +38,7 @@ pub mod grid;
 pub(super) mod inside;
 pub(super) mod last_partition;
 pub mod leaf_data;
+pub(super) mod node_fill;
 pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
@@ -118,6 +120,8 @@ pub struct Solver<const D: usize> {
     pub face_sums: ExactSums<FACE_SUMS>,
     /// What is booked of contact between bodies.
     pub body_sums: ExactSums<LOAD_SUMS>,
+    /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
+    pub shift_sums: ExactSums<1>,
     /// Forces that particles carried in the last step, by own leaf; empty without such loads.
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// Particles near colliders that act on particles, by own leaf; empty without such colliders.

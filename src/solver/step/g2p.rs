@@ -8,9 +8,10 @@ use crate::adaptivity::{LeafMaxima, Watch};
 use crate::boundary::motion::Rate;
 use crate::grid::arenas::Arenas;
 use crate::grid::leaf_geometry::LeafCells;
-use crate::grid::sums::node_fields::{VelocityArena, load_rows};
+use crate::grid::sums::node_fields::{VelocityArena, load_rows, load_values};
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::g2p::{Fields, Gathered, Moments};
+use crate::kernel::fill::{Filling, Flow, Shifted};
+use crate::kernel::g2p::{FILL_MORE, Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
 use crate::kernel::{Row, Scheme, arena_nodes, g2p};
 use crate::load::{Carried, Load};
@@ -29,6 +30,7 @@ use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::carried::{add_ways, follow, has_followers, note_ways, positions, strain};
 use crate::solver::step::contact::guard::Guard;
+use crate::solver::step::fill::means::MeanVolumes;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
 
@@ -37,12 +39,15 @@ struct Scratch<const D: usize> {
     kernel: g2p::Scratch<D>,
     arena: VelocityArena<D>,
     increments: Vec<Row>,
+    fill: Vec<f64>,
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
     sort: leaf_bins::Scratch,
     /// Velocity gradients of particles, 1/s, where they are needed ahead of or after the advance.
     gradients: Vec<(u32, [[f64; D]; D])>,
     mean_dilation: MeanDilation,
+    mean_volumes: MeanVolumes,
+    shifted: Shifted<D>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
@@ -51,11 +56,14 @@ impl<const D: usize> Default for Scratch<D> {
             kernel: g2p::Scratch::default(),
             arena: VelocityArena::default(),
             increments: vec![Row::default(); arena_nodes(D)],
+            fill: vec![0.0; arena_nodes(D) + FILL_MORE],
             gathered: Vec::new(),
             leavers: Leavers::default(),
             sort: leaf_bins::Scratch::default(),
             gradients: Vec::new(),
             mean_dilation: MeanDilation::default(),
+            mean_volumes: MeanVolumes::default(),
+            shifted: Shifted::default(),
         }
     }
 }
@@ -98,6 +106,9 @@ struct Sweep<'a, const D: usize> {
     tensors: Vec<usize>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
+    /// How materials flow, and how full nodes are; where there are fluids.
+    flows: Vec<Flow>,
+    fill: Option<&'a [f64]>,
 }
 
 /// A velocity field from which particles gather.
@@ -124,8 +135,14 @@ struct Members<'a, const D: usize> {
 }
 
 /// What is noted of the particles of a leaf.
-type Notes<'a, const D: usize> =
-    (&'a mut LeafMaxima<D>, &'a mut f64, &'a mut [ParticlePush<D>], &'a mut [Near<D>]);
+struct Notes<'a, const D: usize> {
+    maxima: &'a mut LeafMaxima<D>,
+    signal: &'a mut f64,
+    pushes: &'a mut [ParticlePush<D>],
+    near: &'a mut [Near<D>],
+    /// Mass times shift, kg m.
+    shift: &'a mut [f64; D],
+}
 
 impl<const D: usize> Solver<D> {
     /// Not collective. `v = Σ w v_j`, `B = Σ w v_j ⊗ (x_j - x)`, `b ← (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, return mapping, `τ(b)`,
@@ -146,9 +163,10 @@ impl<const D: usize> Solver<D> {
         self.near.resize_with(self.chunks.len(), Vec::new);
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
-        let LeafData { signal, maxima, places, times } = &mut self.leaf_data;
+        let flows = self.physics.flows(dt);
+        let LeafData { signal, maxima, shifts, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
-        let Grid { plan, fields, arenas, increments, others, lists, migration, .. } = &mut self.grid;
+        let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
         let sweep = Sweep {
             dt,
             scheme: &scheme,
@@ -165,21 +183,29 @@ impl<const D: usize> Solver<D> {
             displacement: self.physics.displacement_column(),
             tensors: self.physics.tensor_columns(),
             openings: self.crossings.fluxes.openings(),
+            fill: fill.as_ref().filter(|_| !flows.is_empty()).map(|fill| &fill.of_nodes[..]),
+            flows,
         };
         let (chunks, pushes, near) = (&mut self.chunks, &mut self.pushes, &mut self.near);
-        self.phases.time(Phase::Gather, || {
-            let leaves =
-                chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal).zip(pushes).zip(near);
+        let departed = self.phases.time(Phase::Gather, || {
+            let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
+            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
-                let (((((chunk, bins), maxima), signal), pushes), near) = notes;
+                let ((((((chunk, bins), maxima), signal), pushes), near), shift) = notes;
                 // Of empty leaves there may be very many, and to take the time costs more than they do.
                 let is_empty = chunk.is_empty();
-                let notes = (maxima, signal, &mut **pushes, &mut **near);
+                let notes = Notes { maxima, signal, pushes, near, shift };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
             departed.filter(Departed::is_any).collect()
-        })
+        });
+        if !self.shift_sums.of.is_empty() {
+            let shifts = std::mem::take(&mut self.leaf_data.shifts);
+            self.book_shifts(&shifts, to - 0.5 * dt);
+            self.leaf_data.shifts = shifts;
+        }
+        departed
     }
 
     /// S: velocities of the nodes of the first field at its particles, leaf by leaf; 0 for those of others.
@@ -200,7 +226,7 @@ impl<const D: usize> Solver<D> {
                 }
                 for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
                     load_rows(plan, bin.number, &bin.window, rows, arena);
-                    let nodes = Fields { velocity: arena, increment: None, moments: None };
+                    let nodes = Fields { velocity: arena, increment: None, fill: None, moments: None };
                     g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
                     if let Some(whole) = bin.whole {
                         g2p::interpolate(kernel, chunk, whole, &bin.frame, &scheme, arena, |p, v| {
@@ -227,13 +253,15 @@ impl<const D: usize> Sweep<'_, D> {
         leaf: usize,
         chunk: &mut Chunk<D>,
         bins: OfLeaf<'_, D>,
-        (maxima, signal, pushes, near): Notes<'_, D>,
+        notes: Notes<'_, D>,
     ) -> Departed {
+        let Notes { maxima, signal, pushes, near, shift } = notes;
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         let follows = self.displacement.is_some() || !self.openings.is_empty();
         let start = follows.then(|| positions(chunk));
         *signal = self.gather(scratch, leaf, chunk, &bins);
+        *shift = scratch.shifted.total();
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
             scratch.leavers.look_again(chunk, &held);
@@ -296,6 +324,7 @@ impl<const D: usize> Sweep<'_, D> {
         bins: &OfLeaf<'_, D>,
     ) -> f64 {
         scratch.leavers.begin(self.borders.of_leaf(leaf));
+        scratch.shifted = Shifted::default();
         if chunk.is_empty() {
             return 0.0;
         }
@@ -307,6 +336,7 @@ impl<const D: usize> Sweep<'_, D> {
         if !are_kept {
             scratch.gradients.clear();
         }
+        scratch.mean_volumes.find(chunk, &LeafCells::new(self.borders.of_leaf(leaf)), &self.flows);
         let mut fastest: f64 = 0.0;
         for Members { source, lists } in self.members(leaf, bins) {
             let cut = cut_of(lists);
@@ -333,21 +363,33 @@ impl<const D: usize> Sweep<'_, D> {
         bin: &BinView<'_, D>,
         chunk: &mut Chunk<D>,
     ) -> f64 {
-        let Scratch { kernel, arena, increments, gathered, leavers, mean_dilation, .. } = scratch;
+        let Scratch { kernel, arena, increments, fill, gathered, leavers, mean_dilation, .. } = scratch;
         let next = source.fields.load(self.plan, source.arenas, bin.number, &bin.window, arena);
         if let Some(rows) = source.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
         }
+        if let Some(values) = self.fill {
+            load_values(self.plan, bin.number, &bin.window, values, fill);
+        }
         let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
         let increment = source.increments.map(|_| &increments[..]);
-        let nodes = Fields { velocity: &arena.rows, increment, moments };
+        let fill = self.fill.map(|_| &fill[..]);
+        let nodes = Fields { velocity: &arena.rows, increment, fill, moments };
         g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
         let Some(whole) = bin.whole else { return 0.0 };
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
         let dilation = &mean_dilation.added[..];
-        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields: &nodes, leavers, dilation }
+        let (fields, shifted) = (&nodes, &mut scratch.shifted);
+        let filling = self.filling(&scratch.mean_volumes);
+        let filling = filling.as_ref();
+        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields, leavers, dilation, filling, shifted }
             .whole_boxes(whole, next)
+    }
+
+    /// What keeps the fluids of a leaf in their volume, if there are any.
+    fn filling<'b>(&'b self, means: &'b MeanVolumes) -> Option<Filling<'b>> {
+        self.fill.map(|_| Filling { flows: &self.flows, means: &means.of_particles })
     }
 
     /// Notes the velocity gradients of the particles of a leaf; with F-bar also what the mean rate of dilation of each cell adds to them.
@@ -373,10 +415,11 @@ impl<const D: usize> Sweep<'_, D> {
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
-        let Scratch { kernel, gathered, leavers, mean_dilation, .. } = scratch;
+        let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, shifted, .. } = scratch;
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
         let (scheme, dt, dilation) = (self.scheme, self.dt, &mean_dilation.added[..]);
-        let update = g2p::Advance { scheme, dt, cell, dilation };
-        g2p::advance_gathered(kernel, chunk, cut, gathered, &update, &extent, leavers)
+        let filling = self.filling(mean_volumes);
+        let update = g2p::Advance { scheme, dt, cell, dilation, filling: filling.as_ref() };
+        g2p::advance_gathered(kernel, chunk, cut, gathered, &update, &extent, (leavers, shifted))
     }
 }

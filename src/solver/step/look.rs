@@ -34,7 +34,7 @@ impl<const D: usize> Look<'_, D> {
         for bin in BinView::of_leaf(self.plan, lists, leaf, chunk.len()) {
             self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
             let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
-            let nodes = Fields { velocity: &arena.rows, increment: None, moments };
+            let nodes = Fields { velocity: &arena.rows, increment: None, fill: None, moments };
             g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
             if let Some(whole) = bin.whole {
                 g2p::look(kernel, chunk, whole, &bin.frame, self.scheme, &nodes, |p, gathered| {

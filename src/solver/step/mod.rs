@@ -8,6 +8,7 @@
 //! | [`g2p`] | nodes to particles, over all leaves |
 //! | `look` | what the particles of a leaf gather, without an advance |
 //! | `mean_dilation` | F-bar: dilation as the mean over cells |
+//! | `fill` | fluids keep their volume |
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders |
@@ -21,6 +22,7 @@ pub mod carried;
 pub mod colliders;
 mod contact;
 pub mod exchange;
+mod fill;
 mod flip_xpic;
 pub mod g2p;
 pub mod loads;

@@ -43,6 +43,7 @@ impl<const D: usize> Solver<D> {
     /// ranks, with the forces f that act on particles; with FLIP and XPIC also `p_j` without forces. With mass scaling m is the mass with
     /// which a particle moves.
     pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
+        self.scatter_volumes();
         self.scale_masses(|mass, scale| mass * scale);
         self.for_each_field(|solver, _| solver.note_velocities());
         let before = self.push_particles(dt);

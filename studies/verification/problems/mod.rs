@@ -15,13 +15,14 @@ pub(crate) mod footing;
 pub(crate) mod incline;
 pub(crate) mod manufactured;
 pub(crate) mod taylor;
+pub(crate) mod water;
 pub(crate) mod weights;
 
 /// Runs a problem and writes its section.
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 16] = [
+pub(crate) const ALL: [(&str, Problem); 17] = [
     ("bar", bar::section),
     ("manufactured", manufactured::square),
     ("manufactured_3d", manufactured::cube),
@@ -33,6 +34,7 @@ pub(crate) const ALL: [(&str, Problem); 16] = [
     ("taylor", taylor::section),
     ("drivers", drivers::section),
     ("dam_break", dam_break::section),
+    ("water", water::section),
     ("weights", weights::section),
     ("incline", incline::section),
     ("contact", contact::section),

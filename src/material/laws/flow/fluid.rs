@@ -117,6 +117,14 @@ impl Law for Fluid {
         (self.parameters.bulk_modulus / self.density).sqrt()
     }
 
+    fn is_fluid(&self) -> bool {
+        true
+    }
+
+    fn bears_tension(&self) -> bool {
+        self.parameters.tension
+    }
+
     fn viscous_speed(&self, cell: f64) -> f64 {
         8.0 / 3.0 * self.parameters.viscosity / (self.density * cell)
     }

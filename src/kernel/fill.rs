@@ -1,0 +1,183 @@
+//! What keeps fluids in their volume: bounded void, a shift out of overfull nodes, and volumes that approach the mean of their cell.
+//!
+//! The volume ratio J of a particle is right on average, but positions drift away from it: flow that compresses along one line and widens along
+//! another gathers particles, and the gaps between them have no sample that would resist. Nodes know how full they are: with the
+//! reference volumes of all material, `φ_j = Σ V₀ w / ∫N_j` and `e_j = max(0, φ_j - 1)`, and a particle gathers
+//! ```text
+//! φ = Σ w φ_j,   s = Σ e_j ∇w
+//! ```
+//! 1. *Void.* A fluid without tension that has widened, J > 1, pushes with nothing. It may fill the void that the grid has around
+//!    it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
+//! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain the excess:
+//!    `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
+//! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell. The energy is convex in J, so it falls.
+//!
+//! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed of sound.
+//! `docs/design/fluid-volume.md` says what each part does, and what else was tried.
+use super::batch::Batch;
+use super::gathered::Sums;
+use crate::material::Symmetric;
+use crate::material::eigen::determinant;
+use crate::particle::chunk::Layout;
+use crate::simd::math::{exp, ln};
+use crate::simd::{LANES, Vector, VectorMask};
+
+/// Rate α of the shift, in speeds of sound over cells.
+const SHIFT: f64 = 0.15;
+/// Greatest shift of a step along an axis, as a share of a cell.
+const FARTHEST: f64 = 0.05;
+/// Rate β towards the mean of a cell, in speeds of sound over cells.
+const MEAN: f64 = 0.05;
+/// Least distance from a wall to which particles are shifted, as a share of a cell.
+const CLOSEST: f64 = 1e-9;
+
+/// A material in a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Flow {
+    /// `c Δt`, the way of sound in the step, m; 0 for what is no fluid.
+    pub way: f64,
+    /// Greatest volume ratio that particles may have where there is no void: 1, or infinite for fluids that bear tension.
+    pub widest: f64,
+}
+
+impl Flow {
+    /// What is no fluid.
+    pub const NONE: Self = Self { way: 0.0, widest: f64::INFINITY };
+}
+
+/// What the advance of particles needs to keep fluids in their volume.
+#[derive(Clone, Copy, Debug)]
+pub struct Filling<'a> {
+    /// By material.
+    pub flows: &'a [Flow],
+    /// By particle of the chunk, the mean J̄ of the fluid in its cell; 1 for what is no fluid.
+    pub means: &'a [f64],
+}
+
+/// Sums of mass times shift over particles, kg m, lane by lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Shifted<const D: usize>([[f64; LANES]; D]);
+
+impl<const D: usize> Default for Shifted<D> {
+    fn default() -> Self {
+        Self([[0.0; LANES]; D])
+    }
+}
+
+impl<const D: usize> Shifted<D> {
+    /// The sums over all lanes.
+    pub fn total(&self) -> [f64; D] {
+        self.0.map(|lanes| lanes.iter().sum())
+    }
+}
+
+/// A batch with what it gathered.
+pub(super) struct Filled<V: Vector, const D: usize> {
+    /// Whether a particle is of a fluid.
+    is_fluid: V::Mask,
+    /// Way of sound in the step over the edge of a cell.
+    reach: V,
+    widest: V,
+    fill: V,
+    /// `Σ e_j ∇w`, 1/m.
+    slope: [V; D],
+    /// J̄ / J - 1.
+    to_mean: V,
+    /// J at the start of the step.
+    ratio: V,
+    cell: f64,
+}
+
+impl Filling<'_> {
+    /// A batch of particles of these materials with the elastic tensors that they had at the start of the step; `None` if none is of a fluid.
+    #[inline(always)]
+    pub(super) fn of_batch<V: Vector, const D: usize>(
+        &self,
+        batch: &Batch,
+        materials: impl Fn() -> [u16; LANES],
+        sums: &Sums<D>,
+        elastic: &Symmetric<V>,
+        cell: f64,
+    ) -> Option<Filled<V, D>> {
+        let (way, widest) = match self.flows {
+            [only] => (V::splat(only.way), V::splat(only.widest)),
+            several => {
+                let of = materials().map(|material| several[usize::from(material)]);
+                (V::new(of.map(|flow| flow.way)), V::new(of.map(|flow| flow.widest)))
+            }
+        };
+        let is_fluid = V::splat(0.0).lt(way);
+        if !is_fluid.any() {
+            return None;
+        }
+        let [x, y, z, fill] = V::columns(&sums.fill);
+        let mut slope = [x; D];
+        slope[1] = y;
+        if D == 3 {
+            slope[D - 1] = z;
+        }
+        let ratio = determinant(elastic).sqrt();
+        let to_mean = batch.values::<V>(self.means) / ratio - V::splat(1.0);
+        Some(Filled { is_fluid, reach: way * (1.0 / cell), widest, fill, slope, to_mean, ratio, cell })
+    }
+}
+
+/// Share of a step in which something with a rate (in speeds of sound over cells) relaxes.
+#[inline(always)]
+fn share<V: Vector>(reach: V, rate: f64) -> V {
+    let y = reach * rate;
+    y / (y + V::splat(1.0))
+}
+
+impl<V: Vector, const D: usize> Filled<V, D> {
+    /// Shifts particles that have moved to `moved`, and sums up their masses times the ways; not through the faces of a domain of this
+    /// extent, if they are near any.
+    #[inline(always)]
+    pub(super) fn shift(
+        &self,
+        batch: &Batch,
+        tile: &[[f64; LANES]],
+        moved: &mut [V; D],
+        extent: Option<&[f64; D]>,
+        shifted: &mut Shifted<D>,
+    ) {
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let excess = self.fill - one;
+        let unexplained = ((self.fill.mul_add(self.ratio, -one)) / excess).max(zero).min(one);
+        let unexplained = zero.lt(excess).select(unexplained, one);
+        let factor = share(self.reach, SHIFT) * unexplained * (self.cell * self.cell);
+        let farthest = V::splat(FARTHEST * self.cell);
+        let mass: V = batch.load(tile, Layout::<D>::MASS);
+        for axis in 0..D {
+            let way = (-(factor * self.slope[axis])).max(-farthest).min(farthest);
+            let way = self.is_fluid.select(way, zero);
+            let mut to = moved[axis] + way;
+            if let Some(extent) = extent {
+                let lower = V::splat(CLOSEST * self.cell);
+                let upper = V::splat(extent[axis]) - lower;
+                to = to.max(lower.min(moved[axis])).min(upper.max(moved[axis]));
+            }
+            let sum = &mut shifted.0[axis];
+            let gone = batch.of_members(mass * (to - moved[axis]));
+            (V::load(sum) + gone).store(sum);
+            moved[axis] = to;
+        }
+    }
+
+    /// Bounds the void of particles and brings them nearer to the mean of their cells, in the elastic tensors after the step.
+    #[inline(always)]
+    pub(super) fn settle(&self, trial: &mut Symmetric<V>) {
+        let one = V::splat(1.0);
+        let ratio = determinant(trial).sqrt();
+        let nearer = ratio * share(self.reach, MEAN).mul_add(self.to_mean, one);
+        let bound = self.widest.max(one / self.fill);
+        let new = nearer.min(bound);
+        let changed = self.is_fluid & (new.lt(ratio) | ratio.lt(new));
+        if changed.any() {
+            let factor = exp(ln(new / ratio) * (2.0 / 3.0));
+            for c in 0..6 {
+                trial[c] = changed.select(trial[c] * factor, trial[c]);
+            }
+        }
+    }
+}

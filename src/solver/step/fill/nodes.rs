@@ -1,0 +1,98 @@
+//! How full nodes are: reference volume of all material at a node over the volume of its basis function.
+use rayon::prelude::*;
+
+use super::solid::add_solids;
+use crate::boundary::Collider;
+use crate::grid::mask::{bits, block_nodes};
+use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::volume::{reference_volume, volume};
+use crate::solver::state::Solver;
+use crate::solver::state::node_fill::NodeFill;
+use crate::solver::state::phases::Phase;
+
+impl<const D: usize> Solver<D> {
+    /// Collective over neighbours. Sums up the reference volumes of all material at the nodes of velocity fields that bodies of unlike density
+    /// share, ahead of P2G, in jobs with fluids. What is no fluid counts with the volume that it has.
+    pub(in crate::solver) fn scatter_volumes(&mut self) {
+        if !self.physics.keeps_volumes() || self.physics.fill_densities.iter().all(Option::is_some) {
+            return;
+        }
+        let physics = &self.physics;
+        let volumes = |chunk: &mut Chunk<D>| {
+            let of = |p: usize| match physics.materials[usize::from(Tag::unpack(chunk.tags()[p]).material)]
+                .is_fluid()
+            {
+                true => reference_volume(chunk, p),
+                false => volume(chunk, p),
+            };
+            let volumes: Vec<f64> = (0..chunk.len()).map(of).collect();
+            let masses = chunk.column_mut(Layout::<D>::MASS).into_iter().zip(volumes);
+            masses.map(|(mass, volume)| std::mem::replace(mass, volume)).collect::<Vec<f64>>()
+        };
+        let masses: Vec<Vec<f64>> = self.chunks.par_iter_mut().with_min_len(8).map(volumes).collect();
+        let mut scattered = Vec::new();
+        self.for_each_field(|solver, field| {
+            if solver.physics.fill_densities[field].is_some() {
+                return scattered.push(Vec::new());
+            }
+            solver.field_from_particles(0.0);
+            scattered.push(solver.grid.fields.rows.iter().map(|row| row.0[3]).collect());
+        });
+        for (chunk, masses) in self.chunks.iter_mut().zip(masses) {
+            chunk.column_mut(Layout::<D>::MASS).into_iter().zip(masses).for_each(|(own, mass)| *own = mass);
+        }
+        self.node_fill().scattered = scattered;
+    }
+
+    fn node_fill(&mut self) -> &mut NodeFill {
+        let grid = &mut self.grid;
+        grid.fill.get_or_insert_with(|| Box::new(NodeFill::new(&grid.plan)))
+    }
+
+    /// Not collective. Finds how full the nodes are that the gather reads, in jobs with fluids: real ones from their masses, constrained
+    /// ones from their parents.
+    pub(in crate::solver) fn fill_nodes(&mut self) {
+        if !self.physics.keeps_volumes() {
+            return;
+        }
+        self.node_fill();
+        let grid = &mut self.grid;
+        let Some(mut fill) = grid.fill.take() else { return };
+        let (plan, nodes) = (&grid.plan, block_nodes(D));
+        let fields: Vec<_> = grid.all_fields().collect();
+        let densities = &self.physics.fill_densities;
+        let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
+        let has_colliders = colliders.iter().any(Collider::is_present);
+        let NodeFill { of_nodes, volumes, dirty, scattered, open } = &mut *fill;
+        self.phases.time(Phase::Nodes, || {
+            let blocks = of_nodes.par_chunks_mut(nodes).zip(dirty).zip(open).enumerate().with_min_len(32);
+            blocks.for_each(|(index, ((values, dirty), open))| {
+                let has_any = fields.iter().any(|fields| fields.active[index]);
+                if *dirty {
+                    values.fill(0.0);
+                }
+                *dirty = has_any || fields.iter().any(|fields| fields.may_hold(index));
+                if !has_any {
+                    return;
+                }
+                let volumes = volumes.of_block(plan, index);
+                for (number, fields) in fields.iter().enumerate().filter(|(_, fields)| fields.active[index]) {
+                    for bit in bits(plan.blocks[index].real_nodes()) {
+                        let bit = bit as usize;
+                        let node = index * nodes + bit;
+                        let volume = match densities[number] {
+                            Some(density) => fields.rows[node].0[3] / density,
+                            None => scattered[number][node],
+                        };
+                        values[bit] += volume / volumes.of_node(bit);
+                    }
+                }
+                if has_colliders {
+                    add_solids(plan, &plan.blocks[index], colliders, states, open, values);
+                }
+            });
+            fields.iter().for_each(|fields| fields.prolong_values(plan, of_nodes));
+        });
+        self.grid.fill = Some(fill);
+    }
+}
