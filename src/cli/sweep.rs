@@ -236,10 +236,10 @@ fn write_table(
         false => text.to_owned(),
     };
     let mut header: Vec<String> = over.iter().map(|(key, _)| quoted(key)).collect();
-    header.extend(["directory", "status", "steps", "wall_seconds (s)"].map(String::from));
+    header.extend(["directory", "status", "steps", "wall_seconds [s]"].map(String::from));
     header.extend(columns.iter().map(|(name, unit)| match unit.is_empty() {
         true => name.clone(),
-        false => format!("{name} ({unit})"),
+        false => format!("{name} [{unit}]"),
     }));
     let mut text = header.join(",") + "\n";
     for (run, status, report) in rows {

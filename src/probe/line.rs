@@ -83,7 +83,7 @@ impl<const D: usize> Line<D> {
         for quantity in &self.quantities {
             match quantity.mean() {
                 Some(mean) => columns.extend(mean.columns::<D>("")),
-                None if *quantity == Sampled::Density => columns.push(("density".to_owned(), "kg/m^3")),
+                None if *quantity == Sampled::Density => columns.push(("density".to_owned(), "kg/m³")),
                 None => columns.push(("volume_fraction".to_owned(), "")),
             }
         }

@@ -139,7 +139,7 @@ impl Measured {
     fn stem_and_unit(self) -> (&'static str, &'static str) {
         match self {
             Self::Mass => ("mass", "kg"),
-            Self::Volume => ("volume", "m^3"),
+            Self::Volume => ("volume", "m³"),
             Self::Centre => ("centre", "m"),
             Self::Velocity => ("velocity", "m/s"),
             Self::Momentum => ("momentum", "kg m/s"),

@@ -27,9 +27,9 @@ const COLUMNS: [Column<'static>; 20] = [
     column("momentum_x", "kg m/s"),
     column("momentum_y", "kg m/s"),
     column("momentum_z", "kg m/s"),
-    column("angular_momentum_x", "kg m^2/s"),
-    column("angular_momentum_y", "kg m^2/s"),
-    column("angular_momentum_z", "kg m^2/s"),
+    column("angular_momentum_x", "kg m²/s"),
+    column("angular_momentum_y", "kg m²/s"),
+    column("angular_momentum_z", "kg m²/s"),
     column("mass", "kg"),
     column("grid_mass", "kg"),
     column("particles", ""),
@@ -110,7 +110,7 @@ const LEDGER: [(&str, &str); 5] =
 
 /// Columns of runs on the way to equilibrium.
 const RELAXATION: [(&str, &str); 3] =
-    [("peak_speed", "m/s"), ("unbalanced_acceleration", "m/s^2"), ("stops", "")];
+    [("peak_speed", "m/s"), ("unbalanced_acceleration", "m/s²"), ("stops", "")];
 
 /// The values of a row that are of the way to equilibrium.
 pub fn relaxation_values(relaxation: &Relaxation) -> [f64; RELAXATION.len()] {

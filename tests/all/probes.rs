@@ -178,7 +178,7 @@ fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
         let [in_block, behind] = [&rows[1], &rows[2]];
         assert_eq!((in_block[at("point")], in_block[at("x [m]")], in_block[at("level")]), (2.0, -2.75, 1.0));
         assert!((in_block[at("volume_fraction")] - 1.0).abs() < 1e-12, "{in_block:?}");
-        assert!((in_block[at("density [kg/m^3]")] - 1024.0).abs() < 1e-9);
+        assert!((in_block[at("density [kg/m³]")] - 1024.0).abs() < 1e-9);
         assert!((in_block[at("velocity_x [m/s]")] - 2.0).abs() < 1e-14);
         assert!(behind[at("volume_fraction")] == 0.0 && behind[at("pressure [Pa]")].is_nan(), "{behind:?}");
         assert_eq!(*line.get_or_insert(text.clone()), text, "the line");

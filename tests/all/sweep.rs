@@ -64,7 +64,7 @@ fn a_killed_sweep_goes_on_and_does_no_run_twice() {
     assert_eq!(rows.len(), 7, "{table}");
     assert_eq!(rows[0][..3], ["materials.sand.friction_angle", "directory", "status"]);
     let front =
-        rows[0].iter().position(|name| *name == "greatest_sand_x (m)").expect("a column of the probe");
+        rows[0].iter().position(|name| *name == "greatest_sand_x [m]").expect("a column of the probe");
     let fronts: Vec<f64> = rows[1..].iter().map(|row| row[front].parse().expect("a number")).collect();
     println!("run-out by friction angle: {fronts:?}");
     assert!(rows[1..].iter().all(|row| row[2] == "finished"), "{table}");

@@ -137,7 +137,8 @@ impl Seen {
         if !self.has_header {
             self.has_header = line == header.trim_end().as_bytes();
             // A whole line of text is no damage. Nothing of such a file is changed.
-            self.has_other_columns = !self.has_header && line.starts_with(b"step,") && line.is_ascii();
+            self.has_other_columns =
+                !self.has_header && line.starts_with(b"step,") && std::str::from_utf8(line).is_ok();
             return if self.has_header || self.has_other_columns { Verdict::Keep } else { Verdict::Stop };
         }
         let (of_step, rows) = (self.of_step, self.rows);
