@@ -13,6 +13,7 @@
 //! | [`plan`] | bins and blocks of one tree and partition; what a rank needs of others |
 //! | [`arenas`] | memory that bins scatter into |
 //! | [`sums`] | node fields of a step: sums of arenas, exchange, restriction, prolongation |
+//! | [`ties`] | nodes at surfaces that move with the material beside them |
 //! | [`direct`] | weights by definition, cell by cell: the oracle of tests |
 pub mod arenas;
 pub mod constraints;
@@ -22,6 +23,7 @@ pub mod mask;
 pub mod order;
 pub mod plan;
 pub mod sums;
+pub mod ties;
 
 pub use arenas::arena_schedule::Seam;
 pub use arenas::window::Window;

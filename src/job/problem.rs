@@ -152,6 +152,8 @@ pub struct Problem<const D: usize> {
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
+    /// Whether surface nodes are tied.
+    pub tied_surfaces: bool,
     /// Output files.
     pub output: OutputSetup,
     /// Checkpoints.

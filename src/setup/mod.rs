@@ -49,6 +49,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         transfer: problem.transfer,
         boxes: problem.boxes,
         f_bar: problem.f_bar,
+        ties: problem.tied_surfaces,
         followed: problem.output.followed,
         control: StepControl {
             cfl: problem.time.cfl,

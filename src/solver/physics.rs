@@ -54,6 +54,8 @@ pub struct Physics<const D: usize> {
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
+    /// Whether surface nodes are tied.
+    pub ties: bool,
     /// What particles carry of what has happened to them.
     pub followed: Followed,
     /// Choice of the time step.

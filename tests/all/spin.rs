@@ -237,7 +237,9 @@ fn first_order_xpic_is_pic() {
 #[test]
 fn bits_do_not_depend_on_ranks() {
     on_ranks("bits_do_not_depend_on_ranks", &[1, 2, 3], |comm| {
-        for transfer in ["'apic'", "'tpic'", "'flip'", "'xpic'\nxpic_order = 3"] {
+        for transfer in
+            ["'apic'", "'tpic'", "'flip'", "'xpic'\nxpic_order = 3", "'flip'\ntied_surfaces = true"]
+        {
             let mut solver = solver::<2>(comm, &with(SQUARE, &format!("transfer = {transfer}")));
             advance(&mut solver, 30);
             let mut sum = [0u64];
@@ -356,6 +358,28 @@ fn affine_fields_are_reproduced() {
     on_ranks("affine_fields_are_reproduced", &[1, 2], |comm| {
         reproduces::<2>(comm, SQUARE);
         reproduces::<3>(comm, CUBE);
+    });
+}
+
+/// A job whose surface nodes are tied, with a shape that ends inside cells.
+fn tied(text: &str, shape: &str) -> String {
+    let start = text.find("\nshape = ").expect("the shape of the body") + 1;
+    let end = start + text[start..].find('\n').expect("a line");
+    let text = format!("{}shape = {{ {shape} }}{}", &text[..start], &text[end..]);
+    text.replace("[numerics]", "[numerics]\ntied_surfaces = true")
+}
+
+const TURNED: &str = "kind = \"polygon\", points = [[1.07, 1.33], [1.69, 1.04], [1.98, 1.66], [1.36, 1.95]]";
+const BALL: &str = "kind = \"sphere\", centre = [1.51, 1.52, 1.49], radius = 0.42";
+
+/// Ties of surface nodes change neither momenta nor affine motion.
+#[test]
+fn ties_keep_momenta_and_affine_fields() {
+    on_ranks("ties_keep_momenta_and_affine_fields", &[1, 2], |comm| {
+        spins::<2>(comm, &tied(SQUARE, TURNED), steps(comm, 2000));
+        spins::<3>(comm, &tied(CUBE, BALL), steps(comm, 100));
+        reproduces::<2>(comm, &tied(SQUARE, TURNED));
+        reproduces::<3>(comm, &tied(CUBE, BALL));
     });
 }
 

@@ -35,6 +35,7 @@ pub struct KnownTree<const D: usize> {
     own_len: usize,
     reach: u32,
     graded: bool,
+    halo: u32,
     /// Level of the finest known leaves.
     deepest: u8,
     /// By level, the octants in whose neighbourhood, themselves included, one holds smaller leaves.
@@ -49,6 +50,8 @@ pub struct Allowance {
     pub reach: u32,
     /// Whether neighbouring leaves differ by one level at most.
     pub graded: bool,
+    /// Blocks around those of its bins, counted along each axis, in which each rank needs all nodes.
+    pub halo: u32,
 }
 
 impl<const D: usize> KnownTree<D> {
@@ -66,6 +69,7 @@ impl<const D: usize> KnownTree<D> {
             own_len: leaves.len(),
             reach: allowance.reach,
             graded: allowance.graded,
+            halo: allowance.halo,
             deepest: 0,
             beside_finer: Vec::new(),
             leaves,
@@ -203,6 +207,7 @@ impl<const D: usize> KnownTree<D> {
             own_len: leaves.len(),
             reach: 0,
             graded: false,
+            halo: 0,
             deepest: 0,
             beside_finer: Vec::new(),
             leaves,
@@ -220,6 +225,11 @@ impl<const D: usize> KnownTree<D> {
     /// Whether neighbouring leaves differ by one level at most.
     pub fn is_graded(&self) -> bool {
         self.graded
+    }
+
+    /// See [`Allowance::halo`].
+    pub fn halo(&self) -> u32 {
+        self.halo
     }
 
     /// Whether all leaves that feed a bin lie within the block around it.

@@ -93,7 +93,8 @@ impl<const D: usize> Closure<D> {
         };
         let bins = own_bins(tree);
         builder.touch_own_bins(&bins);
-        builder.add_parents();
+        let parents = builder.add_parents();
+        builder.add_halo(bins.iter().flatten().copied().chain(parents));
         builder.add_children();
         let missing = builder.missing();
         let blocks = builder
@@ -134,8 +135,30 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
-    /// Value nodes: parents of constrained value nodes, finest level first.
-    fn add_parents(&mut self) {
+    /// Value nodes: the real nodes of blocks around some blocks, as far as the halo goes.
+    fn add_halo(&mut self, blocks: impl Iterator<Item = Octant<D>>) {
+        if self.tree.halo() == 0 || self.tree.ghost_len() == 0 && self.tree.is_whole() {
+            return;
+        }
+        let mut added: FxHashSet<Octant<D>> = FxHashSet::default();
+        for Octant { level, coord } in blocks {
+            for offset in box_offsets::<D>(self.tree.halo()) {
+                let Some(coord) = shifted(coord, offset) else { continue };
+                if !added.insert(Octant { level, coord }) {
+                    continue;
+                }
+                let real =
+                    nodes_in_domain(self.tree, level, coord) & !constrained_nodes(self.tree, level, coord);
+                if real != 0 {
+                    self.sets(level, coord).needs_velocity |= real;
+                }
+            }
+        }
+    }
+
+    /// Value nodes: parents of constrained value nodes, finest level first. Returns their blocks.
+    fn add_parents(&mut self) -> Vec<Octant<D>> {
+        let mut all = Vec::new();
         for level in (1..self.levels.len()).rev() {
             let blocks: Vec<([u32; D], u64)> = self.levels[level]
                 .iter()
@@ -150,9 +173,11 @@ impl<const D: usize> Builder<'_, D> {
                     let coarse = coarser_at(coord, corner);
                     let parents = parents::<D>(place_beside(coord, coarse), mask);
                     self.sets(level as u8 - 1, coarse).needs_velocity |= parents;
+                    all.push(Octant { level: level as u8 - 1, coord: coarse });
                 }
             }
         }
+        all
     }
 
     /// Sum nodes: real value nodes, and coarsest level first the constrained nodes that restrict into them.

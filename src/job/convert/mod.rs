@@ -161,6 +161,7 @@ fn problem<const D: usize>(
         transfer,
         boxes,
         f_bar: file.numerics.f_bar,
+        tied_surfaces: file.numerics.tied_surfaces,
         output,
         checkpoint: CheckpointSetup {
             every_steps: file.checkpoint.every_steps,

@@ -388,6 +388,10 @@ pub struct Numerics {
     /// that keeps the volume, which is too stiff without; a step costs up to half as much again. Off by default.
     #[serde(default)]
     pub f_bar: bool,
+    /// Whether nodes at the surface that belong to no cell at least half full move with the plane through the corners of the nearest such
+    /// cell. Left free, they take the stress of the outermost particles, and bent bodies are too soft. For elastic bodies. Off by default.
+    #[serde(default)]
+    pub tied_surfaces: bool,
 }
 
 /// Transfer of velocity between particles and grid.

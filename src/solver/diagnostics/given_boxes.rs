@@ -109,6 +109,7 @@ impl<const D: usize> GivenBoxes<D> {
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,
             f_bar: false,
+            ties: false,
             followed: Followed::default(),
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
         };

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::grid::arenas::{ArenaMut, Arenas, arena_schedule};
 use crate::grid::plan::ghost_layer::Allowance;
 use crate::grid::sums::exchange::ReceivedSums;
+use crate::grid::ties::{HALO, Ties};
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::{Row, spread};
 use crate::memory::Block;
@@ -40,6 +41,8 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) between: Option<Box<BetweenBodies<D>>>,
     /// How full nodes are; made when it is first needed.
     pub(in crate::solver) fill: Option<Box<NodeFill>>,
+    /// Ties of surface nodes, in jobs that have such.
+    pub(in crate::solver) ties: Option<Box<Ties<D>>>,
     /// Nodes inside colliders that never move, as far as they have been asked for.
     pub(in crate::solver) inside_still: InsideStill<D>,
     /// Bytes of the last exchange of sums.
@@ -57,9 +60,11 @@ impl<const D: usize> Grid<D> {
         physics: &Physics<D>,
         reach: u32,
     ) -> Self {
-        let allowance = Allowance { reach, graded: physics.graded };
+        let allowance =
+            Allowance { reach, graded: physics.graded, halo: if physics.ties { HALO } else { 0 } };
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
+        let ties = physics.ties.then(|| Box::new(Ties::new(comm, &plan)));
         let neighbours = exchange.neighbours().to_vec();
         let others = 1..physics.body_contacts.fields();
         Self {
@@ -79,6 +84,7 @@ impl<const D: usize> Grid<D> {
             contact: None,
             between: None,
             fill: None,
+            ties,
             inside_still: Vec::new(),
             sum_bytes: 0,
             exchange,
@@ -97,6 +103,7 @@ impl<const D: usize> Grid<D> {
         self.contact = None;
         self.between = None;
         self.fill = None;
+        self.ties = None;
         self.inside_still = Vec::new();
     }
 
@@ -211,12 +218,17 @@ impl<const D: usize> Grid<D> {
             + self.others.iter().chain(contact).map(VelocityField::heap_bytes).sum::<usize>()
             + solids.map(Solids::heap_bytes).sum::<usize>()
             + self.fill.as_ref().map_or(0, |fill| fill.heap_bytes())
+            + self.ties.as_deref().map_or(0, Ties::heap_bytes)
     }
 
     /// Messages and bytes that this rank has sent since the grid was built.
     pub fn traffic(&self) -> Traffic {
         let (arenas, particles) = (self.exchange.traffic(), self.migration.traffic());
-        Traffic { messages: arenas.messages + particles.messages, bytes: arenas.bytes + particles.bytes }
+        let ties = self.ties.as_deref().map(Ties::traffic).unwrap_or_default();
+        Traffic {
+            messages: arenas.messages + particles.messages + ties.messages,
+            bytes: arenas.bytes + particles.bytes + ties.bytes,
+        }
     }
 }
 

@@ -17,7 +17,7 @@ use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
     /// Collective over neighbours where colliders act on particles or bodies are in contact. `v_j = p_j / m_j + Δt g` on real nodes, then loads,
-    /// contact between bodies, the conditions of colliders in their order, and those of domain faces, which come last so that nothing is driven
+    /// ties of surface nodes, contact between bodies, the conditions of colliders in their order, and those of domain faces, which come last so that nothing is driven
     /// out of the domain. Returns impulse and
     /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins.
     pub(in crate::solver) fn update_node_velocities(
@@ -31,10 +31,11 @@ impl<const D: usize> Solver<D> {
             true => [0.0; D],
         };
         let mut pushes = Vec::new();
-        self.for_each_field(|solver, _| {
+        self.for_each_field(|solver, field| {
             let grid = &mut solver.grid;
             solver.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
             pushes.push(solver.apply_loads(dt));
+            solver.tie_surface(field);
         });
         let mut held = self.press_bodies(dt);
         let mut impulses = self.no_impulses();
