@@ -37,6 +37,7 @@ mod spin;
 mod stages;
 mod surface_loads;
 mod sweep;
+mod ties;
 mod tutorials;
 mod view;
 mod walls_and_origin;

@@ -1,12 +1,10 @@
 //! Claim: nodes at surfaces move with the material beside them. Bent beams are as stiff as theory says with few cells over their depth,
 //! their surfaces carry their stress, and results do not depend on ranks. That ties change neither momenta nor affine
 //! motion, `spin.rs` shows for free bodies that spin across level jumps.
-#[path = "common/runs.rs"]
-mod runs;
 
-use runs::history::History;
-use runs::launch::{run, succeed};
-use runs::restart;
+use crate::common::history::History;
+use crate::common::launch::{run, succeed};
+use crate::common::restart;
 
 /// A clamped beam that bends by its weight, under damping, with four cells over its depth, to an angle of 38 degrees.
 const BEAM: &str = r#"
