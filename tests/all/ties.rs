@@ -1,6 +1,5 @@
-//! Claim: nodes at surfaces move with the material beside them. Bent beams are as stiff as theory says with few cells over their depth,
-//! their surfaces carry their stress, and results do not depend on ranks. That ties change neither momenta nor affine
-//! motion, `spin.rs` shows for free bodies that spin across level jumps.
+//! Claim: with ties of surface nodes a bent beam is as stiff as theory says with few cells over its depth, and results do not depend on
+//! ranks and restarts. That ties change neither momenta nor affine motion, `spin.rs` shows for free bodies across level jumps.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
