@@ -10,7 +10,7 @@ static ALLOCATOR: agimp::memory::Allocator = agimp::memory::Allocator;
 
 fn main() -> ExitCode {
     // First of all, since a batch queue may send its signal while a run starts. An error is reported when the run begins.
-    if std::env::args_os().nth(1).is_some_and(|command| command == "run") {
+    if std::env::args_os().nth(1).is_some_and(|command| command == "run" || command == "sweep") {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();

@@ -85,6 +85,9 @@ pub enum Failure {
     /// The run was asked to stop and has written a checkpoint.
     #[error("stopped on request; continue with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
+    /// The sweep was asked to stop, as was its run.
+    #[error("stopped on request; the same command continues")]
+    SweepStopped,
     /// The user knows all; what is left is to end with this exit code.
     #[error("a failure that has been reported")]
     Reported(u8),
@@ -101,7 +104,7 @@ impl Failure {
             Self::Run(_) => 1,
             Self::Arguments(error) => error.exit_code() as u8,
             Self::Reported(code) => *code,
-            Self::Stopped(_) => crate::run::stop::STOPPED,
+            Self::Stopped(_) | Self::SweepStopped => crate::run::stop::STOPPED,
         }
     }
 }

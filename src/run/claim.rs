@@ -5,7 +5,7 @@ use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use partition::comm::Comm;
+use partition::comm::{Comm, host};
 
 use super::RunError;
 use super::restart::differing_keys;
@@ -22,18 +22,19 @@ const PATIENCE: Duration = Duration::from_secs(3);
 #[derive(Debug, Default)]
 pub(super) struct Claim(Option<Held>);
 
+/// A lock file that this process holds until it drops this.
 #[derive(Debug)]
-struct Held {
+pub(crate) struct Held {
     file: File,
     path: PathBuf,
 }
 
 /// Why the lock was not taken.
 #[derive(Debug, thiserror::Error)]
-enum Refusal {
-    /// Another run has it.
-    #[error("{}: found another run that writes here ({holder}); wait until it ends, or stop it", path.display())]
-    Taken { path: PathBuf, holder: String },
+pub(crate) enum Refusal {
+    /// Another one has it.
+    #[error("{}: found another {what} that writes here ({holder}); wait until it ends, or stop it", path.display())]
+    Taken { path: PathBuf, what: &'static str, holder: String },
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -44,25 +45,48 @@ impl Claim {
     /// made, and there is nothing to lock.
     ///
     /// # Errors
-    /// Another run has the lock, or its file cannot be written; the same on all ranks.
+    /// Another run has the lock, its file cannot be written, or some rank does not see it; the same on all ranks.
     pub(super) fn take<const D: usize>(&mut self, comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
         let directory = &problem.output.directory;
+        let path = directory.join(format!("{}.lock", problem.name));
         let mut is_taken = false;
         let mut taken = Ok(None);
         if comm.rank() == 0 && self.0.is_none() && directory.is_dir() {
-            taken = lock(&directory.join(format!("{}.lock", problem.name))).map(Some);
+            taken = lock(&path, "run").map(Some);
             is_taken = matches!(taken, Err(Refusal::Taken { .. }));
         }
         let is_taken = comm.any(is_taken);
         match comm.agree(taken) {
             Ok(held) => {
+                let is_new = comm.any(held.is_some());
                 self.0 = self.0.take().or(held);
-                Ok(())
+                if is_new { expect_shared(comm, directory, &path) } else { Ok(()) }
             }
             Err(disagreement) if is_taken => Err(RunError::Refused(disagreement.message)),
             Err(disagreement) => Err(disagreement.into()),
         }
     }
+}
+
+/// Collective. Refuses a directory in which some rank does not see the lock that rank 0 has taken: one that is not on a file system of
+/// all hosts.
+fn expect_shared(comm: &Comm, directory: &Path, lock: &Path) -> Result<(), RunError> {
+    let started = Instant::now();
+    let mut is_seen = lock.exists();
+    // A file system may take a moment to show to one host what another has made.
+    while !is_seen && started.elapsed() < PATIENCE {
+        std::thread::sleep(PATIENCE / 30);
+        is_seen = lock.exists();
+    }
+    let unseen = || {
+        format!(
+            "{}: host {} does not see this directory as rank 0 does; expected an output.directory on a file system that all hosts share",
+            directory.display(),
+            host()
+        )
+    };
+    let seen = comm.agree(if is_seen { Ok(()) } else { Err(unseen()) });
+    seen.map_err(|disagreement| RunError::Refused(disagreement.message))
 }
 
 impl Drop for Held {
@@ -75,8 +99,11 @@ impl Drop for Held {
     }
 }
 
-/// Locks the file and writes into it who has it.
-fn lock(path: &Path) -> Result<Held, Refusal> {
+/// Not collective. Locks the file for a run or a sweep (`what`) and writes into it who has it.
+///
+/// # Errors
+/// Another one has it, or the file cannot be written.
+pub(crate) fn lock(path: &Path, what: &'static str) -> Result<Held, Refusal> {
     let failed = |action| move |source| FileError::System { path: path.into(), action, source };
     let started = Instant::now();
     loop {
@@ -96,7 +123,7 @@ fn lock(path: &Path) -> Result<Held, Refusal> {
                 // What cannot be read is left out.
                 let _ = file.take(200).read_to_string(&mut holder);
                 let holder = holder.trim().escape_debug().to_string();
-                return Err(Refusal::Taken { path: path.into(), holder });
+                return Err(Refusal::Taken { path: path.into(), what, holder });
             }
             // Some file systems of clusters have no locks.
             Err(TryLockError::Error(error)) if cannot_lock(&error) => warn(&format!(
@@ -137,12 +164,6 @@ fn is_at(file: &File, path: &Path) -> bool {
     file.metadata().is_ok_and(|a| path.symlink_metadata().is_ok_and(|b| same(a, b)))
 }
 
-/// Name of this machine.
-fn host() -> String {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    if name.trim().is_empty() { "(unknown)".into() } else { name.trim().to_owned() }
-}
-
 /// Collective. Refuses to start anew where that would destroy results which took long to get.
 ///
 /// # Errors
@@ -178,23 +199,23 @@ mod tests {
         let path = dir.path().join("a.lock");
         // As a process that was killed leaves it.
         std::fs::write(&path, "process 1 on host gone, with a long name of its own\n").unwrap();
-        let held = lock(&path).unwrap();
+        let held = lock(&path, "run").unwrap();
         let told = std::fs::read_to_string(&path).unwrap();
         assert!(told.starts_with(&format!("process {} on host ", std::process::id())), "{told}");
-        let refusal = lock(&path).unwrap_err().to_string();
+        let refusal = lock(&path, "run").unwrap_err().to_string();
         assert!(refusal.contains("another run that writes here (process "), "{refusal}");
         assert!(holder(&path).is_some_and(|who| who.starts_with("process ")));
         drop(held);
         assert_eq!(holder(&path), None);
         assert!(!path.exists());
-        drop(lock(&path).unwrap());
+        drop(lock(&path, "run").unwrap());
     }
 
     #[test]
     fn the_lock_of_another_directory_stays() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.lock");
-        let held = lock(&path).unwrap();
+        let held = lock(&path, "run").unwrap();
         std::fs::remove_file(&path).unwrap();
         std::fs::write(&path, "of somebody else").unwrap();
         drop(held);

@@ -1,4 +1,5 @@
-//! `agimp sweep`: each combination is run once, also when the sweep is killed and started again, and one table has all results.
+//! `agimp sweep`: each combination is run once, also when the sweep is killed, stopped and started again; one table has all results, and results of
+//! another job are replaced only where the user asks for it.
 use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -118,4 +119,150 @@ fn combinations_of_two_keys_are_all_run() {
     assert_eq!(starts.len(), 4, "{table}");
     assert!(table.contains("0.3,\"[0, 0]\",0001_cfl=0.3_velocity=_0__0_,finished,"), "{table}");
     assert!(table.contains("0.5,\"[1, 0]\",0004_cfl=0.5_velocity=_1__0_,finished,"), "{table}");
+}
+
+/// A job with so many thousand steps, roughly.
+fn long_job(thousands: u32) -> String {
+    JOB.replace("end = 0.6", &format!("end = {thousands}")) + "[tree]\nbase_level = 1\n"
+}
+
+/// Starts a sweep over two densities, which its run has begun.
+fn begun(directory: &Path) -> std::process::Child {
+    let over = ["--over", "materials.sand.density=1600,1700"];
+    let child = sweep(directory, &over).stderr(std::process::Stdio::piped()).spawn().expect("starts");
+    let start = Instant::now();
+    let history = directory.join("out/column.sweep/0001_density=1600/column.history.csv");
+    while std::fs::read_to_string(&history).map_or(0, |rows| rows.lines().count()) < 4 {
+        assert!(start.elapsed() < Duration::from_secs(100), "no row of the history in 100 s");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child
+}
+
+/// TERM and USR1 of a batch system, Ctrl-C: the run of the sweep stops with a checkpoint, the sweep ends with the exit code 3, and the same
+/// command gives what an uninterrupted sweep gives.
+#[test]
+fn a_stopped_sweep_stops_its_run_and_the_same_command_continues() {
+    let over = ["--over", "materials.sand.density=1600,1700"];
+    let values = |directory: &Path| -> Vec<String> {
+        let table = std::fs::read_to_string(directory.join("out/column.sweep/sweep.csv")).expect("table");
+        // All but the wall time.
+        let row = |row: &str| -> Vec<String> {
+            row.split(',').enumerate().filter(|(i, _)| *i != 4).map(|(_, cell)| cell.to_owned()).collect()
+        };
+        table.lines().flat_map(row).collect()
+    };
+    let whole = tempfile::tempdir().expect("temporary directory");
+    std::fs::write(whole.path().join("column.toml"), long_job(6)).expect("job");
+    assert!(sweep(whole.path(), &over).output().expect("starts").status.success());
+    for signal in ["-TERM", "-USR1", "-INT"] {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        std::fs::write(directory.path().join("column.toml"), long_job(6)).expect("job");
+        let child = begun(directory.path());
+        Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
+        let output = child.wait_with_output().expect("ended");
+        assert_eq!(output.status.code(), Some(3), "{signal}: {}", words(&output));
+        assert!(words(&output).contains("the same command continues"), "{signal}: {}", words(&output));
+        let run = directory.path().join("out/column.sweep/0001_density=1600");
+        let left: Vec<String> = std::fs::read_dir(run)
+            .expect("directory")
+            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        assert!(left.iter().any(|name| name.contains("checkpoint")), "{signal}: {left:?}");
+        assert!(
+            !left.iter().any(|name| name.ends_with(".part") || name.ends_with(".lock")),
+            "{signal}: {left:?}"
+        );
+        let output = sweep(directory.path(), &over).output().expect("starts");
+        assert!(output.status.success(), "{signal}: {}", words(&output));
+        assert_eq!(values(directory.path()), values(whole.path()), "{signal}");
+    }
+}
+
+/// Two sweeps in a directory would take each other's runs.
+#[test]
+fn a_second_sweep_in_the_directory_is_refused() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    std::fs::write(directory.path().join("column.toml"), long_job(99)).expect("job");
+    let first = begun(directory.path());
+    let second =
+        sweep(directory.path(), &["--over", "materials.sand.density=1600,1700"]).output().expect("starts");
+    Command::new("kill").args(["-TERM", &first.id().to_string()]).status().expect("kill");
+    let first = first.wait_with_output().expect("ended");
+    assert_eq!(second.status.code(), Some(2), "{}", words(&second));
+    assert!(words(&second).contains("found another sweep that writes here"), "{}", words(&second));
+    assert_eq!(first.status.code(), Some(3), "{}", words(&first));
+}
+
+/// A change of the job leads to other results, and the old ones are lost only where the user says so.
+#[test]
+fn results_of_another_job_are_replaced_only_where_asked() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let job = directory.path().join("column.toml");
+    let short = JOB.replace("end = 0.6", "end = 0.01");
+    let over = ["--over", "materials.sand.young=1e6,2e6"];
+    let results = || -> Vec<Vec<u8>> {
+        ["0001_young=1e6", "0002_young=2e6"]
+            .iter()
+            .map(|run| directory.path().join("out/column.sweep").join(run).join("column.history.csv"))
+            .map(|path| std::fs::read(path).expect("history"))
+            .collect()
+    };
+    std::fs::write(&job, &short).expect("job");
+    assert!(sweep(directory.path(), &over).output().expect("starts").status.success());
+    let before = results();
+    std::fs::write(&job, short.replace("density = 1600", "density = 1700")).expect("job");
+    let output = sweep(directory.path(), &over).output().expect("starts");
+    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
+    assert!(words(&output).contains("found a result of another job"), "{}", words(&output));
+    assert!(words(&output).contains("--overwrite"), "{}", words(&output));
+    assert!(results() == before, "results are as they were");
+    let output = sweep(directory.path(), &over).arg("--overwrite").output().expect("starts");
+    assert!(output.status.success(), "{}", words(&output));
+    assert!(results().iter().zip(&before).all(|(new, old)| new != old));
+    // An end before the states that are there: nothing can go on from them.
+    std::fs::write(
+        &job,
+        short.replace("density = 1600", "density = 1700").replace("end = 0.01", "end = 0.004"),
+    )
+    .expect("job");
+    let output = sweep(directory.path(), &over).output().expect("starts");
+    assert_eq!(output.status.code(), Some(1), "{}", words(&output));
+    assert!(words(&output).contains("agimp sweep --overwrite starts it again"), "{}", words(&output));
+    let output = sweep(directory.path(), &over).arg("--overwrite").output().expect("starts");
+    assert!(output.status.success(), "{}", words(&output));
+}
+
+/// A run that was killed between its last output and its report has its whole row after the next start.
+#[test]
+fn a_run_that_has_lost_its_report_gets_its_row_again() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    std::fs::write(directory.path().join("column.toml"), JOB.replace("end = 0.6", "end = 0.01"))
+        .expect("job");
+    let over = ["--over", "materials.sand.young=1e6,2e6"];
+    let table = || {
+        let table =
+            std::fs::read_to_string(directory.path().join("out/column.sweep/sweep.csv")).expect("table");
+        let first: Vec<String> = table.lines().nth(1).expect("a row").split(',').map(str::to_owned).collect();
+        // All but the wall time.
+        [&first[..4], &first[5..]].concat()
+    };
+    assert!(sweep(directory.path(), &over).output().expect("starts").status.success());
+    let before = table();
+    let report = directory.path().join("out/column.sweep/0001_young=1e6/column.report.json");
+    for is_lost in [true, false] {
+        if is_lost {
+            std::fs::remove_file(&report).expect("removed");
+        } else {
+            // As earlier versions left it.
+            let text = std::fs::read_to_string(&report).expect("report");
+            let mut value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+            value["history"] = serde_json::json!({});
+            std::fs::write(&report, value.to_string()).expect("written");
+        }
+        let output = sweep(directory.path(), &over).output().expect("starts");
+        assert!(output.status.success(), "{}", words(&output));
+        assert_eq!(table(), before);
+        assert!(before.iter().all(|cell| !cell.is_empty()), "{before:?}");
+    }
 }

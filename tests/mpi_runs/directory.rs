@@ -1,10 +1,11 @@
 //! Runs that share a directory: no two at once, and no results destroyed that nobody has given up.
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 
 use crate::common::in_turn;
 use crate::common::launch::{
-    Outcome, Running, contents, file, job, last_step, run, signal, succeed, text, variant,
+    Outcome, Running, by_rank, contents, file, job, last_step, run, signal, succeed, text, variant,
 };
 
 const NAME: &str = "collapse_2d";
@@ -123,4 +124,33 @@ fn results_of_another_job_are_not_replaced_unasked() {
     refused(directory, 2, &other, &[], &words);
     succeed(&mut run(directory, 2, 1, &other, &["--quiet", "--overwrite"]));
     refused(directory, 1, &first, &[], &words);
+}
+
+/// A host on which another file system has the place of the results is named. Left out where the system grants no mounts.
+#[test]
+fn a_host_without_the_directory_is_named() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    std::fs::create_dir(home.path().join("out")).expect("made");
+    let elsewhere = |command: &str| {
+        format!("unshare -m -u sh -c 'hostname elsewhere && mount -t tmpfs none out && {command}'")
+    };
+    let allowed = Command::new("sh").args(["-c", &elsewhere("true")]).current_dir(home.path()).output();
+    if !allowed.is_ok_and(|output| output.status.success()) {
+        eprintln!("passed over: no mounts here");
+        return;
+    }
+    let start = format!("{} run {} --quiet --threads 1", env!("CARGO_BIN_EXE_agimp"), job(NAME).display());
+    for restart in [false, true] {
+        if restart {
+            succeed(&mut run(home.path(), 1, 1, &job(NAME), &["--quiet", "--end", "0.005"]));
+        }
+        let start = if restart { format!("{start} --restart latest") } else { start.clone() };
+        let mut command = by_rank(home.path(), [&start, &elsewhere(&start)]);
+        let output = Running::start(&mut command).finish_within(SOON);
+        let shown = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{shown}");
+        let words = "out/collapse_2d: host elsewhere does not see this directory as rank 0 does";
+        assert_eq!(shown.matches(words).count(), 1, "{shown}");
+    }
 }

@@ -3,13 +3,16 @@
 use std::fmt::Display;
 
 use super::Comm;
+use super::environment::host;
 
 /// What every rank gets from [`Comm::agree`] if some rank has failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("rank {rank}: {message}")]
+#[error("rank {rank}{}: {message}", .host.as_ref().map_or(String::new(), |host| format!(" on host {host}")))]
 pub struct Disagreement {
     /// The lowest rank that failed.
     pub rank: usize,
+    /// Its host, where that is not the host of rank 0.
+    pub host: Option<String>,
     /// Its error, as text.
     pub message: String,
     /// How many ranks failed.
@@ -39,6 +42,12 @@ impl Comm {
         };
         self.broadcast_bytes(rank, &mut text);
         let message = String::from_utf8_lossy(&text).into_owned();
-        Err(Disagreement { rank, message, failed: failed[0] as usize })
+        let [first, own] = [0, rank].map(|rank| {
+            let mut name = host().into_bytes();
+            self.broadcast_bytes(rank, &mut name);
+            String::from_utf8_lossy(&name).into_owned()
+        });
+        let host = (own != first).then_some(own);
+        Err(Disagreement { rank, host, message, failed: failed[0] as usize })
     }
 }

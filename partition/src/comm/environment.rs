@@ -10,6 +10,12 @@ pub fn is_launched() -> bool {
         .any(|name| std::env::var_os(name).is_some())
 }
 
+/// Not collective. Name of this machine.
+pub fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    if name.trim().is_empty() { "(unknown)".into() } else { name.trim().to_owned() }
+}
+
 /// Not collective. Gives the library the settings that this program needs, as far as the user has not chosen. A process that has
 /// threads already is left as it is: one of them may read the environment meanwhile.
 pub(super) fn prepare() {

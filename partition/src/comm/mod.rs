@@ -22,7 +22,7 @@ mod sparse;
 mod world;
 
 pub use agree::Disagreement;
-pub use environment::is_launched;
+pub use environment::{host, is_launched};
 pub use neighbour::{NeighbourExchange, Pending, Traffic};
 pub use world::{Comm, CommError, RawComm, World};
 

@@ -1,19 +1,28 @@
 //! `agimp sweep`: runs a job for each combination of values, and puts the results into one table.
 //!
 //! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as `mpirun -n 4`) with a directory of its
-//! own. A run that has its report is finished and not done again, so that the same command goes on after an interruption.
+//! own. A run that has its report is finished and not done again, so that the same command goes on after an interruption. Results of
+//! another job are replaced only where the user says so.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | this | combinations of values, one run after the other |
+//! | `process` | what a directory holds, and the process of a run |
+//! | `table` | `sweep.csv` |
+mod process;
+mod table;
+
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use self::process::Ended;
 use super::Failure;
 use super::shared::message::warn_of;
-use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
 use crate::run::at_end::report::{self, Report};
-use crate::run::stop::STOPPED;
-use crate::text::excerpt;
+use crate::run::claim;
+use crate::run::stop::StopRequest;
 
 /// Most runs of a sweep.
 const MOST_RUNS: usize = 10_000;
@@ -40,6 +49,9 @@ pub struct Arguments {
     /// Threads of each rank.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Start runs again whose directories hold results that they cannot go on from, such as those of another job, and replace these.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// One run of the sweep.
@@ -49,22 +61,33 @@ struct Run {
     /// What is given to `--set`.
     settings: Vec<String>,
     directory: PathBuf,
-    /// What its report must say: digest of the job and end of the run.
-    digest: String,
+    /// What its results must say: digest of the job and end of the run, s.
+    digest: u64,
     end: f64,
 }
 
 /// Runs what is not finished yet, and writes the table.
 ///
 /// # Errors
-/// A combination is no valid job (then nothing is run), or some run failed.
+/// A combination is no valid job, another sweep writes here, or results of another job would be lost (then nothing is run); some run
+/// failed; or the sweep was asked to stop.
 pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
+    let stop = StopRequest::listen()?;
     let over: Vec<(String, Vec<String>)> =
         arguments.over.iter().map(|text| key_and_values(text)).collect::<Result<_, _>>()?;
     let runs = runs(arguments, &over)?;
-    let name = name(arguments);
+    let (name, root) = (name(arguments), root(arguments));
+    let cannot = |error| Failure::Run(format!("{}: cannot create the directory: {error}", root.display()));
+    std::fs::create_dir_all(&root).map_err(cannot)?;
+    let _claim = claim::lock(&root.join("sweep.lock"), "sweep").map_err(|refusal| match refusal {
+        claim::Refusal::Taken { .. } => Failure::Usage(refusal.to_string()),
+        claim::Refusal::File(error) => Failure::Run(error.to_string()),
+    })?;
+    if !arguments.overwrite {
+        process::spare_results(&runs, &name)?;
+    }
     let (mut failed, mut rows) = (0, Vec::new());
-    let table = root(arguments).join("sweep.csv");
+    let table = root.join("sweep.csv");
     for (number, run) in runs.iter().enumerate() {
         let what = run.settings[arguments.set.len()..].join(", ");
         let place = format!("run {} of {}, {what}", number + 1, runs.len());
@@ -72,19 +95,28 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         let mut status = "finished";
         if finished(&report, run).is_some() {
             writeln!(std::io::stderr(), "{place}: finished already")?;
+        } else if stop.is_set() {
+            return Err(Failure::SweepStopped);
         } else {
             writeln!(std::io::stderr(), "{place}")?;
-            let code = start(arguments, run)?;
-            if code == Some(i32::from(STOPPED)) {
-                return Err(Failure::Run("stopped on request; the same command continues".into()));
+            let mut ended = process::start(arguments, run, &name, &stop)?;
+            if ended == Ended::Finished && finished(&report, run).is_none() {
+                ended = Ended::Failed("it has left no report");
             }
-            if code != Some(0) {
-                (failed, status) = (failed + 1, "failed");
-                warn_of(&[format!("{place}: failed; its directory is {}", run.directory.display())]);
+            match ended {
+                Ended::Finished => {}
+                Ended::Stopped => return Err(Failure::SweepStopped),
+                Ended::Failed(why) => {
+                    (failed, status) = (failed + 1, "failed");
+                    warn_of(&[format!(
+                        "{place}: failed, {why}; its directory is {}",
+                        run.directory.display()
+                    )]);
+                }
             }
         }
         rows.push((run, status, finished(&report, run)));
-        write_table(&table, &over, &rows)?;
+        table::write(&table, &over, &rows)?;
     }
     writeln!(std::io::stdout(), "{} ({} runs)", table.display(), runs.len())?;
     match failed {
@@ -157,8 +189,7 @@ fn runs(arguments: &Arguments, over: &[(String, Vec<String>)]) -> Result<Vec<Run
             }
             let problem = job::from_bytes(bytes.clone(), &arguments.job, &checked)?;
             let directory = root(arguments).join(directory(number + 1, over, &values));
-            let digest = report::digest(problem.digest());
-            Ok(Run { values, settings, directory, digest, end: problem.end() })
+            Ok(Run { values, settings, directory, digest: problem.digest(), end: problem.end() })
         })
         .collect()
 }
@@ -178,89 +209,11 @@ fn directory(number: usize, over: &[(String, Vec<String>)], values: &[String]) -
     name
 }
 
-/// The report of a finished run of this job with these settings.
+/// The report of a finished run of this job with these settings; each has the last row of its history.
 fn finished(path: &Path, run: &Run) -> Option<Report> {
     let report: Report = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    (report.digest == run.digest && report.end == run.end).then_some(report)
-}
-
-/// Starts a run, from its latest state if it was interrupted. Returns its exit code, if it has one.
-fn start(arguments: &Arguments, run: &Run) -> Result<Option<i32>, Failure> {
-    let go = |how: &[&str]| {
-        let program = std::env::current_exe()?;
-        let mut words = arguments.launch.split_whitespace();
-        let mut command = match words.next() {
-            Some(first) => {
-                let mut command = Command::new(first);
-                command.args(words).arg(program);
-                command
-            }
-            None => Command::new(program),
-        };
-        command.arg("run").arg(&arguments.job).args(how);
-        command.args(run.settings.iter().flat_map(|setting| ["--set", setting]));
-        command.arg("--out").arg(&run.directory);
-        if let Some(threads) = arguments.threads {
-            command.args(["--threads", &threads.to_string()]);
-        }
-        Ok(command.arg("--quiet").status()?.code())
-    };
-    let failed = |error: std::io::Error| Failure::Run(format!("cannot start a run: {error}"));
-    let is_begun = std::fs::read_dir(&run.directory).is_ok_and(|mut entries| entries.next().is_some());
-    if is_begun {
-        // Nothing that it could go on from, or something of another job: anew.
-        match go(&["--restart", "latest"]).map_err(failed)? {
-            Some(2) => go(&["--overwrite"]).map_err(failed),
-            code => Ok(code),
-        }
-    } else {
-        go(&[]).map_err(failed)
-    }
-}
-
-/// Writes the table of all runs so far: settings, status, and the last row of each history.
-fn write_table(
-    path: &Path,
-    over: &[(String, Vec<String>)],
-    rows: &[(&Run, &str, Option<Report>)],
-) -> Result<(), Failure> {
-    let mut columns: Vec<(String, String)> = Vec::new();
-    for (name, (_, unit)) in rows.iter().filter_map(|(.., report)| report.as_ref()).flat_map(|r| &r.history) {
-        if !columns.iter().any(|(other, _)| other == name) {
-            columns.push((name.clone(), unit.clone()));
-        }
-    }
-    columns.sort();
-    let quoted = |text: &str| match text.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    };
-    let mut header: Vec<String> = over.iter().map(|(key, _)| quoted(key)).collect();
-    header.extend(["directory", "status", "steps", "wall_seconds [s]"].map(String::from));
-    header.extend(columns.iter().map(|(name, unit)| match unit.is_empty() {
-        true => name.clone(),
-        false => format!("{name} [{unit}]"),
-    }));
-    let mut text = header.join(",") + "\n";
-    for (run, status, report) in rows {
-        let mut cells: Vec<String> = run.values.iter().map(|value| quoted(value)).collect();
-        let directory = run.directory.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        cells.extend([quoted(&directory), (*status).to_owned()]);
-        cells.push(report.as_ref().map_or_else(String::new, |report| report.steps.to_string()));
-        cells.push(report.as_ref().map_or_else(String::new, |report| format!("{:.1}", report.wall_seconds)));
-        cells.extend(columns.iter().map(|(name, _)| {
-            let value = report.as_ref().and_then(|report| report.history.get(name)?.0);
-            value.map_or_else(String::new, |value| format!("{value:?}"))
-        }));
-        text.push_str(&(cells.join(",") + "\n"));
-    }
-    let write = || {
-        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        write_whole(path, text.as_bytes())
-    };
-    write().map_err(|error| {
-        Failure::Run(format!("{}: cannot write: {error}", excerpt(&path.display().to_string(), 200)))
-    })
+    let is_of_run = report.digest == report::digest(run.digest) && report.end == run.end;
+    (is_of_run && !report.history.is_empty()).then_some(report)
 }
 
 #[cfg(test)]
