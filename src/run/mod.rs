@@ -41,7 +41,7 @@ use self::room::Room;
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::log::history::Kept;
-use crate::io::snapshot::Outputs;
+use crate::io::snapshot::{Outputs, directory};
 use crate::job::Problem;
 use crate::setup::{self, stages};
 use crate::solver::{Clock, Requests, Solver, StepReport};
@@ -155,6 +155,7 @@ impl<'a, const D: usize> Run<'a, D> {
             // That of an earlier end would be taken for this one's.
             let _ = std::fs::remove_file(report::path(&problem.output.directory, &problem.name));
             let _ = std::fs::remove_file(ending::path(&problem.output.directory, &problem.name));
+            directory::remove_unfinished(&problem.output.directory, &problem.name);
         }
         let cores = Cores::survey(comm);
         recorder.message(&format!(
@@ -216,6 +217,17 @@ impl<'a, const D: usize> Run<'a, D> {
         self.is_settled() || self.solver.clock.time - begun >= duration
     }
 
+    /// Not collective. When the stage or the run ends or an output is due, s, after the present time: bounds steps without material,
+    /// which nothing else does.
+    fn next_event(&self) -> f64 {
+        let (time, physics) = (self.solver.clock.time, &self.solver.physics);
+        let begun = physics.stage_starts.last().copied().unwrap_or(0.0);
+        let stage = begun + self.problem.stages[physics.stage()].duration;
+        let next = stage.min(self.problem.time.end).min(self.schedule.next_output(time));
+        // The sum may be rounded down.
+        next.max(time.next_up())
+    }
+
     /// Not collective. Whether the run has reached its end; the same on all ranks.
     fn is_over(&self) -> bool {
         let is_last = self.solver.physics.stage() + 1 == self.problem.stages.len();
@@ -243,16 +255,19 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Not collective. Says how the way to equilibrium has ended.
     fn tell_equilibrium(&mut self) {
-        if self.solver.physics.equilibrium.is_none() {
-            return;
-        }
+        let Some(asked) = self.solver.physics.equilibrium else { return };
         let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
         let time = quantity(time, "s");
         if self.is_settled() {
             self.recorder.message(&format!("equilibrium at t = {time} (step {step}): {way}"));
         } else {
             let what = if self.problem.stages.len() > 1 { "of the stage" } else { "of the run" };
-            self.recorder.warning(&format!("no equilibrium by the end {what}, t = {time}: {way}"));
+            let [speed, acceleration] = [(asked.speed, "m/s"), (asked.acceleration, "m/s²")]
+                .map(|(bound, unit)| quantity(bound, unit));
+            self.recorder.warning(&format!(
+                "no equilibrium by the end {what}, t = {time}: {way}; expected at most {speed} and {acceleration}. Where stops go on and these do not \
+                 fall, particles that cross cells keep them up: expect no less, or use finer cells"
+            ));
         }
     }
 
@@ -287,7 +302,8 @@ impl<'a, const D: usize> Run<'a, D> {
 
     fn step(&mut self, requests: Requests) -> Result<StepReport, RunError> {
         let clock = self.solver.clock;
-        let report = self.solver.step(f64::INFINITY, requests);
+        let end = if clock.bound.is_finite() { f64::INFINITY } else { self.next_event() };
+        let report = self.solver.step(end, requests);
         report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })
     }
 
@@ -324,6 +340,7 @@ impl<'a, const D: usize> Run<'a, D> {
         }
         let row = self.recorder.last_row() != Some(step);
         self.recorder.write(self.comm, &mut self.solver, row, true)?;
+        self.recorder.recall_row(self.comm, &mut self.solver)?;
         self.recorder.finish(self.comm, &self.solver);
         self.tell_equilibrium();
         self.tell_missed_stages();

@@ -13,6 +13,7 @@ use crate::io::log::progress::Progress;
 use crate::io::log::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
 use crate::probe;
+use crate::probe::line::Sample;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::bookings::FACE_SUMS;
 use crate::solver::state::phases::Phase;
@@ -29,7 +30,7 @@ pub struct Recorder<'a, const D: usize> {
     progress: Progress,
     /// Step of the last row of the history; the same on all ranks.
     last_row: Option<u64>,
-    /// Values of that row, on rank 0, if this process has written it.
+    /// Values of the row of the present step, on rank 0, as far as they are known.
     last_values: Vec<f64>,
     /// What is known for the report of the run.
     report: Report,
@@ -72,7 +73,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let lines = if comm.rank() == 0 { lines::open(problem, kept) } else { Ok(Vec::new()) };
         let (lines, gaps_of_lines) = comm.agree(lines)?.into_iter().unzip();
         let (history, gaps): (Option<History>, _) = history.unzip();
-        let last = history.as_ref().and_then(History::last_step);
+        let last = history.as_ref().and_then(History::last).map(|(step, _)| step);
+        let of_state = history.as_ref().and_then(History::last).filter(|(last, _)| *last == step);
+        let last_values = of_state.map_or_else(Vec::new, |(_, values)| values.to_vec());
         let last_row = match kept {
             // Even if it is missing: files must not depend on damage to the history.
             Some(Kept { to, expected }) if expected == Some(to) => expected,
@@ -85,7 +88,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             lines,
             progress: Progress::new(options.speaks, time, problem.time.end, options.warnings.len()),
             last_row,
-            last_values: Vec::new(),
+            last_values,
             report: Report {
                 ranks: comm.size(),
                 threads: options.threads,
@@ -198,6 +201,16 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok((grid, solver.particle_totals()))
     }
 
+    /// Collective. Makes the values of the last row known for the report, also where an earlier part of the run has written it. If
+    /// its file has lost it, they are measured anew, and means over the time since an earlier row are 0.
+    pub fn recall_row(&mut self, comm: &Comm, solver: &mut Solver<D>) -> Result<(), RunError> {
+        if comm.any(self.history.is_some() && self.last_values.is_empty()) {
+            let (grid, particles) = self.totals(comm, solver)?;
+            self.last_values = self.measure(comm, solver, &particles, &grid).0;
+        }
+        Ok(())
+    }
+
     /// Collective. Writes a row of the history.
     fn row(
         &mut self,
@@ -206,6 +219,31 @@ impl<'a, const D: usize> Recorder<'a, D> {
         particles: &ParticleTotals,
         grid: &GridTotals,
     ) -> Result<(), FileError> {
+        let clock = solver.clock;
+        let (values, samples) = self.measure(comm, solver, particles, grid);
+        let mut written = Ok(());
+        if let Some(history) = &mut self.history {
+            written = history
+                .row(clock.step, &values)
+                .and_then(|()| lines::write(&mut self.lines, self.problem, clock, &samples));
+        }
+        self.last_values = values;
+        // Where the row of this step has been written already, there is nothing to forget.
+        solver.forget_reactions();
+        solver.load_sums.forget(3, clock.time);
+        solver.body_sums.forget(3, clock.time);
+        solver.face_sums.forget(FACE_SUMS, clock.time);
+        written
+    }
+
+    /// Collective. The values of a row of the history, on rank 0, and what the points of lines have.
+    fn measure(
+        &self,
+        comm: &Comm,
+        solver: &mut Solver<D>,
+        particles: &ParticleTotals,
+        grid: &GridTotals,
+    ) -> (Vec<f64>, Vec<Vec<Sample<D>>>) {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let loads = solver.load_totals();
@@ -219,46 +257,36 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
         let shift_work = solver.shift_work();
-        let mut written = Ok(());
-        if let Some(history) = &mut self.history {
-            let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
-            if let Some(ledger) = &ledger {
-                values.extend(history::ledger_values(ledger));
-            }
-            values.extend(shift_work);
-            if self.problem.has_equilibrium() {
-                values.extend(history::relaxation_values(&solver.relaxation));
-            }
-            if self.problem.stages.len() > 1 {
-                values.push((solver.physics.stage() + 1) as f64);
-            }
-            loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
-            for ((_, two_sides), totals) in self.problem.body_contacts.names.iter().zip(&bodies) {
-                values.extend(history::force_and_work::<D>(totals, *two_sides));
-            }
-            let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
-            let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
-            for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {
-                values.extend(probe::values(quantities, readings, &self.problem.origin));
-            }
-            values.extend(passed);
-            faces.iter().for_each(|force| values.extend(&force[..D]));
-            let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
-            for ((collider, state), reaction) in all {
-                values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
-            }
-            written = history
-                .row(clock.step, &values)
-                .and_then(|()| lines::write(&mut self.lines, self.problem, clock, &samples));
-            self.last_values = values;
-            self.report.particles = particles.count;
+        if self.history.is_none() {
+            return (Vec::new(), samples);
         }
-        // Where the row of this step has been written already, there is nothing to forget.
-        solver.forget_reactions();
-        solver.load_sums.forget(3, clock.time);
-        solver.body_sums.forget(3, clock.time);
-        solver.face_sums.forget(FACE_SUMS, clock.time);
-        written
+        let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
+        if let Some(ledger) = &ledger {
+            values.extend(history::ledger_values(ledger));
+        }
+        values.extend(shift_work);
+        if self.problem.has_equilibrium() {
+            values.extend(history::relaxation_values(&solver.relaxation));
+        }
+        if self.problem.stages.len() > 1 {
+            values.push((solver.physics.stage() + 1) as f64);
+        }
+        loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
+        for ((_, two_sides), totals) in self.problem.body_contacts.names.iter().zip(&bodies) {
+            values.extend(history::force_and_work::<D>(totals, *two_sides));
+        }
+        let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
+        let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
+        for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {
+            values.extend(probe::values(quantities, readings, &self.problem.origin));
+        }
+        values.extend(passed);
+        faces.iter().for_each(|force| values.extend(&force[..D]));
+        let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
+        for ((collider, state), reaction) in all {
+            values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
+        }
+        (values, samples)
     }
 
     /// Collective. Speed, traffic and memory since the last record.
@@ -328,9 +356,16 @@ impl<'a, const D: usize> Recorder<'a, D> {
             steps: solver.clock.step,
             time: solver.clock.time,
             wall_seconds: self.began.elapsed().as_secs_f64(),
-            particles: self.report.particles,
+            particles: self.particles(),
             warnings: self.report.warnings.len(),
         }
+    }
+
+    /// Particles in the last row; known on rank 0.
+    fn particles(&self) -> u64 {
+        let columns = history::columns(self.problem);
+        let count = columns.iter().zip(&self.last_values).find(|((name, _), _)| name == "particles");
+        count.map_or(0, |(_, count)| *count as u64)
     }
 
     /// Not collective. Writes the report of the run, on rank 0. All results are on disk by now, so a failure is only a warning.
@@ -353,6 +388,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             steps: solver.clock.step,
             time: solver.clock.time,
             wall_seconds: self.began.elapsed().as_secs_f64(),
+            particles: self.particles(),
             history: columns.map(entry).collect(),
             stages: stages.map(|(stage, start)| (stage.name.clone(), *start)).collect(),
             column_collapse: summary.collapse.as_ref().map(Into::into),

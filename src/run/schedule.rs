@@ -33,13 +33,18 @@ impl Schedule {
     /// Whether an output has become due since this was asked last.
     pub fn output_due(&mut self, time: f64) -> bool {
         let before = std::mem::replace(&mut self.looked_until, time);
-        self.output_every.is_some_and(|every| {
-            // The number of the next one after the time of the last look; a product decides, not a rounded quotient.
-            let mut next = (before / every).floor();
-            while next * every <= before {
+        time >= self.next_output(before)
+    }
+
+    /// When the next output after this time is due, s; infinite if none ever is.
+    pub fn next_output(&self, time: f64) -> f64 {
+        self.output_every.map_or(f64::INFINITY, |every| {
+            // A product decides, not a rounded quotient.
+            let mut next = (time / every).floor();
+            while next * every <= time {
                 next += 1.0;
             }
-            time >= next * every
+            next * every
         })
     }
 

@@ -112,14 +112,19 @@ impl<const D: usize> Solver<D> {
         self.clock.bound = self.comm.min_f64(self.local_bound());
     }
 
-    /// Collective. One time step, not beyond the time `end`. Requests of any rank are granted to all.
+    /// Collective. One time step, not beyond the time `end`, which has to be finite where no material bounds the step. Requests of any
+    /// rank are granted to all.
     ///
     /// # Errors
-    /// On all ranks when any rank failed, with that rank and its reason.
+    /// On all ranks when any rank failed, with that rank and its reason, or the step would not end at a later, finite time.
     pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
         let to = if dt < left { self.clock.time + dt } else { end };
+        if !to.is_finite() || to <= self.clock.time {
+            // All ranks find the same.
+            return self.comm.agree(Err(StepError::Time { dt, to, from: self.clock.time }));
+        }
         self.comm.begin_step(self.clock.step);
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();

@@ -33,6 +33,10 @@ impl<const D: usize> Solver<D> {
         let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
         self.comm.sum_u64(&mut added);
         self.ledger.next_root = self.next_root() + added[0];
+        if self.clock.bound == f64::INFINITY {
+            // A step without material says nothing about the next one.
+            self.clock.dt = 0.0;
+        }
         let before = std::mem::replace(&mut self.physics, physics);
         self.physics.deform_colliders(self.clock.time);
         for (index, collider) in self.physics.colliders.iter().enumerate() {

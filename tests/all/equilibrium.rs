@@ -122,6 +122,36 @@ fn relaxes(scaling: &str) {
     });
 }
 
+/// A beam under a pressure that follows it, which is stopped every few steps once it is near its equilibrium: steps stay as long as the material
+/// allows, the run comes to its end, and says what is left.
+#[test]
+fn stops_do_not_shorten_the_steps() {
+    let job = "version = 1\ndimension = 2\n[domain]\nsize = [6.375, 5.625]\nroot_edge = 0.375\n[boundaries]\nx_min = { kind = 'sticky' }\n\
+               [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'fixed_corotated'\nyoung = 5e6\npoisson = 0.3\n\
+               [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = { kind = 'box', min = [0, 4.125], max = [6, 4.875] }\n\
+               [[loads]]\nname = 'w'\nkind = 'pressure'\npressure = 4000\nfacing = [0, 1]\nfollow = true\n\
+               shape = { kind = 'box', min = [-1, 4.865], max = [7, 4.885] }\n\
+               [equilibrium]\nspeed = 1e-4\nacceleration = 5.333e-3\n[time]\nend = 4.5\ncfl = 0.5\n\
+               [output]\npicture = false\n[history]\nevery_steps = 100\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("beam.toml");
+    std::fs::write(&path, job).expect("job");
+    let output = run(directory.path(), 1, 1, &path, &[]).output().expect("starts");
+    let words =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    let history = History::read(directory.path(), "beam");
+    let lengths = &history.column("dt")[1..];
+    let (least, most) =
+        lengths.iter().fold((f64::MAX, 0.0_f64), |(least, most), &dt| (least.min(dt), most.max(dt)));
+    println!("{} stops, {} s, steps of {least} to {most} s", history.last("stops"), history.last("time"));
+    assert!(
+        output.status.success() && words.contains("no equilibrium by the end of the run, t = 4.5"),
+        "{words}"
+    );
+    assert!(words.contains("expected at most 100 µm/s"), "{words}");
+    assert!(history.last("stops") > 30.0 && least > 0.3 * most, "steps of {least} to {most} s");
+}
+
 #[test]
 fn a_run_that_is_not_settled_at_its_end_says_so() {
     let rest =

@@ -136,3 +136,53 @@ fn gravity_of_a_stage_acts_from_its_start() {
     println!("{:?}", files.keys());
     assert!(outputs >= 3, "an output at the start, at the end of the first stage and at the end");
 }
+
+/// Before the first pour there is no material, and only a stone that falls: the stage ends at its end, outputs come in time, the stone
+/// falls as it does beside material, and what is poured falls as it would from t = 0.
+#[test]
+fn a_stage_without_material_ends_at_its_end() {
+    let stone = "[[colliders]]\nname = 'stone'\nshape = { kind = 'circle', centre = [1.25, 0.7], radius = 0.05 }\n\
+                 motion = { kind = 'free', density = 2500 }\n";
+    let equilibrium = ", equilibrium = { speed = 1e-3, acceleration = 0.1 }";
+    for (stone, wait) in [("", ""), (stone, ""), ("", equilibrium)] {
+        let job = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -10]\n\
+             stages = [{{ name = 'empty', duration = 0.05{wait} }}, {{ name = 'pour' }}]\n[domain]\nsize = [1.6, 0.8]\nroot_edge = 0.4\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+             [[bodies]]\nstage = 'pour'\nname = 'b'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0.2, 0.4], max = [0.5, 0.6] }}\n\
+             [[probes]]\nname = 'b'\nquantities = ['centre']\n{stone}\
+             [time]\nend = 0.2\n[output]\npicture = false\nevery = 0.02\n[history]\nevery_steps = 1\n\
+             [checkpoint]\nevery_steps = 1\nkeep = 999\n"
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("pour.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "pour");
+        let (times, stages, masses) =
+            (history.column("time"), history.column("stage"), history.column("mass"));
+        let poured = stages.iter().position(|&stage| stage > 1.0).expect("a second stage");
+        let begins = if wait.is_empty() { 0.05 } else { times[poured - 1] };
+        assert!((times[poured - 1] - begins).abs() < 1e-15 && begins <= 0.05 + 1e-15, "{times:?}");
+        assert!(masses[poured - 1] == 0.0 && (masses[poured] / 60.0 - 1.0).abs() < 1e-12, "{masses:?}");
+        assert!(times.iter().all(|time| time.is_finite()) && (0.2..0.21).contains(&history.last("time")));
+        let fallen = 0.5 - history.last("centre_b_y");
+        let own = history.last("time") - begins;
+        println!("{} steps, fallen {fallen} m in {own} s", history.last("step"));
+        assert!((fallen / (0.5 * 10.0 * own * own) - 1.0).abs() < 0.05, "{fallen} m in {own} s");
+        if !stone.is_empty() {
+            let (time, y) = (times[poured - 1], history.column("position_stone_y")[poured - 1]);
+            assert!((0.7 - y - 5.0 * time * time).abs() < 1e-12, "{y} m at {time} s");
+        }
+        if wait.is_empty() {
+            let outputs = contents(&directory.path().join("out/pour"));
+            let count = outputs.keys().filter(|name| name.ends_with(".tree.hdf")).count();
+            assert!(count >= 11, "{count} outputs");
+        }
+        // From the middle of the empty stage the same comes out.
+        let reference = Outcome::read(directory.path(), "pour");
+        let from = "out/pour/pour.checkpoint_000000001.hdf";
+        succeed(&mut run(directory.path(), 2, 1, &path, &["--quiet", "--restart", from]));
+        reference.assert_same(&Outcome::read(directory.path(), "pour"), "restart from the empty stage");
+    }
+}

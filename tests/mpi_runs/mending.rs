@@ -170,3 +170,51 @@ fn flipped(directory: &Path, whole: &[u8], group: &str) -> Vec<u8> {
     }
     panic!("no changed bit was noticed")
 }
+
+/// What a killed run leaves at its very end: `--restart latest` gives the report of an uninterrupted run, nothing that was half written stays, and
+/// a good report stays good. Where the history is lost as well, the report has the state.
+#[test]
+fn a_run_that_is_over_has_its_report_again() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let again = |ranks: usize| {
+        let arguments = ["--quiet", "--restart", "latest", "--end", "0.02"];
+        succeed(&mut run(home.path(), ranks, 1, &job(NAME), &arguments));
+    };
+    succeed(&mut run(home.path(), 1, 1, &job(NAME), &["--quiet", "--end", "0.02"]));
+    let report = file(home.path(), NAME, ".report.json");
+    let read = || -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(&report).expect("report")).expect("JSON")
+    };
+    let before = read();
+    let steady = ["history", "particles", "steps", "time", "digest", "outputs", "picture", "column_collapse"];
+    assert!(
+        before["particles"].as_u64() > Some(0) && before["history"].as_object().is_some_and(|h| h.len() > 20)
+    );
+    for (ranks, is_lost) in [(1, false), (1, true), (2, true)] {
+        if is_lost {
+            std::fs::remove_file(&report).expect("removed");
+        }
+        for ending in
+            [".png.part", ".report.json.part", ".checkpoint_000000007.hdf.part", "_000001.tree.hdf.part"]
+        {
+            std::fs::write(file(home.path(), NAME, ending), "half").expect("written");
+        }
+        again(ranks);
+        let after = read();
+        steady.iter().for_each(|key| assert_eq!(after[key], before[key], "{key} on {ranks} ranks"));
+        let left = std::fs::read_dir(report.parent().expect("directory")).expect("listed").flatten();
+        let unfinished: Vec<_> = left
+            .map(|entry| entry.file_name())
+            .filter(|name| name.to_string_lossy().ends_with(".part"))
+            .collect();
+        assert_eq!(unfinished, Vec::<std::ffi::OsString>::new());
+    }
+    std::fs::remove_file(file(home.path(), NAME, ".history.csv")).expect("removed");
+    again(1);
+    let after = read();
+    assert_eq!(after["particles"], before["particles"]);
+    for column in ["time", "kinetic_energy", "elastic_energy", "momentum_y", "mass"] {
+        assert_eq!(after["history"][column], before["history"][column], "{column}");
+    }
+}

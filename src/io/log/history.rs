@@ -21,7 +21,8 @@ pub struct Column<'a> {
 pub struct History {
     lines: Lines,
     columns: usize,
-    last: Option<u64>,
+    /// Step and values of the last row.
+    last: Option<(u64, Vec<f64>)>,
 }
 
 /// Rows of a file that a run goes on with.
@@ -74,7 +75,8 @@ impl History {
         }
         let history = match lines {
             Some(lines) if seen.has_header => {
-                Self { lines, columns: columns.len(), last: seen.row.map(|(step, _)| step) }
+                let last = seen.row.map(|(step, _)| (step, std::mem::take(&mut seen.values)));
+                Self { lines, columns: columns.len(), last }
             }
             _ => {
                 seen = Seen { rows, ..Seen::default() };
@@ -87,9 +89,9 @@ impl History {
         Ok((history, seen.gaps))
     }
 
-    /// Step of the last row.
-    pub fn last_step(&self) -> Option<u64> {
-        self.last
+    /// Step and values of the last row.
+    pub fn last(&self) -> Option<(u64, &[f64])> {
+        self.last.as_ref().map(|(step, values)| (*step, values.as_slice()))
     }
 
     /// Not collective. Appends the row of a step and hands it to the operating system.
@@ -103,7 +105,7 @@ impl History {
             row.push_str(&format!(",{value:?}"));
         }
         row.push('\n');
-        self.last = Some(step);
+        self.last = Some((step, values.to_vec()));
         self.lines.append(&row)
     }
 
@@ -124,6 +126,8 @@ struct Seen {
     rows: usize,
     /// Step and time of the last good row.
     row: Option<(u64, f64)>,
+    /// Its values.
+    values: Vec<f64>,
     /// Good rows of that step.
     of_step: usize,
     gaps: Vec<Gap>,
@@ -146,14 +150,15 @@ impl Seen {
             |step: u64| self.row.is_none_or(|(before, _)| step > before || step == before && of_step < rows);
         match row(line, columns) {
             Some((step, _)) if step > to => Verdict::Stop,
-            Some((step, time)) if is_next(step) => {
+            Some((step, values)) if is_next(step) => {
+                let time = values[0];
                 let is_same = self.row.is_some_and(|(before, _)| before == step);
                 let is_short = !is_same && self.row.is_some() && of_step < rows;
                 self.of_step = if is_same { of_step + 1 } else { 1 };
                 if std::mem::take(&mut self.is_damaged) | is_short {
                     self.gaps.push(Gap { after: self.row.map(|(_, time)| time), before: Some(time) });
                 }
-                self.row = Some((step, time));
+                (self.row, self.values) = (Some((step, time)), values);
                 Verdict::Keep
             }
             _ => {
@@ -164,12 +169,12 @@ impl Seen {
     }
 }
 
-/// Step and time of a whole row.
-fn row(line: &[u8], columns: usize) -> Option<(u64, f64)> {
+/// Step and values of a whole row.
+fn row(line: &[u8], columns: usize) -> Option<(u64, Vec<f64>)> {
     let mut cells = std::str::from_utf8(line).ok()?.split(',');
     let step = cells.next()?.parse().ok()?;
     let values: Vec<f64> = cells.map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
-    (values.len() == columns).then(|| (step, values[0]))
+    (values.len() == columns).then_some((step, values))
 }
 
 fn header(columns: &[Column<'_>]) -> String {

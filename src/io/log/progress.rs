@@ -119,7 +119,7 @@ impl Progress {
 
     fn show(&mut self, step: u64, time: f64, dt: f64) {
         let done = self.done(time);
-        let left = remaining(self.began.elapsed(), done);
+        let left = remaining(self.began.elapsed(), self.done(self.start_time), done);
         self.measure(step);
         let text = self.text(step, time, dt, done, left);
         match &mut self.display {
@@ -154,9 +154,9 @@ impl Progress {
         }
     }
 
+    /// Share of the whole run, also where an earlier part of it has done some.
     fn done(&self, time: f64) -> f64 {
-        let whole = self.end_time - self.start_time;
-        if whole > 0.0 { ((time - self.start_time) / whole).clamp(0.0, 1.0) } else { 1.0 }
+        if self.end_time > 0.0 { (time / self.end_time).clamp(0.0, 1.0) } else { 1.0 }
     }
 
     fn text(&self, step: u64, time: f64, dt: f64, done: f64, left: Option<Duration>) -> String {
@@ -287,10 +287,11 @@ fn compact(value: f64) -> String {
     }
 }
 
-/// Wall time that is left when the part `done` took `elapsed`.
-fn remaining(elapsed: Duration, done: f64) -> Option<Duration> {
-    // Too early for an estimate in the first thousandth.
-    (done > 1e-3).then(|| elapsed.mul_f64((1.0 - done) / done))
+/// Wall time that is left when the part from `before` to `done` took `elapsed`.
+fn remaining(elapsed: Duration, before: f64, done: f64) -> Option<Duration> {
+    let own = done - before;
+    // Too early for an estimate in the first thousandth of this part.
+    (own > 1e-3 * (1.0 - before)).then(|| elapsed.mul_f64((1.0 - done) / own))
 }
 
 /// `h:mm:ss`; from a hundred hours on, days and hours.
@@ -308,13 +309,24 @@ mod tests {
 
     #[test]
     fn one_line_has_it_all() {
-        let mut progress = Progress::new(false, 1.0, 3.0, 0);
+        let mut progress = Progress::new(false, 0.0, 2.0, 0);
         progress.known.words = "1 particles".into();
-        let done = progress.done(1.5);
-        let left = remaining(Duration::from_secs(60), done);
-        let text = progress.text(12, 1.5, 1e-4, done, left);
-        assert_eq!(text, " 25.0 %  step 12  t = 1.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
-        assert_eq!(remaining(Duration::from_secs(1), 0.0), None);
+        let done = progress.done(0.5);
+        let left = remaining(Duration::from_secs(60), 0.0, done);
+        let text = progress.text(12, 0.5, 1e-4, done, left);
+        assert_eq!(text, " 25.0 %  step 12  t = 0.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
+        assert_eq!(remaining(Duration::from_secs(1), 0.0, 0.0), None);
+    }
+
+    /// A run that goes on at half of its time says how far the whole run is, and estimates the rest by its own speed.
+    #[test]
+    fn a_part_of_a_run_counts_from_its_start() {
+        let progress = Progress::new(false, 1.0, 2.0, 0);
+        assert_eq!(progress.done(1.0), 0.5);
+        assert_eq!(progress.done(1.25), 0.625);
+        let left = remaining(Duration::from_secs(60), progress.done(1.0), progress.done(1.25));
+        assert_eq!(left, Some(Duration::from_secs(180)));
+        assert_eq!(remaining(Duration::from_secs(60), 0.5, 0.5), None);
     }
 
     #[test]

@@ -141,6 +141,30 @@ pub fn remove_old_checkpoints(
     })
 }
 
+/// Not collective. Removes what earlier parts of the run `name` were writing when something killed them: files under temporary names.
+/// They are in nobody's way, so that one that cannot be removed stays.
+pub fn remove_unfinished(directory: &Path, name: &str) {
+    let unfinished = files(directory).unwrap_or_default().into_iter();
+    for path in unfinished.filter(|path| is_unfinished(file_name(path), name)) {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// What files of a run have behind its name, but for outputs, trees, checkpoints and maps.
+const OTHERS: [&str; 6] =
+    [".hdf.series", ".tree.hdf.series", ".report.json", ".ended.json", ".png", ".report.html"];
+
+/// Whether a file is one that the run `name` has not finished writing, and not one of another run whose name begins alike.
+fn is_unfinished(file: &str, name: &str) -> bool {
+    let rest = file.strip_suffix(".part").and_then(|file| file.strip_prefix(name));
+    let Some(rest) = rest else { return false };
+    let stem = stem(rest).map(|stem| stem.strip_suffix(".tree").unwrap_or(stem));
+    let number = stem.and_then(|stem| stem.strip_prefix(CHECKPOINT).or_else(|| stem.strip_prefix('_')));
+    number.is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
+        || OTHERS.contains(&rest)
+        || rest.starts_with(".map_") && rest.ends_with(".asc")
+}
+
 /// What a file of a run is, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
@@ -197,4 +221,30 @@ fn files(directory: &Path) -> Result<Vec<PathBuf>, FileError> {
         listed.map_err(|source| FileError::System { path: directory.into(), action: "list", source })?;
     paths.sort();
     Ok(paths)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_run_was_writing_goes_and_all_else_stays() {
+        let gone =
+            ["a_000001.hdf", "a_000001.tree.hdf", "a.checkpoint_000000012.hdf", "a.hdf.series", "a.png"];
+        let gone = gone.map(|name| format!("{name}.part"));
+        let stays = [
+            "a_000001.hdf",
+            "a.history.csv",
+            "a_b_000001.hdf.part",
+            "a_b.png.part",
+            "ab.png.part",
+            "a.txt.part",
+        ];
+        let directory = tempfile::tempdir().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        gone.iter().map(String::as_str).chain(stays).for_each(|name| std::fs::write(path(name), "").unwrap());
+        remove_unfinished(directory.path(), "a");
+        assert!(gone.iter().all(|name| !path(name).exists()));
+        assert!(stays.iter().all(|name| path(name).exists()));
+    }
 }

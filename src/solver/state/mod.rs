@@ -59,6 +59,16 @@ pub enum StepError {
         /// The time step, s.
         dt: f64,
     },
+    /// The time after the step is not finite, or no later than that before it.
+    #[error("a step of {dt} s from t = {from} s would end at t = {to} s; expected a later, finite time")]
+    Time {
+        /// The time step, s.
+        dt: f64,
+        /// Time at its start, s.
+        from: f64,
+        /// Time at its end, s.
+        to: f64,
+    },
 }
 
 /// The state of a run between two steps.

@@ -197,6 +197,19 @@ impl<const D: usize> Solver<D> {
         self.contacts.sums.forget(SUMS, self.clock.time);
     }
 
+    /// Not collective. Bound on a step without material, in which free colliders move alone, s: none goes further than the Courant
+    /// number's part of a cell of a root octant, also from rest. The same on all ranks.
+    pub(super) fn free_bound(&self) -> f64 {
+        let (physics, extent, time) = (&self.physics, self.grid.plan.extent(), self.clock.time);
+        let way = physics.control.cfl * physics.root_edge / f64::from(BLOCK as u32);
+        let gravity = physics.gravity.at(time).iter().map(|g| g * g).sum::<f64>().sqrt();
+        let free = physics.colliders.iter().zip(&self.contacts.states);
+        let free = free.filter(|(collider, _)| collider.is_present() && collider.free().is_some());
+        free.fold(f64::INFINITY, |bound, (collider, state)| {
+            bound.min(way / collider.greatest_speed(state, &extent, time)).min((way / gravity).sqrt())
+        })
+    }
+
     /// Bound on the next step from the colliders: none may cross more than the Courant number's part of a cell of a
     /// leaf with particles, and one that is away may use up its way there as well, s.
     pub(super) fn collider_bound(&self) -> f64 {

@@ -8,15 +8,23 @@ use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::relaxation::{FROM_REST, RelaxPhase};
 
+/// Least length of a step on the way to equilibrium, as a share of what the material allows. A stop shortens the step, and growth makes up for it in
+/// four steps: where stops follow each other faster, as those of noise do that no transfer keeps, lengths would fall without end. That a step is
+/// shorter after a stop is of use: a stop comes one step late, and so does nothing to motions of whose period a few steps are half.
+const SHORTEST: f64 = 0.5;
+
 impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
     ///
     /// A step from rest is shorter: see [`FROM_REST`].
     pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
-        let mut dt = self.clock.bound.min(control.dt_max.unwrap_or(f64::INFINITY));
-        if self.clock.dt > 0.0 {
-            dt = dt.min(control.growth * self.clock.dt);
+        let bound = if self.clock.bound.is_finite() { self.clock.bound } else { self.free_bound() };
+        let mut dt = bound.min(control.dt_max.unwrap_or(f64::INFINITY));
+        // Where no material bounds the step, there is nothing that a longer one could disturb.
+        if self.clock.dt > 0.0 && self.clock.bound.is_finite() {
+            let least = if self.physics.equilibrium.is_some() { SHORTEST * bound } else { 0.0 };
+            dt = dt.min((control.growth * self.clock.dt).max(least));
         }
         if self.relaxation.phase == RelaxPhase::Stopped {
             dt *= FROM_REST;
