@@ -223,3 +223,44 @@ fn a_silo_discharges_at_a_constant_rate() {
     // The edge of the slot is as sharp as a cell, and the slot has five and a half of them.
     assert!((0.7..1.3).contains(&(mean / law)), "C = {}", mean / law);
 }
+
+/// An output shows the state and changes nothing that the history measures: with refinement, which looks at the nodes for it, rows at outputs have the
+/// forces on faces and of loads that they have without outputs, and without refinement.
+#[test]
+fn rows_at_outputs_have_the_forces_of_their_steps() {
+    let job = |every: f64, adaptivity: &str| {
+        format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [1, 1]\nroot_edge = 0.5\n\
+             [boundaries]\ny_min = {{ kind = 'sticky' }}\n[tree]\nbase_level = 1\n\
+             regions = [{{ level = 2, shape = {{ kind = 'box', min = [0.5, 0], max = [1, 0.5] }} }}]\n{adaptivity}\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'hencky'\nyoung = 1e5\npoisson = 0.3\n\
+             [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0.25, 0], max = [0.75, 0.3] }}\n\
+             [[loads]]\nname = 'grip'\nkind = 'velocity'\nx = 0.1\nshape = {{ kind = 'box', min = [0, 0.25], max = [1, 1] }}\n\
+             [[loads]]\nname = 'drag'\nkind = 'damping'\nrate = 1\n\
+             [time]\nend = 0.06\n[output]\nevery = {every}\npicture = false\n[history]\nevery_steps = 1\nface_forces = true\n"
+        )
+    };
+    let history = |job: String| {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("block.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        History::read(directory.path(), "block")
+    };
+    let refined = history(job(0.005, "[adaptivity]\n"));
+    for other in [history(job(1.0, "[adaptivity]\n")), history(job(0.005, ""))] {
+        for column in [
+            "time",
+            "force_x_min_x",
+            "force_y_min_x",
+            "force_y_min_y",
+            "load_grip_x",
+            "load_drag_y",
+            "work_grip",
+            "work_drag",
+        ] {
+            let [first, second] = [&refined, &other].map(|history| history.column(column));
+            assert!(first == second, "{column}: {first:?} against {second:?}");
+        }
+    }
+}

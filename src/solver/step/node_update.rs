@@ -19,7 +19,8 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours where colliders act on particles or bodies are in contact. `v_j = p_j / m_j + Δt g` on real nodes, then loads,
     /// ties of surface nodes, contact between bodies, the conditions of colliders in their order, and those of domain faces, which come last so that nothing is driven
     /// out of the domain. Returns impulse and
-    /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins.
+    /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins. With a `dt` of
+    /// 0 it shows the velocities between two steps: bodies and particles are not held, and nothing is booked.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
         dt: f64,
@@ -30,6 +31,7 @@ impl<const D: usize> Solver<D> {
             false => self.physics.gravity.at(self.clock.time + 0.5 * dt),
             true => [0.0; D],
         };
+        let is_step = dt > 0.0;
         let mut pushes = Vec::new();
         self.for_each_field(|solver, field| {
             let grid = &mut solver.grid;
@@ -41,27 +43,30 @@ impl<const D: usize> Solver<D> {
         let mut impulses = self.no_impulses();
         self.for_each_field(|solver, field| {
             solver.collide(rates, &mut impulses);
-            solver.apply_faces(dt);
-            // What particles have between two steps needs no holding back.
-            if dt > 0.0 && solver.has_contact_at_particles() {
+            solver.apply_faces(dt, is_step);
+            if is_step && solver.has_contact_at_particles() {
                 let of_field = solver.hold_particles(field, dt, rates, &mut impulses);
                 held = held.and(of_field);
             }
-            solver.book_loads(&pushes[field]);
+            if is_step {
+                solver.book_loads(&pushes[field]);
+            }
         });
-        self.note_motion();
+        if is_step {
+            self.note_motion();
+        }
         (impulses, held)
     }
 
     /// Not collective. Holds the nodes on faces of the domain to their conditions, and sums up the impulses on these if that is asked
-    /// for, from the nodes that this rank counts.
-    pub(super) fn apply_faces(&mut self, dt: f64) {
+    /// for and this is part of a step, from the nodes that this rank counts.
+    pub(super) fn apply_faces(&mut self, dt: f64, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
         let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
         let faces = Faces { contacts: faces, absorbing: Some(absorbing), origin: *origin, middle, dt };
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {
-            if sums.is_empty() {
+            if sums.is_empty() || !is_step {
                 return apply_faces(&mut grid.fields, plan, &faces, |_, _, _| ());
             }
             apply_faces(&mut grid.fields, plan, &faces, |face, node, impulse: [f64; D]| {

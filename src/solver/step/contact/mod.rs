@@ -85,7 +85,7 @@ impl<const D: usize> Solver<D> {
             self.grid.swap(&mut other);
             self.collide(rates, sums);
             // Faces that absorb waves have had their share of the step.
-            self.apply_faces(0.0);
+            self.apply_faces(0.0, true);
             self.grid.swap(&mut other);
         }
         self.grid.swap(&mut other);
