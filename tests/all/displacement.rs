@@ -198,3 +198,40 @@ fn restarts_do_not_invent_displacements() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output).contains("displacements"), "{}", text(&output));
 }
+
+/// Sand that a turning cylinder drags along is sheared beyond what rounding leaves of its least stretch: its strains stay finite, and that they are
+/// followed changes neither the run nor its end.
+#[test]
+fn strains_of_stirred_sand_end_no_run() {
+    let job = |fields: &str| {
+        format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [1, 0.5]\nroot_edge = 0.5\n\
+             [boundaries]\nleaving = 'clamp'\ny_min = {{ kind = 'sticky' }}\n[tree]\nbase_level = 2\n\
+             [[materials]]\nname = 'sand'\ndensity = 1600\nmodel = 'drucker_prager'\nyoung = 2e5\npoisson = 0.25\n\
+             friction_angle = 32\nmatch = 'plane_strain'\n\
+             [[bodies]]\nname = 'ground'\nmaterial = 'sand'\nshape = {{ kind = 'box', min = [0, 0], max = [1, 0.1875] }}\n\
+             [[colliders]]\nname = 'sill'\nacts_on = 'particles'\ncontact = {{ kind = 'sticky' }}\n\
+             shape = {{ kind = 'circle', centre = [0.45, 0.05], radius = 0.08 }}\n\
+             motion = {{ kind = 'steady', velocity = [0.3, 0], angular_velocity = 20 }}\n[numerics]\nf_bar = true\n\
+             [time]\nend = 0.8\n[output]\nevery = 0.2\npicture = false\nfields = [{fields}]\n"
+        )
+    };
+    let [with, without] = ["'strain', 'equivalent_strain', 'id'", "'id'"].map(|fields| {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("sand.toml");
+        std::fs::write(&path, job(fields)).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        directory
+    });
+    let mut greatest: f64 = 0.0;
+    for number in 0..=4 {
+        let strains = particles(with.path(), "sand", number, Some("strain"));
+        assert!(strains.iter().all(|strain| strain.is_finite()), "output {number}");
+        greatest = strains.iter().fold(greatest, |most, strain| most.max(strain.abs()));
+        let [own, other] =
+            [&with, &without].map(|directory| particles(directory.path(), "sand", number, None));
+        assert!(own == other, "output {number}: the particles are elsewhere");
+    }
+    println!("greatest strain {greatest}");
+    assert!(greatest > 9.0, "{greatest}");
+}

@@ -150,6 +150,21 @@ impl Values {
             other => other,
         }
     }
+
+    /// What follows from a finite state may be too great for a number. It is not a number then, which programs leave out of ranges of
+    /// colours, and no reason to end a run.
+    pub(crate) fn without_infinities(mut self) -> Self {
+        match &mut self {
+            Self::Real(values, _) => {
+                values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+            }
+            Self::Single(values, _) => {
+                values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f32::NAN);
+            }
+            Self::Id(_) | Self::Integer(_) => {}
+        }
+        self
+    }
 }
 
 /// Applies `append` to each particle.

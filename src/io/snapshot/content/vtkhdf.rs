@@ -9,7 +9,6 @@ use super::fields::{PointField, Values, mean, von_mises};
 use super::state::path;
 use crate::io::hdf5_file::{Element, FileError, Writer};
 use crate::io::snapshot::intact::checked::{Recorded, Rows};
-use crate::io::snapshot::intact::sane;
 use crate::io::snapshot::{Options, View};
 use crate::particle::chunk::Chunk;
 
@@ -116,8 +115,7 @@ pub(in crate::io::snapshot) fn write_particles<const D: usize>(
         }
         let values = chosen.values(view);
         let values = if options.single { values.into_single() } else { values };
-        file.agree(sane::finite_field(view, *chosen, &values).map_err(|reason| file.refuse(reason)))?;
-        field(recorded, &name, particles, &values)?;
+        field(recorded, &name, particles, &values.without_infinities())?;
         let names = match chosen {
             PointField::Material => Some(view.materials),
             PointField::Body => Some(view.bodies),

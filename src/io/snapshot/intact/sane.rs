@@ -4,7 +4,6 @@ use partition::{MAX_LEVEL, Octant};
 
 use crate::grid::leaf_geometry::position_key;
 use crate::io::snapshot::View;
-use crate::io::snapshot::content::fields::{PointField, Values};
 use crate::io::snapshot::content::state::{CARRIED, columns};
 use crate::io::snapshot::header::Header;
 use crate::particle::chunk::{TILE, Tag};
@@ -19,8 +18,13 @@ pub struct Limits {
     pub bodies: usize,
 }
 
-/// This rank's particles have finite numbers only; says which one has not.
+/// Time and this rank's particles have finite numbers only; says which one has not.
 pub(in crate::io::snapshot) fn finite<const D: usize>(view: &View<D>) -> Result<(), String> {
+    for (name, value) in [("time", view.time), ("last step", view.dt)] {
+        if !value.is_finite() {
+            return Err(format!("not written: the {name} is {value} s; expected a finite number"));
+        }
+    }
     for chunk in view.chunks {
         for p in 0..chunk.len() {
             let tile = chunk.tile_of(p);
@@ -38,31 +42,6 @@ pub(in crate::io::snapshot) fn finite<const D: usize>(view: &View<D>) -> Result<
         }
     }
     Ok(())
-}
-
-/// Values of a field that is to be written are finite; `width` for each particle.
-pub(in crate::io::snapshot) fn finite_field<const D: usize>(
-    view: &View<D>,
-    field: PointField,
-    values: &Values,
-) -> Result<(), String> {
-    let (at, width, value) = match values {
-        Values::Real(values, width) => {
-            let Some(at) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
-            (at, width, values[at])
-        }
-        Values::Single(values, width) => {
-            let Some(at) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
-            (at, width, f64::from(values[at]))
-        }
-        Values::Id(_) | Values::Integer(_) => return Ok(()),
-    };
-    let row = at / (*width).max(1);
-    let mut particles = view.chunks.iter().flat_map(|chunk| (0..chunk.len()).map(move |p| (chunk, p)));
-    match particles.nth(row) {
-        Some((chunk, p)) => Err(unstable(field.name(), chunk.ids()[p], value, &chunk.position(p))),
-        None => Ok(()),
-    }
 }
 
 fn unstable(name: &str, id: u64, value: f64, position: &[f64]) -> String {
