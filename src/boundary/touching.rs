@@ -11,9 +11,6 @@ use super::Contact;
 use super::collider::Collider;
 use super::motion::{Pose, Rate, length};
 
-/// Share of the depth under a surface by which a particle whose centre lies there is lifted in a step.
-const LIFT: f64 = 0.02;
-
 /// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces hold it.
 const HELD: f64 = 0.01;
 
@@ -67,7 +64,8 @@ impl<const D: usize> Touching<D> {
         if gap > reach(&normal, &surface, touching) {
             return None;
         }
-        let least = if distance < 0.0 { -LIFT * distance / dt } else { -gap.max(0.0) / dt };
+        // Who is closer already, or inside, does not come closer. To be lifted out would give energy to it.
+        let least = -gap.max(0.0) / dt;
         let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
         let (law, impulse) = (collider.contact, [0.0; D]);
         Some(Self { collider: number, normal, arm, surface, least, held, law, compliance: 0.0, impulse })

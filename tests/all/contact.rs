@@ -386,3 +386,30 @@ fn momentum_balances_and_ranks_and_restarts_change_no_bit() {
         });
     }
 }
+
+/// What begins inside a collider that acts on particles stays there at rest: no energy comes from nowhere. Under gravity it never has more than at the
+/// start.
+#[test]
+fn material_inside_a_collider_is_not_thrown_out() {
+    let sill = "[[colliders]]\nname = 'sill'\nacts_on = 'particles'\nshape = { kind = 'circle', centre = [0.45, 0.05], radius = 0.08 }\n";
+    for (gravity, stress) in [(0.0, ""), (-9.81, "stress = { kind = 'geostatic', k0 = 0.6 }")] {
+        let ground = format!("{{ kind = 'box', min = [0, 0], max = [1, 0.1875] }}\n{stress}");
+        let mut job = head(2, &format!("[0, {gravity}]"), "[1, 1]", 0.5, 2);
+        job += &format!("{}{sill}[time]\nend = 0.2\n", elastic(2e5, &ground));
+        let history = history(&job);
+        let energy = |row: usize| -> f64 {
+            ["kinetic_energy", "elastic_energy", "gravitational_energy"]
+                .iter()
+                .map(|name| history.column(name)[row])
+                .sum()
+        };
+        let rows = history.column("time").len();
+        let greatest = (0..rows).map(energy).fold(f64::MIN, f64::max);
+        println!("gravity {gravity}: {} J at the start, at most {greatest} J", energy(0));
+        if gravity == 0.0 {
+            assert_eq!(greatest, 0.0);
+        } else {
+            assert!(greatest <= energy(0) * (1.0 + 1e-9), "{greatest} J after {} J", energy(0));
+        }
+    }
+}

@@ -47,8 +47,12 @@ pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) 
                 continue;
             }
             if common_point([&body.shape, &collider.shape], common, slack, &mut boxes).is_some() {
+                let what = match collider.acts_on {
+                    ActsOn::Nodes => "which pushes it out",
+                    ActsOn::Particles => "which keeps it there: it may leave, and does not go deeper",
+                };
                 all.push(format!(
-                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", which pushes it out: move one of them",
+                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", {what}: move one of them",
                     excerpt(&body.name, NAME)
                 ));
             }
