@@ -34,6 +34,18 @@ pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     reference_volume(chunk, p) * volume_ratio(chunk, p)
 }
 
+/// Greatest det F with which volume counts where it is measured: that of a box that is stretched as far as the solver stretches boxes by
+/// default, twice along each axis. What flies alone, with nothing around that its det F could fill, may have one of thousands.
+fn greatest_ratio<const D: usize>() -> f64 {
+    (0..D).fold(1.0, |product, _| 2.0 * product)
+}
+
+/// Volume of a particle where it is measured, m³; in plane strain of one metre of thickness. A det F that is no number counts as 1.
+pub fn measured_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+    let ratio = volume_ratio(chunk, p);
+    reference_volume(chunk, p) * if ratio.is_nan() { 1.0 } else { ratio.min(greatest_ratio::<D>()) }
+}
+
 /// Volume of the undeformed particle, m³; in plane strain of one metre of thickness.
 pub fn reference_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     box_volume::<D>(chunk.column(Layout::<D>::HALF)[p])
@@ -57,4 +69,27 @@ pub fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
 pub fn cauchy_stress<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
     let ratio = volume_ratio(chunk, p);
     symmetric(chunk, Layout::<D>::STRESS, p).map(|component| component / ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::particle::chunk::Tag;
+
+    /// A foam that is stretched by a half has its volume, spray the volume of its greatest box.
+    #[test]
+    fn spray_fills_no_more_than_its_boxes() {
+        let mut chunk = Chunk::<3>::new();
+        let p = chunk.push_zeroed(1, Tag { material: 0, body: 0, level: 0 });
+        chunk.column_mut(Layout::<3>::HALF)[p] = 0.5;
+        for (b, plastic, expected) in
+            [(2.25, 0.0, 3.375), (1.0, 9.0, 8.0), (1e8, 0.0, 8.0), (f64::NAN, 0.0, 1.0)]
+        {
+            for component in 0..3 {
+                chunk.column_mut(Layout::<3>::LEFT_CAUCHY_GREEN + component)[p] = b;
+            }
+            chunk.column_mut(Layout::<3>::PLASTIC_VOLUME)[p] = plastic;
+            approx::assert_relative_eq!(measured_volume(&chunk, p), expected, max_relative = 1e-14);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 //! any ranks and across restarts.
 
 use crate::common::history::History;
-use crate::common::launch::{run, succeed};
+use crate::common::launch::{file, run, succeed};
 use crate::common::restart;
 use agimp::io::hdf5_file::Reader;
 
@@ -297,4 +297,30 @@ fn maps_keep_the_largest_depth_and_speed() {
         }
         assert_eq!(*first.get_or_insert(texts.clone()), texts);
     });
+}
+
+/// A spinning disk of sand flies apart into particles that have nothing around them: they fill their boxes, and not the domain. Their det F adds
+/// up to 28 times the volume of the disk.
+#[test]
+fn spray_has_no_more_volume_than_its_boxes() {
+    let job = "version = 1\ndimension = 2\n[domain]\nsize = [2, 2]\nroot_edge = 0.5\n[boundaries]\nleaving = 'clamp'\n[tree]\nbase_level = 1\n\
+               [[materials]]\nname = 'sand'\ndensity = 1000\nmodel = 'drucker_prager'\nyoung = 1e5\npoisson = 0.3\nfriction_angle = 30\n\
+               [[bodies]]\nname = 'disk'\nmaterial = 'sand'\nangular_velocity = 40\nshape = { kind = 'circle', centre = [1, 1], radius = 0.2 }\n\
+               [[probes]]\nname = 'disk'\nquantities = ['volume', 'extent']\n[[maps]]\nname = 'plan'\ncell = 0.25\n\
+               [time]\nend = 0.15\n[output]\npicture = false\n[history]\nevery_steps = 5\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("disk.toml");
+    std::fs::write(&path, job).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let history = History::read(directory.path(), "disk");
+    let volumes = history.column("volume_disk");
+    let greatest = volumes.iter().copied().fold(0.0, f64::max);
+    println!("{} m² at the start, at most {greatest} m²", volumes[0]);
+    assert!(history.last("greatest_disk_x") > 1.9, "it has flown apart");
+    assert!(greatest <= 4.0 * volumes[0] * (1.0 + 1e-12), "{greatest} m² of {} m²", volumes[0]);
+    let depths = std::fs::read_to_string(file(directory.path(), "disk", ".map_plan_depth.asc")).expect("map");
+    let deepest =
+        depths.lines().last().expect("a row").split(' ').map(|depth| depth.parse::<f64>().expect("a number"));
+    let deepest = deepest.fold(0.0, f64::max);
+    assert!(deepest > 0.0 && deepest < 2.0, "{deepest} m deep in a domain of 2 m");
 }

@@ -1,6 +1,6 @@
 //! Depths and speeds over rasters in plan.
 use crate::particle::chunk::{Layout, Tag};
-use crate::particle::volume::volume;
+use crate::particle::volume::measured_volume;
 use crate::probe::Map;
 use crate::solver::state::Solver;
 
@@ -23,7 +23,7 @@ impl<const D: usize> Solver<D> {
                     if map.bodies.as_ref().is_some_and(|bodies| !bodies.contains(&body)) {
                         continue;
                     }
-                    let share = volume(chunk, p) / domain * PIECE;
+                    let share = measured_volume(chunk, p) / domain * PIECE;
                     pieces[2 * cell] += share.floor() as i64;
                     pieces[2 * cell + 1] += (share.fract() * PIECE) as i64;
                     let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);

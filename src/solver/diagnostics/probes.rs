@@ -6,7 +6,7 @@ use super::totals::{DoubleDouble, elastic_energy};
 use crate::exact_sum::ExactSum;
 use crate::particle::Layout;
 use crate::particle::chunk::{Chunk, Tag};
-use crate::particle::volume::{cauchy_stress, reference_volume, volume};
+use crate::particle::volume::{cauchy_stress, measured_volume, reference_volume};
 use crate::probe::{Measured, Probe, Readings};
 use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
@@ -114,7 +114,7 @@ pub(super) fn of_leaf<const D: usize>(
         let (mass, reference, volume) = (
             weight * value(Layout::<D>::MASS),
             weight * reference_volume(chunk, p),
-            weight * volume(chunk, p),
+            weight * measured_volume(chunk, p),
         );
         let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let speed_squared = velocity.iter().fold(0.0, |sum: f64, v| v.mul_add(*v, sum));

@@ -6,7 +6,7 @@ use super::fields::{mean, von_mises};
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::Chunk;
-use crate::particle::volume::{cauchy_stress, volume};
+use crate::particle::volume::{cauchy_stress, measured_volume};
 
 /// Sum of volumes, m³, and of volumes times stresses, J.
 #[derive(Clone, Copy, Default)]
@@ -17,7 +17,7 @@ struct Sum {
 
 impl Sum {
     fn add<const D: usize>(&mut self, chunk: &Chunk<D>, p: usize) {
-        let volume = volume(chunk, p);
+        let volume = measured_volume(chunk, p);
         self.volume += volume;
         let stress = cauchy_stress(chunk, p);
         self.stress.iter_mut().zip(stress).for_each(|(sum, stress)| *sum += volume * stress);
