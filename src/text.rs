@@ -109,6 +109,18 @@ pub fn count(count: u64) -> String {
     out
 }
 
+/// The number of one of a row, from 1: `1st`, `2nd`, `3rd`, `4th`, `11th`, `23rd`.
+pub fn ordinal(number: usize) -> String {
+    let ending = match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{number}{ending}")
+}
+
 /// Bytes in the largest unit that leaves a number of at least 1.
 pub fn bytes(count: f64) -> String {
     let units = ["B", "kB", "MB", "GB", "TB", "PB"];
@@ -234,6 +246,12 @@ mod tests {
         assert_eq!(scale(3.1e5, "J"), (1e3, "kJ".into()));
         assert_eq!(scale(3.1e5, "kg m/s"), (1.0, "kg m/s".into()));
         assert_eq!(scale(0.0, "Pa"), (1.0, "Pa".into()));
+    }
+
+    #[test]
+    fn ordinals_have_their_endings() {
+        let all: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 22, 103, 111, 1012].map(ordinal).into();
+        assert_eq!(all.join(" "), "1st 2nd 3rd 4th 11th 12th 13th 21st 22nd 103rd 111th 1012th");
     }
 
     #[test]

@@ -322,3 +322,60 @@ fn a_foot_that_deforms_presses_as_one_that_moves() {
         assert!(impulse[1] > 1000.0 && (impulse[0] / impulse[1] - 1.0).abs() < 0.005, "{impulse:?}");
     });
 }
+
+/// A cube whose faces were meshed each by itself, a rounding apart at its edges, holds a block as the box does, also by winding number.
+#[test]
+fn a_cube_of_unwelded_faces_is_a_cube() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let mut stl = String::from("SOLID CUBE\n");
+    for (number, corners) in triangles().enumerate() {
+        let gap = 1e-7 * (number / 2) as f64;
+        let _ = writeln!(stl, "FACET NORMAL 0 0 0\nOUTER LOOP");
+        for x in corners.map(corner) {
+            let [x, y, z] = x.map(|c| f64::from(c) + gap);
+            let _ = writeln!(stl, "VERTEX {x:.9} {y:.9} {z:.9}");
+        }
+        let _ = writeln!(stl, "ENDLOOP\nENDFACET");
+    }
+    std::fs::write(directory.path().join("faces.stl"), stl + "ENDSOLID CUBE\n").expect("mesh");
+    let block = "{ kind = 'box', min = [0.75, 0.75, 1], max = [1.25, 1.25, 1.25] }";
+    let force = |shape: &str| {
+        let rest = format!(
+            "[[colliders]]\nname = 'cube'\nshape = {shape}\n[time]\nend = 0.1\n[history]\nevery_steps = 5\n[output]\npicture = false"
+        );
+        let path = directory.path().join("rest.toml");
+        std::fs::write(&path, job(block, &rest)).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]));
+        History::read(directory.path(), "rest").integral("force_cube_z", 0.0)
+    };
+    let exact = force("{ kind = 'box', min = [0.5, 0.5, 0], max = [1.5, 1.5, 1] }");
+    for solid in ["closed", "winding"] {
+        let shape =
+            format!("{{ kind = 'mesh', solid = '{solid}', file = 'faces.stl', origin = [0.5, 0.5, 0] }}");
+        let found = force(&shape);
+        assert!(exact < -1.0 && (found / exact - 1.0).abs() < 1e-3, "{solid}: {found} for {exact}");
+    }
+}
+
+/// A channel whose U-shaped sides are polygons of an OBJ is its three walls.
+#[test]
+fn concave_faces_of_an_obj_are_cut_rightly() {
+    let outline = ["0 0", "1 0", "1 1", "0.75 1", "0.75 0.25", "0.25 0.25", "0.25 1", "0 1"];
+    let mut obj = String::new();
+    for z in ["0", "1"] {
+        outline.iter().for_each(|x| _ = writeln!(obj, "v {x} {z}"));
+    }
+    obj += "f 8 7 6 5 4 3 2 1\nf 9 10 11 12 13 14 15 16\n";
+    for k in 0..8 {
+        let next = (k + 1) % 8;
+        let _ = writeln!(obj, "f {} {} {} {}", k + 1, next + 1, next + 9, k + 9);
+    }
+    let directory = tempfile::tempdir().expect("temporary directory");
+    std::fs::write(directory.path().join("channel.obj"), obj).expect("mesh");
+    let rest = "[time]\nend = 0.01";
+    let mesh = "{ kind = 'mesh', file = 'channel.obj', origin = [0.5, 0.5, 0] }";
+    let walls = "{ kind = 'difference', from = { kind = 'box', min = [0.5, 0.5, 0], max = [1.5, 1.5, 1] }, \
+                 remove = [{ kind = 'box', min = [0.75, 0.75, -1], max = [1.25, 2, 2] }] }";
+    let [found, exact] = [mesh, walls].map(|shape| outcome(directory.path(), &job(shape, rest)));
+    assert!(found.history == exact.history);
+}

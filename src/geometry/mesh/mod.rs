@@ -2,7 +2,9 @@
 //!
 //! | file | what it does |
 //! |---|---|
-//! | `read` | STL, OBJ and PLY to triangles |
+//! | `read` | OBJ, PLY and STL to triangles |
+//! | `stl` | STL |
+//! | `polygon` | faces with more corners to triangles |
 //! | `terrain/` | rasters of heights to triangles |
 //! | `solid` | checks that triangles bound a solid |
 //! | `crossing` | triangles that cross each other |
@@ -25,8 +27,10 @@ use crate::checksum::fnv1a;
 
 mod crossing;
 mod deforming;
+mod polygon;
 mod read;
 mod solid;
+mod stl;
 mod terrain;
 mod winding;
 
@@ -127,14 +131,35 @@ impl Mesh {
     }
 
     fn of(triangles: Triangles, filling: Filling) -> Result<Self, NotSolid> {
-        let Merged { mut vertices, mut indices, numbers } = solid::merged(triangles)?;
-        let words = vertices.iter().flatten().map(|x| x.to_bits());
-        let words = words.chain(indices.iter().flatten().map(|&index| u64::from(index)));
+        let mut merged = solid::merged(triangles)?;
+        match filling {
+            Filling::Winding => {
+                merged = merged.welded();
+                merged.leave_out_doubled();
+            }
+            Filling::Closed => merged.check_doubled()?,
+            Filling::ClosedOrSheet => merged.leave_out_doubled(),
+            Filling::Terrain => {}
+        }
+        let mut checked = merged.check();
+        if matches!(
+            (filling, &checked),
+            (Filling::Closed | Filling::ClosedOrSheet, Err(NotSolid::Open { .. }))
+        ) {
+            // Vertices that are hardly apart may be all that keeps it from being closed.
+            let welded = merged.welded();
+            let closed = welded.check();
+            if closed.is_ok() {
+                (merged, checked) = (welded, closed);
+            }
+        }
+        let words = merged.vertices.iter().flatten().map(|x| x.to_bits());
+        let words = words.chain(merged.indices.iter().flatten().map(|&index| u64::from(index)));
         let checksum = fnv1a(words.chain((filling == Filling::Winding).then_some(1)));
         if filling == Filling::Winding {
-            solid::cap_holes(&mut vertices, &mut indices);
+            checked = merged.capped();
         }
-        let volume = match solid::check(&vertices, &indices) {
+        let volume = match checked {
             Ok(volume) => Some(volume),
             Err(NotSolid::Open { .. } | NotSolid::Turned(_) | NotSolid::Flat(_))
                 if filling == Filling::ClosedOrSheet =>
@@ -143,6 +168,7 @@ impl Mesh {
             }
             Err(other) => return Err(other),
         };
+        let Merged { vertices, mut indices, numbers } = merged;
         if volume.is_some_and(|volume| volume < 0.0) {
             indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }

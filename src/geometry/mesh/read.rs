@@ -5,6 +5,7 @@ use std::path::Path;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, Payload, Property};
 
+use super::{polygon, stl};
 use crate::input_file;
 
 /// Triangles with the places of their corners; the corners are checked to be there.
@@ -14,6 +15,15 @@ pub struct Triangles {
     pub vertices: Vec<[f64; 3]>,
     /// Corners of each triangle, counter-clockwise seen from outside.
     pub indices: Vec<[u32; 3]>,
+}
+
+impl Triangles {
+    /// Appends a triangle with corners of its own.
+    pub(super) fn push(&mut self, corners: &[[f64; 3]; 3]) {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(corners);
+        self.indices.push([first, first + 1, first + 2]);
+    }
 }
 
 /// Why a file gives no triangles.
@@ -38,14 +48,14 @@ pub enum ReadError {
 /// Most bytes of a file.
 pub(super) const MOST_BYTES: u64 = 1 << 31;
 
-/// Reads the triangles of a file, whose ending says what it is. Polygons are cut into fans.
+/// Reads the triangles of a file, whose ending says what it is. Polygons are cut into triangles.
 ///
 /// # Errors
 /// The file cannot be read, is of no known kind, or damaged.
 pub fn read(path: &Path) -> Result<Triangles, ReadError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     let parse: fn(&[u8]) -> Result<Triangles, ReadError> = match ending.as_str() {
-        "stl" => stl,
+        "stl" => stl::parse,
         "obj" => obj,
         "ply" => ply,
         _ => return Err(ReadError::Kind),
@@ -61,27 +71,9 @@ pub fn read(path: &Path) -> Result<Triangles, ReadError> {
     }
 }
 
-fn stl(bytes: &[u8]) -> Result<Triangles, ReadError> {
-    let damaged = |reason: String| ReadError::Damaged { kind: "STL", reason };
-    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|error| damaged(error.to_string()))?;
-    let index = |corner: usize| u32::try_from(corner).map_err(|_| damaged("too many vertices".into()));
-    let mut triangles = Triangles::default();
-    triangles.vertices.extend(mesh.vertices.iter().map(|v| [v[0], v[1], v[2]].map(f64::from)));
-    for face in &mesh.faces {
-        let [a, b, c] = face.vertices;
-        triangles.indices.push([index(a)?, index(b)?, index(c)?]);
-    }
-    Ok(triangles)
-}
-
 fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
     let damaged = |reason: String| ReadError::Damaged { kind: "OBJ", reason };
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // Colours are of no interest here.
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut BufReader::new(bytes), &options, no_materials)
@@ -89,14 +81,22 @@ fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
     let mut triangles = Triangles::default();
     for model in models {
         let first = triangles.vertices.len() as u64;
-        triangles.vertices.extend(model.mesh.positions.as_chunks::<3>().0);
-        for corners in model.mesh.indices.as_chunks::<3>().0 {
-            let mut indices = [0; 3];
-            for (index, corner) in indices.iter_mut().zip(corners) {
-                let sum = first + u64::from(*corner);
-                *index = u32::try_from(sum).map_err(|_| damaged("too many vertices".into()))?;
+        let places = model.mesh.positions.as_chunks::<3>().0;
+        triangles.vertices.extend(places);
+        // Without numbers of corners all faces are triangles.
+        let mut left = &model.mesh.indices[..];
+        let mut counts = model.mesh.face_arities.iter().map(|count| *count as usize);
+        while !left.is_empty() {
+            let (face, rest) = left.split_at(counts.next().unwrap_or(3).clamp(1, left.len()));
+            left = rest;
+            for corners in polygon::triangles(places, face) {
+                let mut indices = [0; 3];
+                for (index, corner) in indices.iter_mut().zip(corners) {
+                    let sum = first + u64::from(corner);
+                    *index = u32::try_from(sum).map_err(|_| damaged("too many vertices".into()))?;
+                }
+                triangles.indices.push(indices);
             }
-            triangles.indices.push(indices);
         }
     }
     Ok(triangles)
@@ -154,9 +154,7 @@ fn ply(bytes: &[u8]) -> Result<Triangles, ReadError> {
         let corners =
             property(face, "vertex_indices").or_else(|| property(face, "vertex_index")).and_then(list);
         let corners = corners.ok_or_else(|| missing("corners of faces (vertex_indices)"))?;
-        if let [first, rest @ ..] = &corners[..] {
-            triangles.indices.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-        }
+        triangles.indices.extend(polygon::triangles(&triangles.vertices, &corners));
     }
     Ok(triangles)
 }

@@ -1,10 +1,11 @@
 //! Whether triangles bound a solid.
 use std::collections::BTreeMap;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::Triangles;
-use crate::text::{number, quantity};
+use super::{Aabb, Triangles};
+use crate::geometry::vector::dot;
+use crate::text::{number, ordinal, quantity};
 
 /// Why triangles bound no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -38,9 +39,9 @@ pub enum NotSolid {
     Turned([f64; 3]),
     /// Triangles go through each other.
     #[error(
-        "found {count} pairs of triangles that intersect, the first the {}th and the {}th of the file near {}; expected a surface that does not intersect itself, or solid = \"winding\", which fills overlaps",
-        triangles[0],
-        triangles[1],
+        "found {count} pairs of triangles that intersect, the first the {} and the {} of the file near {}; expected a surface that does not intersect itself, or solid = \"winding\", which fills overlaps",
+        ordinal(triangles[0]),
+        ordinal(triangles[1]),
         point(near)
     )]
     Crosses {
@@ -51,6 +52,26 @@ pub enum NotSolid {
         /// Where, m.
         near: [f64; 3],
     },
+    /// Triangles that are there more than once.
+    #[error(
+        "found {count} triangles a second time, the first the {} of the file, which is also the {}; expected each once (in a mesh program: \
+         \"remove duplicate faces\"), or solid = \"winding\", which leaves them out",
+        ordinal(triangles[1]),
+        ordinal(triangles[0])
+    )]
+    Doubled {
+        /// How many.
+        count: usize,
+        /// The first pair, counted from 1.
+        triangles: [usize; 2],
+    },
+    /// Nothing is left inside once holes are closed.
+    #[error(
+        "found faces with gaps between them wider than {}, around no solid once the rim of each is closed; expected faces with common vertices \
+         at their edges (in a mesh program: \"merge by distance\")",
+        quantity(*.0, "m")
+    )]
+    Hollow(f64),
     /// Nothing inside.
     #[error("found a surface around a volume of {}; expected one with a volume", quantity(*.0, "m³"))]
     Flat(f64),
@@ -66,6 +87,13 @@ fn point(x: &[f64; 3]) -> String {
 
 /// Greatest coordinate, m: squares and cubes of distances stay finite.
 const FARTHEST: f64 = 1e12;
+
+/// Vertices that are nearer to each other than this share of the longest edge of their bounding box are one, where a surface has gaps:
+/// roundings of programs that mesh each face by itself.
+const WELDED: f64 = 1e-6;
+
+/// Share of the volume that triangles enclose with their middle below which the solid that is left when holes are closed counts as none.
+const HOLLOW: f64 = 0.1;
 
 /// Triangles with vertices of their own.
 pub(super) struct Merged {
@@ -101,9 +129,125 @@ pub(super) fn merged(triangles: Triangles) -> Result<Merged, NotSolid> {
     if indices.is_empty() { Err(NotSolid::Empty) } else { Ok(Merged { vertices, indices, numbers }) }
 }
 
+impl Merged {
+    /// As [`check`].
+    pub(super) fn check(&self) -> Result<f64, NotSolid> {
+        match self.indices.is_empty() {
+            true => Err(NotSolid::Empty),
+            false => check(&self.vertices, &self.indices),
+        }
+    }
+
+    /// The longest edge of the bounding box, m.
+    fn size(&self) -> f64 {
+        let reach = |axis: usize| {
+            let along = self.vertices.iter().map(|x| x[axis]);
+            along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+        };
+        reach(0).max(reach(1)).max(reach(2))
+    }
+
+    /// The distance below which [`Merged::welded`] makes vertices one, m.
+    fn gap(&self) -> f64 {
+        WELDED * self.size()
+    }
+
+    /// The same with vertices that are hardly apart made one: the first of them. Triangles that have two corners at one place then are gone.
+    pub(super) fn welded(&self) -> Self {
+        let gap = self.gap();
+        let cell = |x: &[f64; 3]| x.map(|c| (c / gap).floor());
+        let mut cells: FxHashMap<[u64; 3], Vec<u32>> = FxHashMap::default();
+        let mut vertices: Vec<[f64; 3]> = Vec::new();
+        let mut of_vertex = Vec::with_capacity(self.vertices.len());
+        let is_near = |a: &[f64; 3], b: &[f64; 3]| {
+            (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>() <= gap * gap
+        };
+        for x in &self.vertices {
+            let own = cell(x);
+            let around = (0..27).map(|k| [k % 3, k / 3 % 3, k / 9].map(|c| f64::from(c) - 1.0));
+            let around = around.map(|way| std::array::from_fn(|a| (own[a] + way[a] + 0.0).to_bits()));
+            let near = around.filter_map(|cell| cells.get(&cell)).flatten();
+            let first = near.copied().filter(|&other| is_near(x, &vertices[other as usize])).min();
+            of_vertex.push(first.unwrap_or_else(|| {
+                vertices.push(*x);
+                let number = vertices.len() as u32 - 1;
+                cells.entry(own.map(|c| (c + 0.0).to_bits())).or_default().push(number);
+                number
+            }));
+        }
+        let corners = self.indices.iter().map(|corners| corners.map(|corner| of_vertex[corner as usize]));
+        let numbered = corners.zip(self.numbers.iter().copied());
+        let (indices, numbers) = numbered.filter(|([a, b, c], _)| a != b && b != c && c != a).unzip();
+        Self { vertices, indices, numbers }
+    }
+
+    /// Leaves out triangles that are there already, with the same orientation.
+    pub(super) fn leave_out_doubled(&mut self) {
+        let mut seen = FxHashSet::default();
+        let is_new: Vec<bool> = self.indices.iter().map(|corners| seen.insert(turned(corners))).collect();
+        let mut keep = is_new.iter();
+        self.indices.retain(|_| *keep.next().unwrap_or(&true));
+        let mut keep = is_new.iter();
+        self.numbers.retain(|_| *keep.next().unwrap_or(&true));
+    }
+
+    /// Whether each triangle is there once in an orientation.
+    pub(super) fn check_doubled(&self) -> Result<(), NotSolid> {
+        let (mut seen, mut count, mut first) = (FxHashMap::default(), 0, None);
+        for (corners, number) in self.indices.iter().zip(&self.numbers) {
+            if let Some(before) = seen.insert(turned(corners), *number) {
+                count += 1;
+                first.get_or_insert([before as usize, *number as usize]);
+            }
+        }
+        first.map_or(Ok(()), |triangles| Err(NotSolid::Doubled { count, triangles }))
+    }
+
+    /// Closes the holes. Returns the volume inside, m³, with the sign of its orientation.
+    ///
+    /// # Errors
+    /// Nothing is inside: faces whose edges do not meet lose what they enclose, since the rim of each is closed over itself. Then little is
+    /// left beside the cones over the triangles with their tip in the middle of the bounding box.
+    pub(super) fn capped(&mut self) -> Result<f64, NotSolid> {
+        if self.indices.is_empty() {
+            return Err(NotSolid::Empty);
+        }
+        let bounds = Aabb::of_points(self.vertices.iter().copied());
+        let middle: [f64; 3] = std::array::from_fn(|a| 0.5 * (bounds.lower[a] + bounds.upper[a]));
+        let open = enclosed(&self.vertices, &self.indices, &middle);
+        let gap = self.gap();
+        cap_holes(&mut self.vertices, &mut self.indices);
+        let volume = check(&self.vertices, &self.indices)?;
+        if volume.abs() < HOLLOW * open.abs() { Err(NotSolid::Hollow(gap)) } else { Ok(volume) }
+    }
+}
+
+/// Corners with the least first.
+fn turned([a, b, c]: &[u32; 3]) -> [u32; 3] {
+    let least = *a.min(b).min(c);
+    if *a == least {
+        [*a, *b, *c]
+    } else if *b == least {
+        [*b, *c, *a]
+    } else {
+        [*c, *a, *b]
+    }
+}
+
+/// Volume of the cones over triangles with their tip in a point, with the signs of their orientation, m³.
+fn enclosed(vertices: &[[f64; 3]], indices: &[[u32; 3]], tip: &[f64; 3]) -> f64 {
+    let cones = indices.iter().map(|triangle| {
+        let [a, b, c] = triangle
+            .map(|v| -> [f64; 3] { std::array::from_fn(|axis| vertices[v as usize][axis] - tip[axis]) });
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6.0
+    });
+    cones.sum()
+}
+
 /// Closes what is open by cones. The rims of all holes are what the edges of the triangles add up to with their directions; they have no
 /// end, and so each loop of them and the cone over it, from the mean of its vertices, close the surface.
-pub(super) fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
+fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     let mut sums: BTreeMap<(u32, u32), i64> = BTreeMap::new();
     for [a, b, c] in indices.iter() {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
@@ -122,7 +266,7 @@ pub(super) fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]
         // A walk along the rims; where it comes to a vertex again, it has gone round a loop.
         let mut walk = vec![start];
         let mut places = BTreeMap::from([(start, 0)]);
-        while let Some(next) = walk.last().and_then(|vertex| onwards.get_mut(vertex)).and_then(Vec::pop) {
+        while let Some(next) = next_on_rim(vertices, &walk, &mut onwards) {
             let Some(&place) = places.get(&next) else {
                 places.insert(next, walk.len());
                 walk.push(next);
@@ -145,8 +289,25 @@ pub(super) fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]
     }
 }
 
+/// Where a rim goes on. Where several meet it is the edge that goes back the most: so slits between edges that are divided in different
+/// ways are closed by themselves, and not with whole faces.
+fn next_on_rim(vertices: &[[f64; 3]], walk: &[u32], onwards: &mut BTreeMap<u32, Vec<u32>>) -> Option<u32> {
+    let (last, before) = walk.split_last()?;
+    let ways = onwards.get_mut(last)?;
+    let (Some(before), true) = (before.last(), ways.len() > 1) else { return ways.pop() };
+    let way = |to: u32| -> [f64; 3] {
+        let way: [f64; 3] = std::array::from_fn(|a| vertices[to as usize][a] - vertices[*last as usize][a]);
+        let length = dot(way, way).sqrt();
+        way.map(|c| c / length)
+    };
+    let back = way(*before);
+    let along = |to: &u32| dot(back, way(*to));
+    let most = (0..ways.len()).max_by(|&a, &b| along(&ways[a]).total_cmp(&along(&ways[b])))?;
+    Some(ways.remove(most))
+}
+
 /// Whether triangles are closed and face one way. Returns the volume inside, m³, negative where they face inwards.
-pub(super) fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, NotSolid> {
+fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, NotSolid> {
     // Each edge is gone along as often in one direction as in the other.
     let mut edges: FxHashMap<(u32, u32), [u32; 2]> = FxHashMap::default();
     let directed = |triangle: &[u32; 3]| {
@@ -181,16 +342,7 @@ pub(super) fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, 
     }
     // Tetrahedra with a point of the surface, so that far from the origin nothing is lost.
     let origin = vertices[indices[0][0] as usize];
-    let volume: f64 = indices
-        .iter()
-        .map(|triangle| {
-            let [a, b, c] = triangle.map(|v| -> [f64; 3] {
-                std::array::from_fn(|axis| vertices[v as usize][axis] - origin[axis])
-            });
-            let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-            (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6.0
-        })
-        .sum();
+    let volume = enclosed(vertices, indices, &origin);
     if volume == 0.0 || !volume.is_finite() { Err(NotSolid::Flat(volume)) } else { Ok(volume) }
 }
 
@@ -240,6 +392,71 @@ mod tests {
                 *x = [own[0] + way, own[1], own[2]];
             }
             assert!(!matches!(Mesh::new(apart), Err(NotSolid::Crosses { .. })), "{way}");
+        }
+    }
+
+    /// A cube whose faces have vertices of their own, `gap` apart at its edges.
+    fn unwelded(gap: f64) -> Triangles {
+        let mut apart = Triangles::default();
+        for (number, corners) in cube().indices.iter().enumerate() {
+            let face = (number / 2) as f64 * gap;
+            apart.push(&corners.map(|corner| cube().vertices[corner as usize].map(|c| c + face)));
+        }
+        apart
+    }
+
+    /// Faces that are a rounding apart are one surface, closed or by winding number; wider gaps leave no solid, which is an error.
+    #[test]
+    fn faces_that_are_hardly_apart_are_welded() {
+        for make in [Mesh::new, Mesh::wound] {
+            let mesh = make(unwelded(1e-7)).unwrap_or_else(|error| panic!("{error}"));
+            assert!((mesh.volume() - 1.0).abs() < 1e-5 && mesh.vertices().count() == 8, "{}", mesh.volume());
+            assert!(mesh.distance(&[0.5; 3]) < -0.1 && mesh.distance(&[0.5, 0.5, 1.01]) > 0.0);
+        }
+        assert!(matches!(Mesh::new(unwelded(1e-3)), Err(NotSolid::Open { count: 24, .. })));
+        assert!(matches!(Mesh::wound(unwelded(1e-3)), Err(NotSolid::Hollow(_))));
+    }
+
+    /// Faces that divide their common edge in different ways leave slits without an area: the solid by winding number is the cube.
+    #[test]
+    fn edges_that_are_divided_differently_are_closed_as_slits() {
+        let mut slit = Triangles::default();
+        for (number, corners) in cube().indices.iter().enumerate() {
+            let [a, b, c] = corners.map(|corner| cube().vertices[corner as usize]);
+            let middle = |p: [f64; 3], q: [f64; 3]| std::array::from_fn(|axis| 0.5 * (p[axis] + q[axis]));
+            if number / 2 % 2 == 0 {
+                slit.push(&[a, middle(a, b), c]);
+                slit.push(&[middle(a, b), b, middle(b, c)]);
+                slit.push(&[middle(a, b), middle(b, c), c]);
+            } else {
+                slit.push(&[a, b, c]);
+            }
+        }
+        assert!(matches!(Mesh::new(slit.clone()), Err(NotSolid::Open { .. })));
+        let mesh = Mesh::wound(slit).unwrap_or_else(|error| panic!("{error}"));
+        assert!((mesh.volume() - 1.0).abs() < 1e-14, "{}", mesh.volume());
+        for x in super::super::tests::points(0.7).map(|x| x.map(|c| c + 0.5)) {
+            let exact = x.iter().fold(f64::NEG_INFINITY, |m: f64, c| m.max((c - 0.5).abs() - 0.5));
+            assert_eq!(mesh.distance(&x) < 0.0, exact < 0.0, "{x:?}");
+        }
+    }
+
+    /// One triangle or all of them a second time.
+    #[test]
+    fn doubled_triangles_are_named() {
+        let mut one = cube();
+        let [a, b, c] = one.indices[4];
+        one.indices.push([c, a, b]);
+        let error = Mesh::new(one.clone()).unwrap_err();
+        assert_eq!(error, NotSolid::Doubled { count: 1, triangles: [5, 13] });
+        assert!(error.to_string().starts_with(
+            "found 1 triangles a second time, the first the 13th of the file, which is also the 5th"
+        ));
+        let mut all = cube();
+        all.indices.extend(cube().indices);
+        assert_eq!(Mesh::new(all.clone()), Err(NotSolid::Doubled { count: 12, triangles: [1, 13] }));
+        for doubled in [one, all] {
+            assert!((Mesh::wound(doubled).expect("a cube").volume() - 1.0).abs() < 1e-14);
         }
     }
 }

@@ -2,13 +2,18 @@
 use super::raster::checked_size;
 use super::{MOST, Placing, Raster};
 
-/// Reads a header of `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` and `NODATA_value`, and rows of
-/// values from north to south.
+/// Reads a header of `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` (or `dx` and `dy`) and
+/// `NODATA_value`, and rows of values from north to south.
 pub(super) fn parse(text: &str, placing: &Placing) -> Result<Raster, String> {
-    let mut lines = text.lines().peekable();
+    // Some programs put a mark of the order of bytes first.
+    let mut lines = text.trim_start_matches('\u{feff}').lines().peekable();
     let mut header = std::collections::BTreeMap::new();
+    // A row of values may begin with `nan`.
+    let is_value =
+        |line: &str| line.split_whitespace().next().is_some_and(|word| word.parse::<f64>().is_ok());
     while let Some(line) = lines.next_if(|line| {
-        line.trim().is_empty() || line.trim_start().starts_with(|first: char| first.is_ascii_alphabetic())
+        line.trim().is_empty()
+            || (line.trim_start().starts_with(|first: char| first.is_ascii_alphabetic()) && !is_value(line))
     }) {
         let mut words = line.split_whitespace();
         if let (Some(key), Some(value)) = (words.next(), words.next()) {
@@ -24,14 +29,20 @@ pub(super) fn parse(text: &str, placing: &Placing) -> Result<Raster, String> {
         None => Err(format!("its header has no {key}")),
     };
     let [columns, rows] = checked_size([count("ncols")?, count("nrows")?])?;
-    let cell = given("cellsize")
+    let size = match (given("cellsize"), given("dx"), given("dy")) {
+        (None, Some(dx), Some(dy)) if (dx - dy).abs() > 1e-6 * dx.abs() => {
+            return Err(format!("its cells are {dx} m by {dy} m (dx is not dy); expected squares"));
+        }
+        (cell, dx, dy) => cell.or(dx).or(dy),
+    };
+    let cell = size
         .filter(|cell| *cell > 0.0 && *cell < 1e9)
-        .ok_or("its header has no cellsize above 0")?;
+        .ok_or("its header has no cellsize above 0, nor dx and dy")?;
     let corner = |axis: char| {
         let centre = given(&format!("{axis}llcenter"));
         centre.or_else(|| Some(given(&format!("{axis}llcorner"))? + 0.5 * cell)).unwrap_or(0.5 * cell)
     };
-    let none = given("nodata_value").unwrap_or(-9999.0);
+    let none = given("nodata_value");
     let mut found = Vec::new();
     for word in lines.flat_map(str::split_whitespace) {
         let height: f64 = word.parse().map_err(|_| format!("found {word:?} among the heights"))?;
@@ -43,5 +54,5 @@ pub(super) fn parse(text: &str, placing: &Placing) -> Result<Raster, String> {
     if found.len() != columns * rows {
         return Err(format!("it has {} heights; its header says {columns} x {rows}", found.len()));
     }
-    Raster::from_north(&found, [columns, rows], Some(none), placing, Some((cell, [corner('x'), corner('y')])))
+    Raster::from_north(&found, [columns, rows], none, placing, Some((cell, [corner('x'), corner('y')])))
 }

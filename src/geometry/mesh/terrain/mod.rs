@@ -237,6 +237,33 @@ mod tests {
         }
     }
 
+    /// Forms that other programs write: a mark of the order of bytes, `dx` and `dy`; a hole in the first cell, declared or not.
+    #[test]
+    fn forms_of_other_programs() {
+        let (text, whole) = (slope(), parse(&slope()).unwrap());
+        for (from, to) in
+            [("ncols", "\u{feff}ncols"), ("cellsize 1", "dx 1\ndy 1"), ("cellsize 1", "DX 1.0\nDY 1.0")]
+        {
+            assert_eq!(parse(&text.replace(from, to)).unwrap(), whole, "{to}");
+        }
+        let oblong = parse(&text.replace("cellsize 1", "dx 1\ndy 2")).unwrap_err();
+        assert!(oblong.contains("1 m by 2 m (dx is not dy); expected squares"), "{oblong}");
+        for hole in ["nan", "NaN", "-9999", "-32768", "-32768.0", "1e38"] {
+            let torn = text.replacen("\n9 ", &format!("\n{hole} "), 1);
+            let error = parse(&torn).unwrap_err();
+            assert!(
+                error.contains("1 of 24 cells have no height, the first in row 1, column 1"),
+                "{hole}: {error}"
+            );
+        }
+        let undeclared = text.replace("NODATA_value -9999\n", "").replacen("7.5", "-32768", 1);
+        assert!(
+            parse(&undeclared)
+                .unwrap_err()
+                .contains("1 of 24 cells have no height, the first in row 1, column 3")
+        );
+    }
+
     /// A smooth surface goes through the heights, keeps planes, and is nearer to a sine than triangles are: 0.0065 of its height for 8
     /// heights to a wave, against 0.076.
     #[test]

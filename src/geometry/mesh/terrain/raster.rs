@@ -30,6 +30,12 @@ pub struct Placing {
 /// Greatest magnitude of a value; what is larger stands for none.
 const GREATEST: f64 = 1e9;
 
+/// The least whole number of 16 bits stands for none whatever a file says of others: no ground lies so deep, and many programs write it.
+const HOLE: f64 = -32768.0;
+
+/// What stands for no value in a file that does not say.
+const NONE: f64 = -9999.0;
+
 impl Raster {
     /// Reads a raster: ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`), or array of NumPy (`.npy`, `.npz`).
     ///
@@ -68,7 +74,9 @@ impl Raster {
         if !(cell > 0.0 && cell < 1e9 && corner.iter().all(|c| c.abs() < 1e12)) {
             return Err(format!("its cells of {cell} m from {corner:?} have no finite position"));
         }
-        let known = |value: f64| if Some(value) == none || value.abs() > GREATEST { f64::NAN } else { value };
+        let none = none.unwrap_or(NONE);
+        let is_none = |value: f64| value == none || value == HOLE || value.abs() > GREATEST;
+        let known = |value: f64| if is_none(value) { f64::NAN } else { value };
         let all = (0..rows).rev().flat_map(|row| &values[row * columns..][..columns]);
         Ok(Self { values: all.map(|value| known(*value)).collect(), columns, rows, cell, corner })
     }
