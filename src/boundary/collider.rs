@@ -61,7 +61,7 @@ impl<const D: usize> Collider<D> {
     pub fn state_at(&self, time: f64) -> ColliderState<D> {
         let own = if self.is_present() { time - self.start } else { 0.0 };
         let rate = match &self.motion {
-            Motion::Table(_) => Rate::REST,
+            Motion::Table(_) | Motion::Rising(..) => Rate::REST,
             motion => motion.mean_rate(own, 0.0),
         };
         let state = self.state(self.motion.place(own), rate);
@@ -290,16 +290,20 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
         };
         let rows = |table: &Table<D>| {
             let (speed, spin) = table.greatest_speeds(f64::NEG_INFINITY);
-            format!("a table of {} rows, at most {}", table.0.len(), both(speed, spin))
+            let smooth = if table.is_smooth { "smooth " } else { "" };
+            format!("a {smooth}table of {} rows, at most {}", table.rows.len(), both(speed, spin))
         };
         match &self.motion {
             Motion::Fixed => write!(f, "fixed"),
             Motion::Steady(rate) => write!(f, "steady with {}", speeds(rate)),
+            Motion::Rising(rate, span) => {
+                write!(f, "steady with {} after {}", speeds(rate), quantity(*span, "s"))
+            }
             Motion::Table(table) => write!(f, "by {}", rows(table)),
             Motion::Free(free) => {
                 let turns = if free.turning.is_some() { " about any axis" } else { "" };
                 write!(f, "free{turns}, {}, at first {}", quantity(free.mass, "kg"), speeds(&free.start))?;
-                if free.driven.0.is_empty() {
+                if free.driven.rows.is_empty() {
                     Ok(())
                 } else {
                     write!(f, ", driven by {}", rows(&free.driven))

@@ -215,26 +215,16 @@ impl<const D: usize> Problem<D> {
         (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
     }
 
-    /// Whether two bodies with shapes of their own are there in one stage.
-    pub fn are_together(&self, first: usize, second: usize) -> bool {
-        if [first, second].iter().any(|&body| self.bodies[body].given.is_some()) {
-            return false;
-        }
-        let [first, second] = [first, second].map(|body| self.stages_of_body(body));
-        first.start.max(second.start) < first.end.min(second.end)
+    /// Whether two bodies with shapes of their own come with the same stage. Where what came earlier lies by then, no shape says.
+    pub fn come_together(&self, first: usize, second: usize) -> bool {
+        let [first, second] = [first, second].map(|body| &self.bodies[body]);
+        first.given.is_none() && second.given.is_none() && first.stage == second.stage
     }
 
     /// Gravity at the start of a stage, its time counted from there or from where it began to hold.
     pub fn gravity_of_stage(&self, stage: usize) -> &Gravity<D> {
         let mut changes = self.stages[..=stage].iter().rev().filter_map(|stage| stage.gravity.as_ref());
         changes.next().unwrap_or(&self.gravity)
-    }
-
-    /// The stages in which a body is there.
-    pub fn stages_of_body(&self, body: usize) -> std::ops::Range<usize> {
-        let first = self.bodies[body].stage;
-        let removed = (first..self.stages.len()).find(|&stage| self.stages[stage].removed.contains(&body));
-        first..removed.unwrap_or(self.stages.len())
     }
 
     /// The finest level that the job asks for.
@@ -380,6 +370,8 @@ pub struct InitialStress {
     pub place: Position,
     /// What it is.
     pub kind: StressKind,
+    /// Whether a stress outside the yield surface returns to it; else it is an error.
+    pub relax: bool,
     /// Consolidation, in place of that of the material.
     pub consolidation: Option<Consolidation>,
 }
@@ -405,6 +397,19 @@ pub enum StressKind {
     },
     /// Components `xx, yy, zz, xy, xz, yz`, Pa, tension positive.
     Components(Box<[Quantity; 6]>),
+}
+
+impl StressKind {
+    /// All quantities that it has.
+    pub fn quantities(&self) -> Vec<&Quantity> {
+        match self {
+            Self::Weight { ratio, surface, surcharge } => {
+                [ratio, surcharge].into_iter().chain(surface).collect()
+            }
+            Self::Depth { surface, .. } => surface.iter().collect(),
+            Self::Components(components) => components.iter().collect(),
+        }
+    }
 }
 
 /// End and time step.

@@ -49,14 +49,17 @@ impl<const D: usize> CarriedForce<D> {
         }
     }
 
+    /// All quantities that it has.
+    pub fn quantities(&self) -> Vec<&Quantity> {
+        match self {
+            Self::Traction(components) | Self::Point { force: components, .. } => components.iter().collect(),
+            Self::Pressure { pressure, .. } => vec![pressure],
+        }
+    }
+
     /// Whether it depends on places of the undeformed body.
     pub fn names_undeformed(&self) -> bool {
-        match self {
-            Self::Traction(components) | Self::Point { force: components, .. } => {
-                components.iter().any(Quantity::names_undeformed)
-            }
-            Self::Pressure { pressure, .. } => pressure.names_undeformed(),
-        }
+        self.quantities().into_iter().any(Quantity::names_undeformed)
     }
 
     /// Whether it acts on a surface.

@@ -100,6 +100,16 @@ impl<const D: usize> Load<D> {
         }
     }
 
+    /// All quantities that it has.
+    pub fn quantities(&self) -> Vec<&Quantity> {
+        match &self.kind {
+            Kind::BodyForce(acceleration) => acceleration.iter().collect(),
+            Kind::Velocity(prescribed) => prescribed.iter().flatten().collect(),
+            Kind::Damping(rate) => vec![rate],
+            Kind::Carried(carried) => carried.force.quantities(),
+        }
+    }
+
     /// The place in the job of a point `x` (m from the lower corner of the domain) that is displaced by `u`, m.
     pub fn place(&self, x: &[f64; D], u: &[f64; D]) -> Place {
         let undeformed = std::array::from_fn(|a| x[a] - u[a]);

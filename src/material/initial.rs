@@ -82,13 +82,7 @@ pub fn under_stress_after(
     mut history: [f64; HISTORIES],
     plane: bool,
 ) -> Result<Stressed, NoState> {
-    let (principal, directions) = principal(stress, plane);
-    let strain = material
-        .strain_under(principal, consolidation, &mut history)
-        .filter(|strain| strain.iter().all(|e| e.is_finite()))
-        .ok_or(NoState::Unreachable)?;
-    let volume_ratio = libm::exp(strain.iter().sum::<f64>() + history[PLASTIC_VOLUME]);
-    let elastic = compose(&strain.map(|e| libm::exp(2.0 * e)), &directions);
+    let (elastic, volume_ratio) = elastic_under(material, stress, consolidation, &mut history, plane)?;
     let mut state = State::new(elastic.map(Lanes::splat));
     state.history = history.map(Lanes::splat);
     material.update(&mut state, &Step { dt: LONG, ..Step::rest(plane) });
@@ -114,6 +108,42 @@ pub fn under_stress_after(
         history: state.history.map(first),
         volume_ratio,
     })
+}
+
+/// The state of a material in which the elastic strain under a Cauchy stress (Pa, `xx, yy, zz, xy, xz, yz`) has yielded to the end: on the
+/// yield surface, where the stress lies outside.
+///
+/// # Errors
+/// No elastic strain has this stress, or none is left.
+pub fn yielded(
+    material: &dyn Material,
+    stress: &[f64; 6],
+    consolidation: Option<Consolidation>,
+    plane: bool,
+) -> Result<Stressed, NoState> {
+    let mut history = material.initial_history();
+    let (elastic, _) = elastic_under(material, stress, consolidation, &mut history, plane)?;
+    let state = under_strain(material, &elastic, history, plane);
+    let numbers = state.elastic.iter().chain(&state.stress).chain(&state.history);
+    let is_sane = state.volume_ratio > 0.0 && numbers.into_iter().all(|n| n.is_finite());
+    if is_sane { Ok(state) } else { Err(NoState::Unreachable) }
+}
+
+/// The elastic left Cauchy-Green tensor under a Cauchy stress, and the volume over the reference volume.
+fn elastic_under(
+    material: &dyn Material,
+    stress: &[f64; 6],
+    consolidation: Option<Consolidation>,
+    history: &mut [f64; HISTORIES],
+    plane: bool,
+) -> Result<([f64; 6], f64), NoState> {
+    let (principal, directions) = principal(stress, plane);
+    let strain = material
+        .strain_under(principal, consolidation, history)
+        .filter(|strain| strain.iter().all(|e| e.is_finite()))
+        .ok_or(NoState::Unreachable)?;
+    let volume_ratio = libm::exp(strain.iter().sum::<f64>() + history[PLASTIC_VOLUME]);
+    Ok((compose(&strain.map(|e| libm::exp(2.0 * e)), &directions), volume_ratio))
 }
 
 /// The state of a material with an elastic left Cauchy-Green tensor (`xx, yy, zz, xy, xz, yz`), yielded where it has to.
@@ -263,6 +293,30 @@ mod tests {
         let water = law("model = 'fluid', bulk_modulus = 1e6");
         let sheared = under_stress(&*water, &[-1e3, -2e3, -1e3, 0.0, 0.0, 0.0], None, true);
         assert_eq!(sheared.err(), Some(NoState::Unreachable));
+    }
+
+    /// Outside the yield surface the state is that on it: Rankine's ratio for sand, the yield stress for metal; inside it is that under the
+    /// stress.
+    #[test]
+    fn what_yields_returns_to_the_surface() {
+        let sand = law("model = 'mohr_coulomb', young = 1e7, poisson = 0.3, friction_angle = 30.0");
+        for (ratio, limit) in [(0.2, 1.0 / 3.0), (5.0, 3.0)] {
+            let state =
+                yielded(&*sand, &[-1e4 * ratio, -1e4, -1e4 * ratio, 0.0, 0.0, 0.0], None, true).unwrap();
+            let [horizontal, vertical] = [state.stress[0], state.stress[1]];
+            assert!((horizontal / vertical - limit).abs() < 1e-9 * limit, "{ratio}: {horizontal} {vertical}");
+            // It stays there.
+            let again = under_strain(&*sand, &state.elastic, state.history, true);
+            for c in 0..6 {
+                assert!((again.stress[c] - state.stress[c]).abs() < 1e-6, "{c}");
+            }
+        }
+        let inside = [-5e3, -1e4, -5e3, 0.0, 0.0, 0.0];
+        let (one, other) = (yielded(&*sand, &inside, None, true), under_stress(&*sand, &inside, None, true));
+        assert_eq!(one.unwrap().stress, other.unwrap().stress);
+        let metal = law("model = 'von_mises', young = 1e9, poisson = 0.3, yield_stress = 1e6");
+        let state = yielded(&*metal, &[2e6, 0.0, 0.0, 0.0, 0.0, 0.0], None, false).unwrap();
+        assert!(((state.stress[0] - state.stress[1]).abs() / 1e6 - 1.0).abs() < 1e-9, "{state:?}");
     }
 
     /// The yield surface passes through the stress at a ratio of 1; its size is that of the closed form at any other.

@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `expression.rs` | expressions in x, y, z, t, X, Y, Z, with `libm` behind their functions |
+//! | `expression/` | expressions in x, y, z, t, X, Y, Z, with `libm` behind their functions |
 //! | `record.rs` | tables over time from files of comma-separated values |
 //! | `table.rs` | tables over time, linear between rows |
 //!
@@ -11,8 +11,19 @@ mod expression;
 pub mod record;
 mod table;
 
-pub use expression::{Expression, ExpressionError};
+pub use expression::{Expression, ExpressionError, NotFinite};
 pub use table::{Table, TableError};
+
+/// From 0 at 0 to 1 at 1 on half a period of a cosine, `(1 - cos(π s)) / 2`; constant outside.
+pub fn smooth_step(s: f64) -> f64 {
+    if s <= 0.0 {
+        0.0
+    } else if s >= 1.0 {
+        1.0
+    } else {
+        0.5 * (1.0 - libm::cos(std::f64::consts::PI * s))
+    }
+}
 
 /// A place of material, m, in the coordinates of the job; z is 0 in plane strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +76,11 @@ impl Quantity {
     /// Whether the value belongs to places of the undeformed body.
     pub fn names_undeformed(&self) -> bool {
         matches!(self, Self::Expression(expression) if expression.names_undeformed())
+    }
+
+    /// Where it has had no finite value so far, if it has been evaluated there.
+    pub fn not_finite(&self) -> Option<NotFinite> {
+        if let Self::Expression(expression) = self { expression.not_finite() } else { None }
     }
 
     /// Whether the value changes in time.

@@ -244,12 +244,18 @@ impl<'a, const D: usize> Run<'a, D> {
         if self.recorder.last_row() != Some(step) {
             self.recorder.write(self.comm, &mut self.solver, true, false)?;
         }
-        stages::enter_next(self.comm, self.problem, &mut self.solver).map_err(RunError::Seed)?;
+        let [come, met] =
+            stages::enter_next(self.comm, self.problem, &mut self.solver).map_err(RunError::Seed)?;
         let (physics, time) = (&self.solver.physics, quantity(self.solver.clock.time, "s"));
         let (number, all) = (physics.stage() + 1, self.problem.stages.len());
         let name = &self.problem.stages[physics.stage()].name;
         self.recorder
             .message(&format!("stage {number} of {all}, {name}, starts at t = {time} (step {step})"));
+        if met > 0 {
+            self.recorder.warning(&format!(
+                "stage {name}: {met} of {come} particles come to places that other material takes, and are pushed apart; let it move away first, or remove it"
+            ));
+        }
         Ok(())
     }
 

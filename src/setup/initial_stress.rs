@@ -6,7 +6,7 @@ use partition::Octant;
 
 use super::seed::{SeedError, raster};
 use crate::job::problem::{Body, InitialStress, Problem, StressKind};
-use crate::material::initial::{NoState, Stressed, under_stress};
+use crate::material::initial::{NoState, Stressed, under_stress, yielded};
 use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -93,7 +93,7 @@ fn at<const D: usize>(
     let pressures = match &initial.kind {
         StressKind::Components(components) => {
             let stress = components.each_ref().map(|component| component.at(place, 0.0));
-            return under_stress(material, &stress, initial.consolidation, D == 2);
+            return under(material, &stress, initial, D == 2);
         }
         StressKind::Weight { ratio, surface, surcharge } => {
             let weight = gravity[up.axis].abs()
@@ -117,7 +117,22 @@ fn at<const D: usize>(
     };
     let mut stress = [-pressures[1], -pressures[1], -pressures[1], 0.0, 0.0, 0.0];
     stress[up.axis] = -pressures[0];
-    under_stress(material, &stress, initial.consolidation, D == 2)
+    under(material, &stress, initial, D == 2)
+}
+
+/// The state under a stress, or on the yield surface if the job lets it return there.
+fn under(
+    material: &dyn Material,
+    stress: &[f64; 6],
+    initial: &InitialStress,
+    plane: bool,
+) -> Result<Stressed, NoState> {
+    match under_stress(material, stress, initial.consolidation, plane) {
+        Err(NoState::Yields { .. }) if initial.relax => {
+            yielded(material, stress, initial.consolidation, plane)
+        }
+        other => other,
+    }
 }
 
 /// Values of a table over depth, constant outside.

@@ -6,7 +6,7 @@ use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
 use self::initial_stress::put_under_stress;
-use self::seed::{SeedError, check_counts, count_leaf, fill_leaf};
+use self::seed::{SeedError, check_counts, check_finite, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::material;
 use crate::particle::chunk::{Chunk, Tag};
@@ -155,7 +155,7 @@ fn new_particles<const D: usize>(
     let stressed = forest.leaves().par_iter().zip(&mut chunks);
     let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
     let stressed: Result<(), SeedError> = stressed.collect();
-    comm.agree(stressed)?;
+    comm.agree(check_finite(problem).and(stressed))?;
     Ok(chunks)
 }
 
@@ -219,5 +219,6 @@ fn seed<const D: usize>(
             fill_leaf(problem, leaf, stage, &mut chunk)?;
             Ok(chunk)
         })
-        .collect()
+        .collect::<Result<_, SeedError>>()
+        .and_then(|chunks| check_finite(problem).map(|()| chunks))
 }

@@ -8,7 +8,7 @@ use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::material::initial::NoState;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::quantity::Quantity;
+use crate::quantity::{NotFinite, Quantity};
 use partition::Octant;
 
 /// A particle cannot be made.
@@ -43,7 +43,7 @@ pub enum SeedError {
     /// A body cannot have the stress that the job gives it.
     #[error(
         "{place}: found a stress at {} outside the yield surface of the body \"{body}\": {reason}; expected a stress inside the yield surface: \
-         another k0, more cohesion, or a higher preconsolidation pressure",
+         another k0, more cohesion, a higher preconsolidation pressure, or relax = true, which returns it to the surface",
         crate::text::place(point)
     )]
     Stress {
@@ -56,6 +56,9 @@ pub enum SeedError {
         /// Why.
         reason: NoState,
     },
+    /// A velocity or stress at the start, or gravity, has no finite value.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
     /// A load that particles carry finds none.
     #[error("{place}: found no {found} for the load \"{load}\"; expected {expected}")]
     Load {
@@ -150,7 +153,7 @@ fn place_near<const D: usize>(
     let way = body.sampling.way(&x.map(|c| (c / spacing) as u64), octant.level);
     let fits = |y: &[f64; D]| {
         let others = problem.bodies.iter().enumerate();
-        let mut others = others.filter(|&(other, _)| other != index && problem.are_together(index, other));
+        let mut others = others.filter(|&(other, _)| other != index && problem.come_together(index, other));
         cell.contains(y) && body.shape.contains(y) && others.all(|(_, other)| !other.shape.contains(y))
     };
     let shares = [1.0, 0.5, 0.25, 0.125].into_iter();
@@ -230,6 +233,22 @@ pub fn check_counts<const D: usize>(
         }
         None => Ok(()),
     }
+}
+
+/// Not collective. Whether gravity at the start is finite, and what has been taken so far of velocities and stresses of bodies.
+///
+/// # Errors
+/// The first that was not.
+pub fn check_finite<const D: usize>(problem: &Problem<D>) -> Result<(), SeedError> {
+    // A copy: others may have asked for the gravity of times that never come.
+    let gravity = problem.gravity_of_stage(0).clone();
+    gravity.at(0.0);
+    let of_bodies = problem.bodies.iter().flat_map(|body| {
+        let stress = body.stress.iter().flat_map(|stress| stress.kind.quantities());
+        body.velocity.iter().chain(stress)
+    });
+    let fault = of_bodies.chain(&gravity.acceleration).find_map(Quantity::not_finite);
+    fault.map_or(Ok(()), |fault| Err(fault.into()))
 }
 
 fn place<const D: usize>(problem: &Problem<D>, body: usize) -> String {
@@ -321,7 +340,7 @@ fn visit<const D: usize>(
         if side == Side::Crosses && body.given.is_none() {
             points.retain(|x| body.shape.contains(x));
         }
-        let together = |other: usize| other != index && problem.are_together(index, other);
+        let together = |other: usize| other != index && problem.come_together(index, other);
         for &(other, _) in near.iter().filter(|(other, _)| together(*other)) {
             // Bodies that touch may both claim a point by a rounding; it belongs to the first.
             let rounding = -1e-9 * spacing;

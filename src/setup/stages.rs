@@ -3,7 +3,7 @@ use partition::comm::{Comm, Disagreement};
 
 use super::seed::check_counts;
 use crate::job::Problem;
-use crate::particle::chunk::{Chunk, Tag};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
 
@@ -69,7 +69,8 @@ pub(super) fn material_of<const D: usize>(problem: &Problem<D>, body: usize, sta
     changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
 }
 
-/// Collective. Takes a solver into the next stage of its job: bodies go, change and come.
+/// Collective. Takes a solver into the next stage of its job: bodies go, change and come. Returns how many particles come, and how many
+/// of them to places where there is material already.
 ///
 /// # Errors
 /// A body that comes has no particle, or cannot have its stress; the same on all ranks.
@@ -77,7 +78,7 @@ pub fn enter_next<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
     solver: &mut Solver<D>,
-) -> Result<(), Disagreement> {
+) -> Result<[u64; 2], Disagreement> {
     let mut starts = solver.physics.stage_starts.clone();
     starts.push(solver.clock.time);
     let physics = physics(problem, &starts);
@@ -90,15 +91,33 @@ pub fn enter_next<const D: usize>(
     super::carried::carry(comm, problem, solver, &mut added, stage)?;
     let is_removed = |body| problem.stages[stage].removed.contains(&body);
     let bodies = 0..problem.bodies.len();
+    let is_removed: Vec<bool> = bodies.clone().map(is_removed).collect();
+    let met = solver.chunks.iter().zip(&added).map(|(chunk, added)| occupied(chunk, added, &is_removed));
+    let mut come = [added.iter().map(|chunk| chunk.len() as u64).sum(), met.sum()];
+    comm.sum_u64(&mut come);
     let change = Change {
-        is_removed: bodies.clone().map(is_removed).collect(),
+        is_removed,
         materials: bodies.map(|body| material_of(problem, body, stage) as u16).collect(),
         at_rest: problem.stages[stage].at_rest,
         reset_displacement: problem.stages[stage].reset_displacement,
         added,
     };
     solver.enter_stage(physics, change);
-    Ok(())
+    Ok(come)
+}
+
+/// How many particles come to a leaf where its box is taken by half along each axis by one that is there and stays.
+fn occupied<const D: usize>(chunk: &Chunk<D>, added: &Chunk<D>, is_removed: &[bool]) -> u64 {
+    let half = |of: &Chunk<D>, p: usize| of.column(Layout::<D>::HALF)[p];
+    let stays = |p: &usize| !is_removed[usize::from(Tag::unpack(chunk.tags()[*p]).body)];
+    let is_taken = |p: &usize| {
+        let (x, reach) = (added.position(*p), half(added, *p));
+        (0..chunk.len()).filter(stays).any(|q| {
+            let (y, near) = (chunk.position(q), 0.5 * (reach + half(chunk, q)));
+            (0..D).all(|a| (x[a] - y[a]).abs() < near)
+        })
+    };
+    (0..added.len()).filter(is_taken).count() as u64
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::Followed;
 use crate::particle::group::Group;
 use crate::particle::strain;
+use crate::quantity::{NotFinite, Quantity};
 
 /// What is solved: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
@@ -89,6 +90,13 @@ impl<const D: usize> Physics<D> {
     /// Number of the stage under way, from 0.
     pub fn stage(&self) -> usize {
         self.stage_starts.len().saturating_sub(1)
+    }
+
+    /// The first quantity that has had no finite value where it was needed, if there is one.
+    pub(crate) fn not_finite(&self) -> Option<NotFinite> {
+        let loads = self.loads.iter().flat_map(Load::quantities);
+        let faces = self.absorbing.as_flattened().iter().flatten().map(|face| &face.pressure);
+        self.gravity.acceleration.iter().chain(loads).chain(faces).find_map(Quantity::not_finite)
     }
 
     /// Gives colliders that deform the shape that they have at a time (s): that of a step is the one at its start.

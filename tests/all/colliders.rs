@@ -181,3 +181,43 @@ fn check_lists_colliders() {
         assert!(text.contains(part), "{part}\n{text}");
     }
 }
+
+/// A table of motion in a file moves a collider as the same rows in the job, bit by bit; smooth motions go through their rows on cosines.
+#[test]
+fn motions_come_from_files_and_start_smoothly() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let rows = "Time [s];U;Phi\n0.01;0;0\n0.04;-2.0D+01;90\n0.05;-25;90\n";
+    std::fs::write(directory.path().join("press.csv"), rows).expect("record");
+    let history = |motion: &str| {
+        let text = format!(
+            "version = 1\ndimension = 2\n[domain]\nsize = [1, 1]\nroot_edge = 0.5\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+             [[bodies]]\nname = 'body'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0.25, 0], max = [0.75, 0.5] }}\n\
+             [[colliders]]\nname = 'press'\nshape = {{ kind = 'box', min = [0.25, 0.5], max = [0.75, 1] }}\nmotion = {motion}\n\
+             [time]\nend = 0.06\n[output]\npicture = false\n[history]\nevery_steps = 1\n"
+        );
+        let path = directory.path().join("press.toml");
+        std::fs::write(&path, text).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]));
+        History::read(directory.path(), "press")
+    };
+    let rows = "rows = [{ time = 0.01 }, { time = 0.04, translation = [0, -0.02], rotation = 90 }, \
+                { time = 0.05, translation = [0, -0.025], rotation = 90 }]";
+    let record = "record = { file = 'press.csv', time = 'time', y = 'u', rotation = 3, scale = 1e-3 }";
+    let linear = history(&format!("{{ kind = 'table', {rows} }}"));
+    let from_file = history(&format!("{{ kind = 'table', {record} }}"));
+    for name in ["time", "position_press_y", "angle_press", "force_press_y", "momentum_y"] {
+        assert_eq!(linear.column(name), from_file.column(name), "{name}");
+    }
+    let smooth = history(&format!("{{ kind = 'table', smooth = true, {record} }}"));
+    for (time, y) in smooth.column("time").iter().zip(smooth.column("position_press_y")) {
+        let fall = |from: f64, to: f64| {
+            0.5 * (1.0 - (std::f64::consts::PI * ((time - from) / (to - from)).clamp(0.0, 1.0)).cos())
+        };
+        let exact = 0.75 - 0.02 * fall(0.01, 0.04) - 0.005 * fall(0.04, 0.05);
+        assert!((y - exact).abs() < 1e-14, "{time}: {y} for {exact}");
+    }
+    let rising = history("{ kind = 'steady', velocity = [0, -1], ramp = 0.04 }");
+    let (time, y) = (rising.last("time"), rising.last("position_press_y"));
+    assert!((y - (0.75 - (time - 0.02))).abs() < 1e-14, "{time} {y}");
+}

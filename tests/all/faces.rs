@@ -264,3 +264,32 @@ fn rows_at_outputs_have_the_forces_of_their_steps() {
         }
     }
 }
+
+/// A disk about a point of a plane of symmetry is cut by it: the particles, and so the run, are those of the half disk.
+#[test]
+fn a_plane_of_symmetry_cuts_bodies() {
+    let half = |shape: &str| {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("half.toml");
+        let text = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [1, 1]\nroot_edge = 0.5\n\
+             [boundaries]\nx_min.kind = 'symmetric'\ny_min.kind = 'slip'\n[tree]\nbase_level = 1\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.2\n\
+             [[bodies]]\nname = 'disk'\nmaterial = 'm'\nshape = {shape}\nvelocity = [0, -1]\n\
+             [time]\nend = 0.05\n[output]\npicture = false\n[history]\nevery_steps = 1\n"
+        );
+        std::fs::write(&path, text).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        History::read(directory.path(), "half")
+    };
+    let disk = "{ kind = 'circle', centre = [0, 0.4], radius = 0.3 }";
+    let cut = half(disk);
+    let given = half(&format!(
+        "{{ kind = 'intersection', parts = [{disk}, {{ kind = 'box', min = [0, 0], max = [1, 1] }}] }}"
+    ));
+    for name in ["mass", "momentum_y", "elastic_energy", "kinetic_energy"] {
+        assert_eq!(cut.column(name), given.column(name), "{name}");
+    }
+    let exact = 1000.0 * 0.5 * std::f64::consts::PI * 0.09;
+    assert!((cut.last("mass") / exact - 1.0).abs() < 0.05, "{}", cut.last("mass"));
+}

@@ -191,7 +191,11 @@ fn wrong_stresses_are_refused_with_their_key() {
     let k0 = "{ kind = 'geostatic', k0 = 0.5 }";
     let no_gravity = |text: String| text.replace("gravity = [0, -9.81]", "gravity = [0, 0]");
     let cases = [
-        (ground(2, SAND, "{ kind = 'geostatic', k0 = 0.2 }", 0.1, ""), "bodies[0].stress: ", "yields"),
+        (
+            ground(2, SAND, "{ kind = 'geostatic', k0 = 0.2 }", 0.1, ""),
+            "bodies[0].stress: ",
+            "or relax = true",
+        ),
         (ground(2, CLAY, k0, 0.1, ""), "bodies[0].stress: ", "yields"),
         (
             ground(2, "model = 'fluid'\nbulk_modulus = 2e6", k0, 0.1, ""),
@@ -239,4 +243,18 @@ fn wrong_stresses_are_refused_with_their_key() {
             assert!(message.contains(key) && message.contains(words), "{command}: {key} {words}\n{message}");
         }
     }
+}
+
+/// With `relax` sand under a K0 below Rankine's starts on the yield surface: horizontal stress is the active one, a third of the vertical, and the
+/// ground hardly moves.
+#[test]
+fn stress_beyond_yield_relaxes_to_the_surface() {
+    let sand = "model = 'mohr_coulomb'\nyoung = 2e7\npoisson = 0.3\nfriction_angle = 30";
+    let stress = "{ kind = 'geostatic', k0 = 0.25, relax = true }";
+    let rest = "[[probes]]\nname = 'deep'\nquantities = ['stress']\nshape = { kind = 'box', min = [5.5, -0.5], max = [6.5, 0] }\n";
+    let (history, _) = self::history(&ground(2, sand, stress, 0.02, rest));
+    let first = |name: &str| history.column(name)[0];
+    let ratio = first("stress_deep_xx") / first("stress_deep_yy");
+    assert!((ratio - 1.0 / 3.0).abs() < 1e-6, "{ratio}");
+    assert!(fastest(&history) < 0.05, "{}", fastest(&history));
 }

@@ -264,3 +264,59 @@ fn a_shaken_block_slides_as_newmark_says() {
     assert!(all > 0.1 && (found / all - 1.0).abs() < 0.02, "{found} against {all}");
     assert!(worst < 0.02 * all, "{worst} of {all}");
 }
+
+/// A value that is not finite ends the run with key, expression, place and time; at the start it is refused before the run.
+#[test]
+fn a_value_that_is_not_finite_names_its_expression() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("body.toml");
+    let told = |job: String, code: i32| {
+        std::fs::write(&path, job).expect("job");
+        let output =
+            run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]).output().expect("starts");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{told}");
+        told
+    };
+    let in_time = told(text("[0, '-1 / (t < 0.01)']", 0.02, ""), 1);
+    let parts =
+        ["gravity[1]: found the value -inf of \"-1 / (t < 0.01)\" at t = 0.01", "expected a finite number"];
+    assert!(parts.iter().all(|part| in_time.contains(part)), "{in_time}");
+    let load = "[[loads]]\nname = 'pull'\nkind = 'body_force'\nacceleration = ['sqrt(x + 0.4)', 0]\n";
+    let in_place = told(text("[0, 0]", 0.02, load), 1);
+    let parts = ["loads[0].acceleration[0]: found the value NaN of \"sqrt(x + 0.4)\" at x = -0.", " m"];
+    assert!(parts.iter().all(|part| in_place.contains(part)), "{in_place}");
+    let moving = text("[0, 0]", 0.02, "")
+        .replace("material = 'rubber'\nshape", "material = 'rubber'\nvelocity = ['ln(x + 0.4)', 0]\nshape");
+    let at_start = told(moving, 2);
+    let parts = ["bodies[0].velocity[0]: found the value", "ln(x + 0.4)"];
+    assert!(parts.iter().all(|part| at_start.contains(part)), "{at_start}");
+    let check = agimp(directory.path()).arg("check").arg(&path).output().expect("starts");
+    assert_eq!(check.status.code(), Some(2), "{}", String::from_utf8_lossy(&check.stderr));
+}
+
+/// A record of PEER and one with columns apart by spaces are the table in the job, bit by bit; `ramp` is half a period of a cosine.
+#[test]
+fn records_of_other_programs_and_smooth_ramps() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let peer = "PEER\nSomewhere\nACCELERATION IN UNITS OF G\nNPTS=  4, DT=  .0500 SEC\n  .0000E+00  .2500E+00\n -.5000E+00 .0000E+00\n";
+    std::fs::write(directory.path().join("a.at2"), peer).expect("record");
+    let spaced = "T  ACC\n0.0 0\n5.0D-02 2.5d-1\n0.1 -.5\n0.15 0\n";
+    std::fs::write(directory.path().join("b.txt"), spaced).expect("record");
+    let momenta = |acceleration: &str| {
+        let load =
+            format!("[[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = [{acceleration}, 0]\n");
+        let path = directory.path().join("body.toml");
+        std::fs::write(&path, text("[0, 0]", 0.1, &load)).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]));
+        let history = History::read(directory.path(), "body");
+        (history.column("momentum_x").to_vec(), history.last("momentum_x") / history.last("mass"))
+    };
+    let (table, _) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15000000000000002, 0]]");
+    assert_eq!(momenta("{ file = 'a.at2', scale = 8 }").0, table);
+    let (table, _) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15, 0]]");
+    assert_eq!(momenta("{ file = 'b.txt', time = 't', value = 'acc', scale = 8 }").0, table);
+    // Half of the impulse of the whole force.
+    let (_, speed) = momenta("'8 * ramp(t / 0.1)'");
+    assert!((speed - 0.4).abs() < 1e-3, "{speed}");
+}

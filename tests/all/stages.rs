@@ -186,3 +186,35 @@ fn a_stage_without_material_ends_at_its_end() {
         reference.assert_same(&Outcome::read(directory.path(), "pour"), "restart from the empty stage");
     }
 }
+
+/// Two lifts of sand are poured from one place; if the first is still there, a warning says so.
+#[test]
+fn pours_may_come_from_one_place() {
+    let pour = |duration: f64| {
+        format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [1, 2]\nroot_edge = 0.5\n\
+             [boundaries]\ny_min.kind = 'slip'\n[history]\nevery_steps = 1\n[output]\npicture = false\n\
+             [[materials]]\nname = 's'\ndensity = 1600\nmodel = 'mohr_coulomb'\nyoung = 1e5\npoisson = 0.3\nfriction_angle = 35\n\
+             [[bodies]]\nname = 'a'\nmaterial = 's'\nshape = {{ kind = 'box', min = [0.25, 1.25], max = [0.75, 1.5] }}\n\
+             [[bodies]]\nname = 'b'\nmaterial = 's'\nshape = {{ kind = 'box', min = [0.25, 1.25], max = [0.75, 1.5] }}\nstage = 'two'\n\
+             [[stages]]\nname = 'one'\nduration = {duration}\n[[stages]]\nname = 'two'\n[time]\nend = 0.35\n"
+        )
+    };
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("pour.toml");
+    let told = |duration: f64| {
+        std::fs::write(&path, pour(duration)).expect("job");
+        text(&succeed(&mut run(directory.path(), 1, 1, &path, &["--overwrite"])))
+    };
+    let words = told(0.3);
+    assert!(!words.contains("come to places"), "{words}");
+    let history = History::read(directory.path(), "pour");
+    let lift = 1600.0 * 0.5 * 0.25;
+    let masses = [history.column("mass")[0], history.last("mass")];
+    assert!((masses[0] - lift).abs() < 1e-9 && (masses[1] - 2.0 * lift).abs() < 1e-9, "{masses:?}");
+    let words = told(0.01);
+    assert!(
+        words.contains("stage two: 32 of 32 particles come to places that other material takes"),
+        "{words}"
+    );
+}

@@ -161,5 +161,5 @@ fn ways<const D: usize>(checks: &mut Checks, ways: &[Way], path: &Path) -> Optio
         let translation = checks.vector(&way.translation, &here.key("translation"))?;
         knots.push(Knot { time: way.time, translation, angle: 0.0 });
     }
-    Some(Motion::Table(Table(knots)))
+    Some(Motion::Table(Table { rows: knots, is_smooth: false }))
 }

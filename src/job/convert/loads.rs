@@ -1,6 +1,7 @@
 //! Loads of the job file to those of the solver.
 use super::checks::{Checks, Space};
 use crate::geometry::written::Vector;
+use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::{
@@ -9,7 +10,7 @@ use crate::job::schema::loads::{
 use crate::load::{Carried, CarriedForce, Kind, Load};
 use crate::quantity::record::{self, Column};
 use crate::quantity::{Expression, Quantity, Table};
-use crate::text::written as number;
+use crate::text::{excerpt, written as number};
 
 /// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
@@ -188,10 +189,14 @@ pub(super) fn quantity<const D: usize>(
     let read = match written {
         WrittenQuantity::Number(value) => Ok(Quantity::Constant(*value)),
         WrittenQuantity::Expression(text) => match Expression::parse(text) {
-            Ok(expression) if D == 2 && expression.names_z() => {
-                Err(format!("found z in \"{text}\"; expected x, y, X, Y and t in a 2D job"))
+            Ok(expression) if D == 2 && expression.names_z() => Err(format!(
+                "found z in \"{}\"; expected x, y, X, Y and t in a 2D job",
+                excerpt(text, QUOTED)
+            )),
+            Ok(expression) => {
+                let key = format!("{}: {path}", checks.place(path));
+                Ok(Quantity::Expression(Box::new(expression.of_key(key))))
             }
-            Ok(expression) => Ok(Quantity::Expression(Box::new(expression))),
             Err(error) => Err(error.to_string()),
         },
         WrittenQuantity::Table(rows) => {
@@ -203,14 +208,18 @@ pub(super) fn quantity<const D: usize>(
     read.map_err(|message| checks.fault(path, message)).ok()
 }
 
-/// The table in a file, or a fault.
-fn of_file(checks: &mut Checks, written: &Record, path: &Path) -> Option<Quantity> {
-    let column = |column: &WrittenColumn| match column {
+/// A column of a file.
+pub(super) fn column(written: &WrittenColumn) -> Column {
+    match written {
         WrittenColumn::Number(number) => Column::Number(usize::from(*number)),
         WrittenColumn::Name(name) => Column::Name(name.clone()),
-    };
+    }
+}
+
+/// The table in a file, or a fault.
+fn of_file(checks: &mut Checks, written: &Record, path: &Path) -> Option<Quantity> {
     let (time, value) = (column(&written.time), column(&written.value));
-    let expected = "rows of a time and a value in comma-separated columns";
+    let expected = "rows of a time and a value in columns";
     let read = |file: &std::path::Path| record::read(file, &time, &value, written.scale);
     let table = checks.read(&written.file, expected, &path.key("file"), read)?;
     checks.note_file(table.checksum());

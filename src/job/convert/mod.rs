@@ -405,16 +405,23 @@ fn body<const D: usize>(
         // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
         let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
         let (low, high) = (bounds.lower[a], bounds.upper[a]);
-        let below = low.is_finite() && low < -slack;
-        let above = high.is_finite() && high > space.size[a] + slack;
+        // A plane of symmetry cuts what goes on beyond it; of particles from a file none may lie there.
+        let is_cut = |side: usize| given.is_none() && is_symmetric(&file_of.boundaries, a, side);
+        let below = low.is_finite() && low < -slack && !is_cut(0);
+        let above = high.is_finite() && high > space.size[a] + slack && !is_cut(1);
         if below || above || low >= space.size[a] || high <= 0.0 {
             let o = space.origin[a];
             let [low, high, least, most] = [low + o, high + o, o, o + space.size[a]].map(|x| number(x, 7));
             let (name, axis) = (excerpt(&body.name, QUOTED), AXES[a]);
+            let side = if below { "min" } else { "max" };
+            let hint = match (below || above) && given.is_none() {
+                true => format!("; boundaries.{axis}_{side} = {{ kind = \"symmetric\" }} would cut it there"),
+                false => String::new(),
+            };
             checks.fault(
                 &here,
                 format!(
-                    "found the body \"{name}\" from {axis} = {low} to {high}; expected it inside the domain, from {axis} = {least} to {most}"
+                    "found the body \"{name}\" from {axis} = {low} to {high}; expected it inside the domain, from {axis} = {least} to {most}{hint}"
                 ),
             );
             return None;
@@ -440,6 +447,13 @@ fn body<const D: usize>(
             None => None,
         },
     })
+}
+
+/// Whether a face of the domain is a plane of symmetry.
+fn is_symmetric(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    let face = [[x_min, x_max], [y_min, y_max], [z_min, z_max]][axis][side];
+    matches!(face, Some(file::Face::Symmetric {}))
 }
 
 /// How the particles of a body lie.

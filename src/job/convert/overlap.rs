@@ -27,7 +27,7 @@ pub(in crate::job) fn find<const D: usize>(problem: &Problem<D>) -> Vec<Overlap<
         for first in 0..second.min(pairs) {
             let common = bounds[first].intersection(&bounds[second]);
             if (0..D).any(|axis| common.upper[axis] - common.lower[axis] <= slack)
-                || !problem.are_together(first, second)
+                || !problem.come_together(first, second)
             {
                 continue;
             }

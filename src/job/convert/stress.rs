@@ -115,7 +115,8 @@ pub(super) fn stress<const D: usize>(
             StressKind::Components(Box::new(components.try_into().ok()?))
         }
     };
-    Some(InitialStress { place: (checks.position)(checks.tree.locate(path).start), kind, consolidation })
+    let place = (checks.position)(checks.tree.locate(path).start);
+    Some(InitialStress { place, kind, relax: written.relax, consolidation })
 }
 
 /// A field; a number of at least 0.

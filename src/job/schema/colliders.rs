@@ -1,5 +1,6 @@
 //! Colliders as they are written in a job file.
-use super::common::{AxisName, Spin, velocity};
+use super::common::{AxisName, Spin, is_off, velocity};
+use super::loads::{Column, first, one};
 use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,6 +93,10 @@ pub enum Motion {
         /// Angular velocity about the reference point, rad/s: three components in 3D, one number in 2D.
         #[serde(default)]
         angular_velocity: Option<Spin>,
+        /// Time over which it reaches these velocities from rest, s, smoothly, on half a period of a cosine; at once by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+        ramp: Option<f64>,
     },
     /// Prescribed by a table, linear between rows, at rest before the first and after the last one. The velocity in a time step is the mean
     /// over the step.
@@ -100,9 +105,17 @@ pub enum Motion {
         #[serde(default)]
         #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
-        /// Rows with increasing times; at least two.
+        /// Rows with increasing times; at least two. Either these or `record`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(length(max = 100_000))]
-        rows: Vec<Row>,
+        rows: Option<Vec<Row>>,
+        /// The rows from a file.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        record: Option<MotionRecord>,
+        /// Whether it comes to rest at each row, on half a period of a cosine from one row to the next; the speed then reaches π/2 times
+        /// that of a linear motion.
+        #[serde(default, skip_serializing_if = "is_off")]
+        smooth: bool,
     },
     /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
     /// touches within a cell of its surface. Unless `collides = false` it collides with the faces of the
@@ -156,7 +169,39 @@ pub enum Motion {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(length(max = 100_000))]
         rows: Option<Vec<Row>>,
+        /// These rows from a file.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        record: Option<MotionRecord>,
     },
+}
+
+/// A motion over time from a file with columns separated by semicolons, tabs, commas or spaces. Lines that start with # are comments, and
+/// the first line may hold the names of the columns. If its rows change, a restart is refused.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionRecord {
+    /// Name of the file, relative to the job file.
+    pub file: String,
+    /// Column of the times, s: its number, from 1, or its name in the first line; the first by default.
+    #[serde(default = "first")]
+    pub time: Column,
+    /// Column of the displacement of the reference point along x, m: its number or name; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<Column>,
+    /// The same along y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<Column>,
+    /// The same along z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-dimension" = 3))]
+    pub z: Option<Column>,
+    /// Column of the angle, degrees: its number or name; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Column>,
+    /// Factor for the displacements: 0.001 converts mm to m.
+    #[serde(default = "one")]
+    #[schemars(range(min = -1e12, max = 1e12))]
+    pub scale: f64,
 }
 
 /// Inertia of a free body: a number, about a fixed axis, or three principal moments, kg m².

@@ -34,6 +34,11 @@ pub enum AxisName {
     Z,
 }
 
+/// Whether a flag is off.
+pub(super) fn is_off(flag: &bool) -> bool {
+    !*flag
+}
+
 /// Default of flags that are on.
 pub(super) fn yes() -> bool {
     true

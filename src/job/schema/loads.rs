@@ -12,7 +12,7 @@ pub enum Quantity {
     /// The same everywhere and always.
     Number(#[schemars(range(min = -1e12, max = 1e12))] f64),
     /// An expression in x, y, z (m), t (s) and, in loads on material, X, Y, Z (m; the place in the undeformed body), with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
-    /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, floor, ceil, min, max.
+    /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, ramp, floor, ceil, min, max.
     Expression(String),
     /// Rows [time (s), value] with increasing times.
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
@@ -20,8 +20,8 @@ pub enum Quantity {
     Record(Box<Record>),
 }
 
-/// A table over time from a file with comma-, semicolon- or tab-separated columns. Lines that start with # are comments, and the first line
-/// may hold the names of the columns. If its rows change, a restart is refused.
+/// A table over time from a file with columns separated by semicolons, tabs, commas or spaces, or a record of the PEER database. Lines that
+/// start with # are comments, and the first line may hold the names of the columns. If its rows change, a restart is refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -49,7 +49,7 @@ pub enum Column {
     Name(String),
 }
 
-fn first() -> Column {
+pub(super) fn first() -> Column {
     Column::Number(1)
 }
 
@@ -57,7 +57,7 @@ fn second() -> Column {
     Column::Number(2)
 }
 
-fn one() -> f64 {
+pub(super) fn one() -> f64 {
     1.0
 }
 

@@ -1,11 +1,12 @@
 //! Stress at the start of a body, as it is written in a job file.
+use super::common::is_off;
 use super::loads::Quantity;
 use crate::geometry::written::bound_items;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Initial stress of a body. The elastic strain is set to the one that produces this stress; a stress outside the yield surface is refused.
-/// Vertical is the axis of `gravity` at the start.
+/// Initial stress of a body. The elastic strain is set to the one that produces this stress; a stress outside the yield surface is refused,
+/// or returns to it with `relax`. Vertical is the axis of `gravity` at the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stress {
     /// Overconsolidation ratio: preconsolidation pressure over that of the yield surface through the stress; 1 is normally
@@ -17,6 +18,10 @@ pub struct Stress {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub preconsolidation: Option<f64>,
+    /// Whether a stress outside the yield surface returns to it, as the material yields in one step; then it is not that of the weight above, and
+    /// the ground moves until it carries it. By default such a stress is an error.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub relax: bool,
     /// Kind of initial stress.
     #[serde(flatten)]
     pub kind: StressKind,

@@ -1,6 +1,6 @@
 //! What a job will cost, found without running it.
 use self::count::Tally;
-use super::seed::SeedError;
+use super::seed::{SeedError, check_finite};
 use crate::grid::mask::{offset, offset_count};
 use crate::job::problem::{Field, Problem};
 use crate::material;
@@ -146,9 +146,13 @@ impl Estimate {
 /// # Errors
 /// Two bodies share a lattice point, or the steps cannot be counted.
 pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, EstimateError> {
-    let (time_step, steps) = steps(problem)?;
+    let counted = steps(problem);
     let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
-    super::initial_stress::probe(problem, &materials)?;
+    let probed = super::initial_stress::probe(problem, &materials);
+    // First, for it makes nonsense of the others.
+    check_finite(problem)?;
+    let (time_step, steps) = counted?;
+    probed?;
     let Tally { particles, levels, is_cut } = count::count(problem)?;
     let outputs =
         problem.output.every.map_or(2, |every| (problem.time.end / every - 1e-9).floor() as u64 + 2);
@@ -177,6 +181,7 @@ pub fn steps<const D: usize>(problem: &Problem<D>) -> Result<(f64, f64), Estimat
     let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
     let finest = criteria.map(|criterion| criterion.level).fold(problem.finest_level(), u8::max);
     let time_step = time_step(problem, finest);
+    check_finite(problem)?;
     let steps = (problem.time.end / time_step).ceil();
     if time_step.is_finite() && time_step > 0.0 && steps.is_finite() {
         return Ok((time_step, steps));

@@ -22,6 +22,7 @@ use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::particle::Chunk;
 use crate::probe::{Maxima, Tracked};
+use crate::quantity::NotFinite;
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush};
 use crate::solver::state::cost::Costs;
@@ -53,6 +54,9 @@ pub enum StepError {
     /// A particle's box cannot be transferred.
     #[error(transparent)]
     Bin(#[from] BinMissing),
+    /// A quantity of the job has no finite value.
+    #[error(transparent)]
+    Quantity(#[from] NotFinite),
     /// The time step is not a positive number.
     #[error("the time step became {dt} s; the run has become unstable")]
     TimeStep {

@@ -2,12 +2,12 @@
 use std::cell::OnceCell;
 
 use super::super::checks::Checks;
-use super::{Z, allowed, optional, table};
+use super::{Z, allowed, optional, records};
 use crate::boundary::motion::{Free, Rate, Table, length};
 use crate::boundary::rigid::{Meeting, turning};
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{Inertia, Motion as Written, Row};
+use crate::job::schema::colliders::{Inertia, Motion as Written};
 use crate::job::schema::common::Spin;
 use crate::text::written;
 
@@ -45,6 +45,7 @@ pub(super) fn free_body<const D: usize>(
         friction,
         restitution,
         rows,
+        record,
     } = motion
     else {
         return None;
@@ -71,9 +72,11 @@ pub(super) fn free_body<const D: usize>(
         (true, None, _) => Turns::Freely,
     };
     let meeting = meeting(checks, *collides, [*friction, *restitution], path);
-    let driven = match rows {
-        Some(rows) => driven(checks, rows, &along, !matches!(how, Turns::Never), &path.key("rows"))?,
-        None => Table::default(),
+    let driven = if rows.is_some() || record.is_some() {
+        let table = records::rows(checks, rows.as_deref(), record.as_ref(), path)?;
+        driven(checks, table, &along, !matches!(how, Turns::Never), (path, rows.is_some()))?
+    } else {
+        Table::default()
     };
     // To add up the cells of a boolean takes long, so only where they are asked for.
     let found = OnceCell::new();
@@ -207,23 +210,33 @@ fn meeting(
 /// The table of a body that is free along some axes only: each of its motions is along another one, or a rotation of what does not turn by itself.
 fn driven<const D: usize>(
     checks: &mut Checks,
-    rows: &[Row],
+    table: Table<D>,
     along: &[bool; D],
     turns: bool,
-    path: &Path,
+    (path, is_of_job): (&Path, bool),
 ) -> Option<Table<D>> {
-    let table = table(checks, rows, path)?;
-    for (i, row) in table.0.iter().enumerate() {
+    let here = |row: usize, key: &'static str| match is_of_job {
+        true => path.key("rows").index(row).key(key),
+        false => path.key("record"),
+    };
+    for (i, row) in table.rows.iter().enumerate() {
+        let before = checks.faults.len();
         for a in (0..D).filter(|&a| along[a] && row.translation[a] != 0.0) {
             let message = format!(
                 "found {}; expected 0 along an axis on which the body is free: leave it out of `along`",
                 written(row.translation[a])
             );
-            checks.fault(&path.index(i).key("translation").index(a), message);
+            let here = here(i, "translation");
+            checks.fault(&if is_of_job { here.index(a) } else { here.key(["x", "y", "z"][a]) }, message);
         }
         if turns && row.angle != 0.0 {
             let message = "found a rotation for a body that turns freely; expected `turns = false`";
-            checks.fault(&path.index(i).key("rotation"), message.into());
+            let here = here(i, "rotation");
+            checks.fault(&if is_of_job { here } else { here.key("rotation") }, message.into());
+        }
+        // A file may have many such rows.
+        if !is_of_job && checks.faults.len() > before {
+            break;
         }
     }
     Some(table)

@@ -4,26 +4,27 @@
 //! |---|---|
 //! | `free_bodies` | colliders that move by themselves |
 //! | `deforming` | meshes in time |
+//! | `records` | tables of motion, also from files |
 //! | this | the others, and their motion |
 mod deforming;
 mod free_bodies;
+mod records;
 
 use self::free_bodies::free_body;
 use super::checks::{Checks, Space};
-use crate::boundary::motion::{Knot, Motion, Rate, Table};
+use crate::boundary::motion::{Motion, Rate, Table};
 use crate::boundary::{ActsOn, Collider, Contact};
-use crate::geometry::Aabb;
 use crate::geometry::written::Vector;
+use crate::geometry::{Aabb, Shape, common_point};
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{
-    ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written, Row,
-};
+use crate::job::schema::colliders::{ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written};
 use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file as file;
-use crate::text::written;
 
 /// Most colliders of a job: what a checkpoint's header has room for.
 const MAX_COLLIDERS: usize = 16;
+/// Most boxes in which a point of a shape is looked for.
+const MOST_BOXES: usize = 10_000;
 /// The axis of what turns in a plane.
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -71,7 +72,7 @@ fn collider<const D: usize>(
         true => (0..D).any(|a| bounds.lower[a] > bounds.upper[a]),
         false => bounds.is_empty(),
     };
-    if is_empty {
+    if is_empty || (!takes_sheets && has_no_point(&shape, &bounds)) {
         checks.fault(&here, "found a shape without a point; expected one with a volume".into());
         return None;
     }
@@ -114,6 +115,16 @@ fn collider<const D: usize>(
     })
 }
 
+/// Whether nothing is left of a bounded boolean shape. One that is thinner than a millionth of its size, or takes too long to look at, passes.
+fn has_no_point<const D: usize>(shape: &Shape<D>, bounds: &Aabb<D>) -> bool {
+    let size = (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(0.0, f64::max);
+    let mut boxes = MOST_BOXES;
+    matches!(shape, Shape::Difference(..) | Shape::Intersection(_))
+        && size.is_finite()
+        && common_point([shape; 2], *bounds, 1e-6 * size, &mut boxes).is_none()
+        && boxes > 0
+}
+
 /// The centre of a box, along each axis cut by the domain where it is unbounded.
 fn centre<const D: usize>(bounds: &Aabb<D>, space: &Space<D>) -> [f64; D] {
     std::array::from_fn(|a| {
@@ -135,7 +146,11 @@ fn motion<const D: usize>(
 ) -> Option<(Motion<D>, [f64; 3])> {
     match motion {
         None | Some(Written::Fixed {}) => Some((Motion::Fixed, Z)),
-        Some(Written::Steady { velocity, angular_velocity }) => {
+        Some(Written::Steady { velocity, angular_velocity, ramp }) => {
+            let steady = |rate| match ramp {
+                Some(span) => Motion::Rising(rate, *span),
+                None => Motion::Steady(rate),
+            };
             let velocity = optional(checks, velocity.as_ref(), &path.key("velocity"))?;
             let spin = match (angular_velocity, D) {
                 (None, _) => [0.0; 3],
@@ -152,16 +167,17 @@ fn motion<const D: usize>(
                 }
             };
             if D == 2 {
-                return Some((Motion::Steady(Rate::about_axis(velocity, spin[2])), Z));
+                return Some((steady(Rate::about_axis(velocity, spin[2])), Z));
             }
             let speed = spin.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt();
             let axis = if speed > 0.0 { spin.map(|c| c / speed) } else { Z };
-            Some((Motion::Steady(Rate::about_axis(velocity, speed)), axis))
+            Some((steady(Rate::about_axis(velocity, speed)), axis))
         }
-        Some(Written::Table { axis, rows }) => {
+        Some(Written::Table { axis, rows, record, smooth }) => {
             let axis = checks.turning_axis::<D>(axis.as_ref(), &path.key("axis"));
-            let rows = table(checks, rows, &path.key("rows"));
-            Some((Motion::Table(rows?), axis?))
+            let rows = records::rows::<D>(checks, rows.as_deref(), record.as_ref(), path);
+            let table = rows.map(|rows| Table { is_smooth: *smooth, ..rows });
+            Some((Motion::Table(table?), axis?))
         }
         // With the shape: see `free_body`.
         Some(Written::Free { .. }) => None,
@@ -171,32 +187,6 @@ fn motion<const D: usize>(
 /// A vector, or 0 where none is given.
 fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
     vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
-}
-
-fn table<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Table<D>> {
-    if rows.len() < 2 {
-        checks.fault(path, format!("found {} rows; expected at least 2 rows", rows.len()));
-        return None;
-    }
-    let mut knots = Vec::new();
-    for (i, row) in rows.iter().enumerate() {
-        let here = path.index(i);
-        if i > 0 && row.time <= rows[i - 1].time {
-            let message = format!(
-                "found {}; expected more than the previous {}",
-                written(row.time),
-                written(rows[i - 1].time)
-            );
-            checks.fault(&here.key("time"), message);
-        }
-        let translation = optional(checks, row.translation.as_ref(), &here.key("translation"));
-        knots.push(translation.map(|translation| Knot {
-            time: row.time,
-            translation,
-            angle: row.rotation.to_radians(),
-        }));
-    }
-    knots.into_iter().collect::<Option<_>>().map(Table)
 }
 
 /// Which axes a list names.

@@ -118,7 +118,9 @@ impl Columns {
         let known = groups.iter().flat_map(|group| group.iter().copied());
         let known: Vec<&str> = known.chain(["mass", "volume"]).chain(histories.iter().copied()).collect();
         let names = || table.columns.iter().map(|(name, _)| name.as_str());
-        if let Some(other) = names().find(|name| !known.contains(name) && !table.may_have_others) {
+        // Names in capitals are the same names.
+        let is_known = |name: &str| known.iter().any(|known| known.eq_ignore_ascii_case(name));
+        if let Some(other) = names().find(|name| !is_known(name) && !table.may_have_others) {
             let guess = nearest(other, known.iter().copied());
             let guess = guess.map_or(String::new(), |name| format!("; did you mean \"{name}\"?"));
             return Err(format!(
@@ -127,10 +129,12 @@ impl Columns {
                 known.join(", ")
             ));
         }
-        if let Some(twice) = known.iter().find(|known| names().filter(|name| name == *known).count() > 1) {
+        if let Some(twice) =
+            known.iter().find(|known| names().filter(|name| name.eq_ignore_ascii_case(known)).count() > 1)
+        {
             return Err(format!("it has the column \"{twice}\" twice"));
         }
-        let place = |name: &str| names().position(|other| other == name);
+        let place = |name: &str| names().position(|other| other.eq_ignore_ascii_case(name));
         // All of a group, or none.
         let group = |names: &[&str]| -> Result<Option<Vec<usize>>, String> {
             let places: Vec<Option<usize>> = names.iter().map(|name| place(name)).collect();
@@ -163,6 +167,13 @@ impl Columns {
         Ok(found)
     }
 
+    /// All of them.
+    fn all(&self) -> impl Iterator<Item = usize> {
+        let groups = [&self.velocity, &self.stress, &self.gradient].into_iter().flatten().flatten();
+        let single = [&self.mass, &self.volume].into_iter().chain(&self.history).flatten();
+        self.position.iter().chain(groups).chain(single).copied()
+    }
+
     /// Writes the particle of a row.
     fn put<const D: usize>(
         &self,
@@ -177,10 +188,12 @@ impl Columns {
         let value = |column: usize| table.columns[column].1[row];
         let values =
             |columns: &[usize]| -> Vec<f64> { columns.iter().map(|&column| value(column)).collect() };
-        let position = values(&self.position);
-        if position.iter().any(|x| !x.is_finite()) {
-            return Err("its position is not a number".into());
+        if let Some((name, values)) =
+            self.all().map(|column| &table.columns[column]).find(|(_, values)| !values[row].is_finite())
+        {
+            return Err(format!("found {} in the column \"{name}\"; expected a finite number", values[row]));
         }
+        let position = values(&self.position);
         chunk.write(
             Layout::<D>::POSITION,
             p,
