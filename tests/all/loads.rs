@@ -310,13 +310,18 @@ fn records_of_other_programs_and_smooth_ramps() {
         std::fs::write(&path, text("[0, 0]", 0.1, &load)).expect("job");
         succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]));
         let history = History::read(directory.path(), "body");
-        (history.column("momentum_x").to_vec(), history.last("momentum_x") / history.last("mass"))
+        (
+            history.column("momentum_x").to_vec(),
+            history.last("momentum_x") / history.last("mass"),
+            history.last("time"),
+        )
     };
-    let (table, _) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15000000000000002, 0]]");
+    let (table, ..) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15000000000000002, 0]]");
     assert_eq!(momenta("{ file = 'a.at2', scale = 8 }").0, table);
-    let (table, _) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15, 0]]");
+    let (table, ..) = momenta("[[0, 0], [0.05, 2], [0.1, -4], [0.15, 0]]");
     assert_eq!(momenta("{ file = 'b.txt', time = 't', value = 'acc', scale = 8 }").0, table);
-    // Half of the impulse of the whole force.
-    let (_, speed) = momenta("'8 * ramp(t / 0.1)'");
-    assert!((speed - 0.4).abs() < 1e-3, "{speed}");
+    // Half of the impulse of the whole force over the ramp, and all of it in the rest of the last step.
+    let (_, speed, time) = momenta("'8 * ramp(t / 0.1)'");
+    let exact = 0.4 + 8.0 * (time - 0.1);
+    assert!((speed - exact).abs() < 1e-5, "{speed} for {exact}");
 }
