@@ -151,7 +151,7 @@ fn a_stage_without_material_ends_at_its_end() {
              [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
              [[bodies]]\nstage = 'pour'\nname = 'b'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0.2, 0.4], max = [0.5, 0.6] }}\n\
              [[probes]]\nname = 'b'\nquantities = ['centre']\n{stone}\
-             [time]\nend = 0.2\n[output]\npicture = false\nevery = 0.02\n[history]\nevery_steps = 1\n\
+             [time]\nend = 0.2\n[output]\nevery = 0.02\n[history]\nevery_steps = 1\n\
              [checkpoint]\nevery_steps = 1\nkeep = 999\n"
         );
         let directory = tempfile::tempdir().expect("temporary directory");
