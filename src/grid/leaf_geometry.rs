@@ -34,6 +34,7 @@ impl<const D: usize> LeafCells<D> {
     }
 
     /// Number of the cell that holds a point of the leaf.
+    #[inline]
     pub fn cell_of(&self, x: &[f64; D]) -> usize {
         (0..D).rev().fold(0, |number, axis| {
             let place = ((x[axis] - self.lower[axis]) * self.cells_per_metre) as usize;

@@ -94,7 +94,7 @@ impl Filling<'_> {
     pub(super) fn of_batch<V: Vector, const D: usize>(
         &self,
         batch: &Batch,
-        materials: impl Fn() -> [u16; LANES],
+        materials: [u16; LANES],
         sums: &Sums<D>,
         elastic: &Symmetric<V>,
         cell: f64,
@@ -102,7 +102,7 @@ impl Filling<'_> {
         let (way, widest) = match self.flows {
             [only] => (V::splat(only.way), V::splat(only.widest)),
             several => {
-                let of = materials().map(|material| several[usize::from(material)]);
+                let of = materials.map(|material| several[usize::from(material)]);
                 (V::new(of.map(|flow| flow.way)), V::new(of.map(|flow| flow.widest)))
             }
         };

@@ -302,8 +302,10 @@ impl Advance<'_> {
         for c in 0..Layout::<D>::SYMMETRIC {
             elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
         }
-        let filled =
-            filling.and_then(|filling| filling.of_batch::<V, D>(batch, || index, sums, &elastic, cell));
+        let filled = match filling {
+            Some(filling) => filling.of_batch::<V, D>(batch, index, sums, &elastic, cell),
+            None => None,
+        };
         if let Some(filled) = &filled {
             filled.shift(batch, tile, &mut moved, wall.map(|wall| wall.extent), shifted);
         }

@@ -29,16 +29,6 @@ pub enum OfBlock<'a> {
     Each(&'a [f64]),
 }
 
-impl OfBlock<'_> {
-    /// Volume of a node.
-    pub fn of_node(&self, bit: usize) -> f64 {
-        match self {
-            Self::Same(volume) => *volume,
-            Self::Each(volumes) => volumes[bit],
-        }
-    }
-}
-
 impl NodeVolumes {
     /// Not collective. For a plan.
     pub fn new<const D: usize>(plan: &GridPlan<D>) -> Self {

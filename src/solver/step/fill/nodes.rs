@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use super::solid::add_solids;
 use crate::boundary::Collider;
 use crate::grid::mask::{bits, block_nodes};
+use crate::grid::sums::volumes::OfBlock;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{reference_volume, volume};
 use crate::solver::state::Solver;
@@ -76,19 +77,27 @@ impl<const D: usize> Solver<D> {
                     return;
                 }
                 let volumes = volumes.of_block(plan, index);
+                let block = &plan.blocks[index];
                 for (number, fields) in fields.iter().enumerate().filter(|(_, fields)| fields.active[index]) {
-                    for bit in bits(plan.blocks[index].real_nodes()) {
-                        let bit = bit as usize;
-                        let node = index * nodes + bit;
-                        let volume = match densities[number] {
-                            Some(density) => fields.rows[node].0[3] / density,
-                            None => scattered[number][node],
-                        };
-                        values[bit] += volume / volumes.of_node(bit);
+                    let first = index * nodes;
+                    let of_node = |bit: usize| match densities[number] {
+                        Some(density) => fields.rows[first + bit].0[3] * (1.0 / density),
+                        None => scattered[number][first + bit],
+                    };
+                    match volumes {
+                        // No node is constrained; nodes that nothing reaches have no mass.
+                        OfBlock::Same(volume) => {
+                            let inverse = 1.0 / volume;
+                            (0..nodes).for_each(|bit| values[bit] += of_node(bit) * inverse);
+                        }
+                        OfBlock::Each(volumes) => bits(block.real_nodes()).for_each(|bit| {
+                            let bit = bit as usize;
+                            values[bit] += of_node(bit) / volumes[bit];
+                        }),
                     }
                 }
                 if has_colliders {
-                    add_solids(plan, &plan.blocks[index], colliders, states, open, values);
+                    add_solids(plan, block, colliders, states, open, values);
                 }
             });
             fields.iter().for_each(|fields| fields.prolong_values(plan, of_nodes));
