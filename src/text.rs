@@ -49,9 +49,23 @@ fn prefix(value: f64, unit: &str, digits: usize) -> (i32, &'static str) {
     PREFIXES.into_iter().rfind(|entry| usable(entry)).unwrap_or((0, ""))
 }
 
-/// Text in which HTML sees nothing of its own.
+/// Text in which HTML and SVG see nothing of their own. Characters that XML does not have, or that change the order of
+/// others, become visible; ends of lines and tabs stay.
 pub fn html(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    let mut out = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\t' => out.push(c),
+            '\r' => {}
+            _ if is_hidden(c) => out.extend(c.escape_unicode()),
+            _ => out.push(c),
+        }
+    }
+    out
 }
 
 /// A number with this many significant digits, without zeros at the end.
@@ -80,7 +94,8 @@ fn decimal_exponent(value: f64, digits: usize) -> i32 {
     text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0)
 }
 
-fn without_zeros(text: &str) -> &str {
+/// A decimal number without zeros at its end.
+pub fn without_zeros(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
@@ -201,6 +216,11 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
+/// Whether a character [`controls`] or is none at all: XML has no U+FFFE and U+FFFF.
+fn is_hidden(c: char) -> bool {
+    controls(c) || matches!(c, '\u{fffe}' | '\u{ffff}')
+}
+
 /// Whether a character changes what a terminal does or in which order it shows others.
 pub fn controls(c: char) -> bool {
     c.is_control()
@@ -238,6 +258,11 @@ mod tests {
     #[test]
     fn titles_do_not_become_markup() {
         assert_eq!(html("<b>\"a\" & b</b>"), "&lt;b&gt;&quot;a&quot; &amp; b&lt;/b&gt;");
+        assert_eq!(
+            html("a\u{1}\u{1b}]0;x\u{7}\u{2028}\u{202e}\u{ffff}"),
+            "a\\u{1}\\u{1b}]0;x\\u{7}\\u{2028}\\u{202e}\\u{ffff}"
+        );
+        assert_eq!(html("a = 1\r\n\tb"), "a = 1\n\tb");
     }
 
     #[test]

@@ -5,11 +5,24 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
-use crate::text::number;
+use super::picture::further;
+use crate::text::{number, without_zeros};
 
-/// Colours of the curves of a chart, in their order; the first is for a curve alone.
-pub(crate) const COLOURS: [&str; 8] =
+/// Colours of the first curves of a chart, in their order; the first is for a curve alone.
+const COLOURS: [&str; 8] =
     ["#1f6fb4", "#d9662b", "#2b9348", "#a33ea1", "#c9a227", "#3aa6a6", "#8c564b", "#6b7280"];
+
+/// Colour of a curve of a chart, `#rrggbb`.
+pub(crate) fn colour(curve: usize) -> String {
+    match COLOURS.get(curve) {
+        Some(colour) => (*colour).to_owned(),
+        None => {
+            let [red, green, blue] = further(curve - COLOURS.len());
+            format!("#{red:02x}{green:02x}{blue:02x}")
+        }
+    }
+}
+
 /// Columns of a chart in which a curve keeps its least and its greatest value.
 const COLUMNS: usize = 400;
 /// Decades that a logarithmic axis has at most.
@@ -56,6 +69,13 @@ impl Chart {
         Ok(text)
     }
 
+    /// Least and greatest value of the vertical axis.
+    fn heights(&self) -> (f64, f64) {
+        let values = self.curves.iter().flatten().map(|p| p.1).filter(|y| y.is_finite());
+        let (least, most) = values.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
+        if least > most { (0.0, 1.0) } else { (least, most) }
+    }
+
     /// Draws the chart into an area; letters and lines are `size` times as large as usual.
     ///
     /// # Errors
@@ -69,37 +89,58 @@ impl Chart {
                 values.fold((f64::MAX, 0.0), |(low, high): (f64, f64), y| (low.min(y), high.max(y)));
             let high = if high > 0.0 { 1.5 * high } else { 1.0 };
             let up = (low / 1.5).max(high * 10_f64.powi(-DECADES)).min(0.1 * high)..high;
-            return self.fill(area, size, across, up.log_scale());
+            return self.fill(area, size, across, (up.log_scale(), short));
         }
-        self.fill(area, size, across, span(points().map(|p| p.1), self.from_zero, 0.04))
+        let up = span(points().map(|p| p.1), self.from_zero, 0.04);
+        let number = |y: f64| within(y, &up);
+        self.fill(area, size, across, (up.clone(), number))
     }
 
-    fn fill<Y>(&self, area: &Area<'_>, size: f64, across: Range<f64>, up: Y) -> Result<(), Failure>
+    /// `number` writes the numbers of the vertical axis.
+    fn fill<Y>(
+        &self,
+        area: &Area<'_>,
+        size: f64,
+        across: Range<f64>,
+        (up, number): (Y, impl Fn(f64) -> String),
+    ) -> Result<(), Failure>
     where
         Y: AsRangedCoord<Value = f64>,
         Y::CoordDescType: ValueFormatter<f64>,
     {
         let pixels = |length: f64| (length * size).round() as u32;
+        // Upper bounds on the widths of numbers: places between ticks have more digits.
+        let widest = |number: &dyn Fn(f64) -> String, [low, high]: [f64; 2]| {
+            let texts = (0..=12).map(|i| number(low + f64::from(i) / 12.0 * (high - low)));
+            DIGIT * LETTERS * texts.map(|text| text.chars().count()).max().unwrap_or(0) as f64
+        };
+        let of_across = |x: f64| within(x, &across);
+        let wide = widest(&of_across, [across.start, across.end]);
+        let (least, most) = self.heights();
+        let beside = (widest(&number, [least, most]) + 24.0).max(64.0);
+        let room = f64::from(area.dim_in_pixel().0) / size - beside - 24.0;
+        let labels = (room / (wide + LETTERS)).clamp(2.0, 6.0) as usize;
         let mut chart = ChartBuilder::on(area)
             .margin(pixels(12.0))
+            .margin_right(pixels((0.5 * wide).max(12.0)))
             .x_label_area_size(pixels(40.0))
-            .y_label_area_size(pixels(64.0))
+            .y_label_area_size(pixels(beside))
             .build_cartesian_2d(across.clone(), up)?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
             .bold_line_style(RGBColor(228, 228, 224).stroke_width(pixels(1.0)))
             .axis_style(RGBColor(120, 120, 120).stroke_width(pixels(1.0)))
-            .x_labels(6)
+            .x_labels(labels)
             .y_labels(6)
             .x_desc(&*self.across)
             .y_desc(&*self.up)
-            .label_style(("sans-serif", pixels(12.0)))
-            .x_label_formatter(&short)
-            .y_label_formatter(&short)
+            .label_style(("sans-serif", pixels(LETTERS)))
+            .x_label_formatter(&|x| of_across(*x))
+            .y_label_formatter(&|y| number(*y))
             .draw()?;
         for (number, curve) in self.curves.iter().enumerate() {
-            let colour = rgb(COLOURS[number % COLOURS.len()]);
+            let colour = rgb(&colour(number));
             // A line for each piece between gaps.
             for piece in curve.split(|(x, y)| !(x + y).is_finite() || self.is_logarithmic && *y <= 0.0) {
                 let points = thinned(piece, &across);
@@ -109,6 +150,10 @@ impl Chart {
         Ok(())
     }
 }
+
+/// Size of letters, and the width of a digit over it, no less than in usual fonts.
+const LETTERS: f64 = 12.0;
+const DIGIT: f64 = 0.6;
 
 /// From least to greatest, with a margin on both sides as a share of the whole.
 fn span(values: impl Iterator<Item = f64>, from_zero: bool, margin: f64) -> Range<f64> {
@@ -156,13 +201,32 @@ fn rgb(text: &str) -> RGBColor {
     RGBColor(part(1), part(3), part(5))
 }
 
-/// A number at an axis.
-fn short(value: &f64) -> String {
+/// A number at an axis, with as many digits as tell the numbers of the axis apart.
+fn within(value: f64, axis: &Range<f64>) -> String {
+    let (greatest, span) = (axis.start.abs().max(axis.end.abs()), axis.end - axis.start);
+    if value.abs() < 1e-9 * span {
+        return "0".to_owned();
+    }
+    let digits = if span > 0.0 { (greatest / span).log10().ceil().clamp(0.0, 12.0) as usize } else { 0 };
+    match greatest {
+        1e5.. if digits < 3 => without_zeros_of_power(&format!("{value:.*e}", digits + 2)),
+        _ => number(value, digits + 4),
+    }
+}
+
+/// A number at a logarithmic axis.
+fn short(value: f64) -> String {
     match value.abs() {
         ..1e-12 => "0".to_owned(),
-        1e5.. => format!("{value:.1e}"),
-        _ => number(*value, 4),
+        1e5.. => without_zeros_of_power(&format!("{value:.1e}")),
+        _ => number(value, 4),
     }
+}
+
+/// `2.50e6` without the zeros before the power.
+fn without_zeros_of_power(text: &str) -> String {
+    let (digits, power) = text.split_once('e').unwrap_or((text, "0"));
+    format!("{}e{power}", without_zeros(digits))
 }
 
 #[cfg(test)]
@@ -195,11 +259,55 @@ mod tests {
         }
     }
 
+    /// Numbers at the axes of charts over tiny spans, far from 0, and large: all differ, and none meets another.
+    #[test]
+    fn numbers_at_axes_differ_and_do_not_meet() {
+        for (from, span) in [(0.0, 1e-3), (0.0, 1.0), (1000.0, 0.1), (1e6, 5.0), (-2e5, 4e5), (0.0, 3e8)] {
+            for size in [(1120, 560), (600, 300), (300, 240)] {
+                let curve = (0..50).map(|i| f64::from(i) / 49.0).map(|s| (from + s * span, from + s * span));
+                let svg = chart(vec![curve.collect()], false).svg(size).unwrap();
+                let number = |element: &str, key: &str| -> f64 {
+                    let rest = element.split(&format!("{key}=\"")).nth(1).unwrap();
+                    rest.split('"').next().unwrap().parse().unwrap()
+                };
+                let texts = svg.split("<text").skip(1).filter_map(|element| {
+                    let words = element.split('>').nth(1)?.split('<').next()?.trim();
+                    words.parse::<f64>().ok()?;
+                    Some((
+                        [number(element, " x"), number(element, " y")],
+                        number(element, "font-size"),
+                        words,
+                    ))
+                });
+                let texts: Vec<_> = texts.collect();
+                assert!(texts.len() >= 4, "{svg}");
+                for axis in [0, 1] {
+                    // Numbers of the horizontal axis stand in one row, those of the other end in one column.
+                    let lowest = texts.iter().map(|(at, ..)| at[1]).fold(0.0, f64::max);
+                    let of_axis: Vec<_> =
+                        texts.iter().filter(|(at, ..)| (at[1] == lowest) == (axis == 0)).collect();
+                    for (i, (at, size, words)) in of_axis.iter().enumerate() {
+                        for (other, _, same) in &of_axis[..i] {
+                            let width = 0.55 * size * words.len().max(same.len()) as f64;
+                            let apart = (at[axis] - other[axis]).abs();
+                            assert!(words != same, "{from} + {span}: {words} twice");
+                            assert!(
+                                apart > if axis == 0 { width } else { *size },
+                                "{from} + {span}: {words} and {same}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn numbers_at_axes_are_short() {
-        assert_eq!(
-            [0.0, 0.05, 1250.0, 2.5e6, -0.25, 1e-7].map(|x| short(&x)),
-            ["0", "0.05", "1250", "2.5e6", "-0.25", "1e-7"]
-        );
+        let axis = 0.0..2000.0;
+        assert_eq!([0.0, 0.05, 1250.0, -0.25].map(|x| within(x, &axis)), ["0", "0.05", "1250", "-0.25"]);
+        assert_eq!([2.5e6, 1e6].map(|x| within(x, &(0.0..3e6))), ["2.5e6", "1e6"]);
+        assert_eq!([1000.05, 1000.1].map(|x| within(x, &(1000.0..1000.1))), ["1000.05", "1000.1"]);
+        assert_eq!([1e-7, 2.5e6].map(short), ["1e-7", "2.5e6"]);
     }
 }

@@ -3,7 +3,6 @@ use std::path::{Path, PathBuf};
 
 use super::hdf5_file::{FileError, Reader};
 use super::picture::source;
-use super::series::Series;
 use super::snapshot::content::fields::Values;
 use super::snapshot::intact::checked::Checked;
 use super::snapshot::{Header, PointField};
@@ -61,6 +60,18 @@ impl Frame {
         Ok(Self { header, positions, half_widths, fields })
     }
 
+    /// Numbers of a field that was read, a row of components for each particle; of whole numbers as well, whatever their kind in
+    /// the file.
+    pub fn numbers(&self, field: PointField) -> Option<Vec<f64>> {
+        let (_, values) = self.fields.iter().find(|(known, _)| *known == field)?;
+        Some(match values {
+            Values::Id(ids) => ids.iter().map(|&id| id as f64).collect(),
+            Values::Integer(numbers) => numbers.iter().copied().map(f64::from).collect(),
+            Values::Single(values, _) => values.iter().copied().map(f64::from).collect(),
+            Values::Real(values, _) => values.clone(),
+        })
+    }
+
     /// Lower and upper corner of the domain, m.
     pub fn domain(&self) -> [[f64; 3]; 2] {
         let low = |axis: usize| self.header.origin.get(axis).copied().unwrap_or(0.0);
@@ -86,7 +97,7 @@ pub fn shown_in(path: &Path) -> Result<Vec<PointField>, FileError> {
 fn header_of_particles(file: &Reader) -> Result<Header, FileError> {
     let header = Header::read(file)?;
     if !file.exists("VTKHDF/PointData") || file.exists("VTKHDF/CellData/level") {
-        return Err(file.refuse("found no particles; expected a file of particles, not of the tree"));
+        return Err(file.refuse(source::NO_PARTICLES));
     }
     Ok(header)
 }
@@ -179,24 +190,4 @@ fn tree_beside(output: &Path) -> PathBuf {
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();
     let ending = output.extension().unwrap_or_default().to_string_lossy();
     output.with_file_name(format!("{stem}.tree.{ending}"))
-}
-
-/// The output files that the words of a command line mean: an index (`.series`) stands for the files that it lists.
-pub fn expand(words: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
-    let mut files = Vec::new();
-    for word in words {
-        if word.extension().is_none_or(|ending| ending != "series") {
-            files.push(word.clone());
-            continue;
-        }
-        let refused = |reason: &str| FileError::Refused { path: word.clone(), reason: reason.into() };
-        let entries = Series::listed(word).ok_or_else(|| {
-            refused("found no index of outputs; expected a file such as NAME.hdf.series, written by a run")
-        })?;
-        if entries.is_empty() {
-            return Err(refused("the index lists no outputs"));
-        }
-        files.extend(entries.into_iter().map(|entry| word.with_file_name(entry.name)));
-    }
-    Ok(files)
 }

@@ -6,6 +6,7 @@ use super::batch::{Batch, Batches, Tile};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::particle::volume::det_f;
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 
@@ -252,6 +253,23 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
         *half = half.min(V::splat(greatest));
     }
     half
+}
+
+/// Half widths of one box over its undeformed one, as [`whole_of_batch`] has them where a box follows the volume: for
+/// pictures. `elastic` is the left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
+pub fn stretches_of_one(
+    elastic: &[f64; 6],
+    plastic_volume: f64,
+    dimension: usize,
+    is_plastic: bool,
+    [least, greatest]: [f64; 2],
+) -> [f64; 3] {
+    let stretch: [f64; 3] = if is_plastic {
+        [libm::pow(det_f(*elastic, plastic_volume), 1.0 / dimension as f64); 3]
+    } else {
+        std::array::from_fn(|axis| elastic[axis].sqrt())
+    };
+    stretch.map(|stretch| if stretch.is_nan() { 1.0 } else { stretch.clamp(least, greatest) })
 }
 
 /// Ratio of the half widths to the undeformed ones that keeps the volume.

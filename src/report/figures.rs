@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use super::panels::Panel;
 use super::sections::section;
 use super::{Options, Run};
-use crate::io::chart::{COLOURS, Chart};
+use crate::io::chart::{self, Chart};
 use crate::io::hdf5_file::FileError;
 use crate::io::picture;
 use crate::io::snapshot::Header;
@@ -32,10 +32,11 @@ pub(super) fn pictures(body: &mut String, run: &Run, options: &Options) -> Resul
     chosen.dedup();
     let files: Vec<_> = chosen.into_iter().map(|number| outputs[number].clone()).collect();
     let job = scene::job_of(&outputs[last], options.job.as_deref()).ok();
-    let solids = |header: &Header| job.as_ref().map_or_else(Vec::new, |job| scene::solids_of(job, header));
+    let scene =
+        |header: &Header| job.as_ref().map_or_else(Default::default, |job| scene::of_job(job, header));
     let mut settings = picture::Settings::new("");
     [settings.width, settings.height] = PICTURE;
-    let survey = |colour: &str| picture::survey(&files, colour, &settings, &solids);
+    let survey = |colour: &str| picture::survey(&files, colour, &settings, &scene);
     let (colour, look) = match &options.colour {
         Some(colour) => (colour.as_str(), survey(colour)?),
         None => {
@@ -54,7 +55,7 @@ pub(super) fn pictures(body: &mut String, run: &Run, options: &Options) -> Resul
     );
     (settings.range, settings.frame) = (Some(look.range), Some(look.frame));
     for file in &files {
-        let (png, time) = picture::png_of_file(file, colour, &settings, &solids)?;
+        let (png, time) = picture::png_of_file(file, colour, &settings, &scene)?;
         let (data, time) = (BASE64.encode(png), quantity(time, "s"));
         let name = html(&file.file_name().unwrap_or_default().to_string_lossy());
         let _ = writeln!(
@@ -89,7 +90,7 @@ pub(super) fn charts(body: &mut String, id: &str, title: &str, panels: &[Panel])
         let Ok(svg) = svg else { continue };
         let _ = write!(drawn, "<figure class=\"chart\"><figcaption><b>{}</b>", html(&panel.title));
         for (number, (name, _)) in panel.curves.iter().enumerate().filter(|_| panel.curves.len() > 1) {
-            let colour = COLOURS[number % COLOURS.len()];
+            let colour = chart::colour(number);
             let _ = write!(drawn, " <span class=\"key\" style=\"--c:{colour}\">{}</span>", html(name));
         }
         let _ = writeln!(drawn, "</figcaption>\n{svg}</figure>");

@@ -95,9 +95,30 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
     let name = html(&results.name);
     let title = run.title().map_or_else(|| name.clone(), |title| html(&title));
     let (state, sentence) = run.state();
-    let page = PAGE.replace("/*STYLE*/", STYLE).replace("TITLE", &title).replace("NAME", &name);
-    let page = page.replace("STATE", state).replace("SENTENCE", &html(&sentence));
-    Ok(page.replace("<!--BODY-->", &body))
+    let sentence = html(&sentence);
+    Ok(filled([
+        ("/*STYLE*/", STYLE),
+        ("TITLE", &title),
+        ("NAME", &name),
+        ("STATE", state),
+        ("SENTENCE", &sentence),
+        ("<!--BODY-->", &body),
+    ]))
+}
+
+/// The page with its marks replaced. What replaces a mark may look like another one.
+fn filled(marks: [(&str, &str); 6]) -> String {
+    let (mut page, mut rest) = (String::new(), PAGE);
+    let next = |rest: &str| {
+        let places = marks.iter().filter_map(|(mark, text)| Some((rest.find(mark)?, mark.len(), *text)));
+        places.min()
+    };
+    while let Some((place, length, text)) = next(rest) {
+        page.push_str(&rest[..place]);
+        page.push_str(text);
+        rest = &rest[place + length..];
+    }
+    page + rest
 }
 
 /// What the files of a run say.
@@ -164,6 +185,19 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_title_may_look_like_a_mark() {
+        let page = filled([
+            ("/*STYLE*/", ""),
+            ("TITLE", "NAME of a STATE"),
+            ("NAME", "job"),
+            ("STATE", "ended"),
+            ("SENTENCE", "TITLE"),
+            ("<!--BODY-->", "SENTENCE"),
+        ]);
+        assert!(page.contains("<h1>NAME of a STATE</h1>") && page.contains("ended\">TITLE</span>"), "{page}");
+    }
 
     #[test]
     fn page_has_its_marks_once_and_asks_nobody() {

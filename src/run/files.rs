@@ -46,7 +46,8 @@ impl<const D: usize> Run<'_, D> {
         let view = view(problem, &self.solver, &self.names, &scalars);
         let solids =
             scene::solids(&self.solver.physics.colliders, &self.solver.contacts.states, problem.origin);
-        picture::draw(self.comm, &view, field, &picture::Settings::new(title), solids, &path)
+        let scene = picture::Scene { solids, boxes: Some(scene::boxes(&self.solver.physics)) };
+        picture::draw(self.comm, &view, field, &picture::Settings::new(title), scene, &path)
             .map_err(|error| error.to_string())?;
         Ok(Some(path))
     }

@@ -1,13 +1,14 @@
-//! What pictures show beside the particles: colliders where they are.
+//! What pictures show beside the fields of particles: colliders where they are, and how wide boxes are.
 use std::path::{Path, PathBuf};
 
 use super::restart;
 use crate::boundary::{Collider, ColliderState};
 use crate::geometry::{Aabb, Shape};
-use crate::io::picture::Solid;
+use crate::io::picture::{Boxes, Scene, Solid};
 use crate::io::snapshot::{self, Header, directory};
 use crate::job::{self, AnyProblem, Problem};
 use crate::setup::stages;
+use crate::solver::physics::Physics;
 
 /// The colliders that are there, in these states. `origin` is the lower corner of the domain, m.
 pub fn solids<const D: usize>(
@@ -68,24 +69,30 @@ fn own_triangles<const D: usize>(shape: &Shape<D>) -> Vec<[[f64; 3]; 3]> {
     }
 }
 
-/// Not collective. The colliders of a job at the time of an output of it.
-pub fn solids_of(problem: &AnyProblem, header: &Header) -> Vec<Solid> {
+/// How the solver has the boxes of particles.
+pub fn boxes<const D: usize>(physics: &Physics<D>) -> Boxes {
+    let is_plastic = physics.materials.iter().map(|material| material.is_plastic()).collect();
+    Boxes { policy: physics.boxes, is_plastic }
+}
+
+/// Not collective. The scene of a job at the time of an output of it.
+pub fn of_job(problem: &AnyProblem, header: &Header) -> Scene {
     match problem {
         AnyProblem::Two(problem) => at(problem, header),
         AnyProblem::Three(problem) => at(problem, header),
     }
 }
 
-fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Vec<Solid> {
+fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Scene {
     let starts = restart::stage_starts(problem, header).unwrap_or_else(|| vec![0.0]);
-    let mut colliders = stages::physics(problem, &starts).colliders;
-    colliders.iter_mut().for_each(|collider| collider.deform(header.time));
+    let mut physics = stages::physics(problem, &starts);
+    physics.colliders.iter_mut().for_each(|collider| collider.deform(header.time));
     let state = |(number, collider): (usize, &Collider<D>)| {
         restart::collider_state(number, collider, &header.scalars)
             .unwrap_or_else(|| collider.state_at(header.time))
     };
-    let states: Vec<_> = colliders.iter().enumerate().map(state).collect();
-    solids(&colliders, &states, problem.origin)
+    let states: Vec<_> = physics.colliders.iter().enumerate().map(state).collect();
+    Scene { solids: solids(&physics.colliders, &states, problem.origin), boxes: Some(boxes(&physics)) }
 }
 
 /// Not collective. The title of the job of the run that wrote an output, from the text in it; none if it has no title.

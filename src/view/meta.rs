@@ -7,6 +7,7 @@ use super::Options;
 use super::columns::{Column, LeafMaxima, Scale};
 use super::pack::STEPS_PER_DOUBLING;
 use crate::io::snapshot::{Header, PointField};
+use crate::text::printable;
 
 /// The page's knowledge of all frames.
 #[derive(Serialize)]
@@ -58,7 +59,7 @@ pub(super) struct FrameMeta {
 
 impl FrameMeta {
     pub(super) fn new(path: &Path, header: &Header, tree: usize, leaves: usize) -> Self {
-        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let file = printable(&path.file_name().unwrap_or_default().to_string_lossy()).into_owned();
         Self { file, time: header.time, step: header.step, particles: header.particles, tree, leaves }
     }
 }
@@ -73,7 +74,14 @@ impl Meta {
     ) -> Self {
         let domain = survey.first.as_ref().map_or([[0.0; 3]; 2], |first| first.domain);
         let header = survey.first.as_ref().map(|first| &first.header);
-        let materials = header.map_or(&[][..], |header| &header.materials);
+        let names = |field: PointField| {
+            let names = match field {
+                PointField::Material => header.map_or(&[][..], |header| &header.materials),
+                PointField::Body => header.map_or(&[][..], |header| &header.bodies),
+                _ => &[],
+            };
+            names.iter().map(|name| printable(name).into_owned()).collect()
+        };
         let finite = |[low, high]: [f64; 2]| if low <= high { [low, high] } else { [0.0, 0.0] };
         let column = |(number, (column, scale)): (usize, (&Column, &Scale))| ColumnMeta {
             name: column.name.clone(),
@@ -86,12 +94,12 @@ impl Meta {
             scale: [scale.unit, scale.low, scale.high, f64::from(scale.levels)],
             range: finite(survey.ranges[number]),
             usual: survey.usual(number),
-            names: if column.source == PointField::Material { materials.to_vec() } else { Vec::new() },
+            names: names(column.source),
         };
         // Without particles there is no box round them; the page then looks at the domain.
         let bounds = if survey.bounds[0][0].is_finite() { survey.bounds } else { domain };
         Self {
-            title: options.title.clone(),
+            title: printable(&options.title).into_owned(),
             program: env!("CARGO_PKG_VERSION"),
             dimension: header.map_or(3, |header| header.dimension),
             domain,

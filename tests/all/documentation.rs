@@ -366,3 +366,51 @@ fn the_book_builds() {
         println!("passed over: there is no mdbook (cargo install mdbook)");
     }
 }
+
+/// Each problem of the guide has a job that the program takes without a warning, and the words in code are keys, models or columns.
+#[test]
+fn problems_of_practice_have_jobs_and_their_keys_are_there() {
+    let page = text(Path::new("docs/guide/which-keys.md"));
+    let known = text(Path::new("docs/job-file.md"));
+    let known: BTreeSet<&str> = known.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+    let jobs: Vec<PathBuf> = links(&page)
+        .iter()
+        .filter_map(|(_, link)| target(Path::new("docs/guide/which-keys.md"), link))
+        .filter(|path| path.starts_with("tests/jobs/which_keys"))
+        .collect();
+    let there = files(Path::new("tests/jobs/which_keys"));
+    assert_eq!((jobs.len(), jobs.iter().collect::<BTreeSet<_>>()), (20, there.iter().collect()));
+    for job in jobs {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_agimp"))
+            .arg("check")
+            .arg(repository().join(&job))
+            .output()
+            .expect("starts");
+        let said = mpirun::text(&output);
+        assert!(output.status.success() && !said.contains("warning"), "{}: {said}", job.display());
+    }
+    let code = page.split('`').skip(1).step_by(2);
+    for word in code.flat_map(|code| code.split(|c: char| !(c.is_alphanumeric() || c == '_'))) {
+        let is_column = ["force_", "torque_"].iter().any(|start| word.starts_with(start));
+        let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
+        assert!(is_column || is_number || word == "agimp" || known.contains(word), "found no key {word:?}");
+    }
+}
+
+/// Each study has a quick form, and one command runs all of them.
+#[test]
+fn every_study_has_a_quick_form() {
+    let all = text(Path::new("studies/quick"));
+    let mut studies = 0;
+    for folder in std::fs::read_dir(repository().join("studies")).expect("a folder") {
+        let folder = folder.expect("an entry").path();
+        let script = ["run", "compare"].map(|name| folder.join(name)).into_iter().find(|path| path.exists());
+        let Some(script) = script else { continue };
+        studies += 1;
+        let name = folder.file_name().expect("a name").to_string_lossy().into_owned();
+        let script = std::fs::read_to_string(script).expect("a script");
+        assert!(script.contains("--quick"), "{name} has no quick form");
+        assert!(all.contains(&name), "studies/quick does not run {name}");
+    }
+    assert_eq!(studies, 8);
+}

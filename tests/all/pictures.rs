@@ -431,7 +431,7 @@ fn exported_particles_are_those_of_the_file() {
     assert_eq!(output.status.code(), Some(2), "which format: {}", told(&output));
     let output = agimp(here, &["export", "out/press/press_000004.tree.hdf", "--csv"]);
     assert!(
-        output.status.code() == Some(2) && told(&output).contains("not of the tree"),
+        output.status.code() == Some(2) && told(&output).contains("found the tree of a run"),
         "{}",
         told(&output)
     );
@@ -501,5 +501,149 @@ fn an_exported_tree_is_that_of_the_run() {
             // VTK 9.2 reads no field data of such files.
             assert!(found["time"].is_null() || found["time"] == frame.header.time, "{found}");
         }
+    }
+}
+
+/// A file, several, a pattern with trees, the directory, the index and the job file mean the same outputs for all subcommands.
+#[test]
+fn subcommands_take_files_directories_indices_and_jobs() {
+    let directory = run();
+    let here = directory.path();
+    let all: Vec<String> = (0..5).map(|number| format!("out/press/press_{number:06}.hdf")).collect();
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    let tree = "out/press/press_000000.tree.hdf";
+    let pattern = [&all[..], &[tree]].concat();
+    let words: [&[&str]; 5] =
+        [&all, &pattern, &["out/press"], &["out/press/press.hdf.series"], &["press.toml"]];
+    for words in words {
+        let told = |command: &[&str], options: &[&str]| succeed(here, &[command, words, options].concat());
+        let pictures = told(&["plot", "--colour", "speed"], &["--out", "pictures"]);
+        assert_eq!(
+            pictures.lines().filter(|line| line.starts_with("pictures/press_")).count(),
+            5,
+            "{pictures}"
+        );
+        assert!(told(&["view"], &["--out", "page.html"]).contains("5 times"));
+        assert!(told(&["movie"], &["--out", "movie.png"]).contains("5 frames"));
+        assert_eq!(told(&["export", "--csv"], &["--out", "csv"]).matches("particles").count(), 5);
+        assert!(told(&["report"], &["--out", "report.html"]).contains("report.html"));
+        let about = told(&["info"], &[]);
+        assert_eq!(about.matches("particles        ").count(), 5, "{about}");
+    }
+    // Of one output a file each, as ever.
+    succeed(here, &["plot", all[1], "--out", "one.png"]);
+    assert!(told(&agimp(here, &["view", all[1], "--out", "page.html"])).contains("one time"));
+    assert!(succeed(here, &["report", all[1]]).contains("out/press/press.report.html"));
+    // A tree is none of these but for info and its own export.
+    succeed(here, &["info", tree]);
+    succeed(here, &["export", "--htg", tree, "--out", "csv"]);
+    std::fs::create_dir(here.join("nothing")).expect("made");
+    for (command, options) in
+        [(&["plot"][..], &[][..]), (&["movie"], &[]), (&["view"], &[]), (&["export", "--csv"], &[])]
+    {
+        for (word, message) in [
+            (
+                tree,
+                "press_000000.tree.hdf: found the tree of a run, which holds no particles; expected its outputs: out/press/press_000000.hdf",
+            ),
+            ("nothing", "nothing: found no outputs of a run; expected NAME.hdf.series or NAME_000000.hdf"),
+        ] {
+            let output = agimp(here, &[command, &[word], options].concat());
+            assert_eq!(output.status.code(), Some(2), "{command:?} {word}: {}", told(&output));
+            assert!(told(&output).contains(message), "{command:?} {word}: {}", told(&output));
+        }
+    }
+    let output = agimp(here, &["plot", "out/press", "--out", "all.png"]);
+    assert!(
+        told(&output).contains("found one picture for 5 outputs; expected a directory"),
+        "{}",
+        told(&output)
+    );
+}
+
+#[test]
+fn a_clip_that_keeps_nothing_is_refused() {
+    let directory = run();
+    let here = directory.path();
+    let first = "out/press/press_000000.hdf";
+    for words in [&["plot", first][..], &["plot", "out/press"], &["movie", "out/press"]] {
+        let output = agimp(here, &[words, &["--clip", "x>5"]].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+        let message = "the clip x>5 keeps no particle; expected a place among them, x from ";
+        assert!(told(&output).contains(message), "{}", told(&output));
+    }
+    // Behind a plane of symmetry there is the mirror image.
+    let clip = |options: &[&str]| {
+        agimp(here, &[&["plot", first, "--clip", "x<-0.3", "--out", "a.png"], options].concat())
+    };
+    assert!(!clip(&[]).status.success() && clip(&["--mirror", "x"]).status.success());
+}
+
+/// A sheet of rubber that flies apart along x alone is stretched one and a half times; its particles still cover it without gaps.
+#[test]
+fn stretched_boxes_leave_no_gaps() {
+    let job = r#"
+version = 1
+dimension = 2
+[domain]
+size = [2, 1]
+root_edge = 0.25
+[[materials]]
+name = "rubber"
+density = 1000
+model = "neo_hookean"
+young = 1
+poisson = 0.3
+[[bodies]]
+name = "sheet"
+material = "rubber"
+shape = { kind = "box", min = [0.625, 0.25], max = [1.375, 0.75] }
+velocity = ["2 * (x - 1)", 0]
+[time]
+end = 0.25
+[output]
+picture_field = "material"
+"#;
+    let directory = finished("sheet", job, &[]);
+    let here = directory.path();
+    succeed(here, &["plot", "out/sheet/sheet_000001.hdf", "--colour", "material", "--out", "file.png"]);
+    let places =
+        Frame::read(&here.join("out/sheet/sheet_000001.hdf"), &[], false).expect("a frame").positions;
+    let reach = places.iter().fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x[0]), high.max(x[0])]);
+    assert!(reach[1] - reach[0] > 1.4 * 0.7, "stretched: {reach:?}");
+    for picture in ["file.png", "out/sheet/sheet.png"] {
+        let (width, pixels) = image(&here.join(picture));
+        let covered = |row: usize| {
+            let columns: Vec<usize> =
+                (0..width - 190).filter(|column| pixels[row * width + column] == RUBBER).collect();
+            let span = columns.last().zip(columns.first()).map_or(0, |(last, first)| last - first + 1);
+            (columns.len(), span)
+        };
+        let (count, span) = (0..pixels.len() / width)
+            .map(covered)
+            .filter(|(count, _)| *count > 100)
+            .fold((0, 0), |(a, b), (c, d)| (a + c, b + d));
+        assert!(count > 10_000 && count as f64 > 0.99 * span as f64, "{picture}: {count} of {span} pixels");
+    }
+}
+
+/// Whatever a title or a name holds, pictures and pages are XML and HTML that say it in letters.
+#[test]
+fn control_characters_reach_no_picture_and_no_page() {
+    let name = r"a\u0001\u001b]0;x\u0007\u007F\u2028\u202e";
+    let block = RUBBER_BLOCK
+        .replace("\"rubber\"", &format!("\"{name}\""))
+        .replace("\"block\"", &format!("\"{name}\""));
+    let directory = finished("press", &format!("title = \"{name}\"\n{JOB}{block}"), &[]);
+    let here = directory.path();
+    succeed(here, &["plot", "out/press/press_000001.hdf", "--colour", "body", "--out", "a.svg"]);
+    succeed(here, &["report", "out/press", "--out", "report.html"]);
+    succeed(here, &["view", "out/press", "--out", "view.html"]);
+    for file in ["a.svg", "report.html", "view.html"] {
+        let text = std::fs::read_to_string(here.join(file)).expect("a file");
+        let hidden: Vec<char> =
+            text.chars().filter(|c| agimp::text::controls(*c) && !matches!(c, '\n' | '\t')).collect();
+        assert!(hidden.is_empty(), "{file}: {hidden:?}");
+        assert!(text.contains(r"\u{1b}") || text.contains(r"\\u{1b}"), "{file} shows that there was one");
     }
 }

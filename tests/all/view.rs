@@ -196,7 +196,11 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
         (&["not.hdf"], "not an HDF5 file"),
         (&["none.hdf.series"], "found no index of outputs"),
         (&["empty.hdf.series"], "the index lists no outputs"),
-        (&["out/half/half_000000.tree.hdf"], "not of the tree"),
+        (
+            &["out/half/half_000000.tree.hdf"],
+            "found the tree of a run, which holds no particles; expected its outputs: out/half/half_000000.hdf",
+        ),
+        (&["."], ".: found no outputs of a run"),
         (&[output, "--fields", "stress"], "does not contain stress; it contains "),
         (&[output, "--fields", "presure"], "expected one of velocity, displacement, strain"),
         (&[output, "--bits", "40"], "40 is not in 4..=16"),
@@ -288,10 +292,10 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
     };
     // 0.125 m from the lower corner of the box round the particles, to within a particle.
     let at = |name: &str| row(name).parse::<f64>().expect("a number");
-    assert!((at("x, m") + 0.36).abs() < 0.02, "{}", row("x, m"));
-    assert!((at("y, m") - 2.13).abs() < 0.02, "{}", row("y, m"));
+    assert!((at("x [m]") + 0.36).abs() < 0.02, "{}", row("x [m]"));
+    assert!((at("y [m]") - 2.13).abs() < 0.02, "{}", row("y [m]"));
     // The wall holds the rubber that moves away at 1 m/s: behind the wave of 11.6 m/s it is stretched by 9 %.
-    assert!((900.0..=1001.0).contains(&at("density, kg/m³")), "{}", row("density, kg/m³"));
+    assert!((900.0..=1001.0).contains(&at("density [kg/m³]")), "{}", row("density [kg/m³]"));
     assert_eq!(row("material"), "rubber");
     // Half a metre by half a metre is coloured.
     let area = 0.25 * real(&result["metre"]) * real(&result["metre"]);
@@ -304,4 +308,64 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
         await v.changed('field'); await v.go(0); v.drawNow(); return coloured(v);";
     let (left, _) = in_browser(&chromium, directory.path(), &page, cut);
     assert!(real(&left) < 0.02 * area, "{left} of {area}");
+}
+
+/// The page in a small window, with a title that does not fit into a line: all numbers of both axes are there, from end to end
+/// of the domain, none over another, over the legend or outside.
+#[test]
+fn browser_shows_all_numbers_of_axes_and_no_text_over_another() {
+    let Some(chromium) = chromium() else { return };
+    let directory = run();
+    let title = "a title of many words ".repeat(40);
+    let page = page(directory.path(), &["--title", &title]);
+    let script = "
+        v.state.field = meta.columns.findIndex((column) => column.name === 'density');
+        await v.changed('field'); await v.go(2); v.fit(); v.drawNow();
+        const { ticks, taken, width, height } = v.labels;
+        const fitted = ticks.map(({ axis, words, box }) => ({ axis, words, box }));
+        v.camera.zoom(0.3); v.fitted = false; v.drawNow();
+        return { fitted, taken, width, height, near: v.labels.ticks.map(({ axis, words }) => ({ axis, words })), colours:
+          new Set(Array.from({ length: 40 }, (_, i) => classColour(i).join())).size };";
+    let (result, _) = in_browser(&chromium, directory.path(), &page, script);
+    let boxes = |list: &Value| -> Vec<[f64; 4]> {
+        let list = list.as_array().expect("a list").iter();
+        list.map(|numbers| std::array::from_fn(|i| real(&numbers[i]))).collect()
+    };
+    let ticks = result["fitted"].as_array().expect("ticks");
+    let of_axis = |axis: u64, ticks: &[Value]| -> Vec<f64> {
+        let ticks = ticks.iter().filter(|tick| tick["axis"] == axis);
+        ticks.map(|tick| tick["words"].as_str().expect("text").parse().expect("a number")).collect()
+    };
+    for (axis, low) in [(0, -0.5), (1, 2.0)] {
+        let numbers = of_axis(axis, ticks);
+        assert!(numbers.len() >= 4, "{numbers:?}");
+        let step = numbers[1] - numbers[0];
+        assert!((numbers[0] - low).abs() < step && numbers.is_sorted(), "{numbers:?}");
+        let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() < 1e-9;
+        assert!(numbers.windows(2).all(even), "none is missing: {numbers:?}");
+        // Of a part of the plane the numbers of that part.
+        let near = of_axis(axis, result["near"].as_array().expect("ticks"));
+        assert!(near.len() >= 2 && near[1] - near[0] < step, "{near:?} after {numbers:?}");
+    }
+    let of_ticks: Vec<Value> = ticks.iter().map(|tick| tick["box"].clone()).collect();
+    let own = boxes(&Value::Array(of_ticks));
+    // Of others the edges are kept, with a margin.
+    let others =
+        boxes(&result["taken"]).into_iter().map(|[a, b, c, d]| [a + 4.0, b + 4.0, c - a - 8.0, d - b - 8.0]);
+    let all: Vec<[f64; 4]> = own.iter().copied().chain(others).collect();
+    for (i, [x, y, width, height]) in all.iter().enumerate() {
+        let inside = *x >= 0.0
+            && *y >= 0.0
+            && x + width <= real(&result["width"])
+            && y + height <= real(&result["height"]);
+        assert!(inside, "{:?} is outside", all[i]);
+        for other in all.iter().take(i.min(own.len())) {
+            let apart = x + width <= other[0]
+                || other[0] + other[2] <= *x
+                || y + height <= other[1]
+                || other[1] + other[3] <= *y;
+            assert!(apart, "{:?} over {other:?}", all[i]);
+        }
+    }
+    assert_eq!(result["colours"], 40, "forty bodies have forty colours");
 }

@@ -1,9 +1,10 @@
 //! `agimp export`: particles, their surface, or the tree, for other programs.
+use super::given::Given;
 use crate::cli::Failure;
 use crate::io::export::points::{self, Format};
 use crate::io::export::surface::{MeshFormat, Surface};
 use crate::io::export::tree::Tree;
-use crate::io::frame::{Frame, expand, shown_in};
+use crate::io::frame::{Frame, shown_in};
 use crate::io::snapshot::PointField;
 use crate::text::{bytes, count};
 use std::io::Write;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("format").required(true))]
 pub struct Arguments {
-    /// Output or checkpoint files, or the index of the outputs of a run (NAME.hdf.series).
+    /// Outputs or checkpoints: files, the directory of a run, its index (NAME.hdf.series) or its job file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Binary PLY with radii, single precision: for renderers such as Blender.
@@ -81,7 +82,9 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             _ => beside,
         }
     };
-    for file in expand(&super::without_trees(&arguments.files)).map_err(failed)? {
+    let given =
+        if arguments.htg { Given::any(&arguments.files) } else { Given::particles(&arguments.files) }?;
+    for file in given.files {
         let (out, made) = if arguments.htg {
             let tree = Tree::read(&file).map_err(failed)?;
             let out = place(&file, "htg");

@@ -1,17 +1,19 @@
 //! `agimp info`: what is in an output or checkpoint file.
+use super::given::Given;
 use crate::cli::Failure;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::{Header, PointField, compare};
 use crate::text::{bytes, count as grouped, number, printable, quantity_to};
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `agimp info`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The file.
-    file: PathBuf,
+    /// Outputs, checkpoints or trees: files, the directory of a run, its index (NAME.hdf.series) or its job file.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
     /// Read everything and compare the checksums.
     #[arg(long)]
     verify: bool,
@@ -26,31 +28,38 @@ struct Contents {
     levels: BTreeMap<u8, (u64, u64)>,
 }
 
-/// Prints what is in the file.
+/// Prints what is in each file.
 ///
 /// # Errors
 /// The file is damaged or not of this program.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: FileError| Failure::Usage(error.to_string());
-    let contents = read(arguments).map_err(failed)?;
+    let files = Given::any(&arguments.files)?.files;
     let mut out = std::io::stdout().lock();
-    write(&mut out, &contents)?;
-    if arguments.verify {
-        let sets = compare::verify(&arguments.file).map_err(failed)?;
-        write!(out, "checksums        correct ({sets} data sets)")?;
-        if contents.header.restart {
-            let digest = compare::digest(&arguments.file).map_err(failed)?;
-            write!(out, "; digest {:016x}", digest.whole)?;
+    for (number, path) in files.iter().enumerate() {
+        let contents = read(path).map_err(failed)?;
+        if files.len() > 1 {
+            let gap = if number > 0 { "\n" } else { "" };
+            writeln!(out, "{gap}file             {}", printable(&path.display().to_string()))?;
         }
-        writeln!(out)?;
+        write(&mut out, &contents)?;
+        if arguments.verify {
+            let sets = compare::verify(path).map_err(failed)?;
+            write!(out, "checksums        correct ({sets} data sets)")?;
+            if contents.header.restart {
+                let digest = compare::digest(path).map_err(failed)?;
+                write!(out, "; digest {:016x}", digest.whole)?;
+            }
+            writeln!(out)?;
+        }
     }
     Ok(())
 }
 
-fn read(arguments: &Arguments) -> Result<Contents, FileError> {
-    let file = Reader::open_alone(&arguments.file)?;
+fn read(path: &Path) -> Result<Contents, FileError> {
+    let file = Reader::open_alone(path)?;
     let header = Header::read(&file)?;
-    let size = std::fs::metadata(&arguments.file).map_or(0, |data| data.len());
+    let size = std::fs::metadata(path).map_or(0, |data| data.len());
     let shown = |field: &&PointField| file.exists(&format!("VTKHDF/PointData/{}", field.name()));
     let fields = PointField::ALL.iter().filter(shown).map(|field| field.name()).collect();
     let levels = levels(&file, &header)?;

@@ -2,6 +2,7 @@
 //!
 //! | file | what it does |
 //! |---|---|
+//! | `given.rs` | finds the files that a command line means |
 //! | `info.rs` | says what is in a file |
 //! | `plot.rs`, `movie.rs`, `view.rs` | draws particles: as PNG, as a movie, as a page for a browser |
 //! | `export.rs` | writes particles for other programs |
@@ -10,6 +11,7 @@
 pub(super) mod diff;
 pub(super) mod digest;
 pub(super) mod export;
+mod given;
 pub(super) mod info;
 pub(super) mod movie;
 pub(super) mod plot;
@@ -28,15 +30,6 @@ fn field(name: &str) -> Result<PointField, String> {
     })
 }
 
-/// What a pattern such as `out/a/*.hdf` gives, without the trees, whose outputs are there as well.
-fn without_trees(files: &[PathBuf]) -> Vec<PathBuf> {
-    let is_tree = |file: &&PathBuf| file.to_string_lossy().ends_with(".tree.hdf");
-    if files.iter().all(|file| is_tree(&file)) {
-        return files.to_vec();
-    }
-    files.iter().filter(|file| !is_tree(file)).cloned().collect()
-}
-
 /// With the ending `html`, `a/b.hdf.series` and `a/b.hdf` have their page in `a/b.html`.
 fn beside(file: &Path, ending: &str) -> PathBuf {
     let output = if file.extension().is_some_and(|ending| ending == "series") {
@@ -50,15 +43,6 @@ fn beside(file: &Path, ending: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_pattern_may_take_trees_along() {
-        let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
-        let all = paths(&["a_000000.hdf", "a_000000.tree.hdf", "a_000001.hdf"]);
-        assert_eq!(without_trees(&all), paths(&["a_000000.hdf", "a_000001.hdf"]));
-        // A tree alone is refused by its name.
-        assert_eq!(without_trees(&all[1..2]), all[1..2]);
-    }
 
     #[test]
     fn page_lies_beside_the_file() {

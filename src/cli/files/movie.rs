@@ -1,7 +1,7 @@
 //! `agimp movie`: the outputs of a run as a movie, with one frame and one range of colours.
+use super::given::Given;
 use crate::cli::Failure;
-use crate::cli::shared::looks::{self, Looks};
-use crate::io::frame::expand;
+use crate::cli::shared::looks::Looks;
 use crate::io::movie::{Format, Movie, gif_frame};
 use crate::io::picture::{Prepared, survey};
 use crate::text::bytes;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp movie`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Output files of one run, in order of time, or the index of its outputs (NAME.hdf.series).
+    /// Outputs of one run, in order of time: files, the directory of the run, its index (NAME.hdf.series) or its job file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Appearance.
@@ -36,9 +36,8 @@ pub struct Arguments {
 /// A file cannot be read or does not offer the quantity, or the movie cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
-    let given = super::without_trees(&arguments.files);
-    let files = expand(&given).map_err(failed)?;
-    let out = arguments.out.clone().unwrap_or_else(|| super::beside(&given[0], "movie.png"));
+    let Given { files, first } = Given::particles(&arguments.files)?;
+    let out = arguments.out.clone().unwrap_or_else(|| super::beside(&first, "movie.png"));
     let format = Format::of(&out).ok_or_else(|| {
         Failure::Usage(format!(
             "{}: found no extension of a movie; expected .png, .gif, .mp4 or .webm",
@@ -50,20 +49,17 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = name.trim_end_matches(".movie");
     let mut settings =
         given_looks.settings(arguments.title.as_deref(), files.first().map(PathBuf::as_path), name);
-    let job = files.first().filter(|file| file.is_file()).and_then(|file| given_looks.job(file));
-    let solids = looks::solids(job.as_ref());
+    let scene = given_looks.scene(&files[0]);
     // One look for all frames.
-    let look = survey(&files, &given_looks.colour, &settings, &solids).map_err(failed)?;
-    settings.frame = Some(look.frame);
-    settings.longest = Some(look.longest);
-    settings.range = settings.range.or(Some(look.range));
+    let look = survey(&files, &given_looks.colour, &settings, &scene).map_err(failed)?;
+    settings.share(&look);
 
     let size = [settings.width, settings.height];
     let cannot = |error: std::io::Error| cannot(&out, format, &error);
     let mut movie = Movie::begin(&out, format, size, files.len(), arguments.fps).map_err(cannot)?;
     // HDF5 is read by this thread alone; as many frames are drawn at once as there are threads.
     for some in files.chunks(rayon::current_num_threads().max(1)) {
-        let read = some.iter().map(|file| Prepared::read(file, &given_looks.colour, &settings, &solids));
+        let read = some.iter().map(|file| Prepared::read(file, &given_looks.colour, &settings, &scene));
         let read = read.collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let drawn: Vec<_> = read
             .into_par_iter()

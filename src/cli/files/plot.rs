@@ -1,49 +1,87 @@
-//! `agimp plot`: a picture of the particles in an output file.
+//! `agimp plot`: pictures of the particles in outputs.
+use super::given::Given;
 use crate::cli::Failure;
-use crate::cli::shared::looks::{Looks, solids};
-use crate::io::picture::draw_file;
+use crate::cli::shared::looks::Looks;
+use crate::io::hdf5_file::FileError;
+use crate::io::picture::{draw_file, survey};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `agimp plot`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Output or checkpoint file.
-    file: PathBuf,
+    /// Outputs or checkpoints: files, the directory of a run, its index (NAME.hdf.series) or its job file; a picture for
+    /// each.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
     /// Appearance.
     #[command(flatten)]
     looks: Looks,
     /// Title; by default the title of the job that wrote the file, or the name of the file.
     #[arg(long)]
     title: Option<String>,
-    /// Picture to write: .png, or .svg with text and lines as vectors; by default beside the file with the extension
-    /// png.
+    /// Picture to write: .png, or .svg with text and lines as vectors; of several outputs the directory of the pictures. By
+    /// default beside each file with the extension png.
     #[arg(long)]
     out: Option<PathBuf>,
 }
 
-/// Draws the picture.
+/// Draws the pictures; several have one frame and one range of colours.
 ///
 /// # Errors
-/// The file cannot be read or does not offer the quantity, or the picture cannot be written.
+/// A file cannot be read or does not offer the quantity, or a picture cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-    let mut settings = arguments.looks.settings(arguments.title.as_deref(), Some(&arguments.file), &name);
-    let out = arguments.out.clone().unwrap_or_else(|| arguments.file.with_extension("png"));
-    settings.collect =
-        match out.extension().and_then(|ending| ending.to_str()).map(str::to_lowercase).as_deref() {
-            Some("svg") => true,
-            Some("png") => false,
-            _ => {
-                let out = out.display();
-                return Err(Failure::Usage(format!(
-                    "{out}: found no extension of a picture; expected .png or .svg"
-                )));
-            }
-        };
-    let job = arguments.file.is_file().then(|| arguments.looks.job(&arguments.file)).flatten();
-    draw_file(&arguments.file, &arguments.looks.colour, &settings, &solids(job.as_ref()), &out)
-        .map_err(|error| Failure::Usage(error.to_string()))?;
-    writeln!(std::io::stdout(), "{}", out.display())?;
+    let failed = |error: FileError| Failure::Usage(error.to_string());
+    let Arguments { looks, title, .. } = arguments;
+    let files = Given::particles(&arguments.files)?.files;
+    let outs = outs(arguments.out.as_deref(), &files)?;
+    let scene = looks.scene(&files[0]);
+    let name = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut look = None;
+    if files.len() > 1 {
+        let settings = looks.settings(title.as_deref(), Some(&files[0]), &name(&files[0]));
+        look = Some(survey(&files, &looks.colour, &settings, &scene).map_err(failed)?);
+    }
+    for (file, out) in files.iter().zip(outs) {
+        let mut settings = looks.settings(title.as_deref(), Some(file), &name(file));
+        settings.collect = has_ending(&out, "svg");
+        if let Some(look) = &look {
+            settings.share(look);
+            // What a clip leaves of one of them may be nothing.
+            settings.may_be_empty = true;
+        }
+        draw_file(file, &looks.colour, &settings, &scene, &out).map_err(failed)?;
+        writeln!(std::io::stdout(), "{}", out.display())?;
+    }
     Ok(())
+}
+
+/// The picture of each file: beside it, in the directory that is given, or of the name that is given.
+fn outs(out: Option<&Path>, files: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let beside = |file: &PathBuf| file.with_extension("png");
+    let Some(out) = out else { return Ok(files.iter().map(beside).collect()) };
+    let is_picture = ["png", "svg"].iter().any(|ending| has_ending(out, ending));
+    if files.len() == 1 && is_picture && !out.is_dir() {
+        return Ok(vec![out.to_path_buf()]);
+    }
+    let found = out.display();
+    if is_picture && !out.is_dir() {
+        let count = files.len();
+        return Err(Failure::Usage(format!(
+            "{found}: found one picture for {count} outputs; expected a directory, or one output (agimp movie makes one file of all)"
+        )));
+    }
+    if files.len() == 1 && !out.is_dir() {
+        return Err(Failure::Usage(format!(
+            "{found}: found no extension of a picture; expected .png or .svg, or a directory"
+        )));
+    }
+    std::fs::create_dir_all(out)
+        .map_err(|error| Failure::Usage(format!("{found}: cannot create the directory: {error}")))?;
+    let within = |file: &PathBuf| out.join(beside(file).file_name().unwrap_or_default());
+    Ok(files.iter().map(within).collect())
+}
+
+fn has_ending(path: &Path, wanted: &str) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
 }

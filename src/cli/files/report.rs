@@ -1,4 +1,5 @@
 //! `agimp report`: a run on one page for a browser.
+use super::given::{self, Given};
 use crate::cli::Failure;
 use crate::job;
 use crate::report::{self, Options, Results};
@@ -9,8 +10,10 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp report`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Directory of the results of a run, or job file that was run without --out.
-    run: PathBuf,
+    /// A run: the directory of its results, its index (NAME.hdf.series), outputs of it, or a job file that was run without
+    /// --out.
+    #[arg(required = true)]
+    run: Vec<PathBuf>,
     /// Name of the job, if the directory contains the results of several jobs.
     #[arg(long)]
     name: Option<String>,
@@ -32,10 +35,11 @@ pub struct Arguments {
 /// No results are found, an output cannot be read, or the page cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let results = results(&arguments.run, arguments.name.as_deref())?;
+    let job = arguments.run.iter().find(|run| is_job(run));
     let options = Options {
         colour: arguments.colour.clone(),
         pictures: usize::from(arguments.pictures),
-        job: Some(arguments.run.clone()).filter(|run| run.is_file()),
+        job: job.cloned(),
     };
     let out = arguments.out.clone().unwrap_or_else(|| results.path("report.html"));
     let size = report::write(&results, &options, &out).map_err(|error| Failure::Usage(error.to_string()))?;
@@ -43,17 +47,28 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The results of a job, or those in a directory.
-fn results(run: &Path, name: Option<&str>) -> Result<Results, Failure> {
+/// Whether a word names a job file: neither a directory nor, by its ending, a file of a run.
+fn is_job(word: &Path) -> bool {
+    let ending = word.extension().unwrap_or_default();
+    !word.is_dir() && ["hdf", "vtkhdf", "series"].iter().all(|of_run| ending != *of_run)
+}
+
+/// The results of a job, those in a directory, or those to which files belong.
+fn results(words: &[PathBuf], name: Option<&str>) -> Result<Results, Failure> {
     let unclear = |error: report::Unclear| Failure::Usage(error.to_string());
-    if run.is_dir() {
+    let (run, is_one) = (&words[0], words.len() == 1);
+    if is_one && run.is_dir() {
         return Results::in_directory(run, name).map_err(unclear);
     }
-    let problem = job::load(run)?;
-    Results::in_directory(&problem.output().directory, Some(problem.name())).map_err(|error| {
-        let run = run.display();
-        Failure::Usage(format!(
-            "{error}; run the job (agimp run {run}), or name the directory of its results"
-        ))
-    })
+    if is_one && is_job(run) {
+        let problem = job::load(run)?;
+        return Results::in_directory(&problem.output().directory, Some(problem.name())).map_err(|error| {
+            let run = run.display();
+            Failure::Usage(format!(
+                "{error}; run the job (agimp run {run}), or name the directory of its results"
+            ))
+        });
+    }
+    let (directory, name) = given::run_of_files(&Given::any(words)?.files)?;
+    Results::in_directory(&directory, Some(&name)).map_err(unclear)
 }

@@ -1,17 +1,18 @@
 //! `agimp view`: particles and tree of outputs as a page for a browser.
+use super::given::Given;
 use crate::cli::Failure;
 use crate::cli::shared::looks;
-use crate::io::frame::expand;
 use crate::io::snapshot::PointField;
 use crate::text::bytes;
 use crate::view::{self, Options};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `agimp view`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Output or checkpoint files of one run, in order of time, or the index of its outputs (NAME.hdf.series).
+    /// Outputs or checkpoints of one run, in order of time: files, the directory of the run, its index (NAME.hdf.series)
+    /// or its job file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Fields to include, separated by commas; by default all fields of the files except identifiers and components.
@@ -34,10 +35,8 @@ pub struct Arguments {
 /// A file cannot be read or does not show a field, or the page cannot be written.
 pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let failed = |error: crate::io::hdf5_file::FileError| Failure::Usage(error.to_string());
-    let given = super::without_trees(&arguments.files);
-    let files = expand(&given).map_err(failed)?;
-    let (first, out) = (&given[0], arguments.out.as_deref());
-    let out = out.map_or_else(|| super::beside(first, "html"), Path::to_path_buf);
+    let Given { files, first } = Given::particles(&arguments.files)?;
+    let out = arguments.out.clone().unwrap_or_else(|| super::beside(&first, "html"));
     let name = out.file_stem().unwrap_or_default().to_string_lossy();
     let title = looks::title(arguments.title.as_deref(), files.first().map(PathBuf::as_path), &name);
     let options = Options { title, fields: arguments.fields.clone(), bits: arguments.bits };

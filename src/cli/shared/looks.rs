@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use super::message::warn_of;
-use crate::io::picture::{self, Clip, Direction, Map, Settings, Solid};
+use crate::io::picture::{self, Clip, Direction, Map, Scene, Settings};
 use crate::io::snapshot::Header;
 use crate::job::AnyProblem;
 use crate::run::scene;
@@ -114,22 +114,29 @@ impl Looks {
         }
     }
 
-    /// The job whose colliders are drawn with its outputs; a warning where they cannot be.
-    pub(in crate::cli) fn job(&self, output: &Path) -> Option<AnyProblem> {
-        if self.bare {
+    /// The job of outputs, for what is drawn beside the fields of particles; a warning where colliders cannot be.
+    fn job(&self, output: &Path) -> Option<AnyProblem> {
+        if !output.is_file() {
             return None;
         }
         let job = scene::job_of(output, self.job.as_deref());
-        if let Err(reason) = &job {
+        if let (Err(reason), false) = (&job, self.bare) {
             warn_of(&[format!(
                 "colliders are not drawn: {reason}; name the job file with --job, or leave them out with --bare"
             )]);
         }
         job.ok()
     }
-}
 
-/// The colliders of a job, if there is one.
-pub(in crate::cli) fn solids(job: Option<&AnyProblem>) -> impl Fn(&Header) -> Vec<Solid> + '_ {
-    move |header| job.map_or_else(Vec::new, |job| scene::solids_of(job, header))
+    /// What is drawn beside the fields of the particles of outputs of one run, such as this one.
+    pub(in crate::cli) fn scene(&self, output: &Path) -> impl Fn(&Header) -> Scene + use<> {
+        let (job, is_bare) = (self.job(output), self.bare);
+        move |header| {
+            let mut scene = job.as_ref().map_or_else(Scene::default, |job| scene::of_job(job, header));
+            if is_bare {
+                scene.solids.clear();
+            }
+            scene
+        }
+    }
 }

@@ -2,7 +2,7 @@
 use super::camera::Camera;
 use super::canvas::Canvas;
 use super::colour::Rgb;
-use super::scales::{nice, short};
+use super::scales::{self, nice, short};
 use super::{Drawing, Settings, Splat};
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::Header;
@@ -122,16 +122,11 @@ impl Drawing {
         }
         let paper = settings.paper();
         let (value, unit) = (nice(longest), &self.vectors.unit);
-        let (x, y) = (canvas.width as f64 - 185.0, canvas.height as f64 - 44.0);
-        arrow(canvas, [x, y], [value * LONGEST / longest, 0.0], [paper.ink, paper.paper]);
-        canvas.text(
-            (x + LONGEST) as i64 + 10,
-            y as i64 - 7,
-            2,
-            &format!("{} {unit}", short(value)),
-            paper.ink,
-        );
-        canvas.text(x as i64, y as i64 + 14, 2, &self.vectors.name, paper.ink);
+        let (x, y) = (canvas.width as i64 - canvas.px(scales::WIDTH), canvas.height as i64 - canvas.px(44.0));
+        arrow(canvas, [x as f64, y as f64], [value * LONGEST / longest, 0.0], [paper.ink, paper.paper]);
+        let (right, half) = (x + LONGEST as i64 + canvas.px(10.0), canvas.px(7.0));
+        canvas.text(right, y - half, 2.0, &format!("{} {unit}", short(value)), paper.ink);
+        canvas.text(x, y + 2 * half, 2.0, &self.vectors.name, paper.ink);
     }
 }
 

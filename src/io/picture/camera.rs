@@ -106,8 +106,8 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 
 /// An orthographic camera that fits a box into an image.
 pub(super) struct Camera {
-    right: [f64; 3],
-    up: [f64; 3],
+    pub right: [f64; 3],
+    pub up: [f64; 3],
     pub toward: [f64; 3],
     /// Screen centre in camera coordinates.
     centre: [f64; 2],

@@ -10,7 +10,7 @@ use super::colour::Rgb;
 use super::font;
 use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::write_whole;
-use crate::text::html;
+use crate::text::{html, printable};
 
 /// A colour as SVG has it.
 fn hex([red, green, blue]: Rgb) -> String {
@@ -21,6 +21,8 @@ fn hex([red, green, blue]: Rgb) -> String {
 pub(super) struct Canvas {
     pub width: usize,
     pub height: usize,
+    /// Pixels of a unit of the layout, in which sizes of letters and margins are given.
+    pub unit: f64,
     pixels: Vec<u8>,
     /// Elements of SVG over the pixels, once they are collected.
     marks: Option<String>,
@@ -28,8 +30,13 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// A canvas of one colour.
-    pub(super) fn new(width: usize, height: usize, colour: Rgb) -> Self {
-        Self { width, height, pixels: colour.repeat(width * height), marks: None }
+    pub(super) fn new([width, height]: [usize; 2], unit: f64, colour: Rgb) -> Self {
+        Self { width, height, unit, pixels: colour.repeat(width * height), marks: None }
+    }
+
+    /// Pixels of a length of the layout.
+    pub(super) fn px(&self, length: f64) -> i64 {
+        (length * self.unit).round() as i64
     }
 
     /// Red, green and blue of each pixel, row by row.
@@ -72,8 +79,9 @@ impl Canvas {
         }
     }
 
-    /// Writes a text with the upper left corner of its capitals at `(x, y)`; they are `7 size` pixels high.
-    pub(super) fn text(&mut self, x: i64, y: i64, size: i64, text: &str, colour: Rgb) {
+    /// Writes a text with the upper left corner of its capitals at `(x, y)`; they are `7 size` units high.
+    pub(super) fn text(&mut self, x: i64, y: i64, size: f64, text: &str, colour: Rgb) {
+        let (text, size) = (&printable(text), size * self.unit);
         if let Some(marks) = &mut self.marks {
             let (base, em, colour) = (y + font::cap_height(size), font::em(size), hex(colour));
             let _ = writeln!(
@@ -87,8 +95,42 @@ impl Canvas {
     }
 
     /// Pixels that a text is wide.
-    pub(super) fn text_width(size: i64, text: &str) -> i64 {
-        font::draw(size, text, |_, _, _| ())
+    pub(super) fn text_width(&self, size: f64, text: &str) -> i64 {
+        font::draw(size * self.unit, text, |_, _, _| ())
+    }
+
+    /// A text of at most `width` pixels: an ellipsis stands for what does not fit.
+    pub(super) fn shortened(&self, size: f64, text: &str, width: i64) -> String {
+        let text = printable(text);
+        match font::fitting(size * self.unit, &text, width) {
+            (_, true) => text.into_owned(),
+            _ => {
+                let room = width - self.text_width(size, "…");
+                format!("{}…", font::fitting(size * self.unit, &text, room).0.trim_end())
+            }
+        }
+    }
+
+    /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that are wider than a
+    /// line. An ellipsis stands for what does not fit.
+    pub(super) fn lines(&self, size: f64, text: &str, width: i64, most: usize) -> Vec<String> {
+        let text: Vec<_> = text.split_whitespace().map(printable).collect();
+        let text = text.join(" ");
+        let (mut rest, mut lines) = (text.as_str(), Vec::new());
+        while !rest.is_empty() {
+            let (fitting, is_all) = font::fitting(size * self.unit, rest, width);
+            if is_all || lines.len() + 1 >= most {
+                lines.push(self.shortened(size, rest, width));
+                break;
+            }
+            let is_word = rest[fitting.len()..].starts_with(' ');
+            let end = if is_word { fitting.len() } else { fitting.rfind(' ').unwrap_or(fitting.len()) };
+            // A line has a letter at least, however narrow it is.
+            let end = end.max(rest.chars().next().map_or(0, char::len_utf8));
+            lines.push(rest[..end].trim_end().to_owned());
+            rest = rest[end..].trim_start();
+        }
+        lines
     }
 
     /// Fills a polygon with smooth edges.

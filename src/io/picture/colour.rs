@@ -90,7 +90,25 @@ const CLASSES: [Rgb; 8] = [
 
 /// Colour of a whole number.
 pub(super) fn class(number: usize) -> Rgb {
-    CLASSES[number % CLASSES.len()]
+    CLASSES.get(number).copied().unwrap_or_else(|| further(number - CLASSES.len()))
+}
+
+/// Colours for more classes or curves than a list has: hues go round by the golden ratio, which keeps them apart, on rings of
+/// five lightnesses and saturations.
+pub(crate) fn further(number: usize) -> Rgb {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    const RINGS: [(f64, f64); 5] = [(0.55, 0.82), (0.45, 0.56), (0.27, 0.89), (0.43, 0.77), (0.6, 0.56)];
+    let (lightness, saturation) = RINGS[number % RINGS.len()];
+    hsl((0.38 + GOLDEN * number as f64).fract(), saturation, lightness)
+}
+
+/// The colour of a hue (0 to 1), saturation and lightness.
+fn hsl(hue: f64, saturation: f64, lightness: f64) -> Rgb {
+    let reach = saturation * lightness.min(1.0 - lightness);
+    [0.0, 8.0, 4.0].map(|shift| {
+        let k = (shift + 12.0 * hue) % 12.0;
+        (255.0 * (lightness - reach * (k - 3.0).min(9.0 - k).clamp(-1.0, 1.0))).round() as u8
+    })
 }
 
 /// A colour made lighter or darker.
@@ -138,6 +156,18 @@ pub(super) const DARK: Paper = Paper {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Forty bodies: no two have nearly the same colour, and none that of paper or colliders.
+    #[test]
+    fn classes_differ() {
+        let colours: Vec<Rgb> = (0..40).map(class).chain([LIGHT.paper, LIGHT.solid, DARK.paper]).collect();
+        for (i, a) in colours.iter().enumerate() {
+            for (j, b) in colours[..i].iter().enumerate() {
+                let distance: i32 = (0..3).map(|c| (i32::from(a[c]) - i32::from(b[c])).pow(2)).sum();
+                assert!(distance > 30 * 30, "{i} {a:?}, {j} {b:?}");
+            }
+        }
+    }
 
     #[test]
     fn maps_are_even_in_lightness_but_for_the_one_with_two_sides() {

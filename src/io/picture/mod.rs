@@ -8,7 +8,7 @@
 //! | this | what a picture is made of, and how it is put together |
 //! | `settings.rs` | what can be chosen |
 //! | `camera.rs`, `scene.rs`, `solids.rs`, `tree.rs` | from space to pixels; particles with their light; colliders; leaves |
-//! | `arrows.rs` | vectors |
+//! | `boxes.rs`, `arrows.rs` | widths of particles; vectors |
 //! | `canvas.rs`, `colour.rs`, `scales.rs`, `font.rs` | an image and its file; colours; legends; letters |
 //! | `source/` | what a file offers, and what follows from it |
 
@@ -23,6 +23,7 @@ use crate::particle::chunk::Layout;
 use crate::text::quantity;
 
 mod arrows;
+mod boxes;
 mod camera;
 mod canvas;
 mod colour;
@@ -35,19 +36,31 @@ pub(super) mod source;
 mod tree;
 
 use arrows::Vectors;
+pub use boxes::Boxes;
 pub use camera::View as Direction;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
 pub use colour::Map;
-use scales::{Plot, axes, colour_bar, legend, nice};
+pub(crate) use colour::further;
+use scales::{Plot, colour_bar, legend, nice};
 use scene::{Looks, Raster, Splat};
 pub use settings::{Clip, Look, Settings, place};
 use solids::Layer;
 pub use solids::{Distance, Solid};
 use source::derived::{Source, is_class, magnitude};
 use tree::leaves;
-/// The rigid bodies where they are at the time of a file.
-pub type SolidsOf<'a> = dyn Fn(&Header) -> Vec<Solid> + 'a;
+
+/// What a picture shows of a run beside the fields of its particles.
+#[derive(Debug, Default)]
+pub struct Scene {
+    /// Rigid bodies.
+    pub solids: Vec<Solid>,
+    /// How wide particles are; `None` where that is not known: they are then drawn as they were at the start.
+    pub boxes: Option<Boxes>,
+}
+
+/// The scene at the time of a file.
+pub type SceneOf<'a> = dyn Fn(&Header) -> Scene + 'a;
 
 /// What the colours of a picture mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,8 +92,13 @@ impl Tint {
     }
 }
 
-/// Free space beside the drawing: left, right, top, bottom, in pixels.
+/// Free space beside the drawing: left, right, top, bottom, in units of the layout.
 const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
+/// Most lines of a title.
+const TITLE_LINES: usize = 3;
+/// What balls are larger than the boxes of their particles, so that no gaps are seen between them.
+const LARGER: f64 = 1.2;
+
 /// The particles of one rank and what all ranks know.
 #[derive(Debug)]
 struct Drawing {
@@ -102,9 +120,10 @@ pub fn draw<const D: usize>(
     view: &View<D>,
     field: PointField,
     settings: &Settings,
-    solids: Vec<Solid>,
+    scene: Scene,
     path: &Path,
 ) -> Result<(), FileError> {
+    let Scene { solids, boxes } = scene;
     let domain = domain(&view.origin, view.root_edge, &view.brick.roots.map(u64::from));
     let values = scalars(field.values(view));
     let mut values = values.into_iter();
@@ -114,7 +133,8 @@ pub fn draw<const D: usize>(
         for (p, (half, value)) in half.iter().zip(values.by_ref()).enumerate() {
             let inner = chunk.position(p);
             let position = std::array::from_fn(|i| if i < D { view.origin[i] + inner[i] } else { 0.0 });
-            splats.push(Splat { position, radius: 1.2 * half, value });
+            let half = boxes.as_ref().map_or([*half; 3], |boxes| boxes.of_chunk(chunk, p, view.root_edge));
+            splats.push(Splat { position, radii: half.map(|half| LARGER * half), value });
         }
     }
     let mut particles = [view.chunks.iter().map(|chunk| chunk.len() as u64).sum()];
@@ -137,10 +157,14 @@ pub fn draw_file(
     from: &Path,
     name: &str,
     settings: &Settings,
-    solids: &SolidsOf<'_>,
+    scene: &SceneOf<'_>,
     path: &Path,
 ) -> Result<(), FileError> {
-    drawing(from, name, settings, solids)?.0.compose(None, settings).save(path)
+    let (drawing, _) = drawing(from, name, settings, scene)?;
+    if let (Some(reason), false) = (drawing.emptied(settings), settings.may_be_empty) {
+        return Err(FileError::Refused { path: from.into(), reason });
+    }
+    drawing.compose(None, settings).save(path)
 }
 
 /// Not collective. As [`draw_file`], but returns the bytes of the PNG, and the time of the file, s.
@@ -151,9 +175,9 @@ pub fn png_of_file(
     from: &Path,
     name: &str,
     settings: &Settings,
-    solids: &SolidsOf<'_>,
+    scene: &SceneOf<'_>,
 ) -> Result<(Vec<u8>, f64), FileError> {
-    let (drawing, time) = drawing(from, name, settings, solids)?;
+    let (drawing, time) = drawing(from, name, settings, scene)?;
     let refused = |error: std::io::Error| FileError::Refused { path: from.into(), reason: error.to_string() };
     Ok((drawing.compose(None, settings).png().map_err(refused)?, time))
 }
@@ -171,9 +195,9 @@ impl Prepared {
         from: &Path,
         name: &str,
         settings: &Settings,
-        solids: &SolidsOf<'_>,
+        scene: &SceneOf<'_>,
     ) -> Result<Self, FileError> {
-        Ok(Self(drawing(from, name, settings, solids)?.0))
+        Ok(Self(drawing(from, name, settings, scene)?.0))
     }
 
     /// Draws it: red, green and blue of each pixel, row by row.
@@ -190,13 +214,17 @@ pub fn survey(
     files: &[PathBuf],
     name: &str,
     settings: &Settings,
-    solids: &SolidsOf<'_>,
+    scene: &SceneOf<'_>,
 ) -> Result<Look, FileError> {
     let mut all: Option<Look> = None;
+    let (mut emptied, mut is_any_left) = (None, false);
     for file in files {
-        let (drawing, _) = drawing(file, name, settings, solids)?;
+        let (drawing, _) = drawing(file, name, settings, scene)?;
         let (Bounds { low, high }, [from, to]) = (drawing.frame(None), drawing.range(None, None).0);
         let longest = drawing.vectors.longest();
+        let reason = drawing.emptied(settings);
+        is_any_left |= reason.is_none();
+        emptied = emptied.or(reason.map(|reason| FileError::Refused { path: file.clone(), reason }));
         let seen = all.get_or_insert(Look { range: [from, to], frame: [low, high], longest });
         seen.longest = seen.longest.max(longest);
         seen.range = [seen.range[0].min(from), seen.range[1].max(to)];
@@ -204,6 +232,9 @@ pub fn survey(
             seen.frame[0][axis] = seen.frame[0][axis].min(low[axis]);
             seen.frame[1][axis] = seen.frame[1][axis].max(high[axis]);
         }
+    }
+    if let (Some(refused), false) = (emptied, is_any_left) {
+        return Err(refused);
     }
     Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]], longest: 0.0 }))
 }
@@ -213,7 +244,7 @@ fn drawing(
     from: &Path,
     name: &str,
     settings: &Settings,
-    solids: &SolidsOf<'_>,
+    scene: &SceneOf<'_>,
 ) -> Result<(Drawing, f64), FileError> {
     let file = Reader::open_alone(from)?;
     let header = Header::read(&file)?;
@@ -222,19 +253,23 @@ fn drawing(
     let tint = tint.named(&header.materials, &header.bodies);
     let points = source::points(&file, &header)?;
     let domain = domain(&header.origin, header.root_edge, &header.roots);
-    let radii = source::radii(&file, &header)?;
-    let splats = points.chunks_exact(3).zip(values).zip(radii);
+    let Scene { solids, boxes } = scene(&header);
+    let stretched = boxes.map_or(Ok(None), |boxes| boxes.of_file(&file, &header))?;
+    let half_widths = match stretched {
+        Some(half_widths) => half_widths,
+        None => source::radii(&file, &header)?.into_iter().map(|half| [half; 3]).collect(),
+    };
+    let splats = points.chunks_exact(3).zip(values).zip(half_widths);
     let splats = splats
         .map(|((point, value), half)| Splat {
             position: [point[0], point[1], point[2]],
-            radius: 1.2 * half,
+            radii: half.map(|half| LARGER * half),
             value,
         })
         .collect();
     let caption = caption(header.time, header.step, n);
     let flat = header.dimension == 2;
     let leaves = if settings.tree { leaves(from, &header)? } else { Vec::new() };
-    let solids = solids(&header);
     let vectors = Vectors::read(&file, &header, settings.vectors.as_deref())?;
     Ok((Drawing { flat, domain, splats, tint, caption, solids, leaves, vectors }, header.time))
 }
@@ -280,7 +315,7 @@ impl Drawing {
     /// Collective on a shared drawing. The box around all particles; the domain if there are none.
     fn bounds(&self, comm: Option<&Comm>) -> Bounds {
         let reach = |axis: usize, sign: f64| {
-            let far = self.splats.iter().map(|s| sign * s.position[axis] + s.radius);
+            let far = self.splats.iter().map(|s| sign * s.position[axis] + s.radii[axis]);
             sign * max(comm, far.fold(f64::NEG_INFINITY, f64::max))
         };
         let (low, high): ([f64; 3], [f64; 3]) =
@@ -351,9 +386,19 @@ impl Drawing {
         let frame = self.mirror(settings, frame);
         let ([low, high], beyond) = self.range(comm, settings.range);
         let (width, height) = (settings.width as f64, settings.height as f64);
-        let [left, right, top, bottom] = MARGINS;
+        let size = [settings.width, settings.height];
+        let mut canvas = Canvas::new(size, settings.unit(), paper.paper);
+        let heading = Heading::new(&canvas, &settings.title, &self.caption);
+        let unit = canvas.unit;
+        let [left, right, top, bottom] = MARGINS.map(|margin| margin * unit);
+        let top = top + heading.extra as f64;
         // Numbers and unit of the axes of a plane picture stand there.
-        let [left, right] = if self.flat { [left + 60.0, right + 45.0] } else { [left, right] };
+        let [left, right] = if self.flat {
+            let numbers = scales::Metric::of(&frame).widest(&canvas, [frame.low[1], frame.high[1]]);
+            [(left + 60.0 * unit).max(numbers as f64 + 34.0 * unit), right + 45.0 * unit]
+        } else {
+            [left, right]
+        };
         let camera = Camera::new(
             (self.flat, settings.view),
             &frame,
@@ -377,11 +422,9 @@ impl Drawing {
             comm.max_u64(&mut raster.pixels);
             raster.grain = comm.max_f64(raster.grain);
         }
-        let mut canvas = Canvas::new(settings.width, settings.height, paper.paper);
         if comm.is_some_and(|comm| comm.rank() != 0) {
             return canvas;
         }
-        let size = [settings.width, settings.height];
         let mut shown = frame;
         if let Some(Clip { axis, at, above }) = settings.clip {
             let side = if above { &mut shown.high } else { &mut shown.low };
@@ -405,7 +448,7 @@ impl Drawing {
         self.arrows(&mut canvas, &camera, settings, |splat, [column, row, depth]| {
             let at = row as usize * raster.width + column as usize;
             let inside = (column as usize) < raster.width && (row as usize) < raster.height;
-            let front = depth + splat.radius + 1.5 / camera.scale;
+            let front = depth + splat.reach(&camera.toward) + 1.5 / camera.scale;
             inside && is_kept(splat) && (self.flat || raster.is_free(&camera, &solids, at, front))
         });
         let plot = Plot { columns: [left, width - right], rows: [top, height - bottom] };
@@ -417,21 +460,47 @@ impl Drawing {
         }
         self.arrow_of_scale(&mut canvas, settings);
         if self.flat {
-            let spacing = nice(frame.extent() / 8.0);
-            axes(&mut canvas, &camera, &frame, spacing, paper);
+            scales::axes(&mut canvas, &camera, &frame, paper);
         } else {
             let note = format!("grid {}", quantity(spacing, "m"));
-            canvas.text(24, settings.height as i64 - 36, 2, &note, paper.ink);
+            canvas.text(canvas.px(24.0), settings.height as i64 - canvas.px(36.0), 2.0, &note, paper.ink);
         }
-        canvas.text(24, 20, 3, &settings.title, paper.ink);
-        canvas.text(24, 60, 2, &self.caption, paper.ink);
+        heading.write(&mut canvas, paper);
+        if !self.splats.is_empty() && !raster.has_particles() {
+            let note = "no particle in view: change focus, zoom or clip";
+            let row = 0.5 * (top + height - bottom);
+            canvas.text(left as i64, row as i64, 2.0, note, paper.ink);
+        }
+        let below = top as i64;
         if classes {
-            legend(&mut canvas, &self.tint, low as usize..=high as usize, paper);
+            legend(&mut canvas, &self.tint, low as usize..=high as usize, (paper, below));
         } else {
-            let room = if self.vectors.each.is_empty() { 0 } else { 60 };
-            colour_bar(&mut canvas, &self.tint, ([low, high], beyond), (settings.map, paper), room);
+            let room = if self.vectors.each.is_empty() { 0.0 } else { 60.0 };
+            colour_bar(&mut canvas, &self.tint, ([low, high], beyond), (settings.map, paper), (below, room));
         }
         canvas
+    }
+
+    /// Why a clip leaves nothing to be seen of particles that are there, if so.
+    fn emptied(&self, settings: &Settings) -> Option<String> {
+        let clip = settings.clip?;
+        let axis = clip.axis;
+        let plane = settings.mirror[axis].then(|| self.domain.low[axis]);
+        let places = self.splats.iter().flat_map(|splat| {
+            let own = splat.position[axis];
+            [Some(own), plane.map(|plane| 2.0 * plane - own)]
+        });
+        let places = || places.clone().flatten();
+        if self.splats.is_empty() || places().any(|place| clip.keeps(place)) {
+            return None;
+        }
+        let (low, high) =
+            places().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let [low, high] = [low, high].map(|x| quantity(x, "m"));
+        let name = ["x", "y", "z"][axis];
+        Some(format!(
+            "the clip {clip} keeps no particle; expected a place among them, {name} from {low} to {high}"
+        ))
     }
 
     /// Adds what lies behind planes of symmetry. Returns the frame of all.
@@ -472,6 +541,38 @@ impl Drawing {
             frame.low[axis] = 2.0 * plane - frame.high[axis];
         }
         frame
+    }
+}
+
+/// Title and caption in lines.
+struct Heading {
+    title: Vec<String>,
+    caption: Vec<String>,
+    /// Pixels that they need beside those of a line each.
+    extra: i64,
+}
+
+impl Heading {
+    fn new(canvas: &Canvas, title: &str, caption: &str) -> Self {
+        let width = canvas.width as i64 - 2 * canvas.px(24.0);
+        let (title, caption) =
+            (canvas.lines(3.0, title, width, TITLE_LINES), canvas.lines(2.0, caption, width, TITLE_LINES));
+        let more = |lines: &[String], height: f64| canvas.px(height * lines.len().saturating_sub(1) as f64);
+        let extra = more(&title, 32.0) + more(&caption, 24.0);
+        Self { title, caption, extra }
+    }
+
+    fn write(&self, canvas: &mut Canvas, paper: &colour::Paper) {
+        let (left, mut row) = (canvas.px(24.0), canvas.px(20.0));
+        for line in &self.title {
+            canvas.text(left, row, 3.0, line, paper.ink);
+            row += canvas.px(32.0);
+        }
+        let mut row = row.max(canvas.px(52.0)) + canvas.px(8.0);
+        for line in &self.caption {
+            canvas.text(left, row, 2.0, line, paper.ink);
+            row += canvas.px(24.0);
+        }
     }
 }
 

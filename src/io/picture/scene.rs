@@ -1,5 +1,6 @@
 //! Depth buffer and shading.
 
+use super::LARGER;
 use super::camera::{Bounds, Camera};
 use super::canvas::Canvas;
 use super::colour::{Paper, Rgb, mixed, scaled};
@@ -9,9 +10,17 @@ use super::solids::Layer;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Splat {
     pub position: [f64; 3],
-    pub radius: f64,
+    /// Half axes along x, y and z, m.
+    pub radii: [f64; 3],
     /// Between 0 and 1.
     pub value: f64,
+}
+
+impl Splat {
+    /// How far its ellipsoid reaches in a direction of length 1, m.
+    pub(super) fn reach(&self, direction: &[f64; 3]) -> f64 {
+        (0..3).map(|axis| (self.radii[axis] * direction[axis]).powi(2)).sum::<f64>().sqrt()
+    }
 }
 
 /// What a pixel shows.
@@ -58,31 +67,47 @@ impl Raster {
         *pixel = (*pixel).max(key << 32 | shown);
     }
 
-    /// Draws a particle as a ball, or as a square in a plane picture, so that squares side by side leave no gap.
+    /// Draws a particle as an ellipsoid, or as a rectangle in a plane picture, so that boxes side by side leave no gap.
     pub(super) fn splat(&mut self, camera: &Camera, splat: &Splat, flat: bool) {
+        /// Least half axis, pixels.
+        const LEAST: f64 = 0.75;
         let [column, row, depth] = camera.project(splat.position);
-        let radius = (splat.radius * camera.scale).max(0.75);
-        self.grain = self.grain.max(radius);
+        let splat = Splat { radii: splat.radii.map(|radius| radius.max(LEAST / camera.scale)), ..*splat };
+        let reach = [camera.right, camera.up].map(|axis| splat.reach(&axis) * camera.scale);
+        self.grain = self.grain.max(reach[0].max(reach[1]));
         let shown = 2 << 16 | (splat.value.clamp(0.0, 1.0) * f64::from(u16::MAX)) as u64;
-        let span = |centre: f64, most: usize| {
-            let from = (centre - radius).floor().max(0.0) as i64;
-            from..((centre + radius).ceil() + 1.0).clamp(0.0, most as f64) as i64
+        let span = |centre: f64, reach: f64, most: usize| {
+            let from = (centre - reach).floor().max(0.0) as i64;
+            from..((centre + reach).ceil() + 1.0).clamp(0.0, most as f64) as i64
         };
-        for y in span(row, self.height) {
-            for x in span(column, self.width) {
+        // The point o + s t of a ray is on the ellipsoid where a s² + 2 b s + c = 0; t points towards the viewer.
+        let inverse = splat.radii.map(|radius| 1.0 / (radius * radius));
+        let product = |u: &[f64; 3], v: &[f64; 3]| (0..3).map(|i| u[i] * v[i] * inverse[i]).sum::<f64>();
+        let a = product(&camera.toward, &camera.toward);
+        for y in span(row, reach[1], self.height) {
+            for x in span(column, reach[0], self.width) {
                 let (dx, dy) = (x as f64 + 0.5 - column, y as f64 + 0.5 - row);
-                let inside = radius * radius - dx * dx - dy * dy;
                 if flat {
-                    // Discs are 1.2 times as large as boxes.
-                    let edge = radius / 1.2 + 0.5;
-                    if dx.abs() <= edge && dy.abs() <= edge {
+                    let edge = reach.map(|reach| reach / LARGER + 0.5);
+                    if dx.abs() <= edge[0] && dy.abs() <= edge[1] {
                         self.put(camera, x, y, depth, shown);
                     }
-                } else if inside >= 0.0 {
-                    self.put(camera, x, y, depth + inside.sqrt() / camera.scale, shown);
+                    continue;
+                }
+                let from: [f64; 3] =
+                    std::array::from_fn(|i| (dx * camera.right[i] - dy * camera.up[i]) / camera.scale);
+                let b = product(&from, &camera.toward);
+                let inside = b * b - a * (product(&from, &from) - 1.0);
+                if inside >= 0.0 {
+                    self.put(camera, x, y, depth + (inside.sqrt() - b) / a, shown);
                 }
             }
         }
+    }
+
+    /// Whether any pixel shows a particle.
+    pub(super) fn has_particles(&self) -> bool {
+        self.pixels.iter().any(|pixel| pixel >> 16 & 0xffff >= 2)
     }
 
     /// Draws the floor at the lower side of `bounds` with lines every `spacing` metres.

@@ -36,6 +36,8 @@ pub struct Settings {
     pub vectors: Option<String>,
     /// Length of the longest vector, in its unit; `None`: as found.
     pub longest: Option<f64>,
+    /// Whether a clip may leave nothing of the particles; else that is refused.
+    pub may_be_empty: bool,
     /// Whether frame, axes, texts and arrows are kept apart from pixels, for SVG.
     pub collect: bool,
 }
@@ -62,6 +64,13 @@ impl std::str::FromStr for Clip {
         let axis = ["x", "y", "z"].iter().position(|axis| *axis == name).ok_or_else(expected)?;
         let at = at.parse().ok().filter(|at: &f64| at.is_finite()).ok_or_else(expected)?;
         Ok(Self { axis, at, above: text.as_bytes()[place] == b'<' })
+    }
+}
+
+impl std::fmt::Display for Clip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (axis, side) = (["x", "y", "z"][self.axis], if self.above { '<' } else { '>' });
+        write!(f, "{axis}{side}{}", crate::text::written(self.at))
     }
 }
 
@@ -110,7 +119,26 @@ impl Settings {
             tree: false,
             vectors: None,
             longest: None,
+            may_be_empty: false,
             collect: false,
+        }
+    }
+
+    /// Takes what a series of pictures shares, where nothing else was chosen.
+    pub fn share(&mut self, look: &Look) {
+        self.frame = Some(look.frame);
+        self.longest = Some(look.longest);
+        self.range = self.range.or(Some(look.range));
+    }
+
+    /// Pixels of a unit of the layout: letters and margins keep their size in pictures of usual sizes, and go with the size of
+    /// smaller and larger ones.
+    pub(super) fn unit(&self) -> f64 {
+        let share = (self.width as f64 / 1280.0).min(self.height as f64 / 800.0);
+        match share {
+            ..0.75 => (share / 0.75).max(0.5),
+            1.5.. => share / 1.5,
+            _ => 1.0,
         }
     }
 

@@ -45,6 +45,9 @@ fn stem(name: &str) -> Option<&str> {
     KNOWN_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending))
 }
 
+/// What stands between the name and number of an output and the ending of its tree.
+const TREE: &str = ".tree";
+
 /// What stands between the name of a run and the step of a checkpoint.
 const CHECKPOINT: &str = ".checkpoint_";
 
@@ -177,10 +180,47 @@ pub fn run_of(path: &Path) -> &str {
     let own = || path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
     let stem = stem(file_name(path)).unwrap_or_else(own);
     let stem = stem.split(CHECKPOINT).next().unwrap_or(stem);
+    let stem = stem.strip_suffix(TREE).unwrap_or(stem);
     match stem.rsplit_once('_') {
         Some((name, number)) if number.bytes().all(|byte| byte.is_ascii_digit()) => name,
         _ => stem,
     }
+}
+
+/// Whether a file or an index is, by its name, of the tree.
+pub fn is_of_tree(path: &Path) -> bool {
+    let name = file_name(path);
+    stem(name.strip_suffix(".series").unwrap_or(name)).is_some_and(|stem| stem.ends_with(TREE))
+}
+
+/// Not collective. Names of the runs that have an index or outputs in a directory, sorted.
+pub fn runs(directory: &Path) -> Vec<String> {
+    let files = files(directory).unwrap_or_default();
+    let mut names: Vec<String> =
+        files.iter().filter_map(|path| run_by_name(path)).map(str::to_owned).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// The run of an index of outputs or of an output, by its name.
+fn run_by_name(path: &Path) -> Option<&str> {
+    let name = file_name(path);
+    if is_of_tree(path) {
+        return None;
+    }
+    if let Some(index) = name.strip_suffix(".series") {
+        return stem(index);
+    }
+    let (name, number) = stem(name)?.rsplit_once('_')?;
+    let is_number = number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit());
+    (is_number && !name.ends_with(CHECKPOINT.trim_end_matches('_'))).then_some(name)
+}
+
+/// Not collective. The outputs of a run that has no index, by their numbers.
+pub fn outputs_without_index(directory: &Path, name: &str) -> Vec<PathBuf> {
+    let results = results(directory, name).unwrap_or_default();
+    results.into_iter().filter(|(kind, ..)| *kind == Kind::Output).map(|(.., path)| path).collect()
 }
 
 /// Checkpoints and outputs of the run `name` with their numbers, in the order of these.

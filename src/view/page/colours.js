@@ -22,7 +22,22 @@ function colourAt(map, place) {
   return anchors[below].map((from, part) => from + (at - below) * (anchors[below + 1][part] - from));
 }
 
-const classColour = (number) => CLASSES[((number % CLASSES.length) + CLASSES.length) % CLASSES.length];
+// Behind the colours of the list hues go round by the golden ratio, which keeps them apart, on rings of five lightnesses and
+// saturations.
+const RINGS = [[0.55, 0.82], [0.45, 0.56], [0.27, 0.89], [0.43, 0.77], [0.6, 0.56]];
+
+function classColour(number) {
+  const of = Math.max(number, 0);
+  if (of < CLASSES.length) return CLASSES[of];
+  const more = of - CLASSES.length;
+  const [lightness, saturation] = RINGS[more % RINGS.length];
+  const hue = (0.38 + 0.618033988749895 * more) % 1;
+  const reach = saturation * Math.min(lightness, 1 - lightness);
+  return [0, 8, 4].map((shift) => {
+    const k = (shift + 12 * hue) % 12;
+    return Math.round(255 * (lightness - reach * Math.max(Math.min(k - 3, 9 - k, 1), -1)));
+  });
+}
 
 // Where in the range a value lies: 0 to 1 inside.
 function placeIn([low, high], value, logarithmic) {
@@ -54,8 +69,7 @@ function text(value, digits = 4) {
   return value.toExponential(Math.max(digits - 2, 0)).replace("e+", "e");
 }
 
-const unitText = (unit) => unit.replace("m3", "m³").replace("m2", "m²");
-const named = (column) => column.name.replaceAll("_", " ") + (column.unit ? `, ${unitText(column.unit)}` : "");
+const named = (column) => column.name.replaceAll("_", " ") + (column.unit ? ` [${column.unit}]` : "");
 
 // What a value means: the name of a class, or the number.
 function meaning(column, value, digits = 4) {
@@ -66,4 +80,17 @@ function meaning(column, value, digits = 4) {
 function nice(length) {
   const power = 10 ** Math.floor(Math.log10(length));
   return power * [5, 2, 1].find((digit) => digit * power <= length * 1.0001);
+}
+
+// The unit of places up to so many metres: its length in metres and its name.
+function metric(greatest) {
+  if (greatest < 2e-5) return [1e-6, "µm"];
+  if (greatest < 2e-2) return [1e-3, "mm"];
+  return greatest < 2e4 ? [1, "m"] : [1e3, "km"];
+}
+
+// A tick of an axis as text: as many decimals as the step between ticks has.
+function tickText(value, step) {
+  const decimals = Math.min(Math.max(Math.ceil(-Math.log10(step) - 1e-9), 0), 15);
+  return String(Number(value.toFixed(decimals)) || 0);
 }

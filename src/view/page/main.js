@@ -41,7 +41,11 @@ class Viewer {
   // Does what a change of the state asks for; a later change overtakes an earlier one that waits for data.
   async changed(what) {
     const { state, scene } = this;
-    if (what === "field") this.setRange("usual");
+    if (what === "field") {
+      this.setRange("usual");
+      // The legend of another field may be wider.
+      if (this.fitted) this.fit();
+    }
     if (what === "frame" || what === "field") {
       const wanted = state.frame;
       const frame = await this.frames.get(wanted);
@@ -103,7 +107,7 @@ class Viewer {
   describe(frame, index) {
     const place = [0, 1, 2].map((axis) => frame.place[4 * index + axis] * meta.resolution);
     const axes = [..."xyz"].slice(0, meta.dimension);
-    const rows = axes.map((name, axis) => [`${name}, m`, text(meta.bounds[0][axis] + place[axis], 5)]);
+    const rows = axes.map((name, axis) => [`${name} [m]`, text(meta.bounds[0][axis] + place[axis], 5)]);
     meta.columns.forEach((column, i) => {
       rows.push([named(column), meaning(column, valueOf(column, frame.columns[i][index]))]);
     });
@@ -120,6 +124,28 @@ class Viewer {
 
   view() {
     return this.camera.matrix(this.scene.canvas.width, this.scene.canvas.height);
+  }
+
+  // What labels show.
+  shown() {
+    return { ...this.state, column: meta.columns[this.state.field], shown: this.part, levels: this.levels };
+  }
+
+  // The box whose edges carry numbers: what fitted, and of a plane that is seen from the front what is in the window.
+  box(view) {
+    const { box, ratio } = this.state;
+    const { camera } = this;
+    if (meta.dimension === 3 || camera.yaw || camera.pitch || this.fitted) return box;
+    const [start, end] = [[0, 0, 0], [1, 1, 0]].map((place) => view.project(place));
+    const { left, top } = this.labels.room(this.shown(), this.scene.canvas.clientWidth);
+    const { width, height } = this.scene.canvas;
+    const seen = {
+      low: [((left + 75) * ratio - start.x) / (end.x - start.x), (height - 45 * ratio - start.y) / (end.y - start.y), 0],
+      high: [(width - 25 * ratio - start.x) / (end.x - start.x), (top * ratio - start.y) / (end.y - start.y), 0],
+    };
+    const low = LOW.map((x, axis) => Math.max(x, seen.low[axis]));
+    const high = HIGH.map((x, axis) => Math.min(x, seen.high[axis]));
+    return low[0] < high[0] && low[1] < high[1] ? { low, high } : box;
   }
 
   look() {
@@ -143,9 +169,12 @@ class Viewer {
     const room = 0.25 * Math.max(...reach);
     const low = LOW.map((x, axis) => Math.max(x, -room * (axis < meta.dimension)));
     const high = HIGH.map((x, axis) => Math.min(x, reach[axis] + room * (axis < meta.dimension)));
+    this.state.box = { low, high };
     // Legend and title, and the numbers of the axes, have places of their own.
+    const { left, top } = this.labels.room(this.shown(), clientWidth);
     const numbers = this.state.axes ? 55 : 15;
-    this.camera.fit(low, high, clientWidth, clientHeight, [85 + numbers, 25, 60, numbers]);
+    const wide = this.state.axes ? 75 : 15;
+    this.camera.fit(low, high, clientWidth, clientHeight, [left + wide, 25, top, numbers]);
     this.camera.depth = Math.hypot(...EXTENT);
     this.fitted = true;
     this.redraw();
@@ -177,7 +206,7 @@ class Viewer {
       this.fluent = Math.min(Math.max(this.part * factor, 1 / 64), 1);
     }
     this.pictures = (this.pictures ?? 0) + 1;
-    this.labels.draw(view, { ...this.state, column: meta.columns[this.state.field], shown: this.part, levels: this.levels });
+    this.labels.draw(view, { ...this.shown(), box: this.box(view) });
     reflect(this.state);
   }
 

@@ -110,7 +110,7 @@ impl<'f> Source<'f> {
         }
         let offered = self.offered();
         let reason = if offered.is_empty() {
-            "found no particles; expected a file of particles, not of the tree".into()
+            super::NO_PARTICLES.into()
         } else {
             let meant = crate::text::nearest(name, offered.iter().map(String::as_str));
             let guess = meant.map_or(String::new(), |meant| format!("; did you mean {meant}?"));

@@ -10,6 +10,9 @@ use crate::io::hdf5_file::{FileError, Kind, Reader};
 use crate::io::snapshot::Header;
 use crate::io::snapshot::intact::checked::Checked;
 
+/// What is wrong with a file of the tree, where particles are asked for.
+pub(in crate::io) const NO_PARTICLES: &str = "found no particles: a file of the tree (NAME_000001.tree.hdf); expected the output beside it (NAME_000001.hdf)";
+
 /// Cells of a leaf along an axis.
 const CELLS: f64 = 4.0;
 

@@ -1,0 +1,87 @@
+//! How wide particles are drawn: as the solver has their boxes.
+use super::source::numbers;
+use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::snapshot::Header;
+use crate::io::snapshot::intact::checked::Checked;
+use crate::kernel::BoxPolicy;
+use crate::kernel::domain::stretches_of_one;
+use crate::material::PLASTIC_VOLUME;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::volume::symmetric;
+
+/// Cells of a leaf along an axis.
+const CELLS: f64 = 4.0;
+
+/// What half widths follow from, beside the state of the particles.
+#[derive(Clone, Debug)]
+pub struct Boxes {
+    /// How boxes follow the deformation.
+    pub policy: BoxPolicy,
+    /// Whether each material flows, by its number.
+    pub is_plastic: Vec<bool>,
+}
+
+/// A particle, as far as its box follows from it.
+struct Particle {
+    /// Half of the edge of the undeformed box, m.
+    half: f64,
+    /// Left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
+    elastic: [f64; 6],
+    plastic_volume: f64,
+    tag: Tag,
+}
+
+impl Boxes {
+    /// Half widths along the axes, m.
+    fn half_widths(&self, particle: &Particle, dimension: usize, root_edge: f64) -> [f64; 3] {
+        let Particle { half, elastic, plastic_volume, tag } = particle;
+        match self.policy {
+            BoxPolicy::Fixed => [*half; 3],
+            BoxPolicy::Cell => [0.5 * root_edge / CELLS / f64::from(1_u32 << tag.level.min(31)); 3],
+            BoxPolicy::Volume { min_stretch, max_stretch } => {
+                let is_plastic = self.is_plastic.get(usize::from(tag.material)).copied().unwrap_or(true);
+                let limits = [min_stretch, max_stretch];
+                stretches_of_one(elastic, *plastic_volume, dimension, is_plastic, limits)
+                    .map(|stretch| half * stretch)
+            }
+        }
+    }
+
+    /// Half widths of a particle of a run, m.
+    pub(super) fn of_chunk<const D: usize>(&self, chunk: &Chunk<D>, p: usize, root_edge: f64) -> [f64; 3] {
+        let particle = Particle {
+            half: chunk.column(Layout::<D>::HALF)[p],
+            elastic: symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p),
+            plastic_volume: chunk.column(Layout::<D>::PLASTIC_VOLUME)[p],
+            tag: Tag::unpack(chunk.tags()[p]),
+        };
+        self.half_widths(&particle, D, root_edge)
+    }
+
+    /// Half widths of all particles of a file, m; of one without restart state `None`.
+    pub(super) fn of_file(&self, file: &Reader, header: &Header) -> Result<Option<Vec<[f64; 3]>>, FileError> {
+        let set = |name: &str| format!("state/particles/{name}");
+        let needed = ["half_width", "left_cauchy_green", "history", "tag"].map(set);
+        if !needed.iter().all(|name| file.exists(name)) {
+            return Ok(None);
+        }
+        let [half, elastic, history, tags] = needed;
+        let (half, _) = numbers(file, header, &half)?;
+        let (elastic, components) = numbers(file, header, &elastic)?;
+        let (history, histories) = numbers(file, header, &history)?;
+        let tags: Vec<u64> = Checked::new(None, file, header).read_all(&tags, header.particles, 0)?;
+        let rows = half.iter().zip(elastic.chunks_exact(components)).zip(history.chunks_exact(histories));
+        let widths = rows.zip(tags).map(|(((half, elastic), history), tag)| {
+            // Of the state: xx, yy, zz, xy and in 3D xz, yz.
+            let at = |component: usize| elastic.get(component).copied().unwrap_or(0.0);
+            let particle = Particle {
+                half: *half,
+                elastic: [at(0), at(1), at(2), at(3), at(5), at(4)],
+                plastic_volume: history.get(PLASTIC_VOLUME).copied().unwrap_or(0.0),
+                tag: Tag::unpack(tag),
+            };
+            self.half_widths(&particle, header.dimension, header.root_edge)
+        });
+        Ok(Some(widths.collect()))
+    }
+}
