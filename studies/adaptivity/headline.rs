@@ -1,6 +1,7 @@
 //! The quantities for which a scene is computed.
-use agimp::io::hdf5_file::{FileError, Reader};
-use agimp::io::snapshot::Header;
+use agimp::io::frame::Frame;
+use agimp::io::hdf5_file::FileError;
+use agimp::io::snapshot::PointField;
 use toml::{Table, Value};
 
 use crate::runs::Run;
@@ -61,18 +62,16 @@ impl Headline {
 
 /// The particles at the end of a run.
 fn grains(run: &Run) -> Result<Vec<Grain>, FileError> {
-    let file = Reader::open_alone(&run.last_output)?;
-    let count = Header::read(&file)?.particles;
-    let points = file.read_slab::<f64>("VTKHDF/Points", 0, count)?;
-    let mass = file.read_slab::<f32>("VTKHDF/PointData/mass", 0, count)?;
-    let density = file.read_slab::<f32>("VTKHDF/PointData/density", 0, count)?;
-    let each = points.chunks(3).zip(mass.iter().zip(&density));
+    let fields = [PointField::Mass, PointField::Density];
+    let frame = Frame::read(&run.last_output, &fields, true)?;
+    let [mass, density] = fields.map(|field| frame.numbers(field).unwrap_or_default());
+    let each = frame.positions.iter().zip(mass.iter().zip(&density));
     Ok(each
         .map(|(x, (&mass, &density))| Grain {
             radius: x[0].hypot(x[1]),
             height: x[2],
-            half: f64::from(mass / density).cbrt() / 2.0,
-            mass: f64::from(mass),
+            half: (mass / density).cbrt() / 2.0,
+            mass,
         })
         .collect())
 }

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use agimp::io::frame::Frame;
 use agimp::io::hdf5_file::{FileError, Reader};
-use agimp::io::snapshot::Header;
 use agimp::job::problem::CollapseLaw;
 use agimp::run::at_end::collapse::{Published, published};
 
@@ -50,18 +50,11 @@ impl Deposit {
     }
 
     fn of_file(path: &Path, planar: bool) -> Result<Self, FileError> {
-        let file = Reader::open_alone(path)?;
-        let count = Header::read(&file)?.particles;
-        // In the plane the coordinates for pictures are of single precision.
-        let points = match planar {
-            true => file.read_slab::<f32>("VTKHDF/Points", 0, count)?.into_iter().map(f64::from).collect(),
-            false => file.read_slab::<f64>("VTKHDF/Points", 0, count)?,
-        };
-        let mass = file.read_slab::<f64>("state/particles/mass", 0, count)?;
-        let half = file.read_slab::<f64>("state/particles/half_width", 0, count)?;
-        let mut grains: Vec<[f64; 4]> = points
-            .chunks(3)
-            .zip(mass.iter().zip(&half))
+        let Frame { positions, half_widths, header, .. } = Frame::read(path, &[], true)?;
+        let mass = Reader::open_alone(path)?.read_slab::<f64>("state/particles/mass", 0, header.particles)?;
+        let mut grains: Vec<[f64; 4]> = positions
+            .iter()
+            .zip(mass.iter().zip(&half_widths))
             .map(|(x, (&mass, &half))| match planar {
                 true => [x[0], x[1], half, mass],
                 false => [x[0].hypot(x[1]), x[2], half, mass],

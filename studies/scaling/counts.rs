@@ -99,19 +99,21 @@ fn layer(leaves: f64, thickness: f64) -> f64 {
 /// One run of the page: kind, block, ranks.
 type Case = (&'static str, Block, usize);
 
-fn cases() -> Vec<Case> {
-    let block = Block { roots: [1, 1], level: 4, per_cell: 1, steps: 4, every: 2 };
+fn cases(is_quick: bool) -> Vec<Case> {
+    // Of a quick page all levels are one lower, and no more than 16 ranks.
+    let (lower, most) = if is_quick { (1, 16) } else { (0, 64) };
+    let block = Block { roots: [1, 1], level: 4 - lower, per_cell: 1, steps: 4, every: 2 };
     let strong = [1, 2, 4, 8, 16, 32, 64].map(|ranks| ("strong", block, ranks));
-    let fine = [16, 64].map(|ranks| ("fine", Block { level: 5, ..block }, ranks));
+    let fine = [16, 64].map(|ranks| ("fine", Block { level: 5 - lower, ..block }, ranks));
     let weak =
         [1, 4, 16, 64].map(|ranks| ("weak", Block { roots: Block::roots(ranks), level: 2, ..block }, ranks));
-    strong.into_iter().chain(fine).chain(weak).collect()
+    strong.into_iter().chain(fine).chain(weak).filter(|(.., ranks)| *ranks <= most).collect()
 }
 
 /// Runs all cases and writes the page.
-pub(crate) fn write_page(page: &Path) -> Result<(), Failure> {
+pub(crate) fn write_page(page: &Path, is_quick: bool) -> Result<(), Failure> {
     let mut counts = Vec::new();
-    for (kind, block, ranks) in cases() {
+    for (kind, block, ranks) in cases(is_quick) {
         let records = run(&block, &format!("counts_{kind}_{ranks}"), ranks, 1)?;
         // The last that follows on steps; the end of a run writes one more.
         let last = records.iter().rfind(|record| number(record, "/steps") > 0.0);

@@ -13,7 +13,7 @@ mod fit;
 mod plot;
 mod times;
 
-const USAGE: &str = "usage: scaling counts [PAGE] | times [RANKSxTHREADS …] | \
+const USAGE: &str = "usage: scaling counts [PAGE] | --quick | times [RANKSxTHREADS …] | \
                      job strong|weak RANKS [--large] [--directory DIR] | table TELEMETRY …";
 
 /// Why the program ends early.
@@ -23,8 +23,9 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match &words[..] {
-        ["counts"] => counts::write_page(Path::new("docs/scaling.md")),
-        ["counts", page] => counts::write_page(Path::new(page)),
+        ["counts"] => counts::write_page(Path::new("docs/scaling.md"), false),
+        ["--quick"] => counts::write_page(Path::new("target/quick/scaling.md"), true),
+        ["counts", page] => counts::write_page(Path::new(page), false),
         ["times", ways @ ..] => times::measure(ways),
         ["job", kind @ ("strong" | "weak"), ranks, rest @ ..] => print_job(kind, ranks, rest),
         ["table", files @ ..] if !files.is_empty() => times::table(files),
