@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use agimp::io::hdf5_file::{Reader, Writer};
-use agimp::io::picture::{Settings, draw};
+use agimp::io::picture::{Scene, Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
 use agimp::io::snapshot::{self, Header, Limits, Options, Outputs, PointField, Scalars, View};
@@ -711,9 +711,11 @@ fn a_picture_is_the_same_on_any_ranks() {
             let path = |d: usize| directory.join(format!("{d}_{}.png", comm.size()));
             let settings = Settings::new("made up");
             let solid = Run::<3>::example(share(comm, 40, 0b10), 20);
-            draw(comm, &solid.view(), PointField::Speed, &settings, Vec::new(), &path(3)).expect("drawn");
+            draw(comm, &solid.view(), PointField::Speed, &settings, Scene::default(), &path(3))
+                .expect("drawn");
             let plane = Run::<2>::example(share(comm, 40, 0b10), 20);
-            draw(comm, &plane.view(), PointField::Speed, &settings, Vec::new(), &path(2)).expect("drawn");
+            draw(comm, &plane.view(), PointField::Speed, &settings, Scene::default(), &path(2))
+                .expect("drawn");
         },
         |directory| {
             for d in [2, 3] {

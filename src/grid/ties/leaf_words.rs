@@ -1,7 +1,7 @@
 //! A word of each leaf, from its owner to all ranks that know the leaf.
 use partition::comm::{Comm, NeighbourExchange, Traffic};
 
-use crate::grid::KnownTree;
+use crate::grid::plan::ghost_layer::KnownTree;
 
 const TAG: u16 = 13;
 

@@ -27,7 +27,8 @@ use self::leaf_words::LeafWords;
 use self::neighbourhood::Neighbourhood;
 use self::plane::{Plane, rings};
 use super::mask::{bits, block_nodes, node_of_bit};
-use super::{GridPlan, NodeFields};
+use super::plan::GridPlan;
+use super::sums::node_fields::NodeFields;
 
 /// Sweeps over all ties in a step.
 const SWEEPS: usize = 1;

@@ -1,9 +1,8 @@
 //! Blocks and leaves around a block, for cells and nodes up to a block away.
 use partition::Octant;
 
-use crate::grid::KnownTree;
 use crate::grid::mask::{offset, offset_count, offset_index, shifted};
-use crate::grid::plan::ghost_layer::Cover;
+use crate::grid::plan::ghost_layer::{Cover, KnownTree};
 use crate::grid::plan::{GridPlan, NO_BLOCK};
 use crate::kernel::BLOCK;
 

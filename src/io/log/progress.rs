@@ -309,12 +309,12 @@ mod tests {
 
     #[test]
     fn one_line_has_it_all() {
-        let mut progress = Progress::new(false, 0.0, 2.0, 0);
+        let mut progress = Progress::new(false, 0.0, 6.0, 0);
         progress.known.words = "1 particles".into();
-        let done = progress.done(0.5);
+        let done = progress.done(1.5);
         let left = remaining(Duration::from_secs(60), 0.0, done);
-        let text = progress.text(12, 0.5, 1e-4, done, left);
-        assert_eq!(text, " 25.0 %  step 12  t = 0.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
+        let text = progress.text(12, 1.5, 1e-4, done, left);
+        assert_eq!(text, " 25.0 %  step 12  t = 1.5 s  dt = 100 µs  ETA 0:03:00  1 particles");
         assert_eq!(remaining(Duration::from_secs(1), 0.0, 0.0), None);
     }
 
