@@ -21,20 +21,23 @@ pub(in crate::solver) struct Guard<'a, const D: usize> {
     rates: &'a [Rate<D>],
     /// Where they are after the step.
     next: Vec<Pose<D>>,
+    /// Size of the domain, m.
+    extent: [f64; D],
 }
 
 impl<'a, const D: usize> Guard<'a, D> {
-    /// Over a step to the time `to` (s) of length `dt`; `None` without colliders that act on particles.
+    /// Over a step to the time `to` (s) of length `dt`, in a domain of this size (m); `None` without colliders that act on particles.
     pub(in crate::solver) fn new(
         colliders: &'a [Collider<D>],
         states: &'a [ColliderState<D>],
         rates: &'a [Rate<D>],
         [to, dt]: [f64; 2],
+        extent: [f64; D],
     ) -> Option<Self> {
         let next = colliders.iter().zip(states).zip(rates);
         let next = next.map(|((collider, state), rate)| collider.next_pose(state, rate, [to, dt]));
         let is_any = colliders.iter().any(Collider::acts_on_particles);
-        is_any.then(|| Self { colliders, states, rates, next: next.collect() })
+        is_any.then(|| Self { colliders, states, rates, next: next.collect(), extent })
     }
 
     /// Holds back the particles of a leaf that have moved through a surface; notes what they gave. Returns those held back, ascending.
@@ -55,7 +58,13 @@ impl<'a, const D: usize> Guard<'a, D> {
             if let Some(again) = meets(collider, &met.place, &place, close) {
                 place = again.place;
             }
-            let at = collider.to_space(&place, pose);
+            // The rest of the way takes no particle through a face that its own way has not reached.
+            let mut at = collider.to_space(&place, pose);
+            for axis in 0..D {
+                let edge = 1e-6 * close;
+                let (least, most) = (edge.min(to[axis]), (self.extent[axis] - edge).max(to[axis]));
+                at[axis] = at[axis].max(least).min(most);
+            }
             chunk.write(Layout::<D>::POSITION, p, &at);
             let (normal, surface) =
                 (collider.turned(&met.normal, pose), collider.velocity_at(&at, pose, &self.rates[c]));
