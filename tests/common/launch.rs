@@ -27,6 +27,12 @@ pub(crate) fn variant(directory: &Path, folder: &str, (from, to): (&str, &str)) 
     path
 }
 
+/// Lines in which the program says why it ends; warnings may come ahead of them.
+pub(crate) fn reasons(shown: &str) -> Vec<&str> {
+    let is_reason = |line: &&str| line.starts_with("agimp: ") && !line.starts_with("agimp: warning: ");
+    shown.lines().filter(is_reason).collect()
+}
+
 /// The program, in a directory.
 pub(crate) fn agimp(directory: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_agimp"));
@@ -259,7 +265,7 @@ pub(crate) struct Outcome {
     pub digest: String,
     /// The whole history.
     pub history: Vec<u8>,
-    /// The picture of the last state.
+    /// The picture of the last state; empty where the job wants none.
     pub picture: Vec<u8>,
     /// Names of all files of the run but checkpoints.
     pub files: Vec<String>,
@@ -281,7 +287,7 @@ impl Outcome {
         Self {
             digest: String::from_utf8_lossy(&digest.stdout).into_owned(),
             history: files[&format!("{name}.history.csv")].clone(),
-            picture: files[&format!("{name}.png")].clone(),
+            picture: files.get(&format!("{name}.png")).cloned().unwrap_or_default(),
             files: files
                 .into_keys()
                 .filter(|file| !(file.contains("checkpoint") && file.ends_with("hdf")))

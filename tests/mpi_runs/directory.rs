@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::common::in_turn;
 use crate::common::launch::{
-    Outcome, Running, by_rank, contents, file, job, last_step, run, signal, succeed, text, variant,
+    Outcome, Running, by_rank, contents, file, job, last_step, reasons, run, signal, succeed, text, variant,
 };
 
 const NAME: &str = "collapse_2d";
@@ -18,7 +18,7 @@ fn refused(directory: &Path, ranks: usize, job: &Path, arguments: &[&str], words
     let output = Running::start(&mut run(directory, ranks, 1, job, arguments)).finish_within(SOON);
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(2), "{shown}");
-    assert_eq!(shown.matches("agimp:").count() + shown.matches("error:").count(), 1, "one message: {shown}");
+    assert_eq!(reasons(&shown).len() + shown.matches("error:").count(), 1, "one message: {shown}");
     for word in words {
         assert!(shown.contains(word), "'{word}' is missing: {shown}");
     }
