@@ -31,7 +31,7 @@ fn column_3d(bencher: Bencher, reach: u32) {
             });
         }
         forest.balance(world.comm());
-        let allowance = Allowance { reach, graded: true };
+        let allowance = Allowance { reach, graded: true, halo: 0 };
         bencher
             .counter(divan::counter::ItemsCount::new(forest.leaves().len()))
             .bench_local(|| GridPlan::build(world.comm(), &forest, 1.0, allowance));

@@ -75,10 +75,13 @@ fn ears(flat: &[[f64; 2]]) -> Vec<[usize; 3]> {
 mod tests {
     use super::*;
 
+    /// Where a point of a plane lies in space.
+    type Plane = fn(&[f64; 2]) -> [f64; 3];
+
     /// Polygons in a plane that is turned every way: triangles with the sum of their areas, none of them turned, and each edge of the
     /// polygon once.
     fn is_cut_rightly(polygon: &[[f64; 2]], area: f64) {
-        let planes: [fn(&[f64; 2]) -> [f64; 3]; 4] = [
+        let planes: [Plane; 4] = [
             |x| [x[0], x[1], 2.0],
             |x| [2.0, x[0], x[1]],
             |x| [x[1], -1.0, x[0]],

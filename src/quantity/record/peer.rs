@@ -36,7 +36,7 @@ fn step(line: &str) -> Option<(usize, f64)> {
     }
     let mut numbers = words().filter_map(number_of);
     let (count, step) = (numbers.next()?, numbers.next()?);
-    let is_sane = count >= 1.0 && count <= 1e9 && count.fract() == 0.0 && step > 0.0 && step.is_finite();
+    let is_sane = (1.0..=1e9).contains(&count) && count.fract() == 0.0 && step > 0.0 && step.is_finite();
     is_sane.then_some((count as usize, step))
 }
 
