@@ -10,7 +10,8 @@
 //!    it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
 //! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain the excess:
 //!    `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
-//! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell. The energy is convex in J, so it falls.
+//! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell, as far as J̄ - J is more than weight makes of
+//!    half a cell, `J g h / 2c²`. The energy is convex in J, so it falls.
 //!
 //! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed of sound.
 //! `docs/design/fluid-volume.md` says what each part does, and what else was tried.
@@ -38,11 +39,13 @@ pub struct Flow {
     pub way: f64,
     /// Greatest volume ratio that particles may have where there is no void: 1, or infinite for fluids that bear tension.
     pub widest: f64,
+    /// Change of J over a length, 1/m, that the weight of the fluid explains: `g / c²`.
+    pub weight: f64,
 }
 
 impl Flow {
     /// What is no fluid.
-    pub const NONE: Self = Self { way: 0.0, widest: f64::INFINITY };
+    pub const NONE: Self = Self { way: 0.0, widest: f64::INFINITY, weight: 0.0 };
 }
 
 /// What the advance of particles needs to keep fluids in their volume.
@@ -81,7 +84,7 @@ pub(super) struct Filled<V: Vector, const D: usize> {
     fill: V,
     /// `Σ e_j ∇w`, 1/m.
     slope: [V; D],
-    /// J̄ / J - 1.
+    /// J̄ / J - 1, beyond what weight explains.
     to_mean: V,
     /// J at the start of the step.
     ratio: V,
@@ -99,11 +102,15 @@ impl Filling<'_> {
         elastic: &Symmetric<V>,
         cell: f64,
     ) -> Option<Filled<V, D>> {
-        let (way, widest) = match self.flows {
-            [only] => (V::splat(only.way), V::splat(only.widest)),
+        let (way, widest, weight) = match self.flows {
+            [only] => (V::splat(only.way), V::splat(only.widest), V::splat(only.weight)),
             several => {
                 let of = materials.map(|material| several[usize::from(material)]);
-                (V::new(of.map(|flow| flow.way)), V::new(of.map(|flow| flow.widest)))
+                (
+                    V::new(of.map(|flow| flow.way)),
+                    V::new(of.map(|flow| flow.widest)),
+                    V::new(of.map(|flow| flow.weight)),
+                )
             }
         };
         let is_fluid = V::splat(0.0).lt(way);
@@ -117,7 +124,10 @@ impl Filling<'_> {
             slope[D - 1] = z;
         }
         let ratio = determinant(elastic).sqrt();
+        // Still water is denser below: what lies within that is no noise, and stays.
+        let (zero, explained) = (V::splat(0.0), weight * (0.5 * cell));
         let to_mean = batch.values::<V>(self.means) / ratio - V::splat(1.0);
+        let to_mean = (to_mean - explained).max(zero) + (to_mean + explained).min(zero);
         Some(Filled { is_fluid, reach: way * (1.0 / cell), widest, fill, slope, to_mean, ratio, cell })
     }
 }

@@ -163,7 +163,7 @@ impl<const D: usize> Solver<D> {
         self.near.resize_with(self.chunks.len(), Vec::new);
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
-        let flows = self.physics.flows(dt);
+        let flows = self.physics.flows(self.clock.time, dt);
         let LeafData { signal, maxima, shifts, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
         let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
@@ -179,7 +179,7 @@ impl<const D: usize> Solver<D> {
             watch: watch.unwrap_or_default(),
             places,
             following: &following,
-            guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt]),
+            guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
             displacement: self.physics.displacement_column(),
             tensors: self.physics.tensor_columns(),
             openings: self.crossings.fluxes.openings(),

@@ -13,23 +13,26 @@ mod nodes;
 mod solid;
 
 use crate::kernel::fill::Flow;
+use crate::material::Material;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Physics<D> {
-    /// How materials flow in a step of this length (s), by index; nothing where there are no fluids.
-    pub(super) fn flows(&self, dt: f64) -> Vec<Flow> {
+    /// How materials flow in a step of this length (s) at a time (s), by index; nothing where there are no fluids.
+    pub(super) fn flows(&self, time: f64, dt: f64) -> Vec<Flow> {
         if !self.keeps_volumes() {
             return Vec::new();
         }
-        let flow = |material: &Box<dyn crate::material::Material>| match material.is_fluid() {
+        let gravity = self.gravity.at(time).iter().map(|g| g * g).sum::<f64>().sqrt();
+        let flow = |material: &dyn Material| match material.is_fluid() {
             true => Flow {
                 way: material.wave_speed() * dt,
                 widest: if material.bears_tension() { f64::INFINITY } else { 1.0 },
+                weight: gravity / (material.wave_speed() * material.wave_speed()),
             },
             false => Flow::NONE,
         };
-        self.materials.iter().map(flow).collect()
+        self.materials.iter().map(|material| flow(&**material)).collect()
     }
 }
 
