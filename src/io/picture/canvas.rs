@@ -114,9 +114,10 @@ impl Canvas {
     /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that are wider than a
     /// line. An ellipsis stands for what does not fit.
     pub(super) fn lines(&self, size: f64, text: &str, width: i64, most: usize) -> Vec<String> {
-        let text: Vec<_> = text.split_whitespace().map(printable).collect();
-        let text = text.join(" ");
-        let (mut rest, mut lines) = (text.as_str(), Vec::new());
+        // Wide gaps between words stay, as they part what belongs together.
+        let text = text.trim().replace(['\n', '\r', '\t'], " ");
+        let text = printable(&text);
+        let (mut rest, mut lines) = (&*text, Vec::new());
         while !rest.is_empty() {
             let (fitting, is_all) = font::fitting(size * self.unit, rest, width);
             if is_all || lines.len() + 1 >= most {
