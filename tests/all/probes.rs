@@ -60,10 +60,11 @@ fn bodies_in_flight_follow_their_parabolas() {
     assert_eq!(report["steps"].as_u64(), Some(history.last("step") as u64));
     assert_eq!(report["history"]["momentum_y"][0].as_f64(), Some(history.last("momentum_y")));
     assert_eq!(report["history"]["momentum_y"][1], "kg m/s");
-    assert!(
-        report["history"]["pressure_below"][0].is_null()
-            && report["warnings"].as_array().is_some_and(Vec::is_empty)
-    );
+    assert!(report["history"]["pressure_below"][0].is_null());
+    // The steps are few, and that is all there is to warn of.
+    let warnings = report["warnings"].as_array().expect("warnings");
+    let of_steps = |warning: &serde_json::Value| warning.to_string().contains("the run takes about 26 steps");
+    assert!(warnings.len() == 1 && warnings.iter().all(of_steps), "{warnings:?}");
 }
 
 /// A column of water-like stress at rest: the faces carry its weight and its side pressure, and the mean stress in a layer is that of
