@@ -242,7 +242,7 @@ fn sheets_hold_water() {
                  [[bodies]]\nname = 'column'\nmaterial = 'water'\n\
                  shape = {{ kind = 'intersection', parts = [{above}, {{ kind = 'box', min = [0, 0], max = [2, 12.77] }}] }}\n\
                  [[colliders]]\nname = 'sheet'\nacts_on = 'particles'\nshape = {sheet}\n\
-                 [[probes]]\nname = 'below'\nshape = {below}\nquantities = ['mass']\n[time]\nend = 18.5\n"
+                 [[probes]]\nname = 'below'\nshape = {below}\nquantities = ['mass']\n[time]\nend = 19.5\n"
             );
         let history = history(&job);
         let steps = history.last("step");
