@@ -86,7 +86,7 @@ mod tests {
             chunk.write(Layout::<2>::HALF, p, &[half]);
             chunk.write(Layout::<2>::LEFT_CAUCHY_GREEN, p, &[ratio, ratio, 1.0]);
         }
-        let fluid = Flow { way: 0.1, widest: 1.0 };
+        let fluid = Flow { way: 0.1, widest: 1.0, weight: 0.0 };
         let mut means = MeanVolumes::default();
         let cells = LeafCells::new(&([10.0, 20.0], [14.0, 24.0]));
         means.find(&chunk, &cells, &[fluid, Flow::NONE, fluid]);
