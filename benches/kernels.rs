@@ -1,8 +1,8 @@
 //! Scatter and gather per particle: `cargo bench --bench kernels`.
 //!
 //! A million particles in blocks of their own, so that columns come from memory as in a run; eight
-//! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of their leaf's
-//! particles, whose stencils touch constrained nodes.
+//! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of
+//! their leaf's particles, whose stencils touch constrained nodes.
 use agimp::kernel::constrained_nodes::ConstrainedNodes;
 use agimp::kernel::fill::Shifted;
 use agimp::kernel::hanging::HangingNodes;
@@ -143,7 +143,8 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
     });
 }
 
-/// Of how many particles in four a block beside a level jump has, and whether their stencils touch constrained nodes.
+/// Of how many particles in four a block beside a level jump has, and whether their stencils touch
+/// constrained nodes.
 const MIXES: [(u32, bool); 5] = [(4, false), (4, true), (3, false), (3, true), (1, true)];
 
 /// Two layers of hanging nodes, as beside a face.

@@ -1,7 +1,9 @@
-//! Nanoseconds per particle of each constitutive model, elastic and flowing: `cargo bench --bench materials [-- FILTER]`.
+//! Nanoseconds per particle of each constitutive model, elastic and flowing:
+//! `cargo bench --bench materials [-- FILTER]`.
 //!
-//! One row for each example of each model. Every batch starts from the same trial state, which stays in the cache, so this is the
-//! law alone. Particles of a batch have different principal directions. The median over the repeats counts.
+//! One row for each example of each model. Every batch starts from the same trial state, which stays in the
+//! cache, so this is the law alone. Particles of a batch have different principal directions. The median over
+//! the repeats counts.
 #[path = "../tests/common/random.rs"]
 #[allow(dead_code, reason = "shared with tests, which use all of it")]
 mod random;

@@ -9,13 +9,15 @@ use std::process::ExitCode;
 static ALLOCATOR: agimp::memory::Allocator = agimp::memory::Allocator;
 
 fn main() -> ExitCode {
-    // First of all, since a batch queue may send its signal while a run starts. An error is reported when the run begins.
+    // First of all, since a batch queue may send its signal while a run starts. An error is reported when the
+    // run begins.
     if std::env::args_os().nth(1).is_some_and(|command| command == "run" || command == "sweep") {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();
-    // Without it such a write ends the program, which says nothing. `agimp run` does so on ranks once MPI has started: until then the
-    // limit may be what keeps `mpirun` from starting it, and they would wait for ever.
+    // Without it such a write ends the program, which says nothing. `agimp run` does so on ranks once MPI has
+    // started: until then the limit may be what keeps `mpirun` from starting it, and they would wait for
+    // ever.
     if !is_launched() {
         let _ = agimp::io::cause::tell_size_limits();
     }

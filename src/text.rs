@@ -17,8 +17,8 @@ pub fn quantity(value: f64, unit: &str) -> String {
     quantity_to(value, unit, DIGITS)
 }
 
-/// A quantity with this number of significant digits, without zeros at the end, and a metric prefix where people put one
-/// before the unit.
+/// A quantity with this number of significant digits, without zeros at the end, and a metric prefix where
+/// people put one before the unit.
 pub fn quantity_to(value: f64, unit: &str, digits: usize) -> String {
     let (power, prefix) = prefix(value, unit, digits);
     // Dividing by a whole power is exact to one rounding, multiplying by its inverse is not.
@@ -27,7 +27,8 @@ pub fn quantity_to(value: f64, unit: &str, digits: usize) -> String {
     if unit.is_empty() { number } else { format!("{number} {prefix}{unit}") }
 }
 
-/// The unit with its prefix in which numbers up to `greatest` are short, and by what they are divided: `(1e3, "kJ")`.
+/// The unit with its prefix in which numbers up to `greatest` are short, and by what they are divided:
+/// `(1e3, "kJ")`.
 pub fn scale(greatest: f64, unit: &str) -> (f64, String) {
     let (power, prefix) = prefix(greatest, unit, DIGITS);
     (10_f64.powi(power), format!("{prefix}{unit}"))
@@ -49,8 +50,8 @@ fn prefix(value: f64, unit: &str, digits: usize) -> (i32, &'static str) {
     PREFIXES.into_iter().rfind(|entry| usable(entry)).unwrap_or((0, ""))
 }
 
-/// Text in which HTML and SVG see nothing of their own. Characters that XML does not have, or that change the order of
-/// others, become visible; ends of lines and tabs stay.
+/// Text in which HTML and SVG see nothing of their own. Characters that XML does not have, or that change the
+/// order of others, become visible; ends of lines and tabs stay.
 pub fn html(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 8);
     for c in text.chars() {
@@ -168,8 +169,8 @@ pub fn wall_time(seconds: f64) -> String {
     }
 }
 
-/// Text from a file, a job or a command line, on its way to a terminal: characters that control it, or the order in which
-/// it shows others, become visible.
+/// Text from a file, a job or a command line, on its way to a terminal: characters that control it, or the
+/// order in which it shows others, become visible.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.chars().any(controls) {
         return Cow::Borrowed(text);

@@ -1,5 +1,5 @@
-//! Claim: folders of `src/` are floors, and nothing imports from a floor above its own. The list of floors is that of
-//! `ARCHITECTURE.md`, so the map there is the one that the compiler's input follows.
+//! Claim: folders of `src/` are floors, and nothing imports from a floor above its own. The list of floors is
+//! that of `ARCHITECTURE.md`, so the map there is the one that the compiler's input follows.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Problems of the verification suite that take seconds: within the tolerances of `studies/verification/expected.toml`, and the same numbers, to the last
-//! bit, on 1 and 2 ranks.
+//! Problems of the verification suite that take seconds: within the tolerances of
+//! `studies/verification/expected.toml`, and the same numbers, to the last bit, on 1 and 2 ranks.
 #[path = "../studies/verification/lines.rs"]
 mod lines;
 #[path = "../studies/verification/page.rs"]

@@ -21,8 +21,8 @@ impl<const D: usize> Forest<D> {
     /// Collective. Changes the tree by one level where marked, not the partition. Returns whether
     /// anything changed on any rank.
     ///
-    /// After [`Forest::partition`] between families and [`Forest::uniform`] every family of leaves is on one rank,
-    /// so that the result does not depend on the number of ranks. The result need not be balanced.
+    /// After [`Forest::partition`] between families and [`Forest::uniform`] every family of leaves is on one
+    /// rank, so that the result does not depend on the number of ranks. The result need not be balanced.
     ///
     /// # Panics
     /// If there is not one mark per leaf.

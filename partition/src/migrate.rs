@@ -31,8 +31,8 @@ impl<const D: usize> Forest<D> {
         self.partition_at(comm, cuts)
     }
 
-    /// Collective. Where [`Forest::partition`] would cut the curve. Changes nothing, so that a caller can see what a
-    /// new partition would bring.
+    /// Collective. Where [`Forest::partition`] would cut the curve. Changes nothing, so that a caller can see
+    /// what a new partition would bring.
     ///
     /// # Panics
     /// As [`Forest::partition`].
@@ -40,7 +40,8 @@ impl<const D: usize> Forest<D> {
         weight::cuts(self, comm, weights, at)
     }
 
-    /// Collective. Moves the cuts between ranks to the given places, and the leaves accordingly. The tree stays.
+    /// Collective. Moves the cuts between ranks to the given places, and the leaves accordingly. The tree
+    /// stays.
     ///
     /// # Panics
     /// If the forest has changed since the cuts were planned.
@@ -118,9 +119,9 @@ impl Shipment {
         self.kept.clone()
     }
 
-    /// Collective. Moves one item per old leaf and returns one item per new leaf. Items of leaves that stay are not
-    /// touched; those of leaves that leave are `append`ed to a message, freed, and made anew from their bytes. May be
-    /// called any number of times, for different things.
+    /// Collective. Moves one item per old leaf and returns one item per new leaf. Items of leaves that stay
+    /// are not touched; those of leaves that leave are `append`ed to a message, freed, and made anew from
+    /// their bytes. May be called any number of times, for different things.
     ///
     /// # Panics
     /// If there is not one item per old leaf.

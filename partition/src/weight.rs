@@ -122,7 +122,8 @@ pub(crate) fn cuts<const D: usize>(forest: &Forest<D>, comm: &Comm, weights: &[u
     Cuts { markers, before, revision: forest.revision }
 }
 
-/// Sets the markers of all cuts, and the weight before them, whose ideal place lies at `lower` or after it and before `upper`.
+/// Sets the markers of all cuts, and the weight before them, whose ideal place lies at `lower` or after it
+/// and before `upper`.
 fn place_cuts(markers: &mut [u64], before: &mut [u64], total: u64, lower: Boundary, upper: Boundary) {
     let ranks = (markers.len() - 1) as u128;
     // Everything times `ranks`, so that ideal places are integers.

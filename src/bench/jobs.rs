@@ -1,7 +1,7 @@
 //! The built-in jobs, as job files.
 //!
-//! All have bodies of eight particles per cell (in 2D also four, as is usual there), in motion and deforming from the first step, in a
-//! domain that is little larger. Sizes follow from the number of particles.
+//! All have bodies of eight particles per cell (in 2D also four, as is usual there), in motion and deforming
+//! from the first step, in a domain that is little larger. Sizes follow from the number of particles.
 
 /// A built-in job.
 #[derive(Clone, Copy, Debug)]
@@ -78,8 +78,8 @@ impl BenchJob {
         !matches!(self.kind, Kind::Sheet { .. } | Kind::Block(NEO_HOOKEAN))
     }
 
-    /// The job file for about `particles` particles, with a record of telemetry every `steps` steps and a row of the
-    /// history every 50.
+    /// The job file for about `particles` particles, with a record of telemetry every `steps` steps and a row
+    /// of the history every 50.
     pub fn text(&self, particles: u64, steps: u64, directory: &str) -> String {
         let body = match self.kind {
             Kind::Block(model) => block(particles as f64, model),
@@ -132,8 +132,8 @@ fn sheet(particles: f64, per_cell: f64) -> String {
     )
 }
 
-/// A square column that slides over a rough floor and falls apart. With `adaptive`, cells of 40 mm in its core, 20 mm
-/// around it and 10 mm in its mantle; cells of 20 mm everywhere without.
+/// A square column that slides over a rough floor and falls apart. With `adaptive`, cells of 40 mm in its
+/// core, 20 mm around it and 10 mm in its mantle; cells of 20 mm everywhere without.
 fn column(particles: f64, adaptive: bool) -> String {
     // Height over width; share of the width that the middle and the core take.
     let (slender, middle, core) = (0.9, 0.85, 0.6);
@@ -153,7 +153,8 @@ fn column(particles: f64, adaptive: bool) -> String {
     let top = ((height + 0.1) / ROOT).ceil() * ROOT;
     let (low, high) = (0.5 * (domain - width), 0.5 * (domain + width));
     let region = |level: u8, inner: f64| {
-        // The room that the sand runs into in the course of a measurement is fine as well, all else is coarse.
+        // The room that the sand runs into in the course of a measurement is fine as well, all else is
+        // coarse.
         let (first, last) = (low - 0.03, high + 0.03);
         let (low, high) = (0.5 * (domain - inner * width), 0.5 * (domain + inner * width));
         let inner_height = height - 0.5 * (1.0 - inner) * width;

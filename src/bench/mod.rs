@@ -1,5 +1,5 @@
-//! Measurement of whole steps: built-in jobs, run as any other, with migration, ordered sums, history and telemetry;
-//! figures come from the telemetry that they write.
+//! Measurement of whole steps: built-in jobs, run as any other, with migration, ordered sums, history and
+//! telemetry; figures come from the telemetry that they write.
 pub mod jobs;
 pub mod machine;
 
@@ -28,8 +28,8 @@ pub struct Extent {
     pub repeats: u64,
 }
 
-/// Figures of one job, medians over repeats. Times are in nanoseconds per particle and step, multiplied by the number
-/// of threads of all ranks.
+/// Figures of one job, medians over repeats. Times are in nanoseconds per particle and step, multiplied by
+/// the number of threads of all ranks.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Figures {
     /// Name of the job.
@@ -58,8 +58,8 @@ pub struct Figures {
     pub core_share: f64,
 }
 
-/// Columns that a step reads and writes, each counted once per pass over the particles, of which there are two: P2G and
-/// G2P.
+/// Columns that a step reads and writes, each counted once per pass over the particles, of which there are
+/// two: P2G and G2P.
 fn bytes_per_step(dimension: usize, plastic: bool) -> f64 {
     let columns = match (dimension, plastic) {
         (2, false) => 15 + 7 + 16,
@@ -71,7 +71,8 @@ fn bytes_per_step(dimension: usize, plastic: bool) -> f64 {
     f64::from(8 * (columns + 2))
 }
 
-/// Operations of weights, transfers and the update of particles without the material's; a fused one counts as two.
+/// Operations of weights, transfers and the update of particles without the material's; a fused one counts as
+/// two.
 fn operations_per_step(dimension: usize) -> f64 {
     if dimension == 2 { 710.0 } else { 1800.0 }
 }

@@ -82,11 +82,12 @@ fn report<const D: usize>(
     Ok(())
 }
 
-/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both look at the particles themselves.
+/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both look at
+/// the particles themselves.
 const MOST_MEMORY: f64 = 90e6;
 
-/// The estimate for the tree at the start, which criteria have refined, and what particles carry of each load; if that tree is of
-/// moderate size.
+/// The estimate for the tree at the start, which criteria have refined, and what particles carry of each
+/// load; if that tree is of moderate size.
 fn start<const D: usize>(
     problem: &Problem<D>,
     estimate: &Estimate,

@@ -1,4 +1,5 @@
-//! Command line: one file per subcommand, and `shared/` for what several need. The only part of the library that prints.
+//! Command line: one file per subcommand, and `shared/` for what several need. The only part of the library
+//! that prints.
 use crate::job::JobError;
 use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};

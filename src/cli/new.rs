@@ -146,7 +146,8 @@ impl Template {
     }
 }
 
-/// The text of a template with the name of its new file, and those of the results, in the commands of its comments.
+/// The text of a template with the name of its new file, and those of the results, in the commands of its
+/// comments.
 fn renamed(text: &str, name: &str, path: &Path) -> String {
     let path_in_words = path.display().to_string();
     let stem = path.file_stem().map_or(Cow::from(name), OsStr::to_string_lossy);

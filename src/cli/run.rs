@@ -105,7 +105,8 @@ fn page(results: &Results, job: &Path) -> Result<PathBuf, String> {
     Ok(path)
 }
 
-/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew. Returns the warnings.
+/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew. Returns the
+/// warnings.
 fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Result<Vec<String>, Failure> {
     let (_, steps) = steps(problem).map_err(|error| Failure::Usage(error.to_string()))?;
     let found = if comm.rank() == 0 && is_new { warnings(problem, steps) } else { Vec::new() };
@@ -139,8 +140,8 @@ fn conclude(
     }
 }
 
-/// What the user wants to know when the run is over: where the results are, what the run has taken, and the commands that show
-/// more.
+/// What the user wants to know when the run is over: where the results are, what the run has taken, and the
+/// commands that show more.
 fn print(
     out: &mut impl Write,
     summary: &Summary,

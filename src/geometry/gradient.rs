@@ -3,8 +3,9 @@ use super::vector::in_space;
 use super::{Aabb, Frustum, Shape};
 
 impl<const D: usize> Shape<D> {
-    /// Gradient of [`Shape::distance`]: a unit vector out of the shape, at every point of space. Where the distance
-    /// has no gradient (equally near to two faces, at the centre of a ball) it is that of one of the nearest points.
+    /// Gradient of [`Shape::distance`]: a unit vector out of the shape, at every point of space. Where the
+    /// distance has no gradient (equally near to two faces, at the centre of a ball) it is that of one of the
+    /// nearest points.
     pub fn gradient(&self, x: &[f64; D]) -> [f64; D] {
         match self {
             Self::Box(aabb) => of_box(aabb, x),
@@ -107,8 +108,9 @@ fn of_polygon(points: &[[f64; 2]], q: [f64; 2], inside: bool) -> [f64; 2] {
     }
 }
 
-/// Gradient of the distance to the nearest of the edges, which run counter-clockwise round the inside. Beside an edge
-/// it is the edge's normal, which has no rounding that grows near the surface; round a corner the way from it.
+/// Gradient of the distance to the nearest of the edges, which run counter-clockwise round the inside. Beside
+/// an edge it is the edge's normal, which has no rounding that grows near the surface; round a corner the way
+/// from it.
 fn nearest_normal(edges: impl Iterator<Item = ([f64; 2], [f64; 2])>, q: [f64; 2], inside: bool) -> [f64; 2] {
     let mut best = (f64::INFINITY, [0.0, 1.0]);
     for (a, b) in edges {

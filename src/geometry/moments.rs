@@ -1,5 +1,5 @@
-//! Volume, centre and second moments of shapes: closed forms of primitives, exact sums over the triangles of meshes, and sums over cells of
-//! booleans, the same on all ranks.
+//! Volume, centre and second moments of shapes: closed forms of primitives, exact sums over the triangles of
+//! meshes, and sums over cells of booleans, the same on all ranks.
 use super::{Aabb, Frustum, Mesh, Shape};
 
 /// Levels of cells that a boolean is cut into: 2^7 along each edge of its box.
@@ -29,8 +29,8 @@ impl<const D: usize> Sums<D> {
         Self { origin, volume: 0.0, first: [0.0; D], second: [[0.0; D]; D] }
     }
 
-    /// Adds a simplex with a corner at the origin, of this signed volume: ∫ x = V Σ p / (D + 1), ∫ x xᵀ = V (Σ p pᵀ + Σp Σpᵀ) / ((D + 1)(D + 2))
-    /// (Tonon 2004).
+    /// Adds a simplex with a corner at the origin, of this signed volume: ∫ x = V Σ p / (D + 1), ∫ x xᵀ = V
+    /// (Σ p pᵀ + Σp Σpᵀ) / ((D + 1)(D + 2)) (Tonon 2004).
     fn add_simplex(&mut self, volume: f64, corners: &[[f64; D]]) {
         let n = D as f64;
         let sum: [f64; D] = std::array::from_fn(|a| corners.iter().map(|p| p[a]).sum());
@@ -115,7 +115,8 @@ fn diagonal<const D: usize>(value: impl Fn(usize) -> f64) -> [[f64; D]; D] {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value(i) } else { 0.0 }))
 }
 
-/// Integrals over slices across the axis, of the radius r(t) = a + (b - a) t / h: powers of it are polynomials of t.
+/// Integrals over slices across the axis, of the radius r(t) = a + (b - a) t / h: powers of it are
+/// polynomials of t.
 fn of_frustum<const D: usize>(frustum: &Frustum<D>) -> Option<Moments<D>> {
     let Frustum { base, axis, height: h, lower_radius: a, upper_radius: b } = *frustum;
     let (volume, first, along, across) = if D == 2 {
@@ -162,8 +163,8 @@ fn of_mesh<const D: usize>(mesh: &Mesh) -> Option<Moments<D>> {
     (mesh.volume() > 0.0).then_some(Moments { volume, centre: std::array::from_fn(|a| centre[a]), second })
 }
 
-/// Cells of an octree over the shape: those that the surface may cross are divided, and of the last ones counts what a plane at the distance of
-/// their centre cuts off.
+/// Cells of an octree over the shape: those that the surface may cross are divided, and of the last ones
+/// counts what a plane at the distance of their centre cuts off.
 fn of_cells<const D: usize>(shape: &Shape<D>) -> Option<Moments<D>> {
     let bounds = shape.bounds();
     if bounds.lower.iter().chain(&bounds.upper).any(|c| !c.is_finite()) || bounds.is_empty() {

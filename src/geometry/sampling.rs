@@ -1,11 +1,12 @@
 //! Where the particles of a body lie in the cells of their lattice.
 //!
-//! Each point of the lattice has one particle. Places depend on nothing but the place in the lattice, so that they are the same on any ranks:
-//! jitter comes from a hash of it (splitmix64, Steele, Lea and Flood 2014), blue noise from a tile that fills space.
+//! Each point of the lattice has one particle. Places depend on nothing but the place in the lattice, so that
+//! they are the same on any ranks: jitter comes from a hash of it (splitmix64, Steele, Lea and Flood 2014),
+//! blue noise from a tile that fills space.
 //!
-//! The tile is made once: points of a jittered lattice that repel each other over the distance of particles, as soft balls do, across the faces of the tile
-//! as well. What is left is dense, and without order beyond neighbours. No point leaves its leaf, so that each leaf has as
-//! many as on the lattice.
+//! The tile is made once: points of a jittered lattice that repel each other over the distance of particles,
+//! as soft balls do, across the faces of the tile as well. What is left is dense, and without order beyond
+//! neighbours. No point leaves its leaf, so that each leaf has as many as on the lattice.
 use std::sync::Arc;
 
 /// Greatest jitter along each axis, as a share of the distance of particles.
@@ -17,7 +18,8 @@ const LOOSE: f64 = 1.0;
 /// Rounds in which the points of a tile move apart.
 const ROUNDS: usize = 30;
 
-/// Distance up to which points repel each other, in distances of particles: a little more than dense packings have.
+/// Distance up to which points repel each other, in distances of particles: a little more than dense packings
+/// have.
 const REPULSION: f64 = 1.2;
 
 /// Share of an overlap that a round takes away.
@@ -53,7 +55,8 @@ impl<const D: usize> Sampling<D> {
         Self::Poisson(Arc::new(Tile::new(along_leaf)))
     }
 
-    /// Way from a point of the lattice to its particle, in distances of particles; leaves of different levels have lattices of their own.
+    /// Way from a point of the lattice to its particle, in distances of particles; leaves of different levels
+    /// have lattices of their own.
     pub fn way(&self, index: &[u64; D], level: u8) -> [f64; D] {
         match self {
             Self::Lattice => [0.0; D],
@@ -169,7 +172,8 @@ fn part(word: u64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Distance of each point to its nearest neighbour, in distances of particles, for the points of some leaves.
+    /// Distance of each point to its nearest neighbour, in distances of particles, for the points of some
+    /// leaves.
     fn nearest<const D: usize>(sampling: &Sampling<D>, edge: u64) -> Vec<f64> {
         let place = |mut cell: u64| -> [u64; D] {
             std::array::from_fn(|_| {
@@ -190,7 +194,8 @@ mod tests {
         all.iter().map(least).collect()
     }
 
-    /// No two points are much closer than on the lattice, also across the faces of leaves, and each leaf has all of its own.
+    /// No two points are much closer than on the lattice, also across the faces of leaves, and each leaf has
+    /// all of its own.
     #[test]
     fn blue_noise_keeps_its_distance() {
         let (plane, space) = (Sampling::<2>::poisson(8), Sampling::<3>::poisson(8));
@@ -211,7 +216,8 @@ mod tests {
         }
     }
 
-    /// There is no order beyond neighbours: the structure factor along the axes of the lattice, N for a lattice, stays below 3.
+    /// There is no order beyond neighbours: the structure factor along the axes of the lattice, N for a
+    /// lattice, stays below 3.
     #[test]
     fn blue_noise_has_no_planes() {
         let sampling = Sampling::<2>::poisson(8);

@@ -1,10 +1,11 @@
 //! Pieces of the surface of a region in a box: their area vectors, which point out of the region.
 //!
-//! Where the surface lies on faces of the box, each such face gives a piece. What lies inside the box is one piece more: the part
-//! of the region in the box has a closed surface, the sum of whose area vectors is 0, so that the piece is minus the sum over the
-//! faces of the box of their parts in the region. Both need no more than membership along lines. Plane surfaces on faces of boxes
-//! have their exact area; a plane anywhere else has it as well, but for boxes that its edges cross, and a curved surface to the
-//! second order of the edge of the box.
+//! Where the surface lies on faces of the box, each such face gives a piece. What lies inside the box is one
+//! piece more: the part of the region in the box has a closed surface, the sum of whose area vectors is 0, so
+//! that the piece is minus the sum over the faces of the box of their parts in the region. Both need no more
+//! than membership along lines. Plane surfaces on faces of boxes have their exact area; a plane anywhere else
+//! has it as well, but for boxes that its edges cross, and a curved surface to the second order of the edge
+//! of the box.
 use super::Aabb;
 
 /// A piece of surface.
@@ -76,8 +77,8 @@ pub fn patches<const D: usize>(region: &Region<'_, D>, cell: &Aabb<D>) -> Vec<Pa
     found
 }
 
-/// Share of a face of a box that a set covers, and the centre of that part. The face is cut into lines along one of its axes: the
-/// one along which more lines cross the edge of the set, on which it is found exactly.
+/// Share of a face of a box that a set covers, and the centre of that part. The face is cut into lines along
+/// one of its axes: the one along which more lines cross the edge of the set, on which it is found exactly.
 fn share_of_face<const D: usize>(
     cell: &Aabb<D>,
     axis: usize,
@@ -216,7 +217,8 @@ mod tests {
         assert!((top - 0.24).abs() < 1e-15, "{top}");
     }
 
-    /// A box whose faces lie anywhere: the closed surface has no resultant, and each plane face its area but for its edges.
+    /// A box whose faces lie anywhere: the closed surface has no resultant, and each plane face its area but
+    /// for its edges.
     #[test]
     fn a_box_elsewhere_has_its_area_but_for_its_edges() {
         let block = Shape::Box(Aabb::new([0.13, 0.17], [0.62, 0.79]));

@@ -107,7 +107,8 @@ pub enum Shape {
     /// A solid bounded by triangles, from a file; 3D only.
     #[schemars(extend("x-dimension" = 3))]
     Mesh {
-        /// File in STL (text or binary), OBJ or PLY (text or binary), by its ending; relative to the directory of the job file.
+        /// File in STL (text or binary), OBJ or PLY (text or binary), by its ending; relative to the
+        /// directory of the job file.
         file: String,
         /// Metres per unit of the file: 0.001 for millimetres.
         #[serde(default = "one")]
@@ -123,11 +124,11 @@ pub enum Shape {
     /// Terrain: the solid below a surface of heights, from a raster; 3D only, z points up.
     #[schemars(extend("x-dimension" = 3))]
     Terrain {
-        /// ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`) or array of NumPy (`.npy`, `.npz`), rows from north to south, every cell with a height;
-        /// relative to the directory of the job file.
+        /// ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`) or array of NumPy (`.npy`, `.npz`), rows from north to
+        /// south, every cell with a height; relative to the directory of the job file.
         file: String,
-        /// Distance of neighbouring heights, m: for arrays, which do not have it, or in place of that of the file; the south-western
-        /// height then stands at the origin of the raster's coordinates.
+        /// Distance of neighbouring heights, m: for arrays, which do not have it, or in place of that of the
+        /// file; the south-western height then stands at the origin of the raster's coordinates.
         #[serde(default)]
         #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
         cell: Option<f64>,
@@ -137,22 +138,25 @@ pub enum Shape {
         /// How the surface runs between the heights: `triangles` by default.
         #[serde(default)]
         surface: Surface,
-        /// The solid is a layer on the terrain, this thick, m, measured upwards: a number, or the name of a raster with the same cells, with no
-        /// layer where it has no data. By default it is all that lies below the surface.
+        /// The solid is a layer on the terrain, this thick, m, measured upwards: a number, or the name of a
+        /// raster with the same cells, with no layer where it has no data. By default it is all that lies
+        /// below the surface.
         #[serde(default)]
         thickness: Option<Thickness>,
         /// Where the origin of the raster's coordinates lies, m; the origin of the job by default.
         #[serde(default)]
         origin: Option<Vector>,
-        /// Height in the raster down to which the solid reaches, m; by default a tenth of the raster's length below its least height.
+        /// Height in the raster down to which the solid reaches, m; by default a tenth of the raster's length
+        /// below its least height.
         #[serde(default)]
         #[schemars(range(min = -1e9, max = 1e9))]
         base: Option<f64>,
     },
     /// Particles from a file, one by one, as a body of their own; not a part of other shapes.
     Particles {
-        /// Comma-separated values (`.csv`), PLY (`.ply`), or an output or checkpoint of agimp (`.hdf`, `.h5`), of which the particles of the
-        /// body with this name are taken, or all if there is one body; relative to the directory of the job file.
+        /// Comma-separated values (`.csv`), PLY (`.ply`), or an output or checkpoint of agimp (`.hdf`,
+        /// `.h5`), of which the particles of the body with this name are taken, or all if there is one body;
+        /// relative to the directory of the job file.
         file: String,
     },
     /// A shape turned about a point.
@@ -195,7 +199,8 @@ pub enum Solid {
     /// What the surface encloses: it is closed, its triangles face one way, and it does not cross itself.
     #[default]
     Closed,
-    /// What the surface winds around: holes are closed by cones over their rims, overlaps are filled, and triangles may face either way.
+    /// What the surface winds around: holes are closed by cones over their rims, overlaps are filled, and
+    /// triangles may face either way.
     Winding,
 }
 

@@ -37,8 +37,8 @@ pub fn weights<const D: usize>(
     collected(tree, root_edge, centre, half, hand_to_real)
 }
 
-/// As [`weights`], but hanging nodes keep what they collect, so that fields are discontinuous beside finer leaves: the control
-/// that shows what the constraints do.
+/// As [`weights`], but hanging nodes keep what they collect, so that fields are discontinuous beside finer
+/// leaves: the control that shows what the constraints do.
 pub fn unconstrained_weights<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
@@ -86,8 +86,8 @@ struct Interval {
     cell: u32,
     /// Share of the box's width that lies in the cell.
     share: f64,
-    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is found on its own, as
-    /// a small one keeps its digits only so.
+    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is found
+    /// on its own, as a small one keeps its digits only so.
     middle: [f64; 2],
 }
 

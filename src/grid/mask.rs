@@ -89,10 +89,12 @@ const ALONG: [[u64; 16]; 3] = {
     along
 };
 
-/// The nodes of `mask` with coordinate `k` along an axis, moved to all coordinates along it that are in `set`.
+/// The nodes of `mask` with coordinate `k` along an axis, moved to all coordinates along it that are in
+/// `set`.
 #[inline(always)]
 pub fn moved_along(mask: u64, axis: usize, k: usize, set: u8) -> u64 {
-    // Nodes on the axis itself. A product with them moves what has coordinate 0 to each of them, without carries.
+    // Nodes on the axis itself. A product with them moves what has coordinate 0 to each of them, without
+    // carries.
     let line = LINES[axis][usize::from(set & 0b1111)];
     (mask >> (k << (2 * axis)) & ALONG[axis][1]).wrapping_mul(line)
 }

@@ -23,8 +23,8 @@ pub fn explain(path: &Path, error: &Error) -> String {
     format!("{words} (os error {code})")
 }
 
-/// From now on a write beyond the limit of this process for files (`ulimit -f`) is an error, and does not end the
-/// process without a word.
+/// From now on a write beyond the limit of this process for files (`ulimit -f`) is an error, and does not end
+/// the process without a word.
 pub fn tell_size_limits() -> std::io::Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false))).map(drop)
 }

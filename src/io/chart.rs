@@ -174,7 +174,8 @@ fn span(values: impl Iterator<Item = f64>, from_zero: bool, margin: f64) -> Rang
     least - margin..most + margin
 }
 
-/// A curve of at most four points for each column of the picture: its ends there, its least and greatest value.
+/// A curve of at most four points for each column of the picture: its ends there, its least and greatest
+/// value.
 fn thinned(points: &[(f64, f64)], across: &Range<f64>) -> Vec<(f64, f64)> {
     if points.len() <= 4 * COLUMNS {
         return points.to_vec();
@@ -259,7 +260,8 @@ mod tests {
         }
     }
 
-    /// Numbers at the axes of charts over tiny spans, far from 0, and large: all differ, and none meets another.
+    /// Numbers at the axes of charts over tiny spans, far from 0, and large: all differ, and none meets
+    /// another.
     #[test]
     fn numbers_at_axes_differ_and_do_not_meet() {
         for (from, span) in [(0.0, 1e-3), (0.0, 1.0), (1000.0, 0.1), (1e6, 5.0), (-2e5, 4e5), (0.0, 3e8)] {

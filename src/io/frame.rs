@@ -1,4 +1,5 @@
-//! What the files of a run show at one time: particles with their fields, and leaves. For viewers and exports; not collective.
+//! What the files of a run show at one time: particles with their fields, and leaves. For viewers and
+//! exports; not collective.
 use std::path::{Path, PathBuf};
 
 use super::hdf5_file::{FileError, Reader};
@@ -37,8 +38,8 @@ pub(crate) struct LeafField {
 }
 
 impl Frame {
-    /// Reads the particles of a file with those of the fields `wanted` that it shows. Fields that `required` names
-    /// must be there.
+    /// Reads the particles of a file with those of the fields `wanted` that it shows. Fields that `required`
+    /// names must be there.
     pub fn read(path: &Path, wanted: &[PointField], required: bool) -> Result<Self, FileError> {
         let file = Reader::open_alone(path)?;
         let header = header_of_particles(&file)?;
@@ -60,8 +61,8 @@ impl Frame {
         Ok(Self { header, positions, half_widths, fields })
     }
 
-    /// Numbers of a field that was read, a row of components for each particle; of whole numbers as well, whatever their kind in
-    /// the file.
+    /// Numbers of a field that was read, a row of components for each particle; of whole numbers as well,
+    /// whatever their kind in the file.
     pub fn numbers(&self, field: PointField) -> Option<Vec<f64>> {
         let (_, values) = self.fields.iter().find(|(known, _)| *known == field)?;
         Some(match values {
@@ -129,8 +130,8 @@ pub fn is_integer(field: PointField) -> bool {
 }
 
 impl Leaves {
-    /// The leaves that belong to an output: of the tree file beside it, or of its own restart state; none if there is
-    /// neither.
+    /// The leaves that belong to an output: of the tree file beside it, or of its own restart state; none if
+    /// there is neither.
     pub fn of_output(path: &Path) -> Result<Self, FileError> {
         let (file, header) = with_tree(path)?;
         Self::read(&file, &header)

@@ -1,4 +1,5 @@
-//! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, tables, logs, charts and pictures.
+//! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, tables, logs, charts and
+//! pictures.
 //!
 //! | file or folder | what it has |
 //! |---|---|

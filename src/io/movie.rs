@@ -59,7 +59,8 @@ enum Sink {
 }
 
 impl Movie {
-    /// Begins a movie of so many frames. `ffmpeg` writes to `path` itself; the other formats are whole in memory first.
+    /// Begins a movie of so many frames. `ffmpeg` writes to `path` itself; the other formats are whole in
+    /// memory first.
     ///
     /// # Errors
     /// `ffmpeg` does not start.
@@ -100,7 +101,8 @@ impl Movie {
         Ok(Self { size, frames_per_second: fps, before: Vec::new(), sink })
     }
 
-    /// Appends a frame: red, green and blue of each pixel. `gif` is the same as [`gif_frame`] makes it, where that is needed.
+    /// Appends a frame: red, green and blue of each pixel. `gif` is the same as [`gif_frame`] makes it, where
+    /// that is needed.
     ///
     /// # Errors
     /// It cannot be written.

@@ -104,8 +104,8 @@ fn parse(bytes: &[u8]) -> Result<Table, TableError> {
     if table.lines.is_empty() { Err(TableError::Empty) } else { Ok(table) }
 }
 
-/// Gives columns of ParaView's tables (`Points:0`, `velocity_2`, `stress:3`) the names that they have here. Returns whether it is such a
-/// table.
+/// Gives columns of ParaView's tables (`Points:0`, `velocity_2`, `stress:3`) the names that they have here.
+/// Returns whether it is such a table.
 fn rename_from_paraview(columns: &mut [(String, Vec<f64>)]) -> bool {
     let is_points = |name: &str| component(name, "points").is_some();
     if !columns.iter().any(|(name, _)| is_points(name)) {

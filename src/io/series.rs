@@ -41,8 +41,8 @@ impl Series {
         Some(serde_json::from_slice::<Contents>(&text).ok()?.files)
     }
 
-    /// Not collective. The series of an earlier run, of which `entries` are listed, without those after `time`, from
-    /// which it is restarted.
+    /// Not collective. The series of an earlier run, of which `entries` are listed, without those after
+    /// `time`, from which it is restarted.
     pub fn resume(path: &Path, entries: Vec<Entry>, time: f64) -> Self {
         Self { path: path.into(), entries: entries.into_iter().filter(|entry| entry.time <= time).collect() }
     }

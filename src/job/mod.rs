@@ -58,8 +58,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>, JobError> {
     Ok(bytes)
 }
 
-/// Checks the bytes of a job file, with some values set from outside. Nothing is read from `path`: its stem becomes the name
-/// of the job.
+/// Checks the bytes of a job file, with some values set from outside. Nothing is read from `path`: its stem
+/// becomes the name of the job.
 ///
 /// # Errors
 /// The name is not UTF-8, or the content is not a valid job; all faults that were found, with their places.
@@ -96,8 +96,8 @@ pub fn with_settings(text: &str, name: &Path, settings: &Settings) -> Result<Str
         .map_err(|faults| FaultList { path: name.to_path_buf(), text: text.to_owned(), faults }.into())
 }
 
-/// Checks the text of a job file. Nothing is read from `path` itself: its stem becomes the name of the job, and files that the job
-/// names or includes lie relative to its directory.
+/// Checks the text of a job file. Nothing is read from `path` itself: its stem becomes the name of the job,
+/// and files that the job names or includes lie relative to its directory.
 ///
 /// # Errors
 /// All faults that were found.
@@ -116,7 +116,8 @@ pub fn parse_with(text: &str, path: &Path, settings: &Settings) -> Result<AnyPro
         .map_err(|faults| faults.into_iter().map(|fault| whole.attribute(edited.attribute(fault))).collect())
 }
 
-/// `original` is the text of the job file, `whole` that with what it includes, before settings have changed it.
+/// `original` is the text of the job file, `whole` that with what it includes, before settings have changed
+/// it.
 fn parse_edited(
     edited: &Edited,
     whole: &Whole,

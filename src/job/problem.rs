@@ -215,7 +215,8 @@ impl<const D: usize> Problem<D> {
         (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
     }
 
-    /// Whether two bodies with shapes of their own come with the same stage. Where what came earlier lies by then, no shape says.
+    /// Whether two bodies with shapes of their own come with the same stage. Where what came earlier lies by
+    /// then, no shape says.
     pub fn come_together(&self, first: usize, second: usize) -> bool {
         let [first, second] = [first, second].map(|body| &self.bodies[body]);
         first.given.is_none() && second.given.is_none() && first.stage == second.stage
@@ -356,7 +357,8 @@ impl InStages {
         self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
     }
 
-    /// Time from which its own time is counted, s, with the times at which stages began. Infinite until it acts for the first time.
+    /// Time from which its own time is counted, s, with the times at which stages began. Infinite until it
+    /// acts for the first time.
     pub fn clock(&self, starts: &[f64]) -> f64 {
         let first = self.0.as_ref().map_or(0, |stages| stages.iter().copied().min().unwrap_or(0));
         starts.get(first).copied().unwrap_or(f64::INFINITY)
@@ -376,10 +378,12 @@ pub struct InitialStress {
     pub consolidation: Option<Consolidation>,
 }
 
-/// What the stress of a body is at the start. Levels are in the coordinates of the job, along the axis of gravity.
+/// What the stress of a body is at the start. Levels are in the coordinates of the job, along the axis of
+/// gravity.
 #[derive(Clone, Debug)]
 pub enum StressKind {
-    /// The weight above, Pa, with this ratio of horizontal to vertical stress, under a surface (found: `None`) with a pressure on it.
+    /// The weight above, Pa, with this ratio of horizontal to vertical stress, under a surface (found:
+    /// `None`) with a pressure on it.
     Weight {
         /// Horizontal over vertical stress.
         ratio: Quantity,

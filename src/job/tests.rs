@@ -60,7 +60,8 @@ fn text_that_is_not_toml_is_a_fault_with_a_place() {
     assert!(faults[0].span.start >= 12, "{faults:?}");
 }
 
-/// Included tables are those of the job; what is wrong with them is said of their file, and what is wrong with the job of the job.
+/// Included tables are those of the job; what is wrong with them is said of their file, and what is wrong
+/// with the job of the job.
 #[test]
 fn faults_of_included_files_name_these() {
     let directory = tempfile::tempdir().unwrap();

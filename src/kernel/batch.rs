@@ -69,9 +69,9 @@ impl<'a, const D: usize> Batches<'a, D> {
         Batch { index, lanes: ALL >> (LANES - count), tile, ahead: self.ahead(first, AHEAD) }
     }
 
-    /// To be called after each batch was taken. Tiles run through a page after every few of them. The processor finds
-    /// several pages at the same time, but waits for each that a single line is asked for on. In line: with a call
-    /// between batches, constants would not stay in registers.
+    /// To be called after each batch was taken. Tiles run through a page after every few of them. The
+    /// processor finds several pages at the same time, but waits for each that a single line is asked for on.
+    /// In line: with a call between batches, constants would not stay in registers.
     #[inline(always)]
     pub(super) fn look_up_pages(&self) {
         let is_due = self.taken % (GROUP * TILE) == TILE && self.len > GROUP * TILE;
@@ -140,8 +140,8 @@ impl Batch {
         Self { index: *index, lanes: ALL, tile: Some(index[0] / TILE as u32), ahead: Place::default() }
     }
 
-    /// The first particles of a list, and their number. Where at least a quarter of a tile is on the list, as is usual
-    /// beside level jumps, it is read as it stands; elsewhere particles are picked.
+    /// The first particles of a list, and their number. Where at least a quarter of a tile is on the list, as
+    /// is usual beside level jumps, it is read as it stands; elsewhere particles are picked.
     #[inline(always)]
     fn of_list(list: &[u32]) -> (Self, usize) {
         match list.first_chunk() {
@@ -179,7 +179,8 @@ impl Batch {
         Self { index, lanes: ALL >> (LANES - count), tile: None, ahead: Place::default() }
     }
 
-    /// The particles' tile; `columns` are those that will be read where it has to be brought together in `spare`.
+    /// The particles' tile; `columns` are those that will be read where it has to be brought together in
+    /// `spare`.
     #[inline(always)]
     pub(super) fn tile<'a, const D: usize>(
         &self,

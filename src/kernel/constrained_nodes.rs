@@ -1,7 +1,8 @@
 //! Constrained nodes of an arena: hanging ones, and those that first and second moments belong to.
 //!
-//! Moments are for nodes whose parents are constrained themselves, beside jumps over more than one level. First moments are
-//! matrices, kept as one row for each axis, node by node; a stencil visits those of its own nodes.
+//! Moments are for nodes whose parents are constrained themselves, beside jumps over more than one level.
+//! First moments are matrices, kept as one row for each axis, node by node; a stencil visits those of its own
+//! nodes.
 use super::batch::{Batch, lanes_in};
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights};
@@ -42,8 +43,8 @@ pub struct ConstrainedNodes {
 }
 
 impl ConstrainedNodes {
-    /// Nodes with moments, none twice, and hanging nodes. Stencils visit nodes in the order given, in which their rows of
-    /// moments follow each other.
+    /// Nodes with moments, none twice, and hanging nodes. Stencils visit nodes in the order given, in which
+    /// their rows of moments follow each other.
     pub fn new<const D: usize>(nodes: &[MomentNode<D>], hanging: HangingNodes) -> Self {
         let visits = nodes.iter().zip((0..).step_by(D)).flat_map(|(node, first)| {
             stencils_with::<D>(node.node).map(move |(base, node)| (base, Visit { first, node }))
@@ -63,8 +64,8 @@ impl ConstrainedNodes {
         self.hanging.heap_bytes() + self.visits.heap_bytes() + 8 * self.second.capacity()
     }
 
-    /// Members of a batch whose stencils have nodes with moments, a bit each; if there are any, the weights of all nodes are
-    /// made ready in `nodes`.
+    /// Members of a batch whose stencils have nodes with moments, a bit each; if there are any, the weights
+    /// of all nodes are made ready in `nodes`.
     #[inline(always)]
     pub(super) fn prepare<const D: usize>(
         &self,

@@ -10,12 +10,12 @@ use crate::particle::volume::det_f;
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 
-/// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small that
-/// what a box then has outside the domain is below round-off.
+/// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small
+/// that what a box then has outside the domain is below round-off.
 const LEAST_SHARE: f64 = 1.0 / 70_368_744_177_664.0;
 
-/// Half width, as a share of the cell, below which the slopes of a box that a wall cuts are reduced (see [`softening`]): that
-/// of the usual box of half a cell at the usual least stretch.
+/// Half width, as a share of the cell, below which the slopes of a box that a wall cuts are reduced (see
+/// [`softening`]): that of the usual box of half a cell at the usual least stretch.
 const SOFT_SHARE: f64 = 1.0 / 16.0;
 
 /// Half widths of the selected particles along each axis, m, as the kernels use them on cells of edge
@@ -151,8 +151,9 @@ pub(super) struct AtWall<'a, V, const D: usize> {
 impl<V: Vector, const D: usize> AtWall<'_, V, D> {
     /// What particles that move to `moved` keep of the columns of B, where that is not all for all of them.
     ///
-    /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept, C grows like `1/d`, and
-    /// a particle that drifts to the wall would come with ever faster nodes and pass through. So B falls with the distance.
+    /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept,
+    /// C grows like `1/d`, and a particle that drifts to the wall would come with ever faster nodes and pass
+    /// through. So B falls with the distance.
     #[inline(always)]
     pub(super) fn kept_affine_velocity(&self, moved: &[V; D]) -> Option<[V; D]> {
         if !is_cut(&self.whole, &self.half) {
@@ -169,13 +170,15 @@ impl<V: Vector, const D: usize> AtWall<'_, V, D> {
     }
 }
 
-/// Factors of the slopes along each axis, for boxes of half widths `half` that were cut from `whole`; `None` if all are 1.
+/// Factors of the slopes along each axis, for boxes of half widths `half` that were cut from `whole`; `None`
+/// if all are 1.
 ///
-/// A particle at a distance d from a wall has the weight `d/h` at the next node, and the slope `1/h`. Where it is alone, so that
-/// this node has no other mass, its stress acts on its own velocity gradient with a stiffness in proportion to `1/d`, which no time
-/// step in use resolves when d is small: fragments near walls would gain energy without bound. With the factor `d/d₀` below
-/// `d₀ = h/16`, or below the half width of the box before it was cut, this stiffness falls with d instead. As the same
-/// factor is in the force and in the velocity gradient, energy goes neither way.
+/// A particle at a distance d from a wall has the weight `d/h` at the next node, and the slope `1/h`. Where
+/// it is alone, so that this node has no other mass, its stress acts on its own velocity gradient with a
+/// stiffness in proportion to `1/d`, which no time step in use resolves when d is small: fragments near walls
+/// would gain energy without bound. With the factor `d/d₀` below `d₀ = h/16`, or below the half width of the
+/// box before it was cut, this stiffness falls with d instead. As the same factor is in the force and in the
+/// velocity gradient, energy goes neither way.
 #[inline(always)]
 pub(super) fn softening<V: Vector, const D: usize>(
     whole: &[V; D],
@@ -192,8 +195,8 @@ pub(super) fn softening<V: Vector, const D: usize>(
     is_cut.any().then(|| factors(half, &least))
 }
 
-/// `softening` of a box that is wider than a cell along another axis, of cells of edge `cell`. Before a wall cut it, it was wider
-/// than the limit along every axis.
+/// `softening` of a box that is wider than a cell along another axis, of cells of edge `cell`. Before a wall
+/// cut it, it was wider than the limit along every axis.
 pub fn softening_at<const D: usize>(
     position: &[f64; D],
     half: &[f64; D],
@@ -255,8 +258,8 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
     half
 }
 
-/// Half widths of one box over its undeformed one, as [`whole_of_batch`] has them where a box follows the volume: for
-/// pictures. `elastic` is the left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
+/// Half widths of one box over its undeformed one, as [`whole_of_batch`] has them where a box follows the
+/// volume: for pictures. `elastic` is the left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
 pub fn stretches_of_one(
     elastic: &[f64; 6],
     plastic_volume: f64,
@@ -306,7 +309,8 @@ fn stretches<V: Vector, const D: usize>(
     stretch
 }
 
-/// Bit i says whether lane i is of a plastic material. `index` gives the materials, and is called only if some are plastic.
+/// Bit i says whether lane i is of a plastic material. `index` gives the materials, and is called only if
+/// some are plastic.
 #[inline(always)]
 pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -> u32 {
     if !scheme.is_plastic {
@@ -331,8 +335,8 @@ pub fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
 /// A bound on the widths of a chunk's boxes over their undeformed widths.
 pub fn greatest_stretch<const D: usize>(chunk: &Chunk<D>) -> f64 {
     let first = Layout::<D>::LEFT_CAUCHY_GREEN;
-    // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest of
-    // them, no volume more than its power 3/2.
+    // xx, yy and zz come first in either dimension. No axis is stretched more than the root of the greatest
+    // of them, no volume more than its power 3/2.
     let elastic = (first..first + 3).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
     let plastic = chunk.column(Layout::<D>::PLASTIC_VOLUME).greatest();
     let isotropic = libm::exp((1.5 * libm::log(elastic) + plastic) / D as f64);

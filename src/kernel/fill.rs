@@ -1,20 +1,23 @@
-//! What keeps fluids in their volume: bounded void, a shift out of overfull nodes, and volumes that approach the mean of their cell.
+//! What keeps fluids in their volume: bounded void, a shift out of overfull nodes, and volumes that approach
+//! the mean of their cell.
 //!
-//! The volume ratio J of a particle is right on average, but positions drift away from it: flow that compresses along one line and widens along
-//! another gathers particles, and the gaps between them have no sample that would resist. Nodes know how full they are: with the
-//! reference volumes of all material, `φ_j = Σ V₀ w / ∫N_j` and `e_j = max(0, φ_j - 1)`, and a particle gathers
+//! The volume ratio J of a particle is right on average, but positions drift away from it: flow that
+//! compresses along one line and widens along another gathers particles, and the gaps between them have no
+//! sample that would resist. Nodes know how full they are: with the reference volumes of all material,
+//! `φ_j = Σ V₀ w / ∫N_j` and `e_j = max(0, φ_j - 1)`, and a particle gathers
 //! ```text
 //! φ = Σ w φ_j,   s = Σ e_j ∇w
 //! ```
-//! 1. *Void.* A fluid without tension that has widened, J > 1, pushes with nothing. It may fill the void that the grid has around
-//!    it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
-//! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain the excess:
-//!    `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
-//! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell, as far as J̄ - J is more than weight makes of
-//!    half a cell, `J g h / 2c²`. The energy is convex in J, so it falls.
+//! 1. *Void.* A fluid without tension that has widened, J > 1, pushes with nothing. It may fill the void that
+//!    the grid has around it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
+//! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain
+//!    the excess: `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
+//! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell,
+//!    as far as J̄ - J is more than weight makes of half a cell, `J g h / 2c²`. The energy is convex in J, so
+//!    it falls.
 //!
-//! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed of sound.
-//! `docs/design/fluid-volume.md` says what each part does, and what else was tried.
+//! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed
+//! of sound. `docs/design/fluid-volume.md` says what each part does, and what else was tried.
 use super::batch::Batch;
 use super::gathered::Sums;
 use crate::material::Symmetric;
@@ -37,7 +40,8 @@ const CLOSEST: f64 = 1e-9;
 pub struct Flow {
     /// `c Δt`, the way of sound in the step, m; 0 for what is no fluid.
     pub way: f64,
-    /// Greatest volume ratio that particles may have where there is no void: 1, or infinite for fluids that bear tension.
+    /// Greatest volume ratio that particles may have where there is no void: 1, or infinite for fluids that
+    /// bear tension.
     pub widest: f64,
     /// Change of J over a length, 1/m, that the weight of the fluid explains: `g / c²`.
     pub weight: f64,
@@ -92,7 +96,8 @@ pub(super) struct Filled<V: Vector, const D: usize> {
 }
 
 impl Filling<'_> {
-    /// A batch of particles of these materials with the elastic tensors that they had at the start of the step; `None` if none is of a fluid.
+    /// A batch of particles of these materials with the elastic tensors that they had at the start of the
+    /// step; `None` if none is of a fluid.
     #[inline(always)]
     pub(super) fn of_batch<V: Vector, const D: usize>(
         &self,
@@ -140,8 +145,8 @@ fn share<V: Vector>(reach: V, rate: f64) -> V {
 }
 
 impl<V: Vector, const D: usize> Filled<V, D> {
-    /// Shifts particles that have moved to `moved`, and sums up their masses times the ways; not through the faces of a domain of this
-    /// extent, if they are near any.
+    /// Shifts particles that have moved to `moved`, and sums up their masses times the ways; not through the
+    /// faces of a domain of this extent, if they are near any.
     #[inline(always)]
     pub(super) fn shift(
         &self,
@@ -174,7 +179,8 @@ impl<V: Vector, const D: usize> Filled<V, D> {
         }
     }
 
-    /// Bounds the void of particles and brings them nearer to the mean of their cells, in the elastic tensors after the step.
+    /// Bounds the void of particles and brings them nearer to the mean of their cells, in the elastic tensors
+    /// after the step.
     #[inline(always)]
     pub(super) fn settle(&self, trial: &mut Symmetric<V>) {
         let one = V::splat(1.0);

@@ -20,10 +20,11 @@ pub struct Moments<'a> {
 pub struct Fields<'a> {
     /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.
     pub velocity: &'a [Row],
-    /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`] the velocities that
-    /// particles take on.
+    /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`]
+    /// the velocities that particles take on.
     pub increment: Option<&'a [Row]>,
-    /// How full nodes are (see [`super::fill`]), with [`FILL_MORE`] values behind the last; where there are fluids.
+    /// How full nodes are (see [`super::fill`]), with [`FILL_MORE`] values behind the last; where there are
+    /// fluids.
     pub fill: Option<&'a [f64]>,
     /// Where the block touches constrained nodes.
     pub moments: Option<Moments<'a>>,
@@ -124,8 +125,8 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes` is of use where they
-    /// have moments.
+    /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes`
+    /// is of use where they have moments.
     #[inline(always)]
     pub(super) fn gather<V: Vector>(
         &mut self,
@@ -164,7 +165,8 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// How full the nodes are, and the gradient of what is over: a value of a node at a time, three nodes along x together.
+    /// How full the nodes are, and the gradient of what is over: a value of a node at a time, three nodes
+    /// along x together.
     #[inline(always)]
     fn contract_fill<V: Vector>(&mut self, weights: &Weights<D>, lane: usize, nodes: &[f64]) {
         let nodes = &nodes[..super::stencil_span(D) + FILL_MORE];

@@ -1,16 +1,17 @@
 //! Hanging nodes: here, constrained nodes all of whose parents are real.
 //!
-//! What APIC must see are the weights of real nodes. Of a hanging node j with weight w, along an axis k on which its
-//! coordinate is odd, its parents lie one cell h away on either side, and beside `w v_j d_k` they add
+//! What APIC must see are the weights of real nodes. Of a hanging node j with weight w, along an axis k on
+//! which its coordinate is odd, its parents lie one cell h away on either side, and beside `w v_j d_k` they
+//! add
 //! ```text
 //! w Σ c v_i (x_i - x_j)_k = w h/2 (v_(j+k) - v_(j-k)) = ± w h (v_(j±k) - v_j)
 //! ```
-//! to B, since the velocity is multilinear in the coarse cell on whose surface or in which the node lies, and nodes j ± k
-//! lie there too. So it is a sum over nodes of the stencil with other factors in place of `w d_k`, and what P2G adds is the
-//! transpose: momentum at these nodes, which restriction carries on.
+//! to B, since the velocity is multilinear in the coarse cell on whose surface or in which the node lies, and
+//! nodes j ± k lie there too. So it is a sum over nodes of the stencil with other factors in place of
+//! `w d_k`, and what P2G adds is the transpose: momentum at these nodes, which restriction carries on.
 //!
-//! The hanging nodes of a stencil are those of a few boxes of nodes; beside a plane face they are one. Within a box the
-//! factors are those of each axis.
+//! The hanging nodes of a stencil are those of a few boxes of nodes; beside a plane face they are one. Within
+//! a box the factors are those of each axis.
 use super::batch::{Batch, lanes_in};
 use super::weights::{Weights, add_products, dot, pencils};
 use super::{ARENA_EDGE, BASES, Row, stencil_bases};
@@ -23,12 +24,14 @@ type NodeBox = [u8; 3];
 struct Along {
     /// 1 for nodes of the box.
     inside: [f64; 3],
-    /// By how much `w h` of each node goes from the lower to the upper of the two nodes that it goes to: 1 for nodes with an odd
-    /// coordinate that have one neighbour in the stencil, and 1/2 for the middle one, which has two.
+    /// By how much `w h` of each node goes from the lower to the upper of the two nodes that it goes to: 1
+    /// for nodes with an odd coordinate that have one neighbour in the stencil, and 1/2 for the middle one,
+    /// which has two.
     odd: [f64; 3],
 }
 
-/// By nodes of the box, a bit each, and behind these whether the first node of the stencil has an odd coordinate.
+/// By nodes of the box, a bit each, and behind these whether the first node of the stencil has an odd
+/// coordinate.
 static ALONG: [Along; 16] = {
     let mut along = [const { Along { inside: [0.0; 3], odd: [0.0; 3] } }; 16];
     let mut index = 0;
@@ -55,7 +58,8 @@ pub struct HangingNodes {
     boxes: Vec<NodeBox>,
     /// First box of each stencil by its base (see [`stencil_bases`]), and the end.
     start: Vec<u16>,
-    /// By base, [`HAS_BOXES`] if there are any, and a bit for each axis if all lie at the third node along it.
+    /// By base, [`HAS_BOXES`] if there are any, and a bit for each axis if all lie at the third node along
+    /// it.
     classes: Vec<u8>,
 }
 
@@ -102,8 +106,8 @@ impl HangingNodes {
         size_of::<NodeBox>() * self.boxes.capacity() + 2 * self.start.capacity() + self.classes.capacity()
     }
 
-    /// Members of a batch whose stencils have hanging nodes, a bit each. Boxes that lie in one cell along an axis have a third
-    /// node of weight 0 there, which does not count.
+    /// Members of a batch whose stencils have hanging nodes, a bit each. Boxes that lie in one cell along an
+    /// axis have a third node of weight 0 there, which does not count.
     #[inline(always)]
     pub(super) fn touched<const D: usize>(&self, weights: &Weights<D>, batch: &Batch) -> u32 {
         let class = |lane: usize| u64::from(self.classes[weights.base(lane)]) << (8 * lane);
@@ -127,8 +131,8 @@ impl HangingNodes {
         &self.boxes[usize::from(self.start[base])..usize::from(self.start[base + 1])]
     }
 
-    /// Adds the second moments of the constraints, `Σ w h²` over nodes with odd coordinates along each axis, of the lanes in
-    /// `touched`, to the spread.
+    /// Adds the second moments of the constraints, `Σ w h²` over nodes with odd coordinates along each axis,
+    /// of the lanes in `touched`, to the spread.
     #[inline(always)]
     pub(super) fn add_spread<const D: usize>(
         &self,
@@ -156,7 +160,8 @@ impl HangingNodes {
         }
     }
 
-    /// Adds the affine momentum `C e_k m h` of a lane that goes with other factors to the nodes from the first of its stencil on.
+    /// Adds the affine momentum `C e_k m h` of a lane that goes with other factors to the nodes from the
+    /// first of its stencil on.
     #[inline(always)]
     pub(super) fn scatter<const D: usize>(
         &self,
@@ -170,7 +175,8 @@ impl HangingNodes {
         }
     }
 
-    /// What B of a lane gets more, divided by the edge of a cell: column by column. `nodes` begin with the first of the stencil.
+    /// What B of a lane gets more, divided by the edge of a cell: column by column. `nodes` begin with the
+    /// first of the stencil.
     #[inline(always)]
     pub(super) fn gather<const D: usize>(
         &self,

@@ -165,7 +165,8 @@ pub struct Scheme<'a> {
     pub softens: bool,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
-    /// Columns of what particles carry that are shares of a whole, which add up; those behind are values, which average.
+    /// Columns of what particles carry that are shares of a whole, which add up; those behind are values,
+    /// which average.
     pub shares: usize,
 }
 
@@ -219,7 +220,8 @@ pub struct SubBox<const D: usize> {
     pub centre: [f64; D],
     /// Half widths of the part, m; at most half a cell of the block.
     pub half: [f64; D],
-    /// Factor of the slopes along each axis: below 1 for boxes that a near wall cuts (see [`domain::softening_at`]).
+    /// Factor of the slopes along each axis: below 1 for boxes that a near wall cuts (see
+    /// [`domain::softening_at`]).
     pub softening: [f64; D],
     /// Share of the particle that the part carries: 1 / number of parts.
     pub fraction: f64,

@@ -57,13 +57,14 @@ pub struct Scatter<'a, const D: usize> {
     pub dt: f64,
     /// Rows (momentum, mass) of the nodes.
     pub arena: &'a mut [Row],
-    /// What constrained nodes need, where there are any: first moments, or other factors (see [`super::hanging`]).
+    /// What constrained nodes need, where there are any: first moments, or other factors (see
+    /// [`super::hanging`]).
     pub moments: Option<MomentSums<'a>>,
 }
 
 impl<const D: usize> Scatter<'_, D> {
-    /// Adds the selected particles. Each particle's box must lie within the arena, which holds when its centre lies in the
-    /// block. `next` is the place of the chunk that will be read after this one.
+    /// Adds the selected particles. Each particle's box must lie within the arena, which holds when its
+    /// centre lies in the block. `next` is the place of the chunk that will be read after this one.
     pub fn whole_boxes(&mut self, select: Select, next: Place) {
         let Self { scratch, chunk, frame, scheme, dt, arena, moments } = self;
         // By value, so that the kernel holds each of them in a register.
@@ -106,7 +107,8 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        // Copies of the loop, so that bins away from walls and bins without constrained nodes do not ask at every particle.
+        // Copies of the loop, so that bins away from walls and bins without constrained nodes do not ask at
+        // every particle.
         match (self.bin.frame.is_at_wall(), self.bin.moments.is_some()) {
             (false, false) => self.add_all::<V, false, false>(),
             (true, false) => self.add_all::<V, true, false>(),

@@ -1,8 +1,8 @@
 //! Second moments D of the weights about their particles.
 //!
-//! `D_k = Σ_j w ((x_j - x_p)_k² + S_j,k)` is diagonal for axis-aligned boxes on any tree, but not constant: it
-//! depends on where the box lies in its cells. S_j are the second moments that constrained nodes inherit from their
-//! parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
+//! `D_k = Σ_j w ((x_j - x_p)_k² + S_j,k)` is diagonal for axis-aligned boxes on any tree, but not constant:
+//! it depends on where the box lies in its cells. S_j are the second moments that constrained nodes inherit
+//! from their parents, `S_j = Σ c (S_i + (x_i - x_j)²)`, zero on real nodes.
 use super::batch::{Batch, Batches, Tile};
 use super::constrained_nodes::ConstrainedNodes;
 use super::weights::{NodeWeights, Weights};

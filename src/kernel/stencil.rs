@@ -10,10 +10,10 @@
 //! ```
 //! with `m = min(hi, 1)`, `a = m - lo`, `b = max(hi - 1, 0)`, `V = a + b`.
 //!
-//! Where the box reaches across a grid line the outer weights are `a²/(2V)` and `b²/(2V)`: they vanish as the squares of
-//! their slopes. Rounding must keep that, down to overlaps of one unit of the last place: the impulse of stress goes with
-//! the slope, and a node that gets an impulse without mass takes on any velocity. So `1 - (lo + m)/2` is evaluated as
-//! `((1 - lo) + (1 - m))/2`, whose differences are exact near 1.
+//! Where the box reaches across a grid line the outer weights are `a²/(2V)` and `b²/(2V)`: they vanish as the
+//! squares of their slopes. Rounding must keep that, down to overlaps of one unit of the last place: the
+//! impulse of stress goes with the slope, and a node that gets an impulse without mass takes on any velocity.
+//! So `1 - (lo + m)/2` is evaluated as `((1 - lo) + (1 - m))/2`, whose differences are exact near 1.
 use super::BLOCK;
 use crate::simd::Vector;
 
@@ -106,8 +106,9 @@ mod tests {
         }
     }
 
-    /// Boxes that reach by 1 to 100 units of the last place and more across the line between two cells, at the lower or the
-    /// upper side: the node beyond has a weight that goes with the square of its slope, and neither is zero alone.
+    /// Boxes that reach by 1 to 100 units of the last place and more across the line between two cells, at
+    /// the lower or the upper side: the node beyond has a weight that goes with the square of its slope, and
+    /// neither is zero alone.
     #[test]
     fn outer_weights_are_squares_of_slopes() {
         let overlaps =

@@ -13,7 +13,8 @@ pub(super) struct Factors {
     pub slope: [[f64; LANES]; 3],
 }
 
-/// Stencils of a batch. Made once and filled for batch after batch. Begins with a line of the cache, so that lanes do.
+/// Stencils of a batch. Made once and filled for batch after batch. Begins with a line of the cache, so that
+/// lanes do.
 #[repr(align(64))]
 pub(super) struct Weights<const D: usize> {
     /// Index of the lowest node in the arena; an integer plus 2^52.
@@ -27,8 +28,8 @@ pub(super) struct Weights<const D: usize> {
     pub spread: [[f64; LANES]; D],
 }
 
-/// Weights of a batch node by node, `a + 3 b (+ 9 c)`, which only batches with constrained nodes need. Padded, so that
-/// no index is out of bounds.
+/// Weights of a batch node by node, `a + 3 b (+ 9 c)`, which only batches with constrained nodes need.
+/// Padded, so that no index is out of bounds.
 pub(super) struct NodeWeights(pub [[f64; LANES]; 32]);
 
 /// 2^52: integers added to it stand in the low bits.
@@ -110,7 +111,8 @@ impl<const D: usize> Weights<D> {
         self.base[lane].to_bits() as u16 as usize
     }
 
-    /// Calls `f` with the place in the arena, relative to the first node, and the weight of all nodes of a stencil.
+    /// Calls `f` with the place in the arena, relative to the first node, and the weight of all nodes of a
+    /// stencil.
     #[inline(always)]
     pub(super) fn for_each_node(&self, lane: usize, mut f: impl FnMut(usize, F64x4)) {
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
@@ -127,8 +129,9 @@ impl<const D: usize> Weights<D> {
     }
 }
 
-/// Adds to the nodes of a stencil a sum of products of factors of the axes: `product X_a + x_a (z_c Y_b + y_b Z_c)`, where X, Y
-/// and Z are `along` the axes and `product` is `y_b z_c`. In 2D there is no z.
+/// Adds to the nodes of a stencil a sum of products of factors of the axes:
+/// `product X_a + x_a (z_c Y_b + y_b Z_c)`, where X, Y and Z are `along` the axes and `product` is `y_b z_c`.
+/// In 2D there is no z.
 #[inline(always)]
 pub(super) fn add_products<V: Vector, const D: usize>(
     nodes: &mut [Row],
@@ -156,8 +159,8 @@ pub(super) fn add_products<V: Vector, const D: usize>(
     }
 }
 
-/// The nodes of a stencil averaged over all axes but one, for each axis: along x it is `X_a = Σ_bc y_b z_c v_abc`, and so on.
-/// All come from one pass over the nodes.
+/// The nodes of a stencil averaged over all axes but one, for each axis: along x it is
+/// `X_a = Σ_bc y_b z_c v_abc`, and so on. All come from one pass over the nodes.
 #[inline(always)]
 pub(super) fn pencils<V: Vector, const D: usize>(
     nodes: &[Row],

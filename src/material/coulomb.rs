@@ -1,9 +1,11 @@
-//! Return mapping to the Mohr-Coulomb pyramid in principal stresses, with tension cut-off, exact on faces, edges and apex.
+//! Return mapping to the Mohr-Coulomb pyramid in principal stresses, with tension cut-off, exact on faces,
+//! edges and apex.
 //!
-//! With `s₁ ≥ s₂ ≥ s₃`, tension positive: `f = (s₁ - s₃) + (s₁ + s₃) sin φ - 2c cos φ ≤ 0`, flow along the same with ψ in
-//! place of φ; cut-off `s₁ ≤ T`, flow along the normal. The implicit step is a complementarity problem over the faces that
-//! sorted stresses can reach (the one between 1 and 3 and its two neighbours, and three of the cut-off); its solution is found
-//! by going from faces to edges to the apex, as in de Souza Neto, Perić and Owen (2008), section 8.2.
+//! With `s₁ ≥ s₂ ≥ s₃`, tension positive: `f = (s₁ - s₃) + (s₁ + s₃) sin φ - 2c cos φ ≤ 0`, flow along the
+//! same with ψ in place of φ; cut-off `s₁ ≤ T`, flow along the normal. The implicit step is a complementarity
+//! problem over the faces that sorted stresses can reach (the one between 1 and 3 and its two neighbours, and
+//! three of the cut-off); its solution is found by going from faces to edges to the apex, as in de Souza
+//! Neto, Perić and Owen (2008), section 8.2.
 use super::parameters::Lame;
 use crate::simd::{Vector, VectorMask};
 
@@ -38,7 +40,8 @@ pub(super) struct Slopes<V> {
     stress: [V; 3],
     /// Flow per excess of f on this face, 1/Pa.
     face: V,
-    /// The same per sum of the excesses of f on this face and the one between 1 and 2, where they share the flow.
+    /// The same per sum of the excesses of f on this face and the one between 1 and 2, where they share the
+    /// flow.
     low_edge: V,
     /// The same with the face between 2 and 3.
     high_edge: V,
@@ -100,12 +103,12 @@ impl<V: Vector> Pyramid<V> {
         }
     }
 
-    /// Whether a stress with this mean and this norm of the deviator lies inside whatever its Lode angle, or outside whatever
-    /// its Lode angle. Where it is neither, [`Pyramid::may_hold`] has to tell.
+    /// Whether a stress with this mean and this norm of the deviator lies inside whatever its Lode angle, or
+    /// outside whatever its Lode angle. Where it is neither, [`Pyramid::may_hold`] has to tell.
     #[inline(always)]
     pub(super) fn surely(&self, mean: V, norm: V, slopes: &Slopes<V>) -> [V::Mask; 2] {
-        // √(3/2) |dev| <= s₁ - s₃ <= √2 |dev|; no principal stress is further from the mean than √(2/3) |dev|, and the sum of the
-        // greatest and the least from twice the mean by √(1/6) |dev|.
+        // √(3/2) |dev| <= s₁ - s₃ <= √2 |dev|; no principal stress is further from the mean than √(2/3)
+        // |dev|, and the sum of the greatest and the least from twice the mean by √(1/6) |dev|.
         let far = norm * (2.0_f64 / 3.0).sqrt();
         let beside = norm * (1.0_f64 / 6.0).sqrt();
         let twice = mean + mean;

@@ -1,8 +1,9 @@
 //! States under a given stress, for bodies that do not start without one.
 //!
-//! All models are isotropic, so stress and elastic strain have the same principal directions, and a law has to invert three
-//! numbers only ([`Law::strain_under`](super::Law::strain_under)). What it answers is put through an update, which yields where the
-//! stress lies outside the yield surface: no law says where that is a second time.
+//! All models are isotropic, so stress and elastic strain have the same principal directions, and a law has
+//! to invert three numbers only ([`Law::strain_under`](super::Law::strain_under)). What it answers is put
+//! through an update, which yields where the stress lies outside the yield surface: no law says where that is
+//! a second time.
 use super::eigen::{Symmetric, decompose};
 use super::{HISTORIES, Material, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Lanes, Vector};
@@ -11,7 +12,8 @@ use crate::text::quantity;
 /// How strongly matter that yields under pressure was loaded once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Consolidation {
-    /// Overconsolidation ratio: the preconsolidation pressure over that of the yield surface through the stress; at least 1.
+    /// Overconsolidation ratio: the preconsolidation pressure over that of the yield surface through the
+    /// stress; at least 1.
     Ratio(f64),
     /// The preconsolidation pressure, Pa.
     Pressure(f64),
@@ -89,7 +91,8 @@ pub fn under_stress_after(
     let first = |value: Lanes| value.to_array()[0];
     let found = state.stress.map(first);
     let asked = stress.map(|component| component * volume_ratio);
-    // Strains are small beside 1, so that rounding of the elastic tensor shows in the stress as a part of the modulus.
+    // Strains are small beside 1, so that rounding of the elastic tensor shows in the stress as a part of the
+    // modulus.
     let modulus = material.density() * material.wave_speed() * material.wave_speed();
     let difference: [f64; 6] = std::array::from_fn(|c| found[c] - asked[c]);
     let (lost, allowed) = (norm(&difference), TOLERANCE * norm(&asked) + 1e-13 * modulus);
@@ -110,8 +113,8 @@ pub fn under_stress_after(
     })
 }
 
-/// The state of a material in which the elastic strain under a Cauchy stress (Pa, `xx, yy, zz, xy, xz, yz`) has yielded to the end: on the
-/// yield surface, where the stress lies outside.
+/// The state of a material in which the elastic strain under a Cauchy stress (Pa, `xx, yy, zz, xy, xz, yz`)
+/// has yielded to the end: on the yield surface, where the stress lies outside.
 ///
 /// # Errors
 /// No elastic strain has this stress, or none is left.
@@ -146,7 +149,8 @@ fn elastic_under(
     Ok((compose(&strain.map(|e| libm::exp(2.0 * e)), &directions), volume_ratio))
 }
 
-/// The state of a material with an elastic left Cauchy-Green tensor (`xx, yy, zz, xy, xz, yz`), yielded where it has to.
+/// The state of a material with an elastic left Cauchy-Green tensor (`xx, yy, zz, xy, xz, yz`), yielded where
+/// it has to.
 pub fn under_strain(
     material: &dyn Material,
     elastic: &[f64; 6],
@@ -197,8 +201,9 @@ fn compose(value: &[f64; 3], vector: &[[f64; 3]; 3]) -> [f64; 6] {
         .map(|(i, j)| (0..3).map(|k| vector[k][i] * value[k] * vector[k][j]).sum())
 }
 
-/// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last two points, halves
-/// of the bracket where that leads outside or hardly on. `None` where the function does not change its sign.
+/// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last
+/// two points, halves of the bracket where that leads outside or hardly on. `None` where the function does
+/// not change its sign.
 pub(super) fn increasing_root(function: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> Option<f64> {
     let (mut at_low, mut at_high) = (function(low), function(high));
     if !(at_low <= 0.0 && at_high >= 0.0) {
@@ -231,8 +236,8 @@ mod tests {
     use crate::material::laws::{Visitor, for_each_law};
     use crate::material::{Law, Parameters, build};
 
-    /// Stresses that all models but fluids carry: small beside their strengths, or isotropic. Counts the models that can start
-    /// under stress.
+    /// Stresses that all models but fluids carry: small beside their strengths, or isotropic. Counts the
+    /// models that can start under stress.
     #[derive(Default)]
     struct GivesBack(std::cell::Cell<usize>);
 
@@ -295,8 +300,8 @@ mod tests {
         assert_eq!(sheared.err(), Some(NoState::Unreachable));
     }
 
-    /// Outside the yield surface the state is that on it: Rankine's ratio for sand, the yield stress for metal; inside it is that under the
-    /// stress.
+    /// Outside the yield surface the state is that on it: Rankine's ratio for sand, the yield stress for
+    /// metal; inside it is that under the stress.
     #[test]
     fn what_yields_returns_to_the_surface() {
         let sand = law("model = 'mohr_coulomb', young = 1e7, poisson = 0.3, friction_angle = 30.0");
@@ -319,7 +324,8 @@ mod tests {
         assert!(((state.stress[0] - state.stress[1]).abs() / 1e6 - 1.0).abs() < 1e-9, "{state:?}");
     }
 
-    /// The yield surface passes through the stress at a ratio of 1; its size is that of the closed form at any other.
+    /// The yield surface passes through the stress at a ratio of 1; its size is that of the closed form at
+    /// any other.
     #[test]
     fn clay_is_consolidated_as_asked_for() {
         let text = "model = 'cam_clay', shear_modulus = 4e6, critical_stress_ratio = 1.2, compression_index = 0.1, \

@@ -1,5 +1,5 @@
-//! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the trait
-//! that the solver calls ([`Material`]).
+//! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the
+//! trait that the solver calls ([`Material`]).
 use super::initial::Consolidation;
 use super::laws::hencky::Hencky;
 use super::tensor::eigen::Symmetric;
@@ -75,8 +75,8 @@ pub struct Step {
     pub plane: bool,
     /// Edge of the cells on which the particles move, m: what bounds the step of viscous flow.
     pub cell: f64,
-    /// Edge of the cells that each particle was made for, m: what softening is regularised with. 0: no cells. Set
-    /// only for models that ask for it ([`Material::softens`]).
+    /// Edge of the cells that each particle was made for, m: what softening is regularised with. 0: no cells.
+    /// Set only for models that ask for it ([`Material::softens`]).
     pub size: [f64; LANES],
 }
 
@@ -89,7 +89,8 @@ impl Step {
 
 /// A constitutive model for the registers of any instruction set. [`Material`] follows from it.
 ///
-/// Each lane is computed from that lane alone, so the bits of a particle do not depend on its neighbours in the batch.
+/// Each lane is computed from that lane alone, so the bits of a particle do not depend on its neighbours in
+/// the batch.
 pub trait Law: std::fmt::Debug + Send + Sync {
     /// History columns that it reads and writes; 0 for laws without history.
     const HISTORIES: usize = 0;
@@ -141,7 +142,8 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         None
     }
 
-    /// See [`Material::strain_under`]. By default that of [`Law::solid`]; without either, no body of this law can start under stress.
+    /// See [`Material::strain_under`]. By default that of [`Law::solid`]; without either, no body of this law
+    /// can start under stress.
     fn strain_under(
         &self,
         stress: [f64; 3],
@@ -162,8 +164,8 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// From the trial elastic tensor to the final one, stress, history, work and wave speed.
     fn update(&self, state: &mut State, step: &Step);
 
-    /// Elastic energy per reference volume, J/m³, of elastic tensor and history. `plane` says that the components xz and
-    /// yz of all tensors are zero.
+    /// Elastic energy per reference volume, J/m³, of elastic tensor and history. `plane` says that the
+    /// components xz and yz of all tensors are zero.
     fn energy(&self, state: &State, plane: bool) -> Lanes;
 
     /// Density of the undeformed material, kg/m³.
@@ -172,12 +174,13 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Greatest wave speed of the undeformed material, m/s.
     fn wave_speed(&self) -> f64;
 
-    /// How much faster waves of the undeformed material count on cells of edge `cell` (m), so that explicit viscous stress is
-    /// stable, m/s.
+    /// How much faster waves of the undeformed material count on cells of edge `cell` (m), so that explicit
+    /// viscous stress is stable, m/s.
     fn viscous_speed(&self, cell: f64) -> f64;
 
-    /// Names of the history variables in use, at most [`HISTORIES`]. The first, if there are any, is a measure of plastic
-    /// strain; the second, if there are two, the logarithm of the plastic volume ratio; more belong to the model.
+    /// Names of the history variables in use, at most [`HISTORIES`]. The first, if there are any, is a
+    /// measure of plastic strain; the second, if there are two, the logarithm of the plastic volume ratio;
+    /// more belong to the model.
     fn history_names(&self) -> &'static [&'static str];
 
     /// History variables of an undeformed particle.
@@ -186,15 +189,16 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Whether it asks for the size of cells ([`Step::size`]).
     fn softens(&self) -> bool;
 
-    /// Whether it is a fluid: its particles go where they will among each other, and its elastic state is its volume alone.
+    /// Whether it is a fluid: its particles go where they will among each other, and its elastic state is its
+    /// volume alone.
     fn is_fluid(&self) -> bool;
 
     /// Whether a fluid bears tension.
     fn bears_tension(&self) -> bool;
 
-    /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None` where there are none. The
-    /// volume is that of these strains and of the plastic volume in `history`, which holds the initial values; a law that is
-    /// consolidated changes them to what is asked for.
+    /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None`
+    /// where there are none. The volume is that of these strains and of the plastic volume in `history`,
+    /// which holds the initial values; a law that is consolidated changes them to what is asked for.
     fn strain_under(
         &self,
         stress: [f64; 3],

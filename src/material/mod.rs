@@ -3,12 +3,12 @@
 //! All models are isotropic, so the elastic left Cauchy-Green tensor `b = F_e F_eᵀ` is the whole
 //! elastic state. Plastic models map a trial `b` back to their yield surface in Hencky strains.
 //!
-//! | file | what it holds |
+//! | file | content |
 //! |---|---|
 //! | `law.rs` | state, step, and the traits of a model |
 //! | `initial.rs` | states under a given stress |
 //! | `laws/` | the models, one file each, and the list of them |
-//! | `parameters/` | what models share of their parameters: elastic constants, checks, reading them from text |
+//! | `parameters/` | parameters that models share: elastic constants, checks, reading from text |
 //! | `angle.rs` | angles of friction and dilation that may soften |
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |

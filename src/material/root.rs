@@ -8,8 +8,9 @@ const MOST: usize = 80;
 /// Relative change below which a lane has converged.
 const TOLERANCE: f64 = 4.0 * f64::EPSILON;
 
-/// A function of lanes. What captures more than a few numbers is a type of its own, with its method marked `inline(always)`, and not
-/// a closure: the compiler may make closures functions of their own, which lack the instructions of the kernel that calls them.
+/// A function of lanes. What captures more than a few numbers is a type of its own, with its method marked
+/// `inline(always)`, and not a closure: the compiler may make closures functions of their own, which lack the
+/// instructions of the kernel that calls them.
 pub(super) trait Function<V, R> {
     /// Its value.
     fn at(&self, x: V) -> R;
@@ -24,8 +25,9 @@ impl<V, R, F: Fn(V) -> R> Function<V, R> for F {
 
 /// The root of a decreasing function above 0, by Newton's method within a bracket.
 ///
-/// `function` gives value and slope; its value is positive at 0 and not positive at `high`. A value of at most `noise` counts as
-/// zero. The first point is `guess`, above 0 and at most `high`; lanes that are not `active` stay there.
+/// `function` gives value and slope; its value is positive at 0 and not positive at `high`. A value of at
+/// most `noise` counts as zero. The first point is `guess`, above 0 and at most `high`; lanes that are not
+/// `active` stay there.
 #[inline(always)]
 pub(super) fn newton<V: Vector>(
     function: impl Function<V, [V; 2]>,
@@ -59,11 +61,12 @@ pub(super) fn newton<V: Vector>(
     x
 }
 
-/// The root of a continuous function between 0 and `high`, where it has values of different signs, positive at 0: regula
-/// falsi in the form of Anderson and Björck (1973), with a bisection where three steps have not halved the bracket.
+/// The root of a continuous function between 0 and `high`, where it has values of different signs, positive
+/// at 0: regula falsi in the form of Anderson and Björck (1973), with a bisection where three steps have not
+/// halved the bracket.
 ///
-/// `at_zero` is the value at 0; that at `high` need not be known and counts as its negative. The first point is `guess`. A value of
-/// at most `noise` counts as zero. Lanes that are not `active` stay at 0.
+/// `at_zero` is the value at 0; that at `high` need not be known and counts as its negative. The first point
+/// is `guess`. A value of at most `noise` counts as zero. Lanes that are not `active` stay at 0.
 #[inline(always)]
 pub(super) fn bracketed<V: Vector>(
     function: impl Function<V, V>,

@@ -1,8 +1,8 @@
 //! Long arrays whose pages are their own.
 //!
-//! Pages come from the system zeroed when they are first touched and go back to it at once; an array that grows
-//! takes its pages along without a copy. `unsafe` is needed for the latter: other references could still point to the
-//! old place. Nothing here hands out any that outlive a change.
+//! Pages come from the system zeroed when they are first touched and go back to it at once; an array that
+//! grows takes its pages along without a copy. `unsafe` is needed for the latter: other references could
+//! still point to the old place. Nothing here hands out any that outlive a change.
 #![allow(unsafe_code)]
 
 use std::ops::{Deref, DerefMut};
@@ -38,8 +38,8 @@ impl<T: Pod> Block<T> {
         Self(Memory::Heap(vec![T::zeroed(); len]))
     }
 
-    /// Makes it `len` long. The first elements, as many as there are before and after, stay as they are; others hold
-    /// anything.
+    /// Makes it `len` long. The first elements, as many as there are before and after, stay as they are;
+    /// others hold anything.
     pub fn resize(&mut self, len: usize) {
         let bytes = len * size_of::<T>();
         match &mut self.0 {
@@ -50,8 +50,8 @@ impl<T: Pod> Block<T> {
             }
             #[cfg(target_os = "linux")]
             Memory::Pages(pages) if bytes >= PAGES_FROM => {
-                // SAFETY: `self` is borrowed exclusively, so that nothing refers to the old place; and there is no file
-                // behind the pages that could be cut short.
+                // SAFETY: `self` is borrowed exclusively, so that nothing refers to the old place; and there
+                // is no file behind the pages that could be cut short.
                 let moved = unsafe { pages.remap(bytes, RemapOptions::new().may_move(true)) };
                 if moved.is_err() {
                     self.replace(len);

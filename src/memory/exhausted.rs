@@ -10,8 +10,8 @@ thread_local! {
     static MAY_FAIL: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The system's allocator. Where it has no memory left the program says so and ends with exit code 1: an abort, as by default, would have MPI
-/// print a backtrace.
+/// The system's allocator. Where it has no memory left the program says so and ends with exit code 1: an
+/// abort, as by default, would have MPI print a backtrace.
 #[derive(Debug)]
 pub struct Allocator;
 

@@ -41,7 +41,8 @@ fn address_space(text: &str) -> f64 {
     soft.unwrap_or(f64::INFINITY)
 }
 
-/// The least limit of the control groups of this process and of those around them; `text` is `/proc/self/cgroup`.
+/// The least limit of the control groups of this process and of those around them; `text` is
+/// `/proc/self/cgroup`.
 fn groups(text: &str, root: &Path) -> f64 {
     let mut least = f64::INFINITY;
     for line in text.lines() {

@@ -23,7 +23,8 @@ pub enum Motion {
 }
 
 impl Followed {
-    /// Columns of the pressure of contact, of the total strain (see [`strain`]), and of the displacement, in their order.
+    /// Columns of the pressure of contact, of the total strain (see [`strain`]), and of the displacement, in
+    /// their order.
     pub fn columns<const D: usize>(self) -> [usize; 3] {
         let [strain, displacement] = match self.motion {
             Motion::Nothing => [0, 0],
@@ -33,7 +34,8 @@ impl Followed {
         [usize::from(self.contact_pressure), strain, displacement]
     }
 
-    /// First columns of the same among `carried` columns, of which they are the last; `None` for what particles do not carry.
+    /// First columns of the same among `carried` columns, of which they are the last; `None` for what
+    /// particles do not carry.
     pub fn first_columns<const D: usize>(self, carried: usize) -> [Option<usize>; 3] {
         let columns = self.columns::<D>();
         let behind = |which: usize| columns[which..].iter().sum::<usize>();

@@ -1,10 +1,12 @@
 //! Total strain of a particle, elastic and plastic, since it came.
 //!
-//! Particles carry `e = b - 1` with the total left Cauchy-Green tensor `b = F Fᵀ`, so that small strains keep their digits. A step with
-//! the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In plane strain no component out of the plane changes.
+//! Particles carry `e = b - 1` with the total left Cauchy-Green tensor `b = F Fᵀ`, so that small strains keep
+//! their digits. A step with the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In
+//! plane strain no component out of the plane changes.
 //!
-//! Material that is stirred without end is strained without end. Components of e stop at [`GREATEST`], and the least stretch is not taken
-//! below what rounding leaves of it beside the greatest: strains stay finite for any motion.
+//! Material that is stirred without end is strained without end. Components of e stop at [`GREATEST`], and
+//! the least stretch is not taken below what rounding leaves of it beside the greatest: strains stay finite
+//! for any motion.
 use super::chunk::Chunk;
 use crate::material::tensor::eigen::decompose;
 use crate::simd::{Lanes, Vector};
@@ -69,8 +71,9 @@ pub fn tensor(dimension: usize, e: &Components) -> [f64; 6] {
     }
 }
 
-/// Logarithmic (Hencky) strain `½ ln(1 + e)`, components xx, yy, zz, xy, yz, xz as VTK orders them. Where the greatest principal stretch is
-/// more than 1e8 times the least, rounding has left nothing of the latter, and it is at most approximate.
+/// Logarithmic (Hencky) strain `½ ln(1 + e)`, components xx, yy, zz, xy, yz, xz as VTK orders them. Where the
+/// greatest principal stretch is more than 1e8 times the least, rounding has left nothing of the latter, and
+/// it is at most approximate.
 pub fn logarithmic(dimension: usize, e: &Components) -> [f64; 6] {
     let [xx, yy, zz, xy, xz, yz] = match dimension {
         2 => [e[0], e[1], 0.0, e[2], 0.0, 0.0],
@@ -119,8 +122,8 @@ mod tests {
         assert!((radius - libm::asinh(0.5 * k)).abs() < 1e-14 && (strain[0] + strain[1]).abs() < 1e-14);
     }
 
-    /// Plane strain that is sheared to and fro by unlike amounts, as stirred sand is: strains stay finite, and symmetric as long as rounding
-    /// leaves the least stretch.
+    /// Plane strain that is sheared to and fro by unlike amounts, as stirred sand is: strains stay finite,
+    /// and symmetric as long as rounding leaves the least stretch.
     #[test]
     fn what_is_stirred_without_end_has_finite_strains() {
         let mut e = [0.0; 6];

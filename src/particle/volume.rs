@@ -34,13 +34,15 @@ pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     reference_volume(chunk, p) * volume_ratio(chunk, p)
 }
 
-/// Greatest det F with which volume counts where it is measured: that of a box that is stretched as far as the solver stretches boxes by
-/// default, twice along each axis. What flies alone, with nothing around that its det F could fill, may have one of thousands.
+/// Greatest det F with which volume counts where it is measured: that of a box that is stretched as far as
+/// the solver stretches boxes by default, twice along each axis. What flies alone, with nothing around that
+/// its det F could fill, may have one of thousands.
 fn greatest_ratio<const D: usize>() -> f64 {
     (0..D).fold(1.0, |product, _| 2.0 * product)
 }
 
-/// Volume of a particle where it is measured, m³; in plane strain of one metre of thickness. A det F that is no number counts as 1.
+/// Volume of a particle where it is measured, m³; in plane strain of one metre of thickness. A det F that is
+/// no number counts as 1.
 pub fn measured_volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     let ratio = volume_ratio(chunk, p);
     reference_volume(chunk, p) * if ratio.is_nan() { 1.0 } else { ratio.min(greatest_ratio::<D>()) }

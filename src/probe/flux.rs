@@ -1,7 +1,8 @@
 //! Fluxes: the mass that has passed a plane, or left through a face of the domain.
 //!
-//! The mass beyond a plane, with what has left the domain beyond it, less the mass beyond it at the start: each is an exact sum, so
-//! inside and outside make up the whole. At an opening, a part of a plane, masses are summed up as particles cross.
+//! The mass beyond a plane, with what has left the domain beyond it, less the mass beyond it at the start:
+//! each is an exact sum, so inside and outside make up the whole. At an opening, a part of a plane, masses
+//! are summed up as particles cross.
 
 /// Where mass is counted.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +16,8 @@ pub struct Flux {
 /// A plane, an opening in it, or a face of the domain. Components along z are 0 in plane strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Section {
-    /// A plane through a point (m from the lower corner of the domain); what lies where the normal points is beyond.
+    /// A plane through a point (m from the lower corner of the domain); what lies where the normal points is
+    /// beyond.
     Plane {
         /// The point, m.
         point: [f64; 3],
@@ -41,7 +43,8 @@ pub enum Section {
 }
 
 impl Section {
-    /// Whether a place in or out of the domain lies beyond a whole plane; nothing in the domain lies beyond a face.
+    /// Whether a place in or out of the domain lies beyond a whole plane; nothing in the domain lies beyond a
+    /// face.
     pub fn is_beyond(&self, x: &[f64]) -> bool {
         match self {
             Self::Plane { point, normal } => distance(x, point, normal) > 0.0,
@@ -49,7 +52,8 @@ impl Section {
         }
     }
 
-    /// Whether a way between two places (m) leads through an opening: 1 in the direction of its normal, -1 against it, else 0.
+    /// Whether a way between two places (m) leads through an opening: 1 in the direction of its normal, -1
+    /// against it, else 0.
     pub fn passes(&self, from: &[f64], to: &[f64]) -> f64 {
         let Self::Opening { point, normal, bounds: [lower, upper] } = self else { return 0.0 };
         let [start, end] = [from, to].map(|x| distance(x, point, normal));

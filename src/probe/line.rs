@@ -58,7 +58,8 @@ impl Sampled {
     }
 }
 
-/// What there is about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the edge of a cell.
+/// What there is about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the
+/// edge of a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const D: usize> {
     /// Level of the finest leaf that holds the point.
@@ -90,7 +91,8 @@ impl<const D: usize> Line<D> {
         columns
     }
 
-    /// The values of a row: those of one point, counted from 1. `origin` is the lower corner of the domain, m.
+    /// The values of a row: those of one point, counted from 1. `origin` is the lower corner of the domain,
+    /// m.
     pub fn values(&self, point: usize, sample: &Sample<D>, origin: &[f64]) -> Vec<f64> {
         let mut values = vec![(point + 1) as f64];
         values.extend((0..D).map(|a| origin[a] + self.points[point][a]));
@@ -110,7 +112,8 @@ impl<const D: usize> Line<D> {
 mod tests {
     use super::*;
 
-    /// Particles in the middle of the quarters of cells, each with the volume of a quarter: the weights about any point add up to one cell.
+    /// Particles in the middle of the quarters of cells, each with the volume of a quarter: the weights about
+    /// any point add up to one cell.
     #[test]
     fn weights_add_up_to_a_cell() {
         let places = (0..40).flat_map(|i| (0..40).map(move |j| [i, j].map(|c| 0.125 + 0.25 * f64::from(c))));

@@ -74,7 +74,8 @@ pub enum Measured {
     Extent,
 }
 
-/// Names and units of the columns of quantities, in the order of [`values`]. `suffix` follows the stem of each name.
+/// Names and units of the columns of quantities, in the order of [`values`]. `suffix` follows the stem of
+/// each name.
 pub fn columns<const D: usize>(quantities: &[Measured], suffix: &str) -> Vec<(String, &'static str)> {
     quantities.iter().flat_map(|quantity| quantity.columns::<D>(suffix)).collect()
 }

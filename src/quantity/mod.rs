@@ -6,7 +6,8 @@
 //! | `record.rs` | tables over time from files of comma-separated values |
 //! | `table.rs` | tables over time, linear between rows |
 //!
-//! Knows no particles and no jobs. Values are the same on every machine: `libm` computes all elementary functions.
+//! Knows no particles and no jobs. Values are the same on every machine: `libm` computes all elementary
+//! functions.
 mod expression;
 pub mod record;
 mod table;
@@ -41,8 +42,8 @@ impl From<[f64; 3]> for Place {
     }
 }
 
-/// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job, where quantities are taken; z is 0 in
-/// plane strain.
+/// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job,
+/// where quantities are taken; z is 0 in plane strain.
 pub fn in_job<const D: usize>(origin: &[f64; D], x: &[f64; D]) -> [f64; 3] {
     std::array::from_fn(|a| if a < D { origin[a] + x[a] } else { 0.0 })
 }

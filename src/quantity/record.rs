@@ -1,8 +1,8 @@
 //! Tables over time from files, such as records of earthquakes.
 //!
-//! Cells are separated by semicolons, tabs or commas, whichever the first line has, or else by spaces; lines that begin with `#` are
-//! remarks. The first line may hold names. Records of the PEER database, values at a constant step without times, are known by their
-//! header: see `peer`.
+//! Cells are separated by semicolons, tabs or commas, whichever the first line has, or else by spaces; lines
+//! that begin with `#` are remarks. The first line may hold names. Records of the PEER database, values at a
+//! constant step without times, are known by their header: see `peer`.
 use std::path::Path;
 
 mod peer;
@@ -149,7 +149,8 @@ enum Cells {
 }
 
 impl Cells {
-    /// As the first line with something to read says: at semicolons, tabs or commas if it has some, else at spaces.
+    /// As the first line with something to read says: at semicolons, tabs or commas if it has some, else at
+    /// spaces.
     fn of(bytes: &[u8]) -> Self {
         let first = bytes.split(|&byte| byte == b'\n').find(|text| holds_cells(text)).unwrap_or_default();
         b";\t,".iter().find(|separator| first.contains(separator)).map_or(Self::Spaces, |at| Self::At(*at))
@@ -203,7 +204,8 @@ fn find_columns(first: &[Vec<u8>], columns: &[Column], line: u64) -> Result<(Vec
     Ok((places, is_header))
 }
 
-/// Place of a name: as it is written, or else in letters of either case and without a unit in brackets after it.
+/// Place of a name: as it is written, or else in letters of either case and without a unit in brackets after
+/// it.
 fn named(first: &[Vec<u8>], name: &str) -> Option<usize> {
     let is_like = |cell: &Vec<u8>| {
         let bare = cell.split(|byte| matches!(byte, b'[' | b'(')).next().unwrap_or_default().trim_ascii();
@@ -250,8 +252,8 @@ mod tests {
         parse(text.as_bytes(), &Column::Number(1), &Column::Number(2), 1.0)
     }
 
-    /// One record written as programs write it: with names or without, with commas, semicolons or tabs, with remarks, blank lines,
-    /// quotes, ends of lines of Windows and a mark of the order of bytes.
+    /// One record written as programs write it: with names or without, with commas, semicolons or tabs, with
+    /// remarks, blank lines, quotes, ends of lines of Windows and a mark of the order of bytes.
     #[test]
     fn forms_of_one_record_give_one_table() {
         let table = Table::new(&[(0.0, 1.0), (0.5, -2e-3), (1.0, 4.0)]).unwrap();

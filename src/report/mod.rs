@@ -42,7 +42,8 @@ const STYLE: &str = include_str!("page.css");
 /// What goes into a page.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Quantity that colours the pictures, as for `agimp plot`; `None` for plastic strain if there is any, else the speed.
+    /// Quantity that colours the pictures, as for `agimp plot`; `None` for plastic strain if there is any,
+    /// else the speed.
     pub colour: Option<String>,
     /// Most pictures: times from the first output to the last.
     pub pictures: usize,

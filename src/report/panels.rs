@@ -59,8 +59,8 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
 ];
 /// Charts with a logarithmic axis.
 const LOGARITHMIC: [&str; 2] = ["peak_speed", "unbalanced_acceleration"];
-/// Starts of names: what stands before the name of a load, probe, collider; the longest first where one is the start of
-/// another.
+/// Starts of names: what stands before the name of a load, probe, collider; the longest first where one is
+/// the start of another.
 const STEMS: [(&str, &str); 26] = [
     ("angular_momentum", "Angular momentum"),
     ("contact_work", "Work of contact"),

@@ -17,8 +17,8 @@ use crate::job::Problem;
 /// How long a run waits for one that is ending: ranks that were killed need a moment.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// The lock of a run, `JOB.lock` in its directory. Rank 0 holds it; other ranks have an empty one. It ends with the
-/// process, however that ends, so that a file left by a crash is in nobody's way.
+/// The lock of a run, `JOB.lock` in its directory. Rank 0 holds it; other ranks have an empty one. It ends
+/// with the process, however that ends, so that a file left by a crash is in nobody's way.
 #[derive(Debug, Default)]
 pub(super) struct Claim(Option<Held>);
 
@@ -41,11 +41,12 @@ pub(crate) enum Refusal {
 }
 
 impl Claim {
-    /// Collective. Takes the lock unless this run has it already. Where the directory is not there yet, nothing is
-    /// made, and there is nothing to lock.
+    /// Collective. Takes the lock unless this run has it already. Where the directory is not there yet,
+    /// nothing is made, and there is nothing to lock.
     ///
     /// # Errors
-    /// Another run has the lock, its file cannot be written, or some rank does not see it; the same on all ranks.
+    /// Another run has the lock, its file cannot be written, or some rank does not see it; the same on all
+    /// ranks.
     pub(super) fn take<const D: usize>(&mut self, comm: &Comm, problem: &Problem<D>) -> Result<(), RunError> {
         let directory = &problem.output.directory;
         let path = directory.join(format!("{}.lock", problem.name));
@@ -68,8 +69,8 @@ impl Claim {
     }
 }
 
-/// Collective. Refuses a directory in which some rank does not see the lock that rank 0 has taken: one that is not on a file system of
-/// all hosts.
+/// Collective. Refuses a directory in which some rank does not see the lock that rank 0 has taken: one that
+/// is not on a file system of all hosts.
 fn expect_shared(comm: &Comm, directory: &Path, lock: &Path) -> Result<(), RunError> {
     let started = Instant::now();
     let mut is_seen = lock.exists();
@@ -91,8 +92,8 @@ fn expect_shared(comm: &Comm, directory: &Path, lock: &Path) -> Result<(), RunEr
 
 impl Drop for Held {
     fn drop(&mut self) {
-        // While it is locked, so that no other run has taken it. It may be gone with its directory; then nothing is left
-        // to do.
+        // While it is locked, so that no other run has taken it. It may be gone with its directory; then
+        // nothing is left to do.
         if is_at(&self.file, &self.path) {
             let _ = std::fs::remove_file(&self.path);
         }
@@ -111,7 +112,8 @@ pub(crate) fn lock(path: &Path, what: &'static str) -> Result<Held, Refusal> {
         options.read(true).write(true).create(true).truncate(false).custom_flags(libc::O_NOFOLLOW);
         let mut file = options.open(path).map_err(failed("create"))?;
         match file.try_lock() {
-            // The run that had it may have removed it meanwhile; then another may lock the next file of that name.
+            // The run that had it may have removed it meanwhile; then another may lock the next file of that
+            // name.
             Ok(()) if !is_at(&file, path) => continue,
             Ok(()) => {}
             Err(TryLockError::WouldBlock) if started.elapsed() < PATIENCE => {

@@ -45,7 +45,8 @@ impl Cores {
         (self.host / self.ranks).clamp(1, self.own.max(1))
     }
 
-    /// Collective. A warning if a machine has more threads than cores, or a rank more than it is bound to; the same on all ranks.
+    /// Collective. A warning if a machine has more threads than cores, or a rank more than it is bound to;
+    /// the same on all ranks.
     pub fn shared(&self, comm: &Comm, threads: usize) -> Option<String> {
         let here = comm.host_sum_u64(threads as u64);
         let mut excess = [here.saturating_sub(self.host as u64), threads.saturating_sub(self.own) as u64];

@@ -52,8 +52,8 @@ impl<const D: usize> Run<'_, D> {
         Ok(Some(path))
     }
 
-    /// Collective. Writes the next output. One that `is_due` by its time keeps its number; any other is written because the
-    /// run ends here, and the next output of a run that goes on takes its place.
+    /// Collective. Writes the next output. One that `is_due` by its time keeps its number; any other is
+    /// written because the run ends here, and the next output of a run that goes on takes its place.
     pub(super) fn write_output(&mut self, is_due: bool) -> Result<(), RunError> {
         let start = Instant::now();
         let step = Some(self.solver.clock.step);
@@ -93,8 +93,8 @@ impl<const D: usize> Run<'_, D> {
         })
     }
 
-    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it implies are
-    /// on disk before.
+    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it
+    /// implies are on disk before.
     pub(super) fn settle(&mut self, wait: bool) -> Result<(), RunError> {
         if self.outputs.is_pending() && (wait || self.outputs.is_on_disk(self.comm)) {
             let synced = self.comm.agree(self.recorder.sync());

@@ -40,9 +40,9 @@ const COLUMNS: [Column<'static>; 20] = [
     column("left_mass", "kg"),
 ];
 
-/// Names and units of the columns after the step. What a job has adds its own in this order: splits and merges of dynamic
-/// refinement; the work of the shift of fluids; the way to equilibrium; the number of the stage, from 1; loads; contacts between bodies; probes; tracks;
-/// fluxes; faces of the domain; colliders.
+/// Names and units of the columns after the step. What a job has adds its own in this order: splits and
+/// merges of dynamic refinement; the work of the shift of fluids; the way to equilibrium; the number of the
+/// stage, from 1; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -171,7 +171,8 @@ pub fn row(
     ]
 }
 
-/// The values of a row that are of one load or contact between bodies: the force, if it has one, and the work.
+/// The values of a row that are of one load or contact between bodies: the force, if it has one, and the
+/// work.
 pub fn force_and_work<const D: usize>(totals: &ForceAndWork, has_force: bool) -> impl Iterator<Item = f64> {
     let ForceAndWork { force, work } = *totals;
     force.into_iter().take(if has_force { D } else { 0 }).chain([work])

@@ -181,8 +181,8 @@ impl<'a, const D: usize> Run<'a, D> {
         })
     }
 
-    /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to meet the
-    /// end, so that a run to a later end takes the same steps.
+    /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to
+    /// meet the end, so that a run to a later end takes the same steps.
     fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
         while !self.is_over() {
             if self.stage_is_over() {
@@ -217,8 +217,8 @@ impl<'a, const D: usize> Run<'a, D> {
         self.is_settled() || self.solver.clock.time - begun >= duration
     }
 
-    /// Not collective. When the stage or the run ends or an output is due, s, after the present time: bounds steps without material,
-    /// which nothing else does.
+    /// Not collective. When the stage or the run ends or an output is due, s, after the present time: bounds
+    /// steps without material, which nothing else does.
     fn next_event(&self) -> f64 {
         let (time, physics) = (self.solver.clock.time, &self.solver.physics);
         let begun = physics.stage_starts.last().copied().unwrap_or(0.0);
@@ -292,8 +292,8 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Not collective. Leaves word of why a run ends ahead of its time, on rank 0. The user is told in any case, so a failure to
-    /// write it is none of the run.
+    /// Not collective. Leaves word of why a run ends ahead of its time, on rank 0. The user is told in any
+    /// case, so a failure to write it is none of the run.
     fn note_end(&self, outcome: &Result<Outcome, RunError>) {
         let Clock { step, time, .. } = self.solver.clock;
         let ending = match outcome {

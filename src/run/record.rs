@@ -48,8 +48,8 @@ fn on_all_ranks(comm: &Comm, known: Option<u64>) -> Option<u64> {
 }
 
 impl<'a, const D: usize> Recorder<'a, D> {
-    /// Collective. Opens new files, or goes on with those that an earlier part of the run has left, with the rows of the
-    /// history that are `kept`.
+    /// Collective. Opens new files, or goes on with those that an earlier part of the run has left, with the
+    /// rows of the history that are `kept`.
     pub fn open(
         comm: &Comm,
         problem: &'a Problem<D>,
@@ -180,7 +180,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Not collective. Brings what is written to disk: a state that gets its name now says which row was the last.
+    /// Not collective. Brings what is written to disk: a state that gets its name now says which row was the
+    /// last.
     pub fn sync(&self) -> Result<(), FileError> {
         self.history.iter().chain(&self.lines).try_for_each(History::sync)?;
         self.telemetry.as_ref().map_or(Ok(()), Telemetry::sync)
@@ -201,8 +202,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok((grid, solver.particle_totals()))
     }
 
-    /// Collective. Makes the values of the last row known for the report, also where an earlier part of the run has written it. If
-    /// its file has lost it, they are measured anew, and means over the time since an earlier row are 0.
+    /// Collective. Makes the values of the last row known for the report, also where an earlier part of the
+    /// run has written it. If its file has lost it, they are measured anew, and means over the time since an
+    /// earlier row are 0.
     pub fn recall_row(&mut self, comm: &Comm, solver: &mut Solver<D>) -> Result<(), RunError> {
         if comm.any(self.history.is_some() && self.last_values.is_empty()) {
             let (grid, particles) = self.totals(comm, solver)?;
@@ -368,7 +370,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         count.map_or(0, |(_, count)| *count as u64)
     }
 
-    /// Not collective. Writes the report of the run, on rank 0. All results are on disk by now, so a failure is only a warning.
+    /// Not collective. Writes the report of the run, on rank 0. All results are on disk by now, so a failure
+    /// is only a warning.
     pub fn report(&mut self, solver: &Solver<D>, summary: &Summary) {
         if self.history.is_none() {
             return;

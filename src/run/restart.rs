@@ -243,8 +243,8 @@ fn restore_colliders<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) 
     Some(())
 }
 
-/// Collective. Reads the state and spreads it over the ranks. Of the files that `--restart latest` may mean, the latest is
-/// taken that is whole; a warning names what is passed over.
+/// Collective. Reads the state and spreads it over the ranks. Of the files that `--restart latest` may mean,
+/// the latest is taken that is whole; a warning names what is passed over.
 ///
 /// # Errors
 /// There is no file, or none that can be trusted, or the run ends before it; the same on all ranks.
@@ -382,8 +382,8 @@ fn check_counts<const D: usize>(scalars: &Scalars) -> Result<(), String> {
     Ok(())
 }
 
-/// Collective. Refuses a file of another job, and says which keys differ. What else may be wrong with the file is found
-/// when it is read.
+/// Collective. Refuses a file of another job, and says which keys differ. What else may be wrong with the
+/// file is found when it is read.
 fn check_job<const D: usize>(comm: &Comm, problem: &Problem<D>, path: &Path) -> Result<(), String> {
     let found = if comm.rank() == 0 { differing_job(problem, path) } else { None };
     comm.agree(found.map_or(Ok(()), Err)).map_err(|disagreement| disagreement.message)
@@ -402,8 +402,8 @@ fn differing_job<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<St
     ))
 }
 
-/// The first keys that decide the state and differ between the job of a file and this one, in words. `None` if the file does not hold its job
-/// in a form that can be read.
+/// The first keys that decide the state and differ between the job of a file and this one, in words. `None`
+/// if the file does not hold its job in a form that can be read.
 pub(super) fn differing_keys<const D: usize>(problem: &Problem<D>, path: &Path) -> Option<String> {
     let found = job::differences([&snapshot::job_text(path)?, &problem.text])?;
     let mut reasons: Vec<String> = found.iter().take(MOST_KEYS).map(ToString::to_string).collect();
@@ -419,8 +419,9 @@ pub(super) fn differing_keys<const D: usize>(problem: &Problem<D>, path: &Path) 
 /// Keys that a message names.
 const MOST_KEYS: usize = 3;
 
-/// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and sends the list to the others. If
-/// there is none, a file of another job takes their place: the error says why it cannot be used.
+/// Collective. The files of the run that hold a state, the latest first. Rank 0 looks for them and sends the
+/// list to the others. If there is none, a file of another job takes their place: the error says why it
+/// cannot be used.
 fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathBuf>, RunError> {
     let directory = &problem.output.directory;
     let found = match comm.rank() {

@@ -95,15 +95,16 @@ fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Scene {
     Scene { solids: solids(&physics.colliders, &states, problem.origin), boxes: Some(boxes(&physics)) }
 }
 
-/// Not collective. The title of the job of the run that wrote an output, from the text in it; none if it has no title.
+/// Not collective. The title of the job of the run that wrote an output, from the text in it; none if it has
+/// no title.
 pub fn title_of(output: &Path) -> Option<String> {
     let job: toml::Table = snapshot::job_text(output)?.parse().ok()?;
     let title = job.get("title")?.as_str()?.trim();
     (!title.is_empty()).then(|| title.to_owned())
 }
 
-/// Not collective. The job of the run that wrote an output, from the text in it. Files that it names (meshes, records) lie
-/// beside the job file: `job`, or where the output says it is.
+/// Not collective. The job of the run that wrote an output, from the text in it. Files that it names (meshes,
+/// records) lie beside the job file: `job`, or where the output says it is.
 ///
 /// # Errors
 /// The output holds no job, or the job names files that are not found; why, in words.

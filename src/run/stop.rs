@@ -15,9 +15,9 @@ pub struct StopRequest(Arc<AtomicBool>);
 static LISTENING: Mutex<Option<StopRequest>> = Mutex::new(None);
 
 impl StopRequest {
-    /// Not collective. Listens from now on for SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU (the limit on processor time is near),
-    /// SIGHUP (the terminal has gone; not under `nohup`) and SIGINT, a second of which ends the process at once. To be
-    /// called as soon as the program starts: until then these signals end it.
+    /// Not collective. Listens from now on for SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU (the limit on processor
+    /// time is near), SIGHUP (the terminal has gone; not under `nohup`) and SIGINT, a second of which ends
+    /// the process at once. To be called as soon as the program starts: until then these signals end it.
     ///
     /// # Errors
     /// The operating system refuses.

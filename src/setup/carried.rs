@@ -1,9 +1,10 @@
-//! What particles carry for loads at the start: the surface that they stand for, and their shares of point forces.
+//! What particles carry for loads at the start: the surface that they stand for, and their shares of point
+//! forces.
 //!
-//! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box; where the box has none,
-//! since its centre is not in the body, to the first particle inwards. Bodies against each other have no surface between them, nor
-//! has a body one on a face of the domain. All follows from job and tree, so each rank finds what its own particles carry, in the
-//! same order on any partition.
+//! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box;
+//! where the box has none, since its centre is not in the body, to the first particle inwards. Bodies against
+//! each other have no surface between them, nor has a body one on a face of the domain. All follows from job
+//! and tree, so each rank finds what its own particles carry, in the same order on any partition.
 
 use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
@@ -22,13 +23,14 @@ use crate::particle::volume::reference_volume;
 use crate::solver::Solver;
 use crate::text::excerpt;
 
-/// How far from the surface of its shape a load still counts a point, as a share of the distance of particles.
+/// How far from the surface of its shape a load still counts a point, as a share of the distance of
+/// particles.
 const ROUNDING: f64 = 1e-9;
 /// Steps inwards in search of a particle, half the distance of particles each.
 const STEPS: u32 = 6;
 
-/// Collective. Gives particles that come with a stage what they carry for the loads of the job. They lie in the own leaves of the
-/// solver, which does not have them yet.
+/// Collective. Gives particles that come with a stage what they carry for the loads of the job. They lie in
+/// the own leaves of the solver, which does not have them yet.
 ///
 /// # Errors
 /// A load finds nothing to act on, and no body will come that could have it; the same on all ranks.
@@ -222,8 +224,8 @@ impl<const D: usize> Search<'_, D> {
     }
 }
 
-/// Adds shares to the columns of own particles. They are as they were made, so that `places` gives bodies and places in the lattice of those of
-/// a leaf in their order.
+/// Adds shares to the columns of own particles. They are as they were made, so that `places` gives bodies and
+/// places in the lattice of those of a leaf in their order.
 fn hand_out<const D: usize>(
     places: impl Fn(usize) -> Vec<(u16, [u64; D])>,
     chunks: &mut [Chunk<D>],

@@ -1,7 +1,8 @@
 //! Stress of bodies at the start.
 //!
-//! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along the vertical, this is its
-//! mean over each box, and the sums at the nodes are those of the exact integrals: level ground is at rest to round-off.
+//! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along
+//! the vertical, this is its mean over each box, and the sums at the nodes are those of the exact integrals:
+//! level ground is at rest to round-off.
 use partition::Octant;
 
 use super::seed::{SeedError, raster};
@@ -10,8 +11,9 @@ use crate::material::initial::{NoState, Stressed, under_stress, yielded};
 use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and the volume that they have is the one
-/// under stress: the reference volume is smaller or larger by what the stress does to it.
+/// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and the volume
+/// that they have is the one under stress: the reference volume is smaller or larger by what the stress does
+/// to it.
 ///
 /// # Errors
 /// A material cannot have the stress.
@@ -45,7 +47,8 @@ pub fn put_under_stress<const D: usize>(
     Ok(())
 }
 
-/// Not collective. Looks for stress that a material cannot have at some points of each body, before any particle is made.
+/// Not collective. Looks for stress that a material cannot have at some points of each body, before any
+/// particle is made.
 ///
 /// # Errors
 /// The first such point.
@@ -159,7 +162,8 @@ impl Up {
     }
 }
 
-/// What stands on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density, kg/m³.
+/// What stands on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density,
+/// kg/m³.
 #[derive(Clone, Debug, Default)]
 struct Standing(Vec<[f64; 3]>);
 

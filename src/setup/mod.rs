@@ -77,8 +77,8 @@ pub fn solver<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Solve
 /// Particles, leaves and leaves with particles of all ranks.
 pub type Size = [u64; 3];
 
-/// Collective. As [`solver`], unless `fits` refuses the size of a tree on the way there: then its refusal, before any
-/// particle of that tree is made.
+/// Collective. As [`solver`], unless `fits` refuses the size of a tree on the way there: then its refusal,
+/// before any particle of that tree is made.
 ///
 /// # Errors
 /// Two bodies overlap or one has no particle; the same on all ranks.
@@ -128,8 +128,8 @@ fn seeded<const D: usize>(
     Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 
-/// Collective. The particles that come with the stage of this physics, in the own leaves and under their stress, numbered from `first`
-/// on along the curve, so that no number depends on the partition.
+/// Collective. The particles that come with the stage of this physics, in the own leaves and under their
+/// stress, numbered from `first` on along the curve, so that no number depends on the partition.
 fn new_particles<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
@@ -159,8 +159,8 @@ fn new_particles<const D: usize>(
     Ok(chunks)
 }
 
-/// Collective. The tree that the job asks for before its criteria are looked at; level by level, so that `fits` may refuse it before it is
-/// there.
+/// Collective. The tree that the job asks for before its criteria are looked at; level by level, so that
+/// `fits` may refuse it before it is there.
 fn first_forest<const D: usize, R>(
     comm: &Comm,
     problem: &Problem<D>,

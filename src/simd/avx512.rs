@@ -4,8 +4,8 @@ use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use super::{EXPONENT_MAGIC, F64x4, FRACTION_BITS, LANES, ONE_BITS, TWO_52_BITS, Vector, VectorMask};
 use core::arch::x86_64::*;
 
-/// One number for each of [`LANES`] particles. Only [`super::widest`] names it, for kernels on processors that have
-/// the instructions.
+/// One number for each of [`LANES`] particles. Only [`super::widest`] names it, for kernels on processors
+/// that have the instructions.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(super) struct Wide(__m512d);

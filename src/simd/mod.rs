@@ -1,9 +1,9 @@
 //! Explicit vectors of `f64`: the only module of this crate with CPU intrinsics.
 //!
 //! [`F64x4`] is one AVX register where the build has AVX2 and FMA and an array of four numbers
-//! elsewhere. It holds a row of a node. [`LANES`] particles at a time make a [`Vector`]: two of them ([`Lanes`]), or one
-//! register of 512 bits where the processor has AVX-512 (see [`widest`]). All do the same IEEE 754 operations, each
-//! correctly rounded, so a result never depends on which of them was at work.
+//! elsewhere. It holds a row of a node. [`LANES`] particles at a time make a [`Vector`]: two of them
+//! ([`Lanes`]), or one register of 512 bits where the processor has AVX-512 (see [`widest`]). All do the same
+//! IEEE 754 operations, each correctly rounded, so a result never depends on which of them was at work.
 
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -38,7 +38,8 @@ mod lanes;
 #[cfg_attr(test, allow(unreachable_pub))]
 mod portable;
 
-/// Asks the processor to fetch the cache line at an address, which need not be valid; a hint without effect on results.
+/// Asks the processor to fetch the cache line at an address, which need not be valid; a hint without effect
+/// on results.
 #[inline(always)]
 pub fn prefetch(address: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -51,8 +52,8 @@ pub fn prefetch(address: usize) {
     let _ = address;
 }
 
-/// As [`prefetch`], but past the first level of the cache, where lines at the same place of their pages push each other
-/// out.
+/// As [`prefetch`], but past the first level of the cache, where lines at the same place of their pages push
+/// each other out.
 #[inline(always)]
 pub fn prefetch_to_second_level(address: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -111,9 +112,9 @@ pub trait Vector:
     fn split(self) -> (Self, Self);
     /// `2^self` of integers in `-1022..=1023`.
     fn power_of_two(self) -> Self;
-    /// To be called every fifty instructions or so where a kernel works on rows ([`F64x4`]) for long: processors that narrow
-    /// their units after some hundred instructions without registers of 512 bits wait when such registers come again
-    /// (see `docs/performance.md`). A hint without effect on results.
+    /// To be called every fifty instructions or so where a kernel works on rows ([`F64x4`]) for long:
+    /// processors that narrow their units after some hundred instructions without registers of 512 bits wait
+    /// when such registers come again (see `docs/performance.md`). A hint without effect on results.
     #[inline(always)]
     fn keep_wide() {}
     /// The lower and the upper four lanes.
@@ -121,8 +122,8 @@ pub trait Vector:
     /// Inverse of [`Vector::write_rows`].
     fn columns(rows: &[F64x4; LANES]) -> [Self; 4];
 
-    /// Four numbers for each particle become one row of four per particle. Writes row by row, as they are read: what is
-    /// stored and loaded in different pieces waits in the store queue.
+    /// Four numbers for each particle become one row of four per particle. Writes row by row, as they are
+    /// read: what is stored and loaded in different pieces waits in the store queue.
     #[inline(always)]
     fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
         let [x, y, z, w] = columns;
@@ -166,7 +167,8 @@ pub trait VectorMask<V>: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + N
     }
 }
 
-/// `map` of an array, which the compiler may not move out of line as it does with that of the standard library.
+/// `map` of an array, which the compiler may not move out of line as it does with that of the standard
+/// library.
 #[inline(always)]
 pub fn each<V: Vector, const N: usize>(mut values: [V; N], f: impl Fn(V) -> V) -> [V; N] {
     for value in &mut values {

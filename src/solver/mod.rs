@@ -1,7 +1,7 @@
 //! The time integration: one explicit step of the adaptive material point method.
 //!
-//! `Solver::advance` is the method, and `docs/time-step.md` goes through it; the rooms beside it hold its phases.
-//! [`Solver::step`] adds what is no physics: clock, measured costs and the reduction.
+//! `Solver::advance` is the method, and `docs/time-step.md` goes through it; the rooms beside it hold its
+//! phases. [`Solver::step`] adds what is no physics: clock, measured costs and the reduction.
 //!
 //! | room | what it holds, from the bottom up |
 //! |---|---|
@@ -47,8 +47,8 @@ use crate::solver::state::regrid_timers::RegridTimers;
 use crate::solver::state::relaxation::Relaxation;
 
 impl<const D: usize> Solver<D> {
-    /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state read
-    /// from a file `clock` is that of the file; for a new run it is the default.
+    /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state
+    /// read from a file `clock` is that of the file; for a new run it is the default.
     pub fn new(
         comm: &Comm,
         mut physics: Physics<D>,
@@ -103,8 +103,9 @@ impl<const D: usize> Solver<D> {
         solver
     }
 
-    /// Collective. Makes ready for the first step of particles as a job gives them: what transfers keep of their velocity gradients, and
-    /// the bound on the step. In each own leaf the first particles, as many as `done`, have had steps.
+    /// Collective. Makes ready for the first step of particles as a job gives them: what transfers keep of
+    /// their velocity gradients, and the bound on the step. In each own leaf the first particles, as many as
+    /// `done`, have had steps.
     fn start_from(&mut self, done: &[usize]) {
         // A box without a bin stops the first step, which says so.
         let _ = self.moments_from_affine(done);
@@ -112,11 +113,12 @@ impl<const D: usize> Solver<D> {
         self.clock.bound = self.comm.min_f64(self.local_bound());
     }
 
-    /// Collective. One time step, not beyond the time `end`, which has to be finite where no material bounds the step. Requests of any
-    /// rank are granted to all.
+    /// Collective. One time step, not beyond the time `end`, which has to be finite where no material bounds
+    /// the step. Requests of any rank are granted to all.
     ///
     /// # Errors
-    /// On all ranks when any rank failed, with that rank and its reason, or the step would not end at a later, finite time.
+    /// On all ranks when any rank failed, with that rank and its reason, or the step would not end at a
+    /// later, finite time.
     pub fn step(&mut self, end: f64, requests: Requests) -> Result<StepReport, Disagreement> {
         let left = end - self.clock.time;
         let dt = self.choose_dt(left);
@@ -136,7 +138,8 @@ impl<const D: usize> Solver<D> {
         self.close_step(advanced, requests).map(|report| StepReport { settled, ..report })
     }
 
-    /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s. `docs/time-step.md` goes through it.
+    /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s.
+    /// `docs/time-step.md` goes through it.
     fn advance(&mut self, to: f64, dt: f64) -> Result<Moved, StepError> {
         let mut rates = self.collider_rates(dt);
         let pushes = self.meet_bodies(&mut rates, dt);

@@ -47,7 +47,8 @@ pub struct Physics<const D: usize> {
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
-    /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where materials differ.
+    /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where
+    /// materials differ.
     pub fill_densities: Vec<Option<f64>>,
     /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
@@ -70,8 +71,9 @@ pub struct Equilibrium {
     pub speed: f64,
     /// Greatest root mean square of the unbalanced force per mass, m/s².
     pub acceleration: f64,
-    /// Mass scaling: level of the cells whose material moves with its own mass. On each finer level it moves with four times the mass, so
-    /// that all levels have the same longest step. `None`: all moves with its own.
+    /// Mass scaling: level of the cells whose material moves with its own mass. On each finer level it moves
+    /// with four times the mass, so that all levels have the same longest step. `None`: all moves with its
+    /// own.
     pub own_mass_level: Option<u8>,
 }
 
@@ -99,17 +101,20 @@ impl<const D: usize> Physics<D> {
         self.gravity.acceleration.iter().chain(loads).chain(faces).find_map(Quantity::not_finite)
     }
 
-    /// Gives colliders that deform the shape that they have at a time (s): that of a step is the one at its start.
+    /// Gives colliders that deform the shape that they have at a time (s): that of a step is the one at its
+    /// start.
     pub(crate) fn deform_colliders(&mut self, time: f64) {
         self.colliders.iter_mut().for_each(|collider| collider.deform(time));
     }
 
-    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of what has happened to them.
+    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of what has
+    /// happened to them.
     pub fn carried_columns(&self) -> usize {
         self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
     }
 
-    /// First columns of the pressure of contact, of the total strain and of the displacement, as far as particles carry them.
+    /// First columns of the pressure of contact, of the total strain and of the displacement, as far as
+    /// particles carry them.
     fn followed_columns(&self) -> [Option<usize>; 3] {
         self.followed.first_columns::<D>(self.carried_columns())
     }
@@ -125,7 +130,8 @@ impl<const D: usize> Physics<D> {
         self.followed_column() + self.followed.columns::<D>()[0]..self.carried_columns()
     }
 
-    /// First columns of tensors that follow the deformation, where particles carry them: stretch between neighbours, total strain.
+    /// First columns of tensors that follow the deformation, where particles carry them: stretch between
+    /// neighbours, total strain.
     pub(crate) fn tensor_columns(&self) -> Vec<usize> {
         let (loads, followed) = (self.load_columns(), self.followed_column());
         let gaps = (followed > loads).then_some(loads);
@@ -133,7 +139,8 @@ impl<const D: usize> Physics<D> {
         gaps.into_iter().chain(strain).collect()
     }
 
-    /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A power of four.
+    /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A
+    /// power of four.
     pub(crate) fn mass_scale(&self, level: u8) -> Option<f64> {
         let own = self.equilibrium?.own_mass_level?;
         Some(4.0_f64.powi(i32::from(level) - i32::from(own)))
@@ -149,7 +156,8 @@ impl<const D: usize> Physics<D> {
         self.materials.iter().any(|material| material.is_fluid())
     }
 
-    /// Whether fluids are kept in their volume: not with mass scaling, as the masses of nodes then say nothing of volumes.
+    /// Whether fluids are kept in their volume: not with mass scaling, as the masses of nodes then say
+    /// nothing of volumes.
     pub(in crate::solver) fn keeps_volumes(&self) -> bool {
         self.has_fluids() && !self.has_scaled_masses()
     }

@@ -27,8 +27,8 @@ impl<const D: usize> Solver<D> {
         if self.physics.adaptivity.is_some() { self.ledger.next_root } else { self.first_free_root() }
     }
 
-    /// Collective. Goes on with the physics of another stage after a change of the particles, and with the time step that these
-    /// allow.
+    /// Collective. Goes on with the physics of another stage after a change of the particles, and with the
+    /// time step that these allow.
     pub fn enter_stage(&mut self, physics: Physics<D>, change: Change<D>) {
         let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
         self.comm.sum_u64(&mut added);

@@ -30,8 +30,8 @@ pub(super) enum Part {
 }
 
 impl Column {
-    /// The columns for the fields asked for; by default for all that the files show but identifiers, of the velocity
-    /// its magnitude and of the stress nothing, as its measures are fields of their own.
+    /// The columns for the fields asked for; by default for all that the files show but identifiers, of the
+    /// velocity its magnitude and of the stress nothing, as its measures are fields of their own.
     pub(super) fn chosen(
         shown: &[PointField],
         asked: Option<&[PointField]>,
@@ -133,9 +133,9 @@ pub(super) fn sources(columns: &[Column]) -> Vec<PointField> {
 
 /// How the values of a column become whole numbers `0 ..= levels - 1`.
 ///
-/// Level `q` stands for `unit · sinh(low + q (high - low) / (levels - 1))`: near zero levels are equally far apart, far
-/// from it they are by equal factors. So one outlier does not make all other values the same level. Whole numbers are
-/// kept as they are, from `low` on.
+/// Level `q` stands for `unit · sinh(low + q (high - low) / (levels - 1))`: near zero levels are equally far
+/// apart, far from it they are by equal factors. So one outlier does not make all other values the same
+/// level. Whole numbers are kept as they are, from `low` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     pub unit: f64,

@@ -7,8 +7,9 @@
 //! | `meta.rs` | what the page knows beside the numbers, as JSON |
 //! | `page/` | the page itself: HTML, style and scripts, which stand in the file as they are |
 //!
-//! Positions keep a 32nd of the smallest particle's half width; fields keep a given number of bits on a scale that is
-//! fine near zero (`columns::Scale`). Both are far below what a picture shows; `agimp export` has exact numbers.
+//! Positions keep a 32nd of the smallest particle's half width; fields keep a given number of bits on a scale
+//! that is fine near zero (`columns::Scale`). Both are far below what a picture shows; `agimp export` has
+//! exact numbers.
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -51,11 +52,12 @@ const SCRIPTS: [&str; 7] = [
     include_str!("page/main.js"),
 ];
 
-/// Not collective. Writes the particles and trees of `files`, in this order, to one HTML file. Returns its size in bytes.
+/// Not collective. Writes the particles and trees of `files`, in this order, to one HTML file. Returns its
+/// size in bytes.
 ///
 /// # Errors
-/// A file cannot be read or does not show a field that was asked for, or the HTML file cannot be written; it is then not
-/// there, or as it was.
+/// A file cannot be read or does not show a field that was asked for, or the HTML file cannot be written; it
+/// is then not there, or as it was.
 pub fn write(files: &[PathBuf], options: &Options, out: &Path) -> Result<u64, FileError> {
     let part = out.with_added_extension("part");
     let failed = |source| FileError::System { path: out.into(), action: "write", source };

@@ -1,8 +1,9 @@
 //! Numbers of a frame as few bytes.
 //!
-//! Particles are sorted along a space-filling curve, so that neighbours in the file are neighbours in space and differ
-//! little. Each column is a list of differences from number to number, modulo its range, with the sign in the lowest bit,
-//! as planes of bytes: all lowest bytes, then all next ones. This is what compresses best.
+//! Particles are sorted along a space-filling curve, so that neighbours in the file are neighbours in space
+//! and differ little. Each column is a list of differences from number to number, modulo its range, with the
+//! sign in the lowest bit, as planes of bytes: all lowest bytes, then all next ones. This is what compresses
+//! best.
 use std::io::Write as _;
 
 use flate2::Compression;

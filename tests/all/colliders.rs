@@ -1,5 +1,5 @@
-//! Colliders through the whole program: exact solutions of sliding, resting, pushing and falling, and the same bits
-//! on any ranks and threads and across restarts.
+//! Colliders through the whole program: exact solutions of sliding, resting, pushing and falling, and the
+//! same bits on any ranks and threads and across restarts.
 
 use std::path::Path;
 
@@ -51,11 +51,12 @@ fn blocks_slide_down_a_slope_as_coulomb_says() {
         let ((t0, v0), (t1, v1)) = (speed(0.05), speed(0.299));
         let (found, exact) = ((v1 - v0) / (t1 - t0), 9.81 * (sine - friction * cosine));
         println!("friction {friction}: {found:.4} m/s², exact {exact:.4}");
-        // Of the acceleration without friction: the block vibrates, and friction follows the momentary pressure.
+        // Of the acceleration without friction: the block vibrates, and friction follows the momentary
+        // pressure.
         assert!((found - exact).abs() < 0.01 * 9.81 * sine, "friction {friction}: {found} against {exact}");
     }
-    // It holds above tan(30 degrees) = 0.577. Near to that the block creeps while its vibrations unload it, the more the
-    // softer it is.
+    // It holds above tan(30 degrees) = 0.577. Near to that the block creeps while its vibrations unload it,
+    // the more the softer it is.
     let history = slide(1.0, 1e7);
     let speed = history.last("momentum_x") / history.last("mass");
     println!("friction 1: {speed:.2e} m/s after 0.3 s, free fall along the slope 1.27");
@@ -182,7 +183,8 @@ fn check_lists_colliders() {
     }
 }
 
-/// A table of motion in a file moves a collider as the same rows in the job, bit by bit; smooth motions go through their rows on cosines.
+/// A table of motion in a file moves a collider as the same rows in the job, bit by bit; smooth motions go
+/// through their rows on cosines.
 #[test]
 fn motions_come_from_files_and_start_smoothly() {
     let directory = tempfile::tempdir().expect("temporary directory");

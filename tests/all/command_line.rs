@@ -164,7 +164,8 @@ fn material_refuses_what_it_cannot_use_with_exit_code_2() {
     }
 }
 
-/// A directory with a finished run whose files show the velocity and no more, and one whose files carry the state.
+/// A directory with a finished run whose files show the velocity and no more, and one whose files carry the
+/// state.
 fn finished_run() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     let job = |directory: &str, output: &str| {
@@ -246,7 +247,8 @@ fn new_without_a_name_lists_the_templates() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean \"elastic_cubes\"?"));
 }
 
-/// Each template is written with the files that it names, checked, and does a few steps as it is; the schema lies beside it, where editors look.
+/// Each template is written with the files that it names, checked, and does a few steps as it is; the schema
+/// lies beside it, where editors look.
 #[test]
 fn templates_run_as_they_are() {
     let directory = tempfile::tempdir().unwrap();
@@ -598,8 +600,8 @@ fn settings_decide_what_is_run() {
     assert!(message.contains("`materials[0].young` is 3000000.0 there and 1000000.0 here"), "{message}");
 }
 
-/// `srun` is told the cores of a rank and how to start it; arguments of the script reach the program; after a requeue it goes on from the
-/// checkpoint, whatever they were.
+/// `srun` is told the cores of a rank and how to start it; arguments of the script reach the program; after a
+/// requeue it goes on from the checkpoint, whatever they were.
 #[test]
 fn the_script_for_slurm_passes_arguments_on() {
     use std::os::unix::fs::PermissionsExt as _;

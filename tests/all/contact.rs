@@ -1,5 +1,6 @@
-//! Colliders that act on particles: blocks on inclines, in narrow slots and on sheets without thickness, cylinders between plates and rolling, by their
-//! closed forms; momentum to round-off; same bits on any ranks and across restarts.
+//! Colliders that act on particles: blocks on inclines, in narrow slots and on sheets without thickness,
+//! cylinders between plates and rolling, by their closed forms; momentum to round-off; same bits on any ranks
+//! and across restarts.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -62,7 +63,8 @@ enum Incline {
 
 const ANGLE: f64 = std::f64::consts::FRAC_PI_6;
 
-/// A flat wedge below a plane that falls by 30 degrees along x from the height 0.6 m at x = 0.2 m, as a closed mesh in OBJ.
+/// A flat wedge below a plane that falls by 30 degrees along x from the height 0.6 m at x = 0.2 m, as a
+/// closed mesh in OBJ.
 fn wedge() -> String {
     let height = |x: f64| 0.6 - (x - 0.2) * ANGLE.tan();
     let mut text = String::new();
@@ -84,11 +86,12 @@ fn slope() -> String {
     )
 }
 
-/// Time over which the part of gravity along the incline grows, s: at once, it would set off waves that unload the block here and there.
+/// Time over which the part of gravity along the incline grows, s: at once, it would set off waves that
+/// unload the block here and there.
 const RAMP: f64 = 0.1;
 
-/// A block slides down an incline, after it has come to rest under the part of gravity across the incline. Returns history, direction down
-/// the slope and normal.
+/// A block slides down an incline, after it has come to rest under the part of gravity across the incline.
+/// Returns history, direction down the slope and normal.
 fn slide(dimension: usize, on: Incline, friction: f64) -> (History, Vec<f64>, Vec<f64>) {
     let (sine, cosine) = ANGLE.sin_cos();
     let last = dimension - 1;
@@ -113,7 +116,8 @@ fn slide(dimension: usize, on: Incline, friction: f64) -> (History, Vec<f64>, Ve
     let growing = |(p, d): (&f64, &f64)| format!("'{p} + {} * min(t / {RAMP}, 1)'", 9.81 * sine * d);
     let whole: Vec<String> = pressing.iter().zip(&down).map(growing).collect();
     let whole = whole.join(", ");
-    // Waves that are left unload the block the less the faster they are; close to the angle of friction that counts.
+    // Waves that are left unload the block the less the faster they are; close to the angle of friction that
+    // counts.
     let young = if friction == 0.5 { 1e8 } else { 1e7 };
     let (size, min, max, centre) = match dimension {
         2 => ("[1.6, 0.8]", "[0.2, 0.6]", "[0.5, 0.7]", "[0.2, 0.6]"),
@@ -203,7 +207,8 @@ fn blocks_slide_down_inclines_in_space() {
     blocks_slide_as_coulomb_says(3, &[Incline::Terrain], &[0.5]);
 }
 
-/// A block falls through a slot half a cell wider than itself, between thick walls and between sheets, and touches neither.
+/// A block falls through a slot half a cell wider than itself, between thick walls and between sheets, and
+/// touches neither.
 #[test]
 fn narrow_slots_let_blocks_fall_free() {
     let cell = 0.025;
@@ -226,7 +231,8 @@ fn narrow_slots_let_blocks_fall_free() {
     }
 }
 
-/// 10 m of water stand on a sheet without thickness, level or inclined, for 10,000 steps. None passes, and the sheet carries the weight.
+/// 10 m of water stand on a sheet without thickness, level or inclined, for 10,000 steps. None passes, and
+/// the sheet carries the weight.
 #[test]
 fn sheets_hold_water() {
     for angle in [0.0_f64, 20.0] {
@@ -260,8 +266,8 @@ fn sheets_hold_water() {
     }
 }
 
-/// A quarter of a cylinder of 40 cells radius is pressed by a plate: force and approach are those of Hertz (Johnson, Contact mechanics, 1985,
-/// section 5.6).
+/// A quarter of a cylinder of 40 cells radius is pressed by a plate: force and approach are those of Hertz
+/// (Johnson, Contact mechanics, 1985, section 5.6).
 #[test]
 fn cylinders_between_plates_are_those_of_hertz() {
     let (radius, young, poisson) = (40.0, 1e6, 0.3);
@@ -324,8 +330,8 @@ fn cylinders_slip_down_inclines() {
     }
 }
 
-/// Material, a collider that is hit and a floor of zero thickness across changes of level: what one gives the other takes, to round-off, and results
-/// do not depend on ranks and restarts.
+/// Material, a collider that is hit and a floor of zero thickness across changes of level: what one gives the
+/// other takes, to round-off, and results do not depend on ranks and restarts.
 #[test]
 fn momentum_balances_and_ranks_and_restarts_change_no_bit() {
     for dimension in [2, 3] {
@@ -387,8 +393,8 @@ fn momentum_balances_and_ranks_and_restarts_change_no_bit() {
     }
 }
 
-/// What begins inside a collider that acts on particles stays there at rest: no energy comes from nowhere. Under gravity it never has more than at the
-/// start.
+/// What begins inside a collider that acts on particles stays there at rest: no energy comes from nowhere.
+/// Under gravity it never has more than at the start.
 #[test]
 fn material_inside_a_collider_is_not_thrown_out() {
     let sill = "[[colliders]]\nname = 'sill'\nacts_on = 'particles'\nshape = { kind = 'circle', centre = [0.45, 0.05], radius = 0.08 }\n";

@@ -1,5 +1,5 @@
-//! Contact between bodies that deform, through the whole program: closed forms of impact and friction, a reference of finite elements, and
-//! the same results on any ranks and across restarts.
+//! Contact between bodies that deform, through the whole program: closed forms of impact and friction, a
+//! reference of finite elements, and the same results on any ranks and across restarts.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -28,8 +28,8 @@ fn history(job: &str) -> History {
     History::read(directory.path(), "block")
 }
 
-/// A block that falls between two others, half a cell from each, falls freely; so does one above a slab until the gap of a
-/// third of a cell has closed.
+/// A block that falls between two others, half a cell from each, falls freely; so does one above a slab until
+/// the gap of a third of a cell has closed.
 #[test]
 fn nothing_is_felt_before_a_gap_closes() {
     let slot = format!(
@@ -50,7 +50,8 @@ fn nothing_is_felt_before_a_gap_closes() {
     }
 }
 
-/// Two equal bars meet at 2 × 0.1 m/s: the stress between them is ρ c v, they part at 2 L / c with their velocities exchanged.
+/// Two equal bars meet at 2 × 0.1 m/s: the stress between them is ρ c v, they part at 2 L / c with their
+/// velocities exchanged.
 #[test]
 fn equal_bars_exchange_their_velocities() {
     let (sound, height) = (10.0, 0.0625);
@@ -90,8 +91,8 @@ fn equal_bars_exchange_their_velocities() {
     assert!((velocity + 0.1).abs() < 0.02 * 0.2, "{velocity}");
 }
 
-/// Two disks collide obliquely with friction 0.3, against finite elements: both momenta stay, and the disks leave with velocity and
-/// spin of the reference.
+/// Two disks collide obliquely with friction 0.3, against finite elements: both momenta stay, and the disks
+/// leave with velocity and spin of the reference.
 #[test]
 fn oblique_disks_leave_as_finite_elements_say() {
     let disk = |name: &str, x: f64, y: f64, v: f64| {
@@ -150,8 +151,8 @@ fn blocks_slide_on_slabs_as_coulomb_says() {
     }
 }
 
-/// A block that rests on a slab between slip walls presses on it with its weight, seen from both sides, also beside a level jump; away from
-/// the joint nothing presses.
+/// A block that rests on a slab between slip walls presses on it with its weight, seen from both sides, also
+/// beside a level jump; away from the joint nothing presses.
 #[test]
 fn the_pressure_of_contact_is_the_weight_above() {
     let job = format!(
@@ -184,7 +185,8 @@ fn the_pressure_of_contact_is_the_weight_above() {
     println!("within {worst}");
 }
 
-/// Blocks that meet obliquely beside a level jump, with splits, on any ranks and across a restart; a third one sticks to the second.
+/// Blocks that meet obliquely beside a level jump, with splits, on any ranks and across a restart; a third
+/// one sticks to the second.
 #[test]
 fn contact_does_not_depend_on_ranks() {
     for (transfer, dimension) in [("apic", 2), ("flip", 2), ("apic", 3)] {

@@ -1,4 +1,5 @@
-//! Displacements and total strains through the whole program, by closed forms: of falling and turning bodies, and of drawn metal.
+//! Displacements and total strains through the whole program, by closed forms: of falling and turning bodies,
+//! and of drawn metal.
 
 use std::path::Path;
 
@@ -104,8 +105,8 @@ fn displacements_of_a_turning_body() {
     assert!((part / all - ratio).abs() < 0.02, "{part} of {all}");
 }
 
-/// Material that a grip draws out at a constant rate while it crosses level jumps has the logarithm of its length as total strain, though
-/// its stress has long been at its limit; a stage may count it anew.
+/// Material that a grip draws out at a constant rate while it crosses level jumps has the logarithm of its
+/// length as total strain, though its stress has long been at its limit; a stage may count it anew.
 #[test]
 fn total_strain_of_drawn_metal_is_the_logarithm_of_its_length() {
     let job = FALL
@@ -142,8 +143,8 @@ fn total_strain_of_drawn_metal_is_the_logarithm_of_its_length() {
     assert!(strain.chunks(6).all(|strain| (strain[0] - 0.2).abs() < 5e-3), "{:?}", &strain[..6]);
 }
 
-/// A layer that is drawn out to four times its length, over a level jump: neighbours drift two cells apart, and with `split_gap` never one.
-/// Mass is kept to the last bit. The same on any ranks and across a restart.
+/// A layer that is drawn out to four times its length, over a level jump: neighbours drift two cells apart,
+/// and with `split_gap` never one. Mass is kept to the last bit. The same on any ranks and across a restart.
 #[test]
 fn drawn_layers_keep_no_gaps() {
     let job = |gap: &str| {
@@ -199,8 +200,8 @@ fn restarts_do_not_invent_displacements() {
     assert!(text(&output).contains("displacements"), "{}", text(&output));
 }
 
-/// Sand that a turning cylinder drags along is sheared beyond what rounding leaves of its least stretch: its strains stay finite, and that they are
-/// followed changes neither the run nor its end.
+/// Sand that a turning cylinder drags along is sheared beyond what rounding leaves of its least stretch: its
+/// strains stay finite, and that they are followed changes neither the run nor its end.
 #[test]
 fn strains_of_stirred_sand_end_no_run() {
     let job = |fields: &str| {

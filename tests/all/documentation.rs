@@ -1,13 +1,15 @@
 //! The papers are true: every command in them runs as it stands, and every link leads somewhere.
 //!
-//! A command is what stands in a fenced block `sh` of a Markdown file, or after `#` and five spaces in the comments of a
-//! file in `jobs/`. It runs in a copy of the repository where
+//! A command is what stands in a fenced block `sh` of a Markdown file, or after `#` and five spaces in the
+//! comments of a file in `jobs/`. It runs in a copy of the repository where
 //!
-//! * `target/release/agimp` is the program that cargo has built for the tests, and `cargo build` does nothing,
+//! * `target/release/agimp` is the program that cargo has built for the tests, and `cargo build` does
+//!   nothing,
 //! * jobs have one particle per cell and a hundredth of their time,
 //! * `sbatch` and `srun` run a script on two ranks of this machine.
 //!
-//! Comments before a block say what else differs (`common/papers.rs`). Tutorials run unabridged in `tutorials.rs`.
+//! Comments before a block say what else differs (`common/papers.rs`). Tutorials run unabridged in
+//! `tutorials.rs`.
 
 use crate::common::mpirun;
 use crate::common::papers;
@@ -88,7 +90,8 @@ impl Copy {
     }
 }
 
-/// A job with one particle per cell that ends after a hundredth of its time. Forces at points need the particles that they are for.
+/// A job with one particle per cell that ends after a hundredth of its time. Forces at points need the
+/// particles that they are for.
 fn shortened(job: &str) -> String {
     let mut short = String::new();
     let mut table = "";
@@ -279,7 +282,8 @@ fn links_lead_somewhere() {
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
 }
 
-/// What a link of a paper leads to, from the top of the repository; none for other sites and places in the paper itself.
+/// What a link of a paper leads to, from the top of the repository; none for other sites and places in the
+/// paper itself.
 fn target(paper: &Path, link: &str) -> Option<PathBuf> {
     let file = link.split('#').next().unwrap_or_default();
     if file.is_empty() || link.contains("://") || link.starts_with("mailto:") {
@@ -367,7 +371,8 @@ fn the_book_builds() {
     }
 }
 
-/// Each problem of the guide has a job that the program takes without a warning, and the words in code are keys, models or columns.
+/// Each problem of the guide has a job that the program takes without a warning, and the words in code are
+/// keys, models or columns.
 #[test]
 fn problems_of_practice_have_jobs_and_their_keys_are_there() {
     let page = text(Path::new("docs/guide/which-keys.md"));

@@ -1,5 +1,5 @@
-//! Equilibrium through the whole program: kinetic damping leads a column to its closed form and a slope to rest, the run ends there and
-//! says so, with the same bits on any ranks and across restarts.
+//! Equilibrium through the whole program: kinetic damping leads a column to its closed form and a slope to
+//! rest, the run ends there and says so, with the same bits on any ranks and across restarts.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -20,8 +20,8 @@ const SLOPE: &str = "{ kind = 'polygon', points = [[0, 0], [4, 0], [4, 0.5], [2.
                      stress = { kind = 'geostatic', k0 = 0.5 }";
 const SOIL: &str = "model = 'mohr_coulomb'\nyoung = 2e7\npoisson = 0.3\nfriction_angle = 35\ncohesion = 3e3";
 
-/// A column put under its weight at once comes to rest under the stress of the closed form: its elastic energy is
-/// (ρ g)² H³ / 6 M per area, with M = λ + 2μ.
+/// A column put under its weight at once comes to rest under the stress of the closed form: its elastic
+/// energy is (ρ g)² H³ / 6 M per area, with M = λ + 2μ.
 #[test]
 fn a_column_comes_to_rest_under_its_weight() {
     let job = text(
@@ -48,8 +48,8 @@ fn a_column_comes_to_rest_under_its_weight() {
     assert!((found / exact - 1.0).abs() < 0.02, "{found} for {exact}");
 }
 
-/// However fine the grid and whatever the Courant number, stops take energy out of all motions: a column that is put under its weight has
-/// at most the energy that this does, and rests soon.
+/// However fine the grid and whatever the Courant number, stops take energy out of all motions: a column that
+/// is put under its weight has at most the energy that this does, and rests soon.
 #[test]
 fn stops_feed_no_motion() {
     for cfl in [0.3, 0.4, 0.5] {
@@ -71,8 +71,8 @@ fn stops_feed_no_motion() {
     }
 }
 
-/// With mass scaling the column with a patch that is three levels finer has the same equilibrium, in steps that are eight times as long and so
-/// in fewer of them.
+/// With mass scaling the column with a patch that is three levels finer has the same equilibrium, in steps
+/// that are eight times as long and so in fewer of them.
 #[test]
 fn mass_scaling_leads_to_the_same_equilibrium_in_fewer_steps() {
     let column = |scaling: &str| {
@@ -102,8 +102,8 @@ fn mass_scaling_leads_to_the_same_equilibrium_in_fewer_steps() {
     assert_eq!(scaled.last("mass"), own.last("mass"));
 }
 
-/// A slope under the stress of level ground relaxes to below 1e-6 of the wave speed, 120 m/s, on any ranks and across restarts with the
-/// same bits; without the bounds met until the end, the run says that.
+/// A slope under the stress of level ground relaxes to below 1e-6 of the wave speed, 120 m/s, on any ranks
+/// and across restarts with the same bits; without the bounds met until the end, the run says that.
 #[test]
 fn a_slope_relaxes_with_the_same_bits_on_any_ranks_and_across_restart() {
     relaxes("");
@@ -122,8 +122,8 @@ fn relaxes(scaling: &str) {
     });
 }
 
-/// A beam under a pressure that follows it, which is stopped every few steps once it is near its equilibrium: steps stay as long as the material
-/// allows, the run comes to its end, and says what is left.
+/// A beam under a pressure that follows it, which is stopped every few steps once it is near its equilibrium:
+/// steps stay as long as the material allows, the run comes to its end, and says what is left.
 #[test]
 fn stops_do_not_shorten_the_steps() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [6.375, 5.625]\nroot_edge = 0.375\n[boundaries]\nx_min = { kind = 'sticky' }\n\

@@ -1,5 +1,6 @@
-//! The examples of `docs/extending.md`, followed word by word on a copy of the sources: the new material and the new criterion are in
-//! the schema, a job with them is checked, and the tests of the material pass with those of the other models.
+//! The examples of `docs/extending.md`, followed word by word on a copy of the sources: the new material and
+//! the new criterion are in the schema, a job with them is checked, and the tests of the material pass with
+//! those of the other models.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -49,7 +50,8 @@ fn extended(root: &Path) -> tempfile::TempDir {
     directory
 }
 
-/// Adds the file of an example to a folder, its module ahead of another one, and its line to the end of the list.
+/// Adds the file of an example to a folder, its module ahead of another one, and its line to the end of the
+/// list.
 fn add(root: &Path, folder: &str, name: &str, next: &str, list: &str) {
     let file = format!("{folder}/{name}.rs");
     std::fs::write(root.join(&file), block(&format!("<!-- file: {file} -->"))).expect("file");

@@ -1,5 +1,5 @@
-//! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is counted; material
-//! lets go of faces that pull; states that no material can have end the run.
+//! Faces of the domain through solver and program: what crosses them is put back, refused, or leaves and is
+//! counted; material lets go of faces that pull; states that no material can have end the run.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -22,8 +22,8 @@ fn block_far_from_the_origin(comm: &Comm) -> Solver<2> {
     setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A particle that rounding took through a wall is put back and counted, and the run goes on; further away it has left the
-/// domain, and the message has its place in the coordinates of the job.
+/// A particle that rounding took through a wall is put back and counted, and the run goes on; further away it
+/// has left the domain, and the message has its place in the coordinates of the job.
 #[test]
 fn rounding_takes_no_particle_out_of_the_domain() {
     let is_test = ran_if_launched(|comm| {
@@ -44,7 +44,8 @@ fn rounding_takes_no_particle_out_of_the_domain() {
     }
 }
 
-/// A state that no material can have ends the run in the step in which it arises, with particle, place and quantity.
+/// A state that no material can have ends the run in the step in which it arises, with particle, place and
+/// quantity.
 #[test]
 fn a_broken_state_is_named() {
     let is_test = ran_if_launched(|comm| {
@@ -78,9 +79,9 @@ fn text(end: f64, velocity: &str, rest: &str) -> String {
     )
 }
 
-/// A block that flies out of the domain through a face of outflow: it keeps its velocity and stays without stress, what is inside and
-/// what has left make up the whole at every time, and nothing is left in the end. The same on any ranks and across a
-/// restart, which goes on counting.
+/// A block that flies out of the domain through a face of outflow: it keeps its velocity and stays without
+/// stress, what is inside and what has left make up the whole at every time, and nothing is left in the end.
+/// The same on any ranks and across a restart, which goes on counting.
 #[test]
 fn a_body_leaves_through_an_outflow() {
     let rest = "[checkpoint]\nevery_steps = 60\nkeep = 9\n[boundaries]\nx_max = { kind = 'outflow' }\n";
@@ -107,8 +108,8 @@ fn a_body_leaves_through_an_outflow() {
     });
 }
 
-/// Faces let go of what pulls unless the job says otherwise: a block that touches the ceiling falls freely, and one between slip faces
-/// hangs there.
+/// Faces let go of what pulls unless the job says otherwise: a block that touches the ceiling falls freely,
+/// and one between slip faces hangs there.
 #[test]
 fn a_block_does_not_hang_from_the_ceiling() {
     let fall = |rest: &str| {
@@ -153,7 +154,8 @@ fn bar(motion: &str, more: &str) -> String {
     )
 }
 
-/// A push in the middle runs out at both ends: after the waves have passed, next to nothing of their energy is left.
+/// A push in the middle runs out at both ends: after the waves have passed, next to nothing of their energy
+/// is left.
 #[test]
 fn waves_leave_through_absorbing_faces() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -185,9 +187,10 @@ fn the_pressure_of_an_absorbing_face_holds() {
     });
 }
 
-/// The silo of `jobs/silo.toml` in cells twice as large: sand runs out at the same rate for more than half of the discharge, as no liquid
-/// does, near the rate of Beverloo's law for slots, W = 1.03 ρ √g B^(3/2) per length (R. M. Nedderman, Statics and Kinematics of Granular
-/// Materials, 1992); what is inside and what has left are the whole, to the last bit.
+/// The silo of `jobs/silo.toml` in cells twice as large: sand runs out at the same rate for more than half of
+/// the discharge, as no liquid does, near the rate of Beverloo's law for slots, W = 1.03 ρ √g B^(3/2) per
+/// length (R. M. Nedderman, Statics and Kinematics of Granular Materials, 1992); what is inside and what has
+/// left are the whole, to the last bit.
 #[test]
 fn a_silo_discharges_at_a_constant_rate() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -224,8 +227,9 @@ fn a_silo_discharges_at_a_constant_rate() {
     assert!((0.7..1.3).contains(&(mean / law)), "C = {}", mean / law);
 }
 
-/// An output shows the state and changes nothing that the history measures: with refinement, which looks at the nodes for it, rows at outputs have the
-/// forces on faces and of loads that they have without outputs, and without refinement.
+/// An output shows the state and changes nothing that the history measures: with refinement, which looks at
+/// the nodes for it, rows at outputs have the forces on faces and of loads that they have without outputs,
+/// and without refinement.
 #[test]
 fn rows_at_outputs_have_the_forces_of_their_steps() {
     let job = |every: f64, adaptivity: &str| {
@@ -265,7 +269,8 @@ fn rows_at_outputs_have_the_forces_of_their_steps() {
     }
 }
 
-/// A disk about a point of a plane of symmetry is cut by it: the particles, and so the run, are those of the half disk.
+/// A disk about a point of a plane of symmetry is cut by it: the particles, and so the run, are those of the
+/// half disk.
 #[test]
 fn a_plane_of_symmetry_cuts_bodies() {
     let half = |shape: &str| {

@@ -1,11 +1,13 @@
-//! Fluids through the whole program: viscous flow by its closed form, stable from the first step; volume after violent motion.
+//! Fluids through the whole program: viscous flow by its closed form, stable from the first step; volume
+//! after violent motion.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
 use crate::common::restart;
 
-/// Layers that slide over each other, `v = cos(π y / H)`, are slowed by viscosity alone: velocities fall like `exp(-ν (π/H)² t)`. The
-/// viscosity is so great that a first step chosen by sound alone would be longer than all of this.
+/// Layers that slide over each other, `v = cos(π y / H)`, are slowed by viscosity alone: velocities fall like
+/// `exp(-ν (π/H)² t)`. The viscosity is so great that a first step chosen by sound alone would be longer than
+/// all of this.
 #[test]
 fn layers_of_a_viscous_fluid_slow_down_from_the_first_step() {
     let (depth, viscosity, end) = (0.5, 1e5, 8e-4);
@@ -84,7 +86,8 @@ impl Slosh {
         std::fs::write(&path, self.job()).expect("job");
         succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
         let history = History::read(directory.path(), "slosh");
-        // The depth before weight compresses it: particles are whole, so the column is a little wider or higher than the job says.
+        // The depth before weight compresses it: particles are whole, so the column is a little wider or
+        // higher than the job says.
         let depth = history.last("mass") / 1000.0 / if self.dimension == 2 { 1.0 } else { Self::THICK[0] };
         let fill = history.last("centre_water_y") / still(depth, self.modulus);
         assert!((0.97..=1.06).contains(&fill), "fill {fill}");
@@ -106,8 +109,9 @@ impl Slosh {
     }
 }
 
-/// Height of the centre of mass of still water of this undeformed depth (m) and bulk modulus (Pa): at the height Y of undeformed water the
-/// pressure is the weight above, `p = ρ g (H - Y)`, and a layer has `dy/dY = (1 + γ p/K)^(-1/γ)` of its thickness.
+/// Height of the centre of mass of still water of this undeformed depth (m) and bulk modulus (Pa): at the
+/// height Y of undeformed water the pressure is the weight above, `p = ρ g (H - Y)`, and a layer has
+/// `dy/dY = (1 + γ p/K)^(-1/γ)` of its thickness.
 fn still(depth: f64, modulus: f64) -> f64 {
     let layer = depth / 1000.0;
     let (mut height, mut moment) = (0.0, 0.0);
@@ -120,8 +124,9 @@ fn still(depth: f64, modulus: f64) -> f64 {
     moment / depth
 }
 
-/// Water that has sloshed and come to rest fills the volume that it had, whatever the cells, the stiffness, the particles and the
-/// transfer; the energy falls all the way. With positions that drift away from volumes it filled two thirds.
+/// Water that has sloshed and come to rest fills the volume that it had, whatever the cells, the stiffness,
+/// the particles and the transfer; the energy falls all the way. With positions that drift away from volumes
+/// it filled two thirds.
 #[test]
 fn water_at_rest_after_violent_motion_fills_its_volume() {
     Slosh::default().comes_to_rest();
@@ -140,8 +145,8 @@ fn water_at_rest_fills_its_volume_in_space() {
     Slosh { dimension: 3, level: 0, ..Slosh::default() }.comes_to_rest();
 }
 
-/// Two fluids of unlike density share nodes beside level jumps that follow their surface, between a wall that stands and one that moves: the same bits on any
-/// ranks, and across a restart.
+/// Two fluids of unlike density share nodes beside level jumps that follow their surface, between a wall that
+/// stands and one that moves: the same bits on any ranks, and across a restart.
 #[test]
 fn fluids_slosh_with_the_same_bits_on_any_ranks_and_across_a_restart() {
     let more = "[[materials]]\nname = 'oil'\ndensity = 800\nmodel = 'fluid'\nbulk_modulus = 1e5\nviscosity = 0.1\n\
@@ -158,8 +163,8 @@ fn fluids_slosh_with_the_same_bits_on_any_ranks_and_across_a_restart() {
     });
 }
 
-/// A disc of water that turns and widens in free flight: nowhere are nodes overfull for long, so momentum and angular momentum stay, and the shift
-/// does no work.
+/// A disc of water that turns and widens in free flight: nowhere are nodes overfull for long, so momentum and
+/// angular momentum stay, and the shift does no work.
 #[test]
 fn free_flight_keeps_momentum_and_angular_momentum() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [1, 1]\nroot_edge = 0.5\n[tree]\nbase_level = 2\n\

@@ -1,4 +1,5 @@
-//! A strip footing through the whole program: bearing capacity against limit analysis, and what F-bar does to it.
+//! A strip footing through the whole program: bearing capacity against limit analysis, and what F-bar does to
+//! it.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};

@@ -1,5 +1,6 @@
-//! Free rigid bodies that turn about any axis, through the whole program: what a body without torque keeps, the balance of momentum
-//! and angular momentum of one that falls into sand, and the same bits on any ranks and threads and across a restart.
+//! Free rigid bodies that turn about any axis, through the whole program: what a body without torque keeps,
+//! the balance of momentum and angular momentum of one that falls into sand, and the same bits on any ranks
+//! and threads and across a restart.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -25,8 +26,8 @@ fn motion(history: &History, name: &str) -> Vec<([f64; 4], [f64; 3])> {
     (0..q[0].len()).map(|row| (q.map(|c| c[row]), spin.map(|c| c[row]))).collect()
 }
 
-/// A box of 0.3 x 0.2 x 0.1 m that turns nearly about its middle axis: it turns over time and again (Dzhanibekov), while its angular
-/// momentum and its energy stay.
+/// A box of 0.3 x 0.2 x 0.1 m that turns nearly about its middle axis: it turns over time and again
+/// (Dzhanibekov), while its angular momentum and its energy stay.
 #[test]
 fn bodies_without_torque_keep_energy_and_angular_momentum() {
     let text = "version = 1\ndimension = 3\n[domain]\nsize = [1.6, 0.8, 0.8]\nroot_edge = 0.8\n\
@@ -64,7 +65,8 @@ fn bodies_without_torque_keep_energy_and_angular_momentum() {
     assert!(way.abs() < 1e-12, "{way}");
 }
 
-/// A block of 160 x 120 x 80 mm that falls on an edge into sand gains what its forces and torques give, and comes to rest in it.
+/// A block of 160 x 120 x 80 mm that falls on an edge into sand gains what its forces and torques give, and
+/// comes to rest in it.
 #[test]
 fn blocks_tumble_with_the_same_bits_in_all_ways_and_across_restart() {
     restart::assert_same_in_all_ways("tumbling_block", balances);

@@ -333,13 +333,13 @@ fn tiling<const D: usize>(comm: &Comm, patch: &Value) {
         assert!((node.mass - volume).abs() <= 64.0 * EPS * volume, "volume of {:?}", node.place);
         for axis in 0..D {
             let error = (node.momentum[axis] - number(&exact["sum_V_grad"][axis])).abs();
-            // The sum over the boxes that are transferred: a box around the whole support of a node has no gradient
-            // itself, while its parts have.
+            // The sum over the boxes that are transferred: a box around the whole support of a node has no
+            // gradient itself, while its parts have.
             let bound = EPS * transferred[&node.place];
             assert!(error <= 64.0 * bound, "{}: {error:e} at {:?}", patch["name"], node.place);
             worst = worst.max(error / bound);
-            // Over the boxes as given it holds as well, but where that sum is itself no more than round-off: at nodes
-            // whose whole support lies in one box.
+            // Over the boxes as given it holds as well, but where that sum is itself no more than round-off:
+            // at nodes whose whole support lies in one box.
             if error > 64.0 * EPS * whole[&node.place] {
                 assert!(whole[&node.place] < 1e-13 * transferred[&node.place], "{:?}", node.place);
                 beyond += 1;

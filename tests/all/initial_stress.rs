@@ -1,5 +1,5 @@
-//! Initial stress and velocity through the whole program: ground that starts under its own weight stays at rest, the stress is that of
-//! the job, and what cannot be is refused.
+//! Initial stress and velocity through the whole program: ground that starts under its own weight stays at
+//! rest, the stress is that of the job, and what cannot be is refused.
 
 use crate::common::history::History;
 use crate::common::launch::{agimp, run, succeed};
@@ -13,8 +13,9 @@ const SAND: &str =
 const CLAY: &str = "model = 'cam_clay'\nshear_modulus = 4e6\ncritical_stress_ratio = 1.0\ncompression_index = 0.1\n\
                     swelling_index = 0.02\npressure = 1e4\npreconsolidation_pressure = 2e4";
 
-/// Ground between slip faces, 3 m and half a cell high in a domain of 4 m, at a place away from the origin. Its surface lies between nodes:
-/// on them, rounding would let boxes reach into the empty cells above, where they meet nodes without other mass.
+/// Ground between slip faces, 3 m and half a cell high in a domain of 4 m, at a place away from the origin.
+/// Its surface lies between nodes: on them, rounding would let boxes reach into the empty cells above, where
+/// they meet nodes without other mass.
 fn ground(dimension: usize, model: &str, stress: &str, end: f64, rest: &str) -> String {
     // Cells of level 1 in the plane, of level 0 in space; half of that with finer leaves above.
     let cell = 0.25
@@ -71,8 +72,9 @@ fn fastest(history: &History) -> f64 {
 
 const LAYERED: &str = "[tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = { kind = 'half_space', point = POINT, normal = NORMAL }\n";
 
-/// Level ground with K0 stays at rest to round-off: for a cone of friction and for clay, on trees that are uniform or finer towards the
-/// surface, in the plane and in space. Fault it shows: volumes, boxes or weights that are off by the elastic strain, 3e-4 here.
+/// Level ground with K0 stays at rest to round-off: for a cone of friction and for clay, on trees that are
+/// uniform or finer towards the surface, in the plane and in space. Fault it shows: volumes, boxes or weights
+/// that are off by the elastic strain, 3e-4 here.
 #[test]
 fn level_ground_is_at_rest_to_round_off() {
     let finer_in_the_plane = LAYERED.replace("POINT", "[0, 0.9]").replace("NORMAL", "[0, -1]");
@@ -121,7 +123,8 @@ fn water_is_at_rest() {
         history(&ground(2, water, "{ kind = 'hydrostatic' }", 0.1, "[tree]\nbase_level = 1"));
     let speed = fastest(&history);
     println!("water: {steps} steps, {speed:e} m/s");
-    // Pressure is linear in depth, so it is the density that cannot be the same everywhere: it is, as the body stands.
+    // Pressure is linear in depth, so it is the density that cannot be the same everywhere: it is, as the
+    // body stands.
     assert!(speed < 1e-10, "{speed} m/s after {steps} steps");
 }
 
@@ -135,7 +138,8 @@ fn weight_table_and_expression_are_one_stress() {
         "{ kind = 'depth', table = [[0, 0, 0], [10, 176580, 88290]] }",
         "{ kind = 'components', xx = '-8829 * (2.125 - y)', yy = '-17658 * (2.125 - y)', zz = '-8829 * (2.125 - y)' }",
     ];
-    // σ² / 2E' over 2 m of width, with the square of the depth at the centres of 25 rows of boxes; strains are 1e-3.
+    // σ² / 2E' over 2 m of width, with the square of the depth at the centres of 25 rows of boxes; strains
+    // are 1e-3.
     let square: f64 = (0..25).map(|i| (0.125 * (f64::from(i) + 0.5)).powi(2)).sum::<f64>() * 0.125 * 2.0;
     let per_square = (1.0 + 0.25 + 0.25 - 2.0 * 0.25 * (0.5 + 0.5 + 0.25)) / (2.0 * 2e7);
     let exact = square * 17658.0_f64.powi(2) * per_square;
@@ -160,8 +164,8 @@ fn velocity_may_depend_on_the_place() {
     let mass = 1800.0 * 6.25;
     assert!(history.column("momentum_x")[0].abs() < 1e-12 * mass);
     assert!((history.column("momentum_y")[0] / (mass * 0.2 * 6.0) - 1.0).abs() < 1e-14);
-    // About the lower corner of the domain. Particles carry the gradient with the second moments of their weights on the nodes, which are
-    // up to h²/4 wider than their boxes.
+    // About the lower corner of the domain. Particles carry the gradient with the second moments of their
+    // weights on the nodes, which are up to h²/4 wider than their boxes.
     let turning = mass * (0.2 * (4.0 / 12.0) - 0.5 * (3.125_f64.powi(2) / 12.0));
     let exact = turning + 1.0 * mass * 0.2 * 6.0;
     let found = history.column("angular_momentum_z")[0];
@@ -245,8 +249,8 @@ fn wrong_stresses_are_refused_with_their_key() {
     }
 }
 
-/// With `relax` sand under a K0 below Rankine's starts on the yield surface: horizontal stress is the active one, a third of the vertical, and the
-/// ground hardly moves.
+/// With `relax` sand under a K0 below Rankine's starts on the yield surface: horizontal stress is the active
+/// one, a third of the vertical, and the ground hardly moves.
 #[test]
 fn stress_beyond_yield_relaxes_to_the_surface() {
     let sand = "model = 'mohr_coulomb'\nyoung = 2e7\npoisson = 0.3\nfriction_angle = 30";

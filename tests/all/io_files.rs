@@ -234,8 +234,9 @@ fn files_are_the_same_on_any_ranks_and_come_back() {
     );
 }
 
-/// Whoever opens a file with nothing but HDF5 learns what is in it: each data set stands in the guide, each field of the particles
-/// and each column of the state says its unit and what it is, and the job is there as text.
+/// Whoever opens a file with nothing but HDF5 learns what is in it: each data set stands in the guide, each
+/// field of the particles and each column of the state says its unit and what it is, and the job is there as
+/// text.
 #[test]
 fn files_explain_themselves() {
     on_ranks(
@@ -433,7 +434,8 @@ fn a_failing_rank_leaves_no_file() {
     );
 }
 
-/// A state that has blown up gets no file: the message names particle and quantity, and the file of that name stays as it was.
+/// A state that has blown up gets no file: the message names particle and quantity, and the file of that name
+/// stays as it was.
 #[test]
 fn numbers_that_are_not_finite_are_not_written() {
     on_ranks(
@@ -519,7 +521,8 @@ fn a_full_disk_leaves_the_old_file() {
     assert!(output.status.success(), "{text}");
 }
 
-/// Room for none, some and all but the last page of a file: wherever it fails, all ranks get the reason, and nothing stays.
+/// Room for none, some and all but the last page of a file: wherever it fails, all ranks get the reason, and
+/// nothing stays.
 fn full_at_any_point(comm: &Comm, directory: &Path) {
     const PAGE: u64 = 4096;
     let (path, ballast) = (directory.join("later.hdf"), directory.join("ballast"));
@@ -610,8 +613,8 @@ fn outputs_checkpoints_and_the_latest() {
     );
 }
 
-/// Earlier versions named their files `.vtkhdf`. A run restarts from them, its index goes on to list them, and its
-/// checkpoints replace theirs.
+/// Earlier versions named their files `.vtkhdf`. A run restarts from them, its index goes on to list them,
+/// and its checkpoints replace theirs.
 #[test]
 fn files_named_by_earlier_versions_are_found_and_continued() {
     let earlier = |path: PathBuf| path.with_file_name(name(&path).replace(".hdf", ".vtkhdf"));

@@ -1,5 +1,5 @@
-//! Loads through the whole program: closed forms of motion under body forces, grips and damping, work against energy, and
-//! the same results on any ranks and across restarts.
+//! Loads through the whole program: closed forms of motion under body forces, grips and damping, work against
+//! energy, and the same results on any ranks and across restarts.
 
 use crate::common::history::History;
 use crate::common::launch::{agimp, run, succeed};
@@ -27,7 +27,8 @@ fn history(gravity: &str, end: f64, rest: &str) -> History {
     History::read(directory.path(), "body")
 }
 
-/// A uniform force that changes in time is an acceleration: v = A/ω (1 - cos ωt), to the second order of the midpoint rule.
+/// A uniform force that changes in time is an acceleration: v = A/ω (1 - cos ωt), to the second order of the
+/// midpoint rule.
 #[test]
 fn a_body_force_gives_its_impulse_and_its_work() {
     let force = "[[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = ['8 * sin(20 * t)', -1]\n";
@@ -104,9 +105,9 @@ fn grips_stretch_a_bar() {
     assert!(history.last("work_right") > history.last("elastic_energy"));
 }
 
-/// Springs between the material and its places in the undeformed body, `-ω² (x - X)`: a block with a velocity v swings as a whole, through
-/// splits and merges at level jumps, by v/ω sin ωt. A load that is a function of X alone stays with its material. The same on any ranks and
-/// across a restart.
+/// Springs between the material and its places in the undeformed body, `-ω² (x - X)`: a block with a velocity
+/// v swings as a whole, through splits and merges at level jumps, by v/ω sin ωt. A load that is a function of
+/// X alone stays with its material. The same on any ranks and across a restart.
 #[test]
 fn forces_belong_to_places_of_the_undeformed_body() {
     let loads = "[checkpoint]\nevery_steps = 50\nkeep = 9\n\
@@ -180,7 +181,8 @@ fn wrong_loads_are_refused_with_their_key() {
     }
 }
 
-/// A record in a file is the table in the job, bit by bit, whatever its columns are called; with other rows it is another job.
+/// A record in a file is the table in the job, bit by bit, whatever its columns are called; with other rows
+/// it is another job.
 #[test]
 fn a_record_in_a_file_is_a_table_over_time() {
     let load = |acceleration: &str| {
@@ -213,8 +215,10 @@ fn a_record_in_a_file_is_a_table_over_time() {
     assert!(told.contains("files that the job names"), "{told}");
 }
 
-/// A stiff block on a slope with friction, shaken by the record of `jobs/shaken_slope.toml`, slides as N. M. Newmark (Géotechnique 15,
-/// 1965) says: while it moves, its acceleration is that of the record and its weight less the friction, and else it sticks.
+/// A stiff block on a slope with friction, shaken by the record of `jobs/shaken_slope.toml`, slides as N. M.
+/// Newmark (Géotechnique 15,
+/// 1965) says: while it moves, its acceleration is that of the record and its weight less the friction, and
+///       else it sticks.
 #[test]
 fn a_shaken_block_slides_as_newmark_says() {
     let (slope, friction, g) = (8_f64.to_radians(), 0.22, 9.81);
@@ -265,7 +269,8 @@ fn a_shaken_block_slides_as_newmark_says() {
     assert!(worst < 0.02 * all, "{worst} of {all}");
 }
 
-/// A value that is not finite ends the run with key, expression, place and time; at the start it is refused before the run.
+/// A value that is not finite ends the run with key, expression, place and time; at the start it is refused
+/// before the run.
 #[test]
 fn a_value_that_is_not_finite_names_its_expression() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -295,7 +300,8 @@ fn a_value_that_is_not_finite_names_its_expression() {
     assert_eq!(check.status.code(), Some(2), "{}", String::from_utf8_lossy(&check.stderr));
 }
 
-/// A record of PEER and one with columns apart by spaces are the table in the job, bit by bit; `ramp` is half a period of a cosine.
+/// A record of PEER and one with columns apart by spaces are the table in the job, bit by bit; `ramp` is half
+/// a period of a cosine.
 #[test]
 fn records_of_other_programs_and_smooth_ramps() {
     let directory = tempfile::tempdir().expect("temporary directory");

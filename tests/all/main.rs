@@ -1,5 +1,5 @@
-//! Tests of results: the library and the program against closed forms, independent data and conservation laws. One crate, so that the
-//! library is linked once; a module for each topic.
+//! Tests of results: the library and the program against closed forms, independent data and conservation
+//! laws. One crate, so that the library is linked once; a module for each topic.
 #[path = "../common/mod.rs"]
 mod common;
 

@@ -1,5 +1,6 @@
-//! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as collider gives the same results on any
-//! ranks and across a restart; a raster of heights is the same terrain from each format; hostile files give a message.
+//! Bodies and colliders from triangle meshes: a cube from a file is a box, in each format; a turned cube as
+//! collider gives the same results on any ranks and across a restart; a raster of heights is the same terrain
+//! from each format; hostile files give a message.
 
 use crate::common::damage::damage;
 use crate::common::history::History;
@@ -106,7 +107,8 @@ fn a_cube_from_a_file_is_a_box() {
     }
 }
 
-/// A block falls on an edge of a turned cube: same results on 1 to 3 ranks and across a restart, and the block presses the cube down.
+/// A block falls on an edge of a turned cube: same results on 1 to 3 ranks and across a restart, and the
+/// block presses the cube down.
 #[test]
 fn a_mesh_as_collider_gives_the_same_on_any_ranks_and_across_restart() {
     let rest = "[[colliders]]\nname = 'cube'\n[colliders.shape]\nkind = 'rotated'\ncentre = [1, 1, 0.2]\naxis = [1, 2, 0]\nangle = 40\n\
@@ -226,7 +228,8 @@ fn a_raster_of_any_format_is_the_same_terrain() {
     }
 }
 
-/// Rasters with bytes flipped, cut, doubled and overwritten: a terrain, or an error; never a panic, and never slow.
+/// Rasters with bytes flipped, cut, doubled and overwritten: a terrain, or an error; never a panic, and never
+/// slow.
 #[test]
 fn damaged_rasters_give_a_message() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -272,7 +275,8 @@ fn a_torn_cube_is_filled() {
     assert!(found.history == reference.history);
 }
 
-/// Each format with bytes flipped, cut, doubled and overwritten: a mesh, or an error; never a panic, and never slow.
+/// Each format with bytes flipped, cut, doubled and overwritten: a mesh, or an error; never a panic, and
+/// never slow.
 #[test]
 fn damaged_files_give_a_message() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -300,8 +304,8 @@ fn damaged_files_give_a_message() {
     println!("{read_well} of 4000 are solids all the same");
 }
 
-/// A foot whose lower face comes down by 80 mm in three meshes presses a block as one that moves down as a whole. Same results on 1 to 3 ranks and
-/// across a restart.
+/// A foot whose lower face comes down by 80 mm in three meshes presses a block as one that moves down as a
+/// whole. Same results on 1 to 3 ranks and across a restart.
 #[test]
 fn a_foot_that_deforms_presses_as_one_that_moves() {
     let name = "deforming_foot";
@@ -323,7 +327,8 @@ fn a_foot_that_deforms_presses_as_one_that_moves() {
     });
 }
 
-/// A cube whose faces were meshed each by itself, a rounding apart at its edges, holds a block as the box does, also by winding number.
+/// A cube whose faces were meshed each by itself, a rounding apart at its edges, holds a block as the box
+/// does, also by winding number.
 #[test]
 fn a_cube_of_unwelded_faces_is_a_cube() {
     let directory = tempfile::tempdir().expect("temporary directory");

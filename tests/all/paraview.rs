@@ -1,6 +1,8 @@
-//! ParaView itself opens what a run has written, by the names alone, with the times of the run and all fields.
+//! ParaView itself opens what a run has written, by the names alone, with the times of the run and all
+//! fields.
 //!
-//! Needs `pvbatch`; without it the test says so and passes. `AGIMP_PVBATCH` names another one than that of the path.
+//! Needs `pvbatch`; without it the test says so and passes. `AGIMP_PVBATCH` names another one than that of
+//! the path.
 use std::path::Path;
 use std::process::Command;
 
@@ -25,7 +27,8 @@ fn text(job: &str) -> String {
     std::fs::read_to_string(path).expect("the job")
 }
 
-/// A short run of one of the jobs that come with the program, with every field. Returns the times of its outputs.
+/// A short run of one of the jobs that come with the program, with every field. Returns the times of its
+/// outputs.
 fn run(directory: &Path, job: &str) -> Vec<f64> {
     let fields: Vec<PointField> = fields(job).collect();
     let mut job: toml::Table = text(job).parse().expect("TOML");

@@ -1,5 +1,6 @@
-//! Bodies whose particles come from a file: a lattice from a table is a box, also deformed and under stress; an output is a body with the same state;
-//! same results on any ranks and across a restart; damaged files give a message.
+//! Bodies whose particles come from a file: a lattice from a table is a box, also deformed and under stress;
+//! an output is a body with the same state; same results on any ranks and across a restart; damaged files
+//! give a message.
 
 use crate::common::damage::damage;
 use crate::common::launch::{Outcome, agimp, run, succeed, text};
@@ -34,7 +35,8 @@ fn state(outcome: &Outcome) -> Vec<&str> {
     outcome.digest.lines().filter(|line| line.contains("state/particles")).collect()
 }
 
-/// The particles of a box, with velocity and mass or volume from a table or from the job, give the run of the box.
+/// The particles of a box, with velocity and mass or volume from a table or from the job, give the run of the
+/// box.
 #[test]
 fn a_lattice_from_a_table_is_a_box() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -53,7 +55,8 @@ fn a_lattice_from_a_table_is_a_box() {
     }
 }
 
-/// What was stretched by 1 % has the stress of a Hencky solid at the start, and its undeformed volume; given this stress it has the stretch.
+/// What was stretched by 1 % has the stress of a Hencky solid at the start, and its undeformed volume; given
+/// this stress it has the stretch.
 #[test]
 fn stretch_and_stress_belong_together() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -94,8 +97,8 @@ fn stretch_and_stress_belong_together() {
     }
 }
 
-/// The last output of a block that has struck the floor and yields is the first state of a body, to the last bit, in the same and in a shifted
-/// domain.
+/// The last output of a block that has struck the floor and yields is the first state of a body, to the last
+/// bit, in the same and in a shifted domain.
 #[test]
 fn an_output_is_a_body_with_the_same_state() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -132,7 +135,8 @@ fn same_on_any_ranks_and_across_restart() {
     restart::assert_same_on_any_ranks(&job(&shape, rest), "block", |_, _| {});
 }
 
-/// Tables, PLY and outputs with bytes flipped, cut, doubled and overwritten: a body, or an error of the job; never a panic.
+/// Tables, PLY and outputs with bytes flipped, cut, doubled and overwritten: a body, or an error of the job;
+/// never a panic.
 #[test]
 fn damaged_files_give_a_message() {
     let directory = tempfile::tempdir().expect("temporary directory");

@@ -437,7 +437,8 @@ fn exported_particles_are_those_of_the_file() {
     );
 }
 
-/// The tree for other programs keeps levels and particles: in the text, and as VTK reads it where it is installed.
+/// The tree for other programs keeps levels and particles: in the text, and as VTK reads it where it is
+/// installed.
 #[test]
 fn an_exported_tree_is_that_of_the_run() {
     let levels = "tree.regions=[{level = 2, shape = {kind = 'box', min = [0.3, 0.05], max = [0.45, 0.2]}}]";
@@ -504,7 +505,8 @@ fn an_exported_tree_is_that_of_the_run() {
     }
 }
 
-/// A file, several, a pattern with trees, the directory, the index and the job file mean the same outputs for all subcommands.
+/// A file, several, a pattern with trees, the directory, the index and the job file mean the same outputs for
+/// all subcommands.
 #[test]
 fn subcommands_take_files_directories_indices_and_jobs() {
     let directory = run();
@@ -579,7 +581,8 @@ fn a_clip_that_keeps_nothing_is_refused() {
     assert!(!clip(&[]).status.success() && clip(&["--mirror", "x"]).status.success());
 }
 
-/// A sheet of rubber that flies apart along x alone is stretched one and a half times; its particles still cover it without gaps.
+/// A sheet of rubber that flies apart along x alone is stretched one and a half times; its particles still
+/// cover it without gaps.
 #[test]
 fn stretched_boxes_leave_no_gaps() {
     let job = r#"

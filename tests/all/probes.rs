@@ -1,5 +1,5 @@
-//! Measurements of a run through the whole program: probes, forces on faces and the report, against closed forms, with the same results on
-//! any ranks and across restarts.
+//! Measurements of a run through the whole program: probes, forces on faces and the report, against closed
+//! forms, with the same results on any ranks and across restarts.
 
 use crate::common::history::History;
 use crate::common::launch::{file, run, succeed};
@@ -25,8 +25,8 @@ const TWO_BLOCKS: &str = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domai
     [[probes]]\nname = 'right'\nbodies = ['right']\nquantities = ['mass', 'centre', 'velocity', 'momentum', 'kinetic_energy', 'extent', 'greatest_speed']\n\
     [[probes]]\nname = 'below'\nshape = { kind = 'box', min = [1, 0], max = [3, 0.5] }\nquantities = ['mass', 'centre', 'stress', 'pressure']\n";
 
-/// Bodies in free flight: centre, velocity and energy of each are those of a parabola, sums over bodies those of the run, and a shape
-/// that nothing has reached has no mass and no mean.
+/// Bodies in free flight: centre, velocity and energy of each are those of a parabola, sums over bodies those
+/// of the run, and a shape that nothing has reached has no mass and no mean.
 #[test]
 fn bodies_in_flight_follow_their_parabolas() {
     let (history, report) = history_of("flight", &format!("{TWO_BLOCKS}[time]\nend = 0.2\n"));
@@ -67,8 +67,8 @@ fn bodies_in_flight_follow_their_parabolas() {
     assert!(warnings.len() == 1 && warnings.iter().all(of_steps), "{warnings:?}");
 }
 
-/// A column of water-like stress at rest: the faces carry its weight and its side pressure, and the mean stress in a layer is that of
-/// the weight above. The probes of two halves add up to that of the whole.
+/// A column of water-like stress at rest: the faces carry its weight and its side pressure, and the mean
+/// stress in a layer is that of the weight above. The probes of two halves add up to that of the whole.
 #[test]
 fn a_column_at_rest_weighs_on_its_floor() {
     let job = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nsize = [2, 2]\nroot_edge = 1\n\
@@ -99,8 +99,8 @@ fn a_column_at_rest_weighs_on_its_floor() {
     close("mass_layer", 1000.0);
 }
 
-/// Blocks fall into a graded tree and onto a floor: probes and face forces have the same bits on 1 to 3 ranks and across a restart, and
-/// the floor's impulse is what the momentum lacks.
+/// Blocks fall into a graded tree and onto a floor: probes and face forces have the same bits on 1 to 3 ranks
+/// and across a restart, and the floor's impulse is what the momentum lacks.
 #[test]
 fn measurements_are_the_same_on_any_ranks_and_across_restart() {
     let rest = "[history]\nface_forces = true\nevery_steps = 5\n[time]\nend = 0.6\n[checkpoint]\nevery_steps = 20\nkeep = 99\n\
@@ -117,9 +117,10 @@ fn measurements_are_the_same_on_any_ranks_and_across_restart() {
     });
 }
 
-/// Blocks of 64 and 128 particles of 1 kg fly through a plane and out of an outflow face: at every row what has passed the face and what is
-/// there make up the whole exactly, and what has passed the plane is what lies beyond it or has left. A plane with the reverse normal
-/// has the reverse flux. The same on any ranks and across a restart, as are the particle that is followed and the files of a line.
+/// Blocks of 64 and 128 particles of 1 kg fly through a plane and out of an outflow face: at every row what
+/// has passed the face and what is there make up the whole exactly, and what has passed the plane is what
+/// lies beyond it or has left. A plane with the reverse normal has the reverse flux. The same on any ranks
+/// and across a restart, as are the particle that is followed and the files of a line.
 #[test]
 fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
     let job = "version = 1\ndimension = 2\n[domain]\nmin = [-3, 7]\nsize = [1, 1]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
@@ -156,7 +157,8 @@ fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
                 && column("passed_none").iter().all(|&m| m == 0.0)
         );
         assert!(gate.iter().any(|&mass| mass > 0.0 && mass < 64.0), "{gate:?}");
-        // The particle in the corner of the large block: an eighth of a cell from its faces, and it flies freely.
+        // The particle in the corner of the large block: an eighth of a cell from its faces, and it flies
+        // freely.
         for (row, t) in column("time").iter().enumerate() {
             let (x, y) = (column("centre_corner_x")[row], column("centre_corner_y")[row]);
             let way = 1.0 / 64.0 - 2.875 + 2.0 * t;
@@ -186,7 +188,8 @@ fn fluxes_tracks_and_lines_are_exact_on_any_ranks_and_across_restart() {
     });
 }
 
-/// A line through ground at rest shows the stress of the weight above, exactly in the middle of linear fields, and the level of each leaf.
+/// A line through ground at rest shows the stress of the weight above, exactly in the middle of linear
+/// fields, and the level of each leaf.
 #[test]
 fn a_line_through_ground_shows_the_stress_of_its_depth() {
     let job = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domain]\nsize = [2, 2]\nroot_edge = 1\n\
@@ -241,8 +244,8 @@ fn a_line_through_ground_shows_the_stress_of_its_depth() {
     }
 }
 
-/// A particle that is followed into finer leaves and out of them: it splits twice, its family is merged again, and the centre and the mass
-/// of the whole go on exactly.
+/// A particle that is followed into finer leaves and out of them: it splits twice, its family is merged
+/// again, and the centre and the mass of the whole go on exactly.
 #[test]
 fn a_track_goes_on_through_splits_and_merges() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [8, 1]\nroot_edge = 1\n[adaptivity]\nevery_steps = 2\nbuffer = 0\n\
@@ -265,8 +268,8 @@ fn a_track_goes_on_through_splits_and_merges() {
     }
 }
 
-/// A block flies over a raster: each cell keeps the depth of what has been over it, exactly, and the speed; the rasters are the same on any
-/// ranks and across a restart, as ESRI grids and in the outputs.
+/// A block flies over a raster: each cell keeps the depth of what has been over it, exactly, and the speed;
+/// the rasters are the same on any ranks and across a restart, as ESRI grids and in the outputs.
 #[test]
 fn maps_keep_the_largest_depth_and_speed() {
     let job = "version = 1\ndimension = 3\n[domain]\nmin = [10, 20, 30]\nsize = [2, 1, 1]\nroot_edge = 1\n[tree]\nbase_level = 1\n\
@@ -285,7 +288,8 @@ fn maps_keep_the_largest_depth_and_speed() {
             let rows = text.strip_prefix(header).expect("header").lines();
             rows.map(|row| row.split(' ').map(|cell| cell.parse().expect("number")).collect()).collect()
         };
-        // It begins over the second cell and ends over the third and the fourth; half a metre of depth, along the middle rows.
+        // It begins over the second cell and ends over the third and the fourth; half a metre of depth, along
+        // the middle rows.
         let [depth, speed] = texts.each_ref().map(|text| rows(text));
         for row in [0, 3] {
             assert_eq!((&depth[row], &speed[row]), (&vec![-9999.0; 4], &vec![-9999.0; 4]), "row {row}");
@@ -300,8 +304,8 @@ fn maps_keep_the_largest_depth_and_speed() {
     });
 }
 
-/// A spinning disk of sand flies apart into particles that have nothing around them: they fill their boxes, and not the domain. Their det F adds
-/// up to 28 times the volume of the disk.
+/// A spinning disk of sand flies apart into particles that have nothing around them: they fill their boxes,
+/// and not the domain. Their det F adds up to 28 times the volume of the disk.
 #[test]
 fn spray_has_no_more_volume_than_its_boxes() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [2, 2]\nroot_edge = 0.5\n[boundaries]\nleaving = 'clamp'\n[tree]\nbase_level = 1\n\

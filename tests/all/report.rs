@@ -1,7 +1,7 @@
 //! `agimp report`: one page says what a run has done, finished or not, with the numbers of its files.
 //!
-//! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM` names another
-//! one than that of the path.
+//! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM`
+//! names another one than that of the path.
 
 use std::path::Path;
 use std::process::Command;

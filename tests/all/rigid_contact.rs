@@ -1,5 +1,6 @@
-//! Free rigid bodies among faces, colliders and each other, through the whole program: rolling and slipping against the closed forms, a body
-//! that a table drives, balances of momentum, and the same results on any ranks and threads and across a restart.
+//! Free rigid bodies among faces, colliders and each other, through the whole program: rolling and slipping
+//! against the closed forms, a body that a table drives, balances of momentum, and the same results on any
+//! ranks and threads and across a restart.
 
 use crate::common::history::History;
 use crate::common::launch::{job, run, succeed};
@@ -8,8 +9,8 @@ use crate::common::restart;
 const G: f64 = 9.81;
 const SLOPE: f64 = 30.0;
 
-/// Down a slope of 30 degrees: what rolls gains g sin α / (1 + I / m r²), that is 5/7 g sin α for a ball and 2/3 for a cylinder; with friction
-/// 0.1 both slip and gain g (sin α - μ cos α). All stay on the slope.
+/// Down a slope of 30 degrees: what rolls gains g sin α / (1 + I / m r²), that is 5/7 g sin α for a ball and
+/// 2/3 for a cylinder; with friction 0.1 both slip and gain g (sin α - μ cos α). All stay on the slope.
 #[test]
 fn balls_and_cylinders_roll_and_slip_as_the_closed_forms_say() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -34,8 +35,8 @@ fn balls_and_cylinders_roll_and_slip_as_the_closed_forms_say() {
     }
 }
 
-/// A block, a ball and a driven roller on rubber, between walls: each body that is free gains what gravity and its forces give; the roller follows
-/// its table; nothing goes through walls.
+/// A block, a ball and a driven roller on rubber, between walls: each body that is free gains what gravity
+/// and its forces give; the roller follows its table; nothing goes through walls.
 #[test]
 fn bodies_meet_with_the_same_results_in_all_ways_and_across_restart() {
     restart::assert_same_in_all_ways("bodies_that_meet", balances);

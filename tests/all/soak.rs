@@ -1,5 +1,6 @@
-//! Plain jobs, many of them: bodies of every model fall, spin, bounce and are squeezed, on lattices aligned with the cells and
-//! not, on uniform and refined trees. All run through, keep every particle, and gain no energy beyond a bound.
+//! Plain jobs, many of them: bodies of every model fall, spin, bounce and are squeezed, on lattices aligned
+//! with the cells and not, on uniform and refined trees. All run through, keep every particle, and gain no
+//! energy beyond a bound.
 
 use std::fmt::Write as _;
 
@@ -55,8 +56,9 @@ impl Case {
         )
     }
 
-    /// Most energy that it may gain, as a share of what it has to give. The energy that particles hold in their affine
-    /// velocities is not in the sums; a few particles that spin have much of it, and lose it to their velocities.
+    /// Most energy that it may gain, as a share of what it has to give. The energy that particles hold in
+    /// their affine velocities is not in the sums; a few particles that spin have much of it, and lose it to
+    /// their velocities.
     fn most_gain(&self) -> f64 {
         if MOTIONS[self.motion] == "spins" { 0.25 } else { 0.05 }
     }
@@ -241,8 +243,8 @@ fn check(comm: &Comm, name: &str, course: Result<Course, String>, most_gain: f64
     }
 }
 
-/// A rubber disk between a bed and a plate that comes down: its lattice lies on the lines of the cells, and the symmetry of the
-/// motion keeps many box edges within round-off of them.
+/// A rubber disk between a bed and a plate that comes down: its lattice lies on the lines of the cells, and
+/// the symmetry of the motion keeps many box edges within round-off of them.
 fn plates(comm: &Comm, radii: &[f64], models: &[&str]) {
     let mut failed = Vec::new();
     for (radius, model) in radii.iter().flat_map(|radius| models.iter().map(move |model| (radius, model))) {
@@ -304,8 +306,8 @@ fn disks_between_plates_run_through() {
     });
 }
 
-/// A block of metal that hits slip walls with 0.3 of the speed of its waves, with a yield stress so low that it splashes. Single
-/// fragments come as near to the walls as they like, and no energy comes from that.
+/// A block of metal that hits slip walls with 0.3 of the speed of its waves, with a yield stress so low that
+/// it splashes. Single fragments come as near to the walls as they like, and no energy comes from that.
 #[test]
 fn soft_plastic_impacts_are_stable() {
     on_ranks("soft_plastic_impacts_are_stable", &[1], |comm| {
@@ -329,8 +331,8 @@ fn soft_plastic_impacts_are_stable() {
     });
 }
 
-/// Gravity a hundred thousand times that of the Earth takes no particle out of the domain in the first step: a disk falls its height
-/// in the time that the law of free fall says.
+/// Gravity a hundred thousand times that of the Earth takes no particle out of the domain in the first step:
+/// a disk falls its height in the time that the law of free fall says.
 #[test]
 fn great_gravity_is_resolved_from_the_first_step() {
     on_ranks("great_gravity_is_resolved_from_the_first_step", &[1], |comm| {

@@ -1,4 +1,5 @@
-//! Softening through the whole program: load and shear band of a compressed specimen do not depend on the cells.
+//! Softening through the whole program: load and shear band of a compressed specimen do not depend on the
+//! cells.
 #[path = "../../studies/softening/band.rs"]
 mod band;
 
@@ -38,8 +39,8 @@ fn compress(level: u8, more: &[&str]) -> Outcome {
     }
 }
 
-/// Softening is regularised by the size of cells: without, half the cells would halve the work that the band takes, and the load
-/// would fall twice as fast.
+/// Softening is regularised by the size of cells: without, half the cells would halve the work that the band
+/// takes, and the load would fall twice as fast.
 #[test]
 fn load_and_band_do_not_depend_on_the_cells() {
     let coarse = compress(0, &[]);

@@ -1,4 +1,5 @@
-//! Free flight across level jumps: what each transfer conserves. Each test launches its own binary under mpirun.
+//! Free flight across level jumps: what each transfer conserves. Each test launches its own binary under
+//! mpirun.
 
 use crate::common::relaunch::{ran_if_launched, relaunch};
 use crate::common::spinning::{CUBE, SQUARE};
@@ -15,7 +16,8 @@ fn first_word(text: &str) -> String {
     text.split_whitespace().next().unwrap_or_default().to_string()
 }
 
-/// Runs `body` on each number of ranks; what it prints after `same: ` must not depend on that number. Each is a new process group, as MPI starts once per process.
+/// Runs `body` on each number of ranks; what it prints after `same: ` must not depend on that number. Each is
+/// a new process group, as MPI starts once per process.
 fn on_ranks(test: &str, ranks: &[usize], body: impl Fn(&Comm)) {
     if ran_if_launched(body) {
         return;
@@ -185,8 +187,9 @@ fn every_transfer_keeps_linear_momentum() {
     });
 }
 
-/// FLIP keeps the angular momentum of points up to the lumping of mass, `Σ_p m w (x_p - x_i) ≠ 0` at free surfaces:
-/// its drift falls with the cells and hardly depends on the step. PIC loses angular momentum in no time, XPIC lies between.
+/// FLIP keeps the angular momentum of points up to the lumping of mass, `Σ_p m w (x_p - x_i) ≠ 0` at free
+/// surfaces: its drift falls with the cells and hardly depends on the step. PIC loses angular momentum in no
+/// time, XPIC lies between.
 #[test]
 fn angular_momentum_of_flip_falls_with_the_cells() {
     on_ranks("angular_momentum_of_flip_falls_with_the_cells", &[1], |comm| {

@@ -1,5 +1,5 @@
-//! Stages of a run through the whole program: "settle, then excavate, then fill and load" is one job, with the same results on any ranks
-//! and across restarts, also from the step in which a stage ended.
+//! Stages of a run through the whole program: "settle, then excavate, then fill and load" is one job, with
+//! the same results on any ranks and across restarts, also from the step in which a stage ended.
 
 use crate::common::history::History;
 use crate::common::launch::{Outcome, contents, run, succeed, text};
@@ -26,8 +26,8 @@ const STAGES: &str = "[[stages]]\nname = 'settle'\nduration = 0.5\nequilibrium =
     materials = [{ body = 'ground', material = 'soft' }]\nboundaries = { x_max = { kind = 'separating' } }\n\
     [[stages]]\nname = 'load'\ngravity = [0, '-9.81 * (1 + t)']\n";
 
-/// The mass of the history is that of the bodies that are there, the plate presses in its stage alone, and all is the same on 1 to 3
-/// ranks and across a restart, with dynamic refinement.
+/// The mass of the history is that of the bodies that are there, the plate presses in its stage alone, and
+/// all is the same on 1 to 3 ranks and across a restart, with dynamic refinement.
 #[test]
 fn settle_dig_fill_and_load_is_one_job() {
     let rest = "[time]\nend = 0.08\n[checkpoint]\nevery_steps = 15\nkeep = 99\n\
@@ -82,7 +82,8 @@ fn restarts_from_any_step_give_the_same() {
     }
 }
 
-/// A stage gives bodies their materials from its first step on, the first stage as well: the first time step is that of the new one.
+/// A stage gives bodies their materials from its first step on, the first stage as well: the first time step
+/// is that of the new one.
 #[test]
 fn the_first_stage_changes_materials_as_any_other() {
     let first_step = |material: &str, stage: &str| {
@@ -106,7 +107,8 @@ fn the_first_stage_changes_materials_as_any_other() {
     assert_eq!(first_step("soft", changed), stiff);
 }
 
-/// A block in free flight falls from the start of the stage that has gravity, and every stage ends with an output.
+/// A block in free flight falls from the start of the stage that has gravity, and every stage ends with an
+/// output.
 #[test]
 fn gravity_of_a_stage_acts_from_its_start() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [1, 2]\nroot_edge = 1\n\
@@ -137,8 +139,9 @@ fn gravity_of_a_stage_acts_from_its_start() {
     assert!(outputs >= 3, "an output at the start, at the end of the first stage and at the end");
 }
 
-/// Before the first pour there is no material, and only a stone that falls: the stage ends at its end, outputs come in time, the stone
-/// falls as it does beside material, and what is poured falls as it would from t = 0.
+/// Before the first pour there is no material, and only a stone that falls: the stage ends at its end,
+/// outputs come in time, the stone falls as it does beside material, and what is poured falls as it would
+/// from t = 0.
 #[test]
 fn a_stage_without_material_ends_at_its_end() {
     let stone = "[[colliders]]\nname = 'stone'\nshape = { kind = 'circle', centre = [1.25, 0.7], radius = 0.05 }\n\

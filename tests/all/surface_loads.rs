@@ -1,5 +1,6 @@
-//! Tractions, pressures and point forces through the whole program: force, impulse and work are those of the definition while
-//! particles split and merge; closed forms of a pulled bar, a falling column and a cantilever; same bits on any ranks.
+//! Tractions, pressures and point forces through the whole program: force, impulse and work are those of the
+//! definition while particles split and merge; closed forms of a pulled bar, a falling column and a
+//! cantilever; same bits on any ranks.
 
 use crate::common::history::History;
 use crate::common::launch::{agimp, run, succeed};
@@ -32,7 +33,8 @@ const REFINED: &str =
 const DYNAMIC: &str = "[adaptivity]\nevery_steps = 3\n[[adaptivity.criteria]]\nkind = 'region'\nlevel = 3\n\
                        shape = { kind = 'box', min = [-0.36, -0.4], max = [-0.24, 0.4] }\n";
 
-/// Traction on the right face, dead pressure on the upper, following pressure on the lower, a force on the middle.
+/// Traction on the right face, dead pressure on the upper, following pressure on the lower, a force on the
+/// middle.
 const LOADS: &str = "[[loads]]\nname = 'pull'\nkind = 'traction'\ntraction = [40, '30 * t']\nfacing = [1, 0]\n\
     [[loads]]\nname = 'dead'\nkind = 'pressure'\npressure = 25\nfollow = false\nfacing = [0, 1]\n\
     [[loads]]\nname = 'wind'\nkind = 'pressure'\npressure = 20\nfacing = [0, -1]\n\
@@ -51,8 +53,8 @@ fn history(text: &str, name: &str) -> History {
     History::read(directory.path(), name)
 }
 
-/// The impulse of dead loads is force times time, all momentum comes from loads, and the energy that they give is their work; on
-/// uniform, refined and changing trees.
+/// The impulse of dead loads is force times time, all momentum comes from loads, and the energy that they
+/// give is their work; on uniform, refined and changing trees.
 #[test]
 fn impulses_are_those_of_the_definition_while_particles_split_and_merge() {
     for (name, tree, rest) in [("uniform", "", ""), ("refined", REFINED, ""), ("dynamic", "", DYNAMIC)] {
@@ -63,7 +65,8 @@ fn impulses_are_those_of_the_definition_while_particles_split_and_merge() {
             assert!(history.last("splits") > 50.0 && history.last("merges") > 50.0);
         }
         let impulse = |load: &str, axis: &str| history.integral(&format!("load_{load}_{axis}"), 0.0);
-        // An edge of 0.2 m each. The step takes forces at its middle, which is exact for those that are linear in time.
+        // An edge of 0.2 m each. The step takes forces at its middle, which is exact for those that are
+        // linear in time.
         let exact = [
             ("pull", "x", 40.0 * 0.2 * time),
             ("pull", "y", 0.5 * 30.0 * 0.2 * time * time),
@@ -185,8 +188,8 @@ fn confined(
     )
 }
 
-/// A bar between slip faces, fixed at one end and pulled suddenly at the other: its end goes to and fro along a triangle up to
-/// twice the static displacement, and the wall feels 0 or twice the traction.
+/// A bar between slip faces, fixed at one end and pulled suddenly at the other: its end goes to and fro along
+/// a triangle up to twice the static displacement, and the wall feels 0 or twice the traction.
 #[test]
 fn a_bar_pulled_suddenly_follows_the_closed_form() {
     let (length, stiffness, traction) = (25.0, 100.0, 0.5);
@@ -228,8 +231,8 @@ fn a_bar_pulled_suddenly_follows_the_closed_form() {
     assert!((energy - history.last("work_pull")).abs() < 0.02 * largest);
 }
 
-/// A column on which gravity acts suddenly: its top moves as the sum of its modes. A small force is the probe: its work is force
-/// times way.
+/// A column on which gravity acts suddenly: its top moves as the sum of its modes. A small force is the
+/// probe: its work is force times way.
 #[test]
 fn a_column_under_sudden_weight_follows_the_closed_form() {
     let (height, gravity, speed) = (50.0_f64, 10.0, (1e6_f64 / 80.0).sqrt());
@@ -269,8 +272,8 @@ fn a_column_under_sudden_weight_follows_the_closed_form() {
     assert!(error < 0.02 && end < 0.02, "{error} {end}");
 }
 
-/// A cantilever with a dead load at its tip, taken to equilibrium: large rotations. The reference is a finite element solution of
-/// the plane problem (Q9, converged to 0.1 %): -8.2814 m for Hencky's law.
+/// A cantilever with a dead load at its tip, taken to equilibrium: large rotations. The reference is a finite
+/// element solution of the plane problem (Q9, converged to 0.1 %): -8.2814 m for Hencky's law.
 #[test]
 fn a_cantilever_bends_as_finite_elements_do() {
     let job = confined(
@@ -291,7 +294,8 @@ fn a_cantilever_bends_as_finite_elements_do() {
     assert!((found / -8.2814 - 1.0).abs() < 0.05, "{found}");
 }
 
-/// A quarter of a thick cylinder under inner pressure: the force is p a along each axis, and the inner wall goes where Lamé says.
+/// A quarter of a thick cylinder under inner pressure: the force is p a along each axis, and the inner wall
+/// goes where Lamé says.
 #[test]
 fn a_thick_cylinder_widens_as_lame_says() {
     let job = confined(

@@ -1,5 +1,5 @@
-//! `agimp sweep`: each combination is run once, also when the sweep is killed, stopped and started again; one table has all results, and results of
-//! another job are replaced only where the user asks for it.
+//! `agimp sweep`: each combination is run once, also when the sweep is killed, stopped and started again; one
+//! table has all results, and results of another job are replaced only where the user asks for it.
 use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,8 @@ fn reports(directory: &Path) -> BTreeMap<PathBuf, SystemTime> {
         .collect()
 }
 
-/// Six friction angles, the sweep and its run killed (SIGKILL) after the second has finished: the next start does the rest.
+/// Six friction angles, the sweep and its run killed (SIGKILL) after the second has finished: the next start
+/// does the rest.
 #[test]
 fn a_killed_sweep_goes_on_and_does_no_run_twice() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -139,8 +140,8 @@ fn begun(directory: &Path) -> std::process::Child {
     child
 }
 
-/// TERM and USR1 of a batch system, Ctrl-C: the run of the sweep stops with a checkpoint, the sweep ends with the exit code 3, and the same
-/// command gives what an uninterrupted sweep gives.
+/// TERM and USR1 of a batch system, Ctrl-C: the run of the sweep stops with a checkpoint, the sweep ends with
+/// the exit code 3, and the same command gives what an uninterrupted sweep gives.
 #[test]
 fn a_stopped_sweep_stops_its_run_and_the_same_command_continues() {
     let over = ["--over", "materials.sand.density=1600,1700"];

@@ -1,11 +1,13 @@
-//! Claim: with ties of surface nodes a bent beam is as stiff as theory says with few cells over its depth, and results do not depend on
-//! ranks and restarts. That ties change neither momenta nor affine motion, `spin.rs` shows for free bodies across level jumps.
+//! Claim: with ties of surface nodes a bent beam is as stiff as theory says with few cells over its depth,
+//! and results do not depend on ranks and restarts. That ties change neither momenta nor affine motion,
+//! `spin.rs` shows for free bodies across level jumps.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
 use crate::common::restart;
 
-/// A clamped beam that bends by its weight, under damping, with four cells over its depth, to an angle of 38 degrees.
+/// A clamped beam that bends by its weight, under damping, with four cells over its depth, to an angle of 38
+/// degrees.
 const BEAM: &str = r#"
 version = 1
 dimension = 2
@@ -79,7 +81,8 @@ fn bent_beam_is_as_stiff_as_theory_says() {
     assert!(free > 0.04, "nothing to cure: {free}");
 }
 
-/// Turned bars meet, rub and fall on a slope and on level jumps: two velocity fields, a collider, refinement that follows.
+/// Turned bars meet, rub and fall on a slope and on level jumps: two velocity fields, a collider, refinement
+/// that follows.
 #[test]
 fn ties_give_the_same_on_any_ranks_and_across_restart() {
     let job = r#"

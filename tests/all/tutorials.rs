@@ -1,8 +1,9 @@
 //! The tutorials are true: each runs word by word in an empty directory, and leaves what it says.
 //!
 //! * A fenced block after a line "Save as `NAME`:" is written to that file.
-//! * A block `sh` runs; a block `text` after it shows some of what it prints, line by line and in order. Numbers may differ by 1 %, as those of
-//!   another build do, `…` stands for any words, and punctuation does not count.
+//! * A block `sh` runs; a block `text` after it shows some of what it prints, line by line and in order.
+//!   Numbers may differ by 1 %, as those of another build do, `…` stands for any words, and punctuation does
+//!   not count.
 //! * Bold numbers are among those printed.
 //! * Files that the text names in code exist at the end, and so do the pictures that it shows.
 

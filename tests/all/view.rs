@@ -1,7 +1,7 @@
 //! `agimp view`: the page holds what the files hold, asks nobody, and draws it in a browser.
 //!
-//! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM` names another
-//! one than that of the path.
+//! The test that opens a browser needs Chromium; without it the test says so and passes. `AGIMP_CHROMIUM`
+//! names another one than that of the path.
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -215,8 +215,8 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
     assert!(pages().all(|entry| !entry.file_name().to_string_lossy().contains("html")));
 }
 
-/// Opens the page in a browser without a window, runs `script` in it when it is ready (`v` is the viewer), and returns what
-/// the script returns and how many pixels of the screenshot are coloured.
+/// Opens the page in a browser without a window, runs `script` in it when it is ready (`v` is the viewer),
+/// and returns what the script returns and how many pixels of the screenshot are coloured.
 fn in_browser(chromium: &str, directory: &Path, page: &str, script: &str) -> (Value, usize) {
     let ending = format!(
         "<script>(async () => {{ \
@@ -302,7 +302,8 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
     assert!((real(&result["area"]) / area - 1.0).abs() < 0.08, "{} pixels of {area}", result["area"]);
     assert!(coloured > 20_000, "the screenshot shows it too: {coloured}");
 
-    // Cut in the middle of the domain, at x = 0: nothing is to its right; the other side has next to nothing left.
+    // Cut in the middle of the domain, at x = 0: nothing is to its right; the other side has next to nothing
+    // left.
     let cut = "v.state.dark = false; v.state.cutAxis = 'x'; v.state.cutFlip = true; v.state.axes = false;
         v.state.field = meta.columns.findIndex((column) => column.name === 'material');
         await v.changed('field'); await v.go(0); v.drawNow(); return coloured(v);";
@@ -310,8 +311,8 @@ fn browser_draws_the_particles_where_they_are_and_reads_their_values() {
     assert!(real(&left) < 0.02 * area, "{left} of {area}");
 }
 
-/// The page in a small window, with a title that does not fit into a line: all numbers of both axes are there, from end to end
-/// of the domain, none over another, over the legend or outside.
+/// The page in a small window, with a title that does not fit into a line: all numbers of both axes are
+/// there, from end to end of the domain, none over another, over the legend or outside.
 #[test]
 fn browser_shows_all_numbers_of_axes_and_no_text_over_another() {
     let Some(chromium) = chromium() else { return };

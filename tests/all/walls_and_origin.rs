@@ -1,7 +1,7 @@
 //! Bodies at walls, and domains far from the origin: jobs on trees of several levels.
 //!
-//! A body under uniform stress that fills a domain with walls stays at rest, at faces, edges and corners, whatever the
-//! number of particles per cell; and where the domain lies changes no bit.
+//! A body under uniform stress that fills a domain with walls stays at rest, at faces, edges and corners,
+//! whatever the number of particles per cell; and where the domain lies changes no bit.
 
 use std::fmt::Write as _;
 
@@ -45,8 +45,8 @@ fn at<const D: usize>(origin: [f64; 3], x: [f64; 3]) -> String {
     format!("{:?}", &std::array::from_fn::<f64, D, _>(|a| origin[a] + x[a])[..])
 }
 
-/// A job on a domain of edge 1 m with leaves of levels 1 to 3, where level 1 touches level 3: fine leaves lie in the
-/// middle and in the upper corner.
+/// A job on a domain of edge 1 m with leaves of levels 1 to 3, where level 1 touches level 3: fine leaves lie
+/// in the middle and in the upper corner.
 fn job<const D: usize>(origin: [f64; 3], body: &str, rest: &str) -> String {
     let region = |low: f64, high: f64| {
         let (min, max) = (at::<D>(origin, [low; 3]), at::<D>(origin, [high; 3]));

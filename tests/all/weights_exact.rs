@@ -1,4 +1,5 @@
-//! Weights of random boxes on random trees against exact arithmetic, through the same entry as `agimp weights`.
+//! Weights of random boxes on random trees against exact arithmetic, through the same entry as
+//! `agimp weights`.
 
 use crate::common::exact::{UNIT, UnitBox, weights};
 use crate::common::random::Random;

@@ -378,10 +378,10 @@ fn two_halves<const D: usize>(axis: usize, levels: [u32; 2]) -> Vec<Octant<D>> {
     leaves
 }
 
-/// A box that reaches across a line between cells by one unit of the last place or more, from either side, on a uniform tree
-/// and across jumps of one and three levels, whole or in parts: nodes beyond the line have `w 2V = (slope h V)²`, where h is
-/// their distance from the line and V the box's width in units of h. So what a particle's own stress gives back to it stays
-/// bounded.
+/// A box that reaches across a line between cells by one unit of the last place or more, from either side, on
+/// a uniform tree and across jumps of one and three levels, whole or in parts: nodes beyond the line have
+/// `w 2V = (slope h V)²`, where h is their distance from the line and V the box's width in units of h. So
+/// what a particle's own stress gives back to it stays bounded.
 fn slivers<const D: usize>(comm: &Comm) {
     let mut random = Random::new(29 + D as u64);
     let overlaps: Vec<u64> = if D == 2 {
@@ -436,7 +436,8 @@ fn slivers<const D: usize>(comm: &Comm) {
                     let beyond: Vec<_> = nodes.iter().filter(|node| distance(node) > 0.0).collect();
                     let case = format!("path {path}, levels {levels:?}, {overlap:e}, {centre:?}, {half:?}");
                     for node in &beyond {
-                        // The other axes' share is the same in weight and slope, so that it is left of the quotient.
+                        // The other axes' share is the same in weight and slope, so that it is left of the
+                        // quotient.
                         let (h, slope) = (distance(node), outward * node.momentum[axis]);
                         assert!(node.mass > 0.0 && slope > 0.0, "{case}: {node:?}");
                         let whole: f64 = beyond.iter().map(|node| outward * node.momentum[axis]).sum();

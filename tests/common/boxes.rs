@@ -32,8 +32,8 @@ pub(crate) fn cell_at<const D: usize>(leaves: &[Octant<D>], at: [f64; D]) -> f64
 /// A box, by centre and half widths, and its share of the volume of the one that it was cut from.
 pub(crate) type Part<const D: usize> = ([f64; D], [f64; D], f64);
 
-/// The boxes that are transferred in place of one: equal parts, cut along the axes on which they are wider than the
-/// finest cell that they overlap.
+/// The boxes that are transferred in place of one: equal parts, cut along the axes on which they are wider
+/// than the finest cell that they overlap.
 pub(crate) fn parts<const D: usize>(leaves: &[Octant<D>], whole: Part<D>) -> Vec<Part<D>> {
     let (centre, half, share) = whole;
     let overlaps = |leaf: &Octant<D>| {

@@ -1,7 +1,8 @@
-//! Weights from their definition in exact arithmetic: nothing is shared with the program but the format of trees.
+//! Weights from their definition in exact arithmetic: nothing is shared with the program but the format of
+//! trees.
 //!
-//! Boxes have integer coordinates in units of `2^-45` root edges, so that every weight is an integer over the volume
-//! of the box and a power of two.
+//! Boxes have integer coordinates in units of `2^-45` root edges, so that every weight is an integer over the
+//! volume of the box and a power of two.
 use std::collections::BTreeMap;
 
 use partition::Octant;
@@ -133,7 +134,8 @@ pub(crate) fn weights<const D: usize>(
     nodes.into_iter().map(|(place, sums)| (place, real(sums))).collect()
 }
 
-/// Cells of a leaf that a box overlaps along one axis: lower corner, length, and twice the middle above that corner.
+/// Cells of a leaf that a box overlaps along one axis: lower corner, length, and twice the middle above that
+/// corner.
 fn overlaps(leaf: u32, cell: u64, centre: u64, half: u64) -> Vec<(u64, u64, u64)> {
     let cells = (0..4).map(|i| (4 * u64::from(leaf) + i) * cell);
     let cut = cells.filter_map(|lower| {

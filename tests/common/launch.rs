@@ -47,8 +47,8 @@ pub(crate) fn mpirun(directory: &Path, ranks: usize) -> Command {
     command
 }
 
-/// A command of the shell for rank 0 and one for rank 1. One command of `mpirun`: several, of which each fails, make that of
-/// Open MPI 5.0.7 crash.
+/// A command of the shell for rank 0 and one for rank 1. One command of `mpirun`: several, of which each
+/// fails, make that of Open MPI 5.0.7 crash.
 pub(crate) fn by_rank(directory: &Path, [first, second]: [&str; 2]) -> Command {
     let mut command = mpirun(directory, 2);
     let script = r#"if [ "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}" = 0 ]; then eval "$0"; else eval "$1"; fi"#;
@@ -227,8 +227,9 @@ pub(crate) fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
 }
 
-/// What a run to the end leaves, but for times measured and the text of the job. Files with a state stand there with their digests,
-/// other outputs with the checksums of all their data sets but that text; of checkpoints the last counts.
+/// What a run to the end leaves, but for times measured and the text of the job. Files with a state stand
+/// there with their digests, other outputs with the checksums of all their data sets but that text; of
+/// checkpoints the last counts.
 pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
     let results = directory.join("out").join(name);
     let mut files = contents(&results);

@@ -1,14 +1,15 @@
-//! What tests share.
+//! Code that all test crates share.
 //!
-//! | module | what it holds |
+//! | module | content |
 //! |---|---|
 //! | [`mpirun`] | the one place where ranks start |
 //! | [`scenarios`], [`relaunch`] | this binary again, under `mpirun` |
 //! | [`launch`] | the program, as a user starts it |
-//! | [`runs`], [`history`], [`restart`] | whole runs: what they leave; the same on any ranks and across a restart |
+//! | [`runs`], [`history`], [`restart`] | results of whole runs; equality across ranks and restarts |
 //! | [`program`] | subcommands, a browser, a body for a job |
 //! | [`papers`] | fenced blocks of the documentation |
-//! | [`boxes`], [`exact`], [`tree`], [`random`], [`damage`], [`spinning`] | input: boxes, exact weights, trees, numbers, damaged files, rotating bodies |
+//! | [`boxes`], [`exact`], [`tree`] | boxes, exact weights and trees |
+//! | [`random`], [`damage`], [`spinning`] | random numbers, damaged files, rotating bodies |
 #![allow(dead_code, reason = "each test crate uses its part")]
 pub(crate) mod boxes;
 pub(crate) mod damage;

@@ -13,8 +13,9 @@ pub(crate) fn environment() -> PathBuf {
         .expect("the tests run in the workspace")
 }
 
-/// `mpirun` for that many ranks, which may share cores; what follows is the program with its arguments. The process
-/// becomes `mpirun`, so that its identifier and signals are those of the launcher. Ended after `seconds`.
+/// `mpirun` for that many ranks, which may share cores; what follows is the program with its arguments. The
+/// process becomes `mpirun`, so that its identifier and signals are those of the launcher. Ended after
+/// `seconds`.
 pub(crate) fn command(ranks: usize, seconds: u32) -> Command {
     let mut command = Command::new("bash");
     command
@@ -31,7 +32,8 @@ pub(crate) fn is_mpich() -> bool {
     text(&output).contains("HYDRA")
 }
 
-/// Runs a command of [`command`] to its end. One at a time in this process: more would only compete for the same cores.
+/// Runs a command of [`command`] to its end. One at a time in this process: more would only compete for the
+/// same cores.
 pub(crate) fn finish(command: &mut Command) -> Output {
     static ONE_LAUNCH: Mutex<()> = Mutex::new(());
     let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());

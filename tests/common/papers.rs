@@ -1,7 +1,8 @@
 //! What tests of papers share: their files, their fenced blocks, and a shell for the commands in them.
 //!
-//! An HTML comment before a block says what differs from its words: `<!-- test: needs: PROGRAMS -->` passes over the block where
-//! one of them is missing, `<!-- test: quick: OLD => NEW; REASON -->` replaces words, `<!-- test: skip: REASON -->` leaves it out.
+//! An HTML comment before a block says what differs from its words: `<!-- test: needs: PROGRAMS -->` passes
+//! over the block where one of them is missing, `<!-- test: quick: OLD => NEW; REASON -->` replaces words,
+//! `<!-- test: skip: REASON -->` leaves it out.
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -110,7 +111,8 @@ pub(crate) fn commands(paper: &Path, block: &Block) -> Option<String> {
     Some(block.text.clone())
 }
 
-/// Runs commands in a directory, until one fails. `environment` are commands before them, `programs` a directory in front of the PATH.
+/// Runs commands in a directory, until one fails. `environment` are commands before them, `programs` a
+/// directory in front of the PATH.
 pub(crate) fn bash(directory: &Path, programs: &Path, environment: &str, commands: &str) -> Output {
     let script = format!("{environment}\ntrap 'echo \"failed: $BASH_COMMAND\" >&2' ERR\n{commands}");
     let path = std::env::var("PATH").unwrap_or_default();

@@ -20,8 +20,8 @@ pub(crate) fn ran_if_launched(body: impl Fn(&Comm)) -> bool {
     true
 }
 
-/// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it printed. `module` is the
-/// `module_path!()` of the test.
+/// Runs a test of this binary on a number of ranks; it must succeed within `seconds`. Returns what it
+/// printed. `module` is the `module_path!()` of the test.
 pub(crate) fn relaunch(module: &str, test: &str, ranks: usize, seconds: u32) -> String {
     let test = &full_name(module, test);
     let mut command = mpirun::command(ranks, seconds);

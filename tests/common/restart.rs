@@ -1,11 +1,12 @@
-//! Runs on several ranks, and from one of their checkpoints, that must give the same. The test has the module `launch`.
+//! Runs on several ranks, and from one of their checkpoints, that must give the same. The test has the module
+//! `launch`.
 use std::path::Path;
 
 use super::history::History;
 use super::launch::{Outcome, contents, job, run, succeed, text};
 
-/// Runs a job of that name on 1, 2 and 3 ranks and goes on from its second checkpoint: the results are the same. `look` sees the
-/// directory of each run, and what the run said.
+/// Runs a job of that name on 1, 2 and 3 ranks and goes on from its second checkpoint: the results are the
+/// same. `look` sees the directory of each run, and what the run said.
 pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnMut(&Path, &str)) {
     let mut reference: Option<Outcome> = None;
     for ranks in [1, 2, 3] {
@@ -24,8 +25,8 @@ pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnM
     }
 }
 
-/// Runs a job of `tests/jobs/runs` on 1, 2 and 3 ranks and with 2 threads, and goes on from the checkpoint in the middle of it: the results are the
-/// same. `look` sees the history of the first run.
+/// Runs a job of `tests/jobs/runs` on 1, 2 and 3 ranks and with 2 threads, and goes on from the checkpoint in
+/// the middle of it: the results are the same. `look` sees the history of the first run.
 pub(crate) fn assert_same_in_all_ways(name: &str, look: impl FnOnce(&History)) {
     let (mut reference, mut look): (Option<Outcome>, _) = (None, Some(look));
     for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1)] {
@@ -41,7 +42,8 @@ pub(crate) fn assert_same_in_all_ways(name: &str, look: impl FnOnce(&History)) {
     }
 }
 
-/// Goes on from the checkpoint in the middle of a run that has left more than three, on three ranks: what is left is that of the run before.
+/// Goes on from the checkpoint in the middle of a run that has left more than three, on three ranks: what is
+/// left is that of the run before.
 pub(crate) fn assert_middle_gives(whole: &Outcome, directory: &Path, job: &Path, name: &str) {
     let checkpoints = checkpoints(directory, name);
     assert!(checkpoints.len() > 3, "{checkpoints:?}");

@@ -6,7 +6,8 @@ use super::launch::{self, Outcome};
 use agimp::io::hdf5_file::Reader;
 use agimp::io::snapshot::Header;
 
-/// Runs a job on one rank in a directory, as `block.toml`, over what an earlier run has left. Returns what it leaves.
+/// Runs a job on one rank in a directory, as `block.toml`, over what an earlier run has left. Returns what it
+/// leaves.
 pub(crate) fn outcome(directory: &Path, job: &str) -> Outcome {
     let path = directory.join("block.toml");
     std::fs::write(&path, job).expect("job");

@@ -1,5 +1,5 @@
-//! Runs scenarios on several ranks: a test launches its own binary, where the hidden test `worker` runs the scenario
-//! that an environment variable names.
+//! Runs scenarios on several ranks: a test launches its own binary, where the hidden test `worker` runs the
+//! scenario that an environment variable names.
 use super::mpirun;
 use partition::comm::is_launched;
 use partition::{Comm, World};

@@ -86,7 +86,8 @@ fn a_forgotten_restart_destroys_nothing() {
     refused(directory, 2, &other, &["--quiet"], &words);
     refused(directory, 1, &often, &["--restart", "latest", "--overwrite"], &["cannot be used with"]);
 
-    // Even then the checkpoints of the other sand stay, but for those whose names the run needs (here after 20 steps).
+    // Even then the checkpoints of the other sand stay, but for those whose names the run needs (here after
+    // 20 steps).
     let of_the_first = |name: &String| name.contains("checkpoint_") && !name.contains("_000000020.");
     let before = contents(&directory.join("out").join(NAME));
     assert!(before.keys().filter(|name| of_the_first(name)).count() >= 2);
@@ -126,7 +127,8 @@ fn results_of_another_job_are_not_replaced_unasked() {
     refused(directory, 1, &first, &[], &words);
 }
 
-/// A host on which another file system has the place of the results is named. Left out where the system grants no mounts.
+/// A host on which another file system has the place of the results is named. Left out where the system
+/// grants no mounts.
 #[test]
 fn a_host_without_the_directory_is_named() {
     let _turn = in_turn();

@@ -57,9 +57,9 @@ impl std::fmt::Display for Kill {
     }
 }
 
-/// Ranks or `mpirun` are killed one after another, in a run on 1 to 3 ranks that writes a checkpoint after every step and an
-/// output after every few; each time the run goes on from the latest. Besides, the directory holds the later checkpoints
-/// of an earlier run with other sand.
+/// Ranks or `mpirun` are killed one after another, in a run on 1 to 3 ranks that writes a checkpoint after
+/// every step and an output after every few; each time the run goes on from the latest. Besides, the
+/// directory holds the later checkpoints of an earlier run with other sand.
 fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
     let name = "collapse_2d";
     let home = tempfile::tempdir().expect("temporary directory");
@@ -151,7 +151,8 @@ fn a_failure_while_writing_names_the_step() {
     assert_eq!(output.status.code(), Some(1), "{shown}");
     let messages: Vec<&str> = shown.lines().filter(|line| line.starts_with("agimp:")).collect();
     assert_eq!(messages.len(), 1, "one message: {shown}");
-    // Which file it was depends on the moment: a checkpoint, a table, or the directory when old files are looked for.
+    // Which file it was depends on the moment: a checkpoint, a table, or the directory when old files are
+    // looked for.
     for part in ["step ", "time ", "out/collapse_2d"] {
         assert!(messages[0].contains(part), "'{part}' is missing: {}", messages[0]);
     }
@@ -209,8 +210,8 @@ fn an_unwritable_directory_ends_all_ranks() {
     assert!(shown.contains("out/few_leaves: cannot create the directory"), "{shown}");
 }
 
-/// One rank alone cannot write on, as with a quota, a full disk of one node or a failing client. Without the trap the
-/// system would end that rank without a word.
+/// One rank alone cannot write on, as with a quota, a full disk of one node or a failing client. Without the
+/// trap the system would end that rank without a word.
 #[test]
 fn a_rank_that_cannot_write_ends_all_with_the_reason() {
     let _turn = in_turn();
@@ -249,7 +250,8 @@ fn rank_of(process: u32) -> u32 {
     rank.and_then(|rank| rank.parse().ok()).expect("a rank")
 }
 
-/// Nobody takes the message of rank 0 for three seconds; `mpirun` leaves others one second once a rank has ended.
+/// Nobody takes the message of rank 0 for three seconds; `mpirun` leaves others one second once a rank has
+/// ended.
 #[test]
 fn ranks_end_after_the_message_has_gone_out() {
     let _turn = in_turn();

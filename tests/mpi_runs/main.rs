@@ -1,5 +1,5 @@
-//! The whole program under `mpirun`: same bits on any ranks and threads, restarts, signals, and the end of all
-//! ranks when one fails.
+//! The whole program under `mpirun`: same bits on any ranks and threads, restarts, signals, and the end of
+//! all ranks when one fails.
 #[path = "../common/mod.rs"]
 mod common;
 mod differing_ranks;

@@ -1,5 +1,5 @@
-//! What a crash of the machine may leave: tables without their last rows, with garbage or empty, and damaged states. A run
-//! goes on from what is whole, and says what it has passed over.
+//! What a crash of the machine may leave: tables without their last rows, with garbage or empty, and damaged
+//! states. A run goes on from what is whole, and says what it has passed over.
 use std::path::Path;
 
 use agimp::text::quantity;
@@ -96,7 +96,8 @@ fn tables_are_mended_and_gaps_told() {
     }
 }
 
-/// One bit of the newest state is wrong, or it is cut short: the run goes on from the one before, and says so.
+/// One bit of the newest state is wrong, or it is cut short: the run goes on from the one before, and says
+/// so.
 #[test]
 fn a_damaged_state_is_passed_over() {
     let _turn = in_turn();
@@ -171,8 +172,9 @@ fn flipped(directory: &Path, whole: &[u8], group: &str) -> Vec<u8> {
     panic!("no changed bit was noticed")
 }
 
-/// What a killed run leaves at its very end: `--restart latest` gives the report of an uninterrupted run, nothing that was half written stays, and
-/// a good report stays good. Where the history is lost as well, the report has the state.
+/// What a killed run leaves at its very end: `--restart latest` gives the report of an uninterrupted run,
+/// nothing that was half written stays, and a good report stays good. Where the history is lost as well, the
+/// report has the state.
 #[test]
 fn a_run_that_is_over_has_its_report_again() {
     let _turn = in_turn();

@@ -48,8 +48,8 @@ fn stopped_twice_and_finished_on_other_ranks() {
     assert!(!second.exists() || first.exists(), "checkpoints beyond `keep` go, oldest first");
 }
 
-/// A run to a later end is the run to the end in one go: all states, tables and pictures, whether an output is due where it
-/// ends first or not.
+/// A run to a later end is the run to the end in one go: all states, tables and pictures, whether an output
+/// is due where it ends first or not.
 #[test]
 fn a_later_end_is_the_same_run() {
     let _turn = in_turn();

@@ -1,9 +1,11 @@
-//! Settings of the MPI library in environment variables, made before it starts, and what its launcher sets for ranks.
+//! Settings of the MPI library in environment variables, made before it starts, and what its launcher sets
+//! for ranks.
 //!
-//! What must be known before `mpirun` itself starts (running as root, more ranks than cores) stands in `jobs/environment`.
+//! What must be known before `mpirun` itself starts (running as root, more ranks than cores) stands in
+//! `jobs/environment`.
 
-/// Not collective. Whether a launcher has started this process as one of its ranks: `mpirun` of Open MPI or MPICH, or
-/// `srun` through PMI or PMIx. A process that none has started is alone.
+/// Not collective. Whether a launcher has started this process as one of its ranks: `mpirun` of Open MPI or
+/// MPICH, or `srun` through PMI or PMIx. A process that none has started is alone.
 pub fn is_launched() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMI_RANK", "PMI_SIZE", "PMIX_RANK"]
         .iter()
@@ -16,8 +18,8 @@ pub fn host() -> String {
     if name.trim().is_empty() { "(unknown)".into() } else { name.trim().to_owned() }
 }
 
-/// Not collective. Gives the library the settings that this program needs, as far as the user has not chosen. A process that has
-/// threads already is left as it is: one of them may read the environment meanwhile.
+/// Not collective. Gives the library the settings that this program needs, as far as the user has not chosen.
+/// A process that has threads already is left as it is: one of them may read the environment meanwhile.
 pub(super) fn prepare() {
     let version = mpi::environment::library_version().unwrap_or_default();
     for &(name, value) in settings(&version) {
@@ -28,7 +30,8 @@ pub(super) fn prepare() {
     }
 }
 
-/// Whether this thread is the only one of the process. Where the system does not say, it is taken to have others.
+/// Whether this thread is the only one of the process. Where the system does not say, it is taken to have
+/// others.
 fn has_one_thread() -> bool {
     std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1)
 }
@@ -36,8 +39,8 @@ fn has_one_thread() -> bool {
 /// Settings for the library that calls itself `version`.
 fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
     if version.starts_with("Open MPI v") {
-        // A rank that waits for a message gives its core to whoever has work: another rank, a thread that writes files,
-        // another program. Where nobody has, it comes back at once.
+        // A rank that waits for a message gives its core to whoever has work: another rank, a thread that
+        // writes files, another program. Where nobody has, it comes back at once.
         &[("OMPI_MCA_mpi_yield_when_idle", "1")]
     } else {
         &[]
@@ -48,7 +51,8 @@ fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
 mod tests {
     use super::{has_one_thread, settings};
 
-    /// A process with threads does not get its environment changed. A test is a thread beside that of its harness.
+    /// A process with threads does not get its environment changed. A test is a thread beside that of its
+    /// harness.
     #[test]
     fn threads_are_noticed() {
         std::thread::scope(|scope| {

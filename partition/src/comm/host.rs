@@ -23,7 +23,8 @@ impl Comm {
         sum
     }
 
-    /// Collective. The bits that any rank of this rank's machine has set; all ranks give the same number of words.
+    /// Collective. The bits that any rank of this rank's machine has set; all ranks give the same number of
+    /// words.
     pub fn host_union(&self, bits: &[u64]) -> Vec<u64> {
         let mut union = bits.to_vec();
         if !bits.is_empty() {

@@ -7,7 +7,8 @@
 //!   and a finish between which other work can be done (`neighbour.rs`),
 //! * `host.rs` asks the ranks of one machine,
 //! * `environment.rs` has what differs between MPI libraries,
-//! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for environment variables that are set before MPI starts.
+//! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for
+//!   environment variables that are set before MPI starts.
 //!
 //! Everything here runs on the main thread (`MPI_THREAD_FUNNELED`); [`Comm`] is neither `Send`
 //! nor `Sync`, so the compiler keeps it there. No call has a cost that grows like the number of

@@ -26,8 +26,8 @@ const NO_STEP: u64 = u64::MAX;
 /// Set by the first panic of this process: threads that share a bug must not repeat the message.
 static TOLD: AtomicBool = AtomicBool::new(false);
 
-/// Ranks that share a bug must not all report it: the others give rank 0 this long to end the job first. Longer than
-/// Open MPI takes between SIGTERM, which the program may catch, and SIGKILL (1 s).
+/// Ranks that share a bug must not all report it: the others give rank 0 this long to end the job first.
+/// Longer than Open MPI takes between SIGTERM, which the program may catch, and SIGKILL (1 s).
 const RANK_0_FIRST: Duration = Duration::from_millis(1500);
 
 /// Why MPI could not be started.

@@ -77,8 +77,8 @@ impl<const D: usize> Oracle<D> {
         self.leaves.extend(children(leaf));
     }
 
-    /// Number of leaves of each rank for these weights: each cut is nearest to its ideal place, between families
-    /// runs of siblings are whole.
+    /// Number of leaves of each rank for these weights: each cut is nearest to its ideal place, between
+    /// families runs of siblings are whole.
     pub(crate) fn shares(&self, ranks: usize, at: CutAt, weight: impl Fn(&Octant<D>) -> u64) -> Vec<usize> {
         let leaves: Vec<_> = self.leaves.iter().copied().collect();
         let mut weights: Vec<u64> = leaves.iter().map(weight).collect();

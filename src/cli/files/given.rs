@@ -1,5 +1,5 @@
-//! The files that a command line means: each word is a file, the directory of a run, the index of its outputs or its job
-//! file.
+//! The files that a command line means: each word is a file, the directory of a run, the index of its outputs
+//! or its job file.
 use std::path::{Path, PathBuf};
 
 use crate::cli::Failure;
@@ -16,8 +16,8 @@ pub(super) struct Given {
 }
 
 impl Given {
-    /// Files with particles. What a pattern such as `out/a/*.hdf` finds of the tree is passed over, as the outputs are there
-    /// as well.
+    /// Files with particles. What a pattern such as `out/a/*.hdf` finds of the tree is passed over, as the
+    /// outputs are there as well.
     ///
     /// # Errors
     /// A word means no files, or only files of the tree.

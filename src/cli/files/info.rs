@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp info`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Outputs, checkpoints or trees: files, the directory of a run, its index (NAME.hdf.series) or its job file.
+    /// Outputs, checkpoints or trees: files, the directory of a run, its index (NAME.hdf.series) or its job
+    /// file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Read everything and compare the checksums.

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp movie`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Outputs of one run, in order of time: files, the directory of the run, its index (NAME.hdf.series) or its job file.
+    /// Outputs of one run, in order of time: files, the directory of the run, its index (NAME.hdf.series) or
+    /// its job file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Appearance.
@@ -24,8 +25,8 @@ pub struct Arguments {
     /// Frames per second.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=60))]
     fps: u16,
-    /// Movie to write: .png (APNG) or .gif; .mp4 and .webm with ffmpeg on the PATH; by default NAME.movie.png beside
-    /// the first file.
+    /// Movie to write: .png (APNG) or .gif; .mp4 and .webm with ffmpeg on the PATH; by default NAME.movie.png
+    /// beside the first file.
     #[arg(long)]
     out: Option<PathBuf>,
 }

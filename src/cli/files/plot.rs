@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp plot`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Outputs or checkpoints: files, the directory of a run, its index (NAME.hdf.series) or its job file; a picture for
-    /// each.
+    /// Outputs or checkpoints: files, the directory of a run, its index (NAME.hdf.series) or its job file; a
+    /// picture for each.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Appearance.
@@ -20,8 +20,8 @@ pub struct Arguments {
     /// Title; by default the title of the job that wrote the file, or the name of the file.
     #[arg(long)]
     title: Option<String>,
-    /// Picture to write: .png, or .svg with text and lines as vectors; of several outputs the directory of the pictures. By
-    /// default beside each file with the extension png.
+    /// Picture to write: .png, or .svg with text and lines as vectors; of several outputs the directory of
+    /// the pictures. By default beside each file with the extension png.
     #[arg(long)]
     out: Option<PathBuf>,
 }

@@ -10,15 +10,15 @@ use std::path::{Path, PathBuf};
 /// Arguments of `agimp report`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A run: the directory of its results, its index (NAME.hdf.series), outputs of it, or a job file that was run without
-    /// --out.
+    /// A run: the directory of its results, its index (NAME.hdf.series), outputs of it, or a job file that
+    /// was run without --out.
     #[arg(required = true)]
     run: Vec<PathBuf>,
     /// Name of the job, if the directory contains the results of several jobs.
     #[arg(long)]
     name: Option<String>,
-    /// Quantity that colours the pictures, as for `agimp plot`; by default plastic strain if there is any, otherwise
-    /// the speed.
+    /// Quantity that colours the pictures, as for `agimp plot`; by default plastic strain if there is any,
+    /// otherwise the speed.
     #[arg(long, alias = "color")]
     colour: Option<String>,
     /// Maximum number of pictures, from the first output to the last.

@@ -11,11 +11,12 @@ use std::path::PathBuf;
 /// Arguments of `agimp view`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Outputs or checkpoints of one run, in order of time: files, the directory of the run, its index (NAME.hdf.series)
-    /// or its job file.
+    /// Outputs or checkpoints of one run, in order of time: files, the directory of the run, its index
+    /// (NAME.hdf.series) or its job file.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Fields to include, separated by commas; by default all fields of the files except identifiers and components.
+    /// Fields to include, separated by commas; by default all fields of the files except identifiers and
+    /// components.
     #[arg(long, value_delimiter = ',', value_parser = super::field)]
     fields: Option<Vec<PointField>>,
     /// Bits for each real value; more bits give finer values and a larger page.

@@ -1,4 +1,5 @@
-//! States of a particle as a picture of three panels: stress and volume over shear strain, and the path of stress.
+//! States of a particle as a picture of three panels: stress and volume over shear strain, and the path of
+//! stress.
 use std::path::Path;
 
 use plotters::prelude::*;

@@ -50,8 +50,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1e5, requires = "test", allow_negative_numbers = true)]
     pub pressure: f64,
 
-    /// End of --test, measured from the confined state: logarithmic strain along z, along all axes (isotropic), or
-    /// shear (simple_shear) [default: -0.1; simple_shear: 0.2]
+    /// End of --test, measured from the confined state: logarithmic strain along z, along all axes
+    /// (isotropic), or shear (simple_shear) [default: -0.1; simple_shear: 0.2]
     #[arg(long, requires = "test", allow_negative_numbers = true)]
     pub range: Option<f64>,
 
@@ -67,12 +67,12 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
 
-    /// The path: CSV or JSON. A CSV whose header names strain_xx (logarithmic) or stress_xx (Cauchy, Pa), and so on for yy, zz,
-    /// xy, xz and yz, the shear (of x over y) or the time (s), prescribes these since the start; other components have no
-    /// strain. Otherwise each row is the total deformation since the start: 3 numbers are
-    /// logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a list of
-    /// rows, alone or under the key "path" or "rows"; a row is a list of numbers (the 9 may be nested) or
-    /// an object that holds one under "F" or "eps_log"; its other keys do not matter.
+    /// The path: CSV or JSON. A CSV whose header names strain_xx (logarithmic) or stress_xx (Cauchy, Pa), and
+    /// so on for yy, zz, xy, xz and yz, the shear (of x over y) or the time (s), prescribes these since the
+    /// start; other components have no strain. Otherwise each row is the total deformation since the start: 3
+    /// numbers are logarithmic strains along the axes, 9 are the deformation gradient row by row. JSON is a
+    /// list of rows, alone or under the key "path" or "rows"; a row is a list of numbers (the 9 may be
+    /// nested) or an object that holds one under "F" or "eps_log"; its other keys do not matter.
     #[arg(value_name = "PATH", required_unless_present = "test")]
     pub path: Option<PathBuf>,
 }

@@ -84,8 +84,8 @@ impl Table {
     }
 }
 
-/// Trace, norm of the deviator, and Lode angle in degrees: 0 in extension (two lesser values equal), 60 in compression (two greater
-/// values equal), 30 in pure shear and where there is no deviator.
+/// Trace, norm of the deviator, and Lode angle in degrees: 0 in extension (two lesser values equal), 60 in
+/// compression (two greater values equal), 30 in pure shear and where there is no deviator.
 fn invariants(tensor: &[f64; 6]) -> [f64; 3] {
     let trace = tensor[0] + tensor[1] + tensor[2];
     let deviator: [f64; 6] = std::array::from_fn(|c| if c < 3 { tensor[c] - trace / 3.0 } else { tensor[c] });

@@ -10,8 +10,8 @@ use crate::run::scene;
 /// Options of subcommands that draw particles.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Looks {
-    /// Quantity that gives the colours: a field of the file or a derived quantity, such as speed, pressure, stress_xy,
-    /// stress_1 (greatest principal stress) or max_shear. An unknown name lists all quantities.
+    /// Quantity that gives the colours: a field of the file or a derived quantity, such as speed, pressure,
+    /// stress_xy, stress_1 (greatest principal stress) or max_shear. An unknown name lists all quantities.
     #[arg(long, alias = "color", default_value = "leaf_level")]
     pub(in crate::cli) colour: String,
     /// Value of the first colour; by default the range of the values without the outermost 0.5 % at each end.
@@ -114,7 +114,8 @@ impl Looks {
         }
     }
 
-    /// The job of outputs, for what is drawn beside the fields of particles; a warning where colliders cannot be.
+    /// The job of outputs, for what is drawn beside the fields of particles; a warning where colliders cannot
+    /// be.
     fn job(&self, output: &Path) -> Option<AnyProblem> {
         if !output.is_file() {
             return None;

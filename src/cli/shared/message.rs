@@ -43,13 +43,14 @@ pub(in crate::cli) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Re
     Err(Failure::Reported(code[0] as u8))
 }
 
-/// Collective under `mpirun`: its ranks. A process that it has not started is alone, and need not be able to start MPI.
+/// Collective under `mpirun`: its ranks. A process that it has not started is alone, and need not be able to
+/// start MPI.
 pub(in crate::cli) fn launched() -> Result<Option<World>, Failure> {
     is_launched().then(World::init).transpose().map_err(|error| Failure::Run(error.to_string()))
 }
 
-/// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the parser
-/// refuses, reported once.
+/// Collective under `mpirun`, where all ranks have the same command line as a rule. A command line that the
+/// parser refuses, reported once.
 pub fn unusable(error: clap::Error) -> Failure {
     let Ok(Some(world)) = launched() else { return error.into() };
     match together(world.comm(), Err::<(), _>(error.into())) {
@@ -63,7 +64,8 @@ fn visible(message: &str) -> String {
     message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
-/// Writes a message in one piece: `mpirun` may put its own words between pieces. That nobody listens is no failure.
+/// Writes a message in one piece: `mpirun` may put its own words between pieces. That nobody listens is no
+/// failure.
 fn print(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }

@@ -9,7 +9,8 @@ use crate::text::controls;
 /// Most characters of a line that are shown.
 const WIDTH: usize = 200;
 
-/// The line of a fault with its neighbours. Characters that control a terminal stand as one visible character each.
+/// The line of a fault with its neighbours. Characters that control a terminal stand as one visible character
+/// each.
 #[derive(Debug)]
 pub(super) struct Quote {
     name: String,
@@ -54,8 +55,8 @@ impl Quote {
     }
 }
 
-/// Appends at most [`WIDTH`] characters of a line from one on, with dots where it is cut. Returns the bytes at which the
-/// characters begin, dots included, relative to the first.
+/// Appends at most [`WIDTH`] characters of a line from one on, with dots where it is cut. Returns the bytes
+/// at which the characters begin, dots included, relative to the first.
 fn cleaned(line: &str, from: usize, out: &mut String) -> Vec<usize> {
     let (start, mut places) = (out.len(), Vec::new());
     let mut push = |c: char| {

@@ -1,8 +1,9 @@
 //! One command on many ranks: the same command line, and the job that rank 0 has read.
 //!
-//! Each rank is a process of its own: it may have been started with other arguments, and it may see another text of
-//! the job, when the file is edited while a batch system starts the ranks or when a network file system holds an old
-//! copy. Ranks that ran different jobs would wait for each other for ever, or compute what nobody has asked for.
+//! Each rank is a process of its own: it may have been started with other arguments, and it may see another
+//! text of the job, when the file is edited while a batch system starts the ranks or when a network file
+//! system holds an old copy. Ranks that ran different jobs would wait for each other for ever, or compute
+//! what nobody has asked for.
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::Path;
@@ -13,8 +14,8 @@ use super::message::together;
 use crate::cli::Failure;
 use crate::job::{self, AnyProblem, Settings};
 
-/// Collective. Refuses ranks whose command differs from that of rank 0. `words` are the words of the command that decide
-/// what it does.
+/// Collective. Refuses ranks whose command differs from that of rank 0. `words` are the words of the command
+/// that decide what it does.
 pub(in crate::cli) fn same_command(comm: &Comm, words: &[&OsStr]) -> Result<(), Failure> {
     // Ranks whose command line cannot be used at all say so here.
     together(comm, Ok(()))?;

@@ -5,8 +5,8 @@ use crate::job::Settings;
 /// Options of subcommands that read a job.
 #[derive(Debug, clap::Args)]
 pub struct Changes {
-    /// Set a value of the job, such as `time.cfl=0.3`, `materials.sand.density=1500` or `bodies.0.velocity=[1, 0]`; may be
-    /// given several times.
+    /// Set a value of the job, such as `time.cfl=0.3`, `materials.sand.density=1500` or
+    /// `bodies.0.velocity=[1, 0]`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Directory of the results: sets `output.directory`.

@@ -1,8 +1,9 @@
 //! `agimp sweep`: runs a job for each combination of values, and puts the results into one table.
 //!
-//! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as `mpirun -n 4`) with a directory of its
-//! own. A run that has its report is finished and not done again, so that the same command goes on after an interruption. Results of
-//! another job are replaced only where the user says so.
+//! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as
+//! `mpirun -n 4`) with a directory of its own. A run that has its report is finished and not done again, so
+//! that the same command goes on after an interruption. Results of another job are replaced only where the
+//! user says so.
 //!
 //! | file | what it has |
 //! |---|---|
@@ -34,7 +35,8 @@ const NAME: usize = 60;
 pub struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
-    /// A key of the job, as for --set, and its values, separated by commas; with several keys, each combination is run.
+    /// A key of the job, as for --set, and its values, separated by commas; with several keys, each
+    /// combination is run.
     #[arg(long, value_name = "KEY=A,B,C", required = true)]
     over: Vec<String>,
     /// A value for all runs, as for `agimp run`; may be given several times.
@@ -49,7 +51,8 @@ pub struct Arguments {
     /// Threads of each rank.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Start runs again whose directories hold results that they cannot go on from, such as those of another job, and replace these.
+    /// Start runs again whose directories hold results that they cannot go on from, such as those of another
+    /// job, and replace these.
     #[arg(long)]
     overwrite: bool,
 }
@@ -69,8 +72,8 @@ struct Run {
 /// Runs what is not finished yet, and writes the table.
 ///
 /// # Errors
-/// A combination is no valid job, another sweep writes here, or results of another job would be lost (then nothing is run); some run
-/// failed; or the sweep was asked to stop.
+/// A combination is no valid job, another sweep writes here, or results of another job would be lost (then
+/// nothing is run); some run failed; or the sweep was asked to stop.
 pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let over: Vec<(String, Vec<String>)> =

@@ -122,8 +122,8 @@ fn command(arguments: &Arguments, run: &Run, how: &[&str]) -> Result<Command, st
     Ok(command)
 }
 
-/// Waits for a process. Once the sweep is asked to stop, so is the process, by the one signal that launchers hand on to their ranks.
-/// Returns its exit code, if it has one.
+/// Waits for a process. Once the sweep is asked to stop, so is the process, by the one signal that launchers
+/// hand on to their ranks. Returns its exit code, if it has one.
 fn wait(mut command: Command, stop: &StopRequest) -> std::io::Result<Option<i32>> {
     let mut child = command.spawn()?;
     let mut is_told = false;

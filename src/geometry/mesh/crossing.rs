@@ -3,10 +3,12 @@ use parry3d_f64::partitioning::Bvh;
 
 use super::solid::NotSolid;
 
-/// Heights over a plane below this share of the size of the triangles, cubed with the area, count as on it: they touch.
+/// Heights over a plane below this share of the size of the triangles, cubed with the area, count as on it:
+/// they touch.
 const TOUCHES: f64 = 1e-12;
 
-/// Looks for pairs of triangles of which an edge of one goes through the other. Pairs with a common edge are left out.
+/// Looks for pairs of triangles of which an edge of one goes through the other. Pairs with a common edge are
+/// left out.
 pub(super) fn check(
     vertices: &[[f64; 3]],
     indices: &[[u32; 3]],

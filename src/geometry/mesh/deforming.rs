@@ -25,7 +25,8 @@ enum Place {
     Last,
 }
 
-/// Why meshes are not one surface: which of them has other vertices or triangles than the first, and how many.
+/// Why meshes are not one surface: which of them has other vertices or triangles than the first, and how
+/// many.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mismatch {
     /// Number of the mesh.
@@ -135,7 +136,8 @@ mod tests {
         Mesh::new(Triangles { vertices, indices }).expect("closed")
     }
 
-    /// A ball that grows from 1 to 2 m in half a second: its radius is linear in time, and its surface goes outwards at 2 m/s.
+    /// A ball that grows from 1 to 2 m in half a second: its radius is linear in time, and its surface goes
+    /// outwards at 2 m/s.
     #[test]
     fn a_growing_ball_has_the_radius_and_velocity_of_its_time() {
         let mut deforming = Deforming::new(vec![scaled(1.0), scaled(2.0)], 0.5).expect("same triangles");

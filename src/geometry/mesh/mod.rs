@@ -12,9 +12,10 @@
 //! | `winding` | inside and outside by the generalised winding number |
 //! | this | signed distance and normal |
 //!
-//! The nearest point of the surface comes from the tree of `parry3d`, and the side from its angle-weighted normals (Baerentzen and Aanaes
-//! 2005), which is exact at edges and corners, or, for what is not quite closed, from the winding number. A raster of distances stands before it: away from the surface a point takes the bound that
-//! its cell of the raster gives, so that what asks from afar does not search the tree.
+//! The nearest point of the surface comes from the tree of `parry3d`, and the side from its angle-weighted
+//! normals (Baerentzen and Aanaes 2005), which is exact at edges and corners, or, for what is not quite
+//! closed, from the winding number. A raster of distances stands before it: away from the surface a point
+//! takes the bound that its cell of the raster gives, so that what asks from afar does not search the tree.
 use std::sync::{Arc, OnceLock};
 
 use parry3d_f64::math::Vector;
@@ -88,7 +89,8 @@ struct Inner {
     volume: f64,
 }
 
-/// Signed distances at the centres of the cells of a regular grid over the bounding box with a margin of a cell.
+/// Signed distances at the centres of the cells of a regular grid over the bounding box with a margin of a
+/// cell.
 struct Raster {
     lower: [f64; 3],
     edge: f64,
@@ -105,7 +107,8 @@ impl Mesh {
         Self::of(triangles, Filling::Closed)
     }
 
-    /// The solid below a terrain: as [`Mesh::new`], without the search for crossings, which a surface of heights cannot have.
+    /// The solid below a terrain: as [`Mesh::new`], without the search for crossings, which a surface of
+    /// heights cannot have.
     ///
     /// # Errors
     /// A height is at no place.
@@ -113,7 +116,8 @@ impl Mesh {
         Self::of(triangles, Filling::Terrain)
     }
 
-    /// The solid that triangles bound, or, where they are not closed, the sheet that they are: all its distances are positive.
+    /// The solid that triangles bound, or, where they are not closed, the sheet that they are: all its
+    /// distances are positive.
     ///
     /// # Errors
     /// There is no triangle with an area, or a vertex is at no place.
@@ -121,8 +125,8 @@ impl Mesh {
         Self::of(triangles, Filling::ClosedOrSheet)
     }
 
-    /// The solid that triangles wind around: they may leave holes, cross each other and face both ways. Holes are closed by cones over
-    /// their rims, and what the surface winds around is inside.
+    /// The solid that triangles wind around: they may leave holes, cross each other and face both ways. Holes
+    /// are closed by cones over their rims, and what the surface winds around is inside.
     ///
     /// # Errors
     /// There is no triangle with an area, a vertex is at no place, or nothing is inside.
@@ -193,7 +197,8 @@ impl Mesh {
         Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.unwrap_or(0.0).abs() })))
     }
 
-    /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a look at whether it crosses itself.
+    /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a look at
+    /// whether it crosses itself.
     pub(super) fn moved(&self, vertices: Vec<[f64; 3]>) -> Self {
         let bounds = Aabb::of_points(vertices.iter().copied());
         let indices = self.0.surface.surface.indices().to_vec();
@@ -260,8 +265,8 @@ impl Mesh {
         self.0.checksum
     }
 
-    /// Signed distance of a point to the surface, m, negative inside: exact within some cells of the raster from the surface, elsewhere a
-    /// bound, not larger in magnitude and with the right sign.
+    /// Signed distance of a point to the surface, m, negative inside: exact within some cells of the raster
+    /// from the surface, elsewhere a bound, not larger in magnitude and with the right sign.
     pub fn distance(&self, x: &[f64; 3]) -> f64 {
         if let Some(bound) = self.raster().bound(x) {
             return bound;

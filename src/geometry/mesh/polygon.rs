@@ -1,13 +1,14 @@
 //! Polygons of a mesh to triangles.
 //!
-//! A polygon is cut into a fan from its first corner where that is right, as it is for all convex ones; else ears are cut off one by one
-//! (Meisters 1975), in the plane that it faces most.
+//! A polygon is cut into a fan from its first corner where that is right, as it is for all convex ones; else
+//! ears are cut off one by one (Meisters 1975), in the plane that it faces most.
 use crate::geometry::vector::{cross, dot};
 
 /// Most corners of a polygon whose ears are cut: the time goes with their square.
 const MOST: usize = 2_000;
 
-/// The triangles of a polygon with these corners, with their orientation. Corners without a vertex are left as they are.
+/// The triangles of a polygon with these corners, with their orientation. Corners without a vertex are left
+/// as they are.
 pub(super) fn triangles(vertices: &[[f64; 3]], corners: &[u32]) -> Vec<[u32; 3]> {
     let [first, rest @ ..] = corners else { return Vec::new() };
     let fan = || rest.windows(2).map(|pair| [*first, pair[0], pair[1]]).collect();
@@ -43,7 +44,8 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Triangles of a simple polygon by numbers of its corners. Of one that crosses itself: some triangles with its edges.
+/// Triangles of a simple polygon by numbers of its corners. Of one that crosses itself: some triangles with
+/// its edges.
 fn ears(flat: &[[f64; 2]]) -> Vec<[usize; 3]> {
     let mut left: Vec<usize> = (0..flat.len()).collect();
     let mut found = Vec::with_capacity(flat.len());
@@ -61,7 +63,8 @@ fn ears(flat: &[[f64; 2]]) -> Vec<[usize; 3]> {
                     is_other && turn(a, b, x) >= 0.0 && turn(b, c, x) >= 0.0 && turn(c, a, x) >= 0.0
                 })
         };
-        // One after another around the polygon, so that no fan of thin triangles arises; where there is none, whatever comes.
+        // One after another around the polygon, so that no fan of thin triangles arises; where there is none,
+        // whatever comes.
         let k = (from..from + n).find(is_ear).unwrap_or(from) % n;
         found.push(corners(k));
         left.remove(k);
@@ -78,8 +81,8 @@ mod tests {
     /// Where a point of a plane lies in space.
     type Plane = fn(&[f64; 2]) -> [f64; 3];
 
-    /// Polygons in a plane that is turned every way: triangles with the sum of their areas, none of them turned, and each edge of the
-    /// polygon once.
+    /// Polygons in a plane that is turned every way: triangles with the sum of their areas, none of them
+    /// turned, and each edge of the polygon once.
     fn is_cut_rightly(polygon: &[[f64; 2]], area: f64) {
         let planes: [Plane; 4] = [
             |x| [x[0], x[1], 2.0],

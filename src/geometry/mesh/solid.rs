@@ -88,11 +88,12 @@ fn point(x: &[f64; 3]) -> String {
 /// Greatest coordinate, m: squares and cubes of distances stay finite.
 const FARTHEST: f64 = 1e12;
 
-/// Vertices that are nearer to each other than this share of the longest edge of their bounding box are one, where a surface has gaps:
-/// roundings of programs that mesh each face by itself.
+/// Vertices that are nearer to each other than this share of the longest edge of their bounding box are one,
+/// where a surface has gaps: roundings of programs that mesh each face by itself.
 const WELDED: f64 = 1e-6;
 
-/// Share of the volume that triangles enclose with their middle below which the solid that is left when holes are closed counts as none.
+/// Share of the volume that triangles enclose with their middle below which the solid that is left when holes
+/// are closed counts as none.
 const HOLLOW: f64 = 0.1;
 
 /// Triangles with vertices of their own.
@@ -152,7 +153,8 @@ impl Merged {
         WELDED * self.size()
     }
 
-    /// The same with vertices that are hardly apart made one: the first of them. Triangles that have two corners at one place then are gone.
+    /// The same with vertices that are hardly apart made one: the first of them. Triangles that have two
+    /// corners at one place then are gone.
     pub(super) fn welded(&self) -> Self {
         let gap = self.gap();
         let cell = |x: &[f64; 3]| x.map(|c| (c / gap).floor());
@@ -206,8 +208,9 @@ impl Merged {
     /// Closes the holes. Returns the volume inside, m³, with the sign of its orientation.
     ///
     /// # Errors
-    /// Nothing is inside: faces whose edges do not meet lose what they enclose, since the rim of each is closed over itself. Then little is
-    /// left beside the cones over the triangles with their tip in the middle of the bounding box.
+    /// Nothing is inside: faces whose edges do not meet lose what they enclose, since the rim of each is
+    /// closed over itself. Then little is left beside the cones over the triangles with their tip in the
+    /// middle of the bounding box.
     pub(super) fn capped(&mut self) -> Result<f64, NotSolid> {
         if self.indices.is_empty() {
             return Err(NotSolid::Empty);
@@ -245,8 +248,9 @@ fn enclosed(vertices: &[[f64; 3]], indices: &[[u32; 3]], tip: &[f64; 3]) -> f64 
     cones.sum()
 }
 
-/// Closes what is open by cones. The rims of all holes are what the edges of the triangles add up to with their directions; they have no
-/// end, and so each loop of them and the cone over it, from the mean of its vertices, close the surface.
+/// Closes what is open by cones. The rims of all holes are what the edges of the triangles add up to with
+/// their directions; they have no end, and so each loop of them and the cone over it, from the mean of its
+/// vertices, close the surface.
 fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     let mut sums: BTreeMap<(u32, u32), i64> = BTreeMap::new();
     for [a, b, c] in indices.iter() {
@@ -289,8 +293,8 @@ fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     }
 }
 
-/// Where a rim goes on. Where several meet it is the edge that goes back the most: so slits between edges that are divided in different
-/// ways are closed by themselves, and not with whole faces.
+/// Where a rim goes on. Where several meet it is the edge that goes back the most: so slits between edges
+/// that are divided in different ways are closed by themselves, and not with whole faces.
 fn next_on_rim(vertices: &[[f64; 3]], walk: &[u32], onwards: &mut BTreeMap<u32, Vec<u32>>) -> Option<u32> {
     let (last, before) = walk.split_last()?;
     let ways = onwards.get_mut(last)?;
@@ -306,7 +310,8 @@ fn next_on_rim(vertices: &[[f64; 3]], walk: &[u32], onwards: &mut BTreeMap<u32, 
     Some(ways.remove(most))
 }
 
-/// Whether triangles are closed and face one way. Returns the volume inside, m³, negative where they face inwards.
+/// Whether triangles are closed and face one way. Returns the volume inside, m³, negative where they face
+/// inwards.
 fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, NotSolid> {
     // Each edge is gone along as often in one direction as in the other.
     let mut edges: FxHashMap<(u32, u32), [u32; 2]> = FxHashMap::default();
@@ -405,7 +410,8 @@ mod tests {
         apart
     }
 
-    /// Faces that are a rounding apart are one surface, closed or by winding number; wider gaps leave no solid, which is an error.
+    /// Faces that are a rounding apart are one surface, closed or by winding number; wider gaps leave no
+    /// solid, which is an error.
     #[test]
     fn faces_that_are_hardly_apart_are_welded() {
         for make in [Mesh::new, Mesh::wound] {
@@ -417,7 +423,8 @@ mod tests {
         assert!(matches!(Mesh::wound(unwelded(1e-3)), Err(NotSolid::Hollow(_))));
     }
 
-    /// Faces that divide their common edge in different ways leave slits without an area: the solid by winding number is the cube.
+    /// Faces that divide their common edge in different ways leave slits without an area: the solid by
+    /// winding number is the cube.
     #[test]
     fn edges_that_are_divided_differently_are_closed_as_slits() {
         let mut slit = Triangles::default();

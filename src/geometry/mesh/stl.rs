@@ -1,7 +1,8 @@
 //! STL, text and binary.
 //!
-//! A file is binary if it is as long as the number of triangles in its header says, whatever the header begins with; else, if its first
-//! word is `solid`, it is text: words in letters of either case, one after another as many solids as there are.
+//! A file is binary if it is as long as the number of triangles in its header says, whatever the header
+//! begins with; else, if its first word is `solid`, it is text: words in letters of either case, one after
+//! another as many solids as there are.
 use super::read::{ReadError, Triangles};
 use crate::text::excerpt;
 
@@ -97,7 +98,8 @@ mod tests {
         indices.into_iter().map(|corners| corners.map(|corner| vertices[corner as usize])).collect()
     }
 
-    /// In capitals, with a mark of the order of bytes, without a name, with several solids: all triangles are there.
+    /// In capitals, with a mark of the order of bytes, without a name, with several solids: all triangles are
+    /// there.
     #[test]
     fn forms_of_text_give_the_same_triangles() {
         let expected = corners(TEXT.as_bytes());

@@ -47,8 +47,8 @@ pub(super) fn points(reach: f64) -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// The distance of a cube is exact near its surface, edges and corners included, and a bound with the right sign elsewhere; the
-/// normal is the gradient.
+/// The distance of a cube is exact near its surface, edges and corners included, and a bound with the right
+/// sign elsewhere; the normal is the gradient.
 #[test]
 fn a_cube_is_a_box() {
     let mesh = Mesh::new(cube()).unwrap();
@@ -72,7 +72,8 @@ fn a_cube_is_a_box() {
     assert_eq!(mesh.gradient(&[0.25, 0.5, 1.0]), [0.0, 0.0, 1.0]);
 }
 
-/// A ball of 8,192 triangles: as far off as its facets are, 2e-4 of the radius squared over the square of their edge.
+/// A ball of 8,192 triangles: as far off as its facets are, 2e-4 of the radius squared over the square of
+/// their edge.
 #[test]
 fn a_fine_ball_is_nearly_a_ball() {
     let mesh = Mesh::new(ball(5)).unwrap();
@@ -139,8 +140,9 @@ fn to_triangle(x: &[f64; 3], corners: &[[f64; 3]; 3]) -> f64 {
     edges.iter().map(to_edge).fold(f64::INFINITY, f64::min)
 }
 
-/// Within a raster cell of the surface the distance to a torus and to a bunny is that to the nearest of all triangles, to 1e-12 of the
-/// size; that to the torus of the closed form differs by the flatness of the triangles alone.
+/// Within a raster cell of the surface the distance to a torus and to a bunny is that to the nearest of all
+/// triangles, to 1e-12 of the size; that to the torus of the closed form differs by the flatness of the
+/// triangles alone.
 #[test]
 fn distances_of_a_torus_and_a_bunny_are_those_of_the_nearest_triangle() {
     let bunny = read(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/jobs/meshes/bunny.obj")));

@@ -1,7 +1,8 @@
-//! How often a surface winds around a point: the generalised winding number of Jacobson, Kavan and Sorkine-Hornung (2013).
+//! How often a surface winds around a point: the generalised winding number of Jacobson, Kavan and
+//! Sorkine-Hornung (2013).
 //!
-//! Solid angles of near triangles are exact (Van Oosterom and Strackee 1983); a group of triangles that is far off counts by the first term
-//! of its expansion (Barill, Dickson, Schmidt, Levin and Jacobson 2018).
+//! Solid angles of near triangles are exact (Van Oosterom and Strackee 1983); a group of triangles that is
+//! far off counts by the first term of its expansion (Barill, Dickson, Schmidt, Levin and Jacobson 2018).
 
 use crate::geometry::vector::{cross, dot};
 
@@ -140,7 +141,8 @@ mod tests {
         }
     }
 
-    /// A ball without every fiftieth triangle, and with every seventh turned, has the ball's volume but for the holes.
+    /// A ball without every fiftieth triangle, and with every seventh turned, has the ball's volume but for
+    /// the holes.
     #[test]
     fn a_ball_with_holes_has_nearly_its_volume() {
         let mut torn = ball(4);

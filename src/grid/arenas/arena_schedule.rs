@@ -1,14 +1,15 @@
 //! In which order bins scatter and blocks are summed up, so that few arenas are held at a time.
 //!
-//! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have scattered, and an
-//! arena whose blocks are all summed up serves a bin of a later wave. The first wave are the bins that other ranks need, so that
-//! their exchange can start. No sum depends on any of this: what a block adds up, and in which order, the plan says.
+//! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have
+//! scattered, and an arena whose blocks are all summed up serves a bin of a later wave. The first wave are
+//! the bins that other ranks need, so that their exchange can start. No sum depends on any of this: what a
+//! block adds up, and in which order, the plan says.
 use crate::csr::Csr;
 use crate::grid::plan::GridPlan;
 use crate::kernel::{Row, arena_nodes};
 
-/// Bytes of the arenas of a wave, for each thread: few enough for its cache, and so many bins (64 in 3D) that threads rarely
-/// wait for the last ones.
+/// Bytes of the arenas of a wave, for each thread: few enough for its cache, and so many bins (64 in 3D) that
+/// threads rarely wait for the last ones.
 const BYTES_PER_THREAD: usize = 64 * size_of::<Row>() * arena_nodes(3);
 
 /// What bins and blocks have to do with other ranks.
@@ -63,8 +64,8 @@ impl ArenaSchedule {
         BYTES_PER_THREAD / (size_of::<Row>() * arena_nodes(D)) * rayon::current_num_threads()
     }
 
-    /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` says which blocks a bin reaches. Without
-    /// a size all but those of the first wave are in one, and every bin keeps its arena.
+    /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` says which blocks a
+    /// bin reaches. Without a size all but those of the first wave are in one, and every bin keeps its arena.
     pub fn plan<I: Iterator<Item = usize>>(
         &mut self,
         size: Option<usize>,

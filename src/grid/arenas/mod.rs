@@ -24,8 +24,8 @@ const PREFETCHED: usize = 25;
 /// No arena.
 const NONE: u32 = u32::MAX;
 
-/// Arenas of the bins that are occupied in a step; empty bins hold no memory. Bins of one wave (see [`ArenaSchedule`]) leave
-/// theirs to those of later ones.
+/// Arenas of the bins that are occupied in a step; empty bins hold no memory. Bins of one wave (see
+/// [`ArenaSchedule`]) leave theirs to those of later ones.
 #[derive(Clone, Debug, Default)]
 pub struct Arenas<const D: usize> {
     rows: Vec<Row>,
@@ -40,8 +40,8 @@ pub struct Arenas<const D: usize> {
     schedule: ArenaSchedule,
     keep: bool,
     constraints: Arc<Vec<ArenaConstraints<D>>>,
-    /// Per block, whether a bin reaches it whose block lies outside its leaf; in most steps few do: boxes must be wide, or
-    /// lie across a change of level.
+    /// Per block, whether a bin reaches it whose block lies outside its leaf; in most steps few do: boxes
+    /// must be wide, or lie across a change of level.
     outer_reach: Vec<bool>,
 }
 
@@ -95,8 +95,8 @@ impl<const D: usize> Arenas<D> {
         self.keep = true;
     }
 
-    /// Makes room for the occupied bins, which come in order with the nodes that their particles touch. Contents are left
-    /// over from earlier steps.
+    /// Makes room for the occupied bins, which come in order with the nodes that their particles touch.
+    /// Contents are left over from earlier steps.
     pub fn occupy(
         &mut self,
         plan: &GridPlan<D>,
@@ -223,8 +223,8 @@ impl<const D: usize> Arenas<D> {
     }
 }
 
-/// Grows with little room to spare, since arenas are a large part of the memory beside the particles; but with some,
-/// since a moving body occupies a few more bins in nearly every step.
+/// Grows with little room to spare, since arenas are a large part of the memory beside the particles; but
+/// with some, since a moving body occupies a few more bins in nearly every step.
 fn grow<T: Clone>(values: &mut Vec<T>, len: usize, value: T) {
     if len > values.len() {
         if len > values.capacity() {

@@ -27,7 +27,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Asks for the rows of the nodes, of which the first lies at an address: at most four, so in three cache lines.
+    /// Asks for the rows of the nodes, of which the first lies at an address: at most four, so in three cache
+    /// lines.
     #[inline(always)]
     pub fn read_ahead(&self, first: usize) {
         prefetch(first);
@@ -104,13 +105,14 @@ impl<const D: usize> Window<D> {
     }
 }
 
-/// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing of what the
-/// arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums never meet part of a region.
+/// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing
+/// of what the arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums never
+/// meet part of a region.
 const FIRST: [u8; 5] = [0, 1, 1, 3, 4];
 const END: [u8; 5] = [3, 4, 5, 7, 7];
 
-/// First arena node, the one after the last, and the first block node that the arena of a bin shares along one axis
-/// with the blocks below, at and above it.
+/// First arena node, the one after the last, and the first block node that the arena of a bin shares along
+/// one axis with the blocks below, at and above it.
 const PIECES: [(usize, usize, usize); 3] = [(0, 1, 3), (1, 5, 0), (5, 7, 0)];
 
 /// A box of nodes that an arena and a block share.

@@ -1,7 +1,8 @@
-//! First moments of constrained nodes whose parents are constrained, and of those parents. Other nodes need none
-//! (`kernel/hanging.rs`).
+//! First moments of constrained nodes whose parents are constrained, and of those parents. Other nodes need
+//! none (`kernel/hanging.rs`).
 //!
-//! Which nodes of a block have them is a set with a bit each; they are kept node by node in the order of bits.
+//! Which nodes of a block have them is a set with a bit each; they are kept node by node in the order of
+//! bits.
 use crate::kernel::Row;
 
 /// First moments of one node: row `k` is column `k` of the matrix `A_j = Σ w m C` on the way from particles

@@ -1,6 +1,7 @@
 //! Parents of the nodes of fine blocks, in one table for all blocks.
 //!
-//! Where the parents of a node lie follows from its place in its block and the parity of the block's coordinates.
+//! Where the parents of a node lie follows from its place in its block and the parity of the block's
+//! coordinates.
 use std::sync::LazyLock;
 
 use super::parents::{block_and_bit, node_coord, parents_of};
@@ -9,11 +10,13 @@ use crate::grid::mask::{block_nodes, moved_along, offset, offset_index};
 /// A parent of a node of a fine block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParentNode {
-    /// The parent's block: bit `k` says whether it is the upper one along axis `k` of those that hold parents.
+    /// The parent's block: bit `k` says whether it is the upper one along axis `k` of those that hold
+    /// parents.
     pub corner: u8,
     /// The parent in its block.
     pub bit: u8,
-    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see [`weight_of`].
+    /// Offset number of parent minus node, in cells of the finer level. The weight follows from it, see
+    /// [`weight_of`].
     pub offset: u8,
 }
 
@@ -26,14 +29,14 @@ pub struct ParentTable {
     having: Vec<[u64; 8]>,
 }
 
-/// By offset of a fine block from the coarse one (both along an axis, the coarse coordinate doubled) and node of the coarse
-/// one: its children, a bit each, along the axis.
+/// By offset of a fine block from the coarse one (both along an axis, the coarse coordinate doubled) and node
+/// of the coarse one: its children, a bit each, along the axis.
 const CHILDREN: [[u8; 4]; 3] = relatives(false);
 /// The same by node of the fine block: its parents.
 const PARENTS: [[u8; 4]; 3] = relatives(true);
 
-/// Where a node of the one block has relatives in the other: nodes of a fine block at most a fine cell from one of a coarse
-/// block have it as parent.
+/// Where a node of the one block has relatives in the other: nodes of a fine block at most a fine cell from
+/// one of a coarse block have it as parent.
 const fn relatives(is_upwards: bool) -> [[u8; 4]; 3] {
     let mut relatives = [[0; 4]; 3];
     let mut entry = 0;
@@ -104,8 +107,8 @@ impl ParentTable {
     }
 }
 
-/// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate of the
-/// coarse block to the fine one.
+/// Nodes of a fine block that have a parent in `mask`. `place` is the offset number from twice the coordinate
+/// of the coarse block to the fine one.
 pub fn children<const D: usize>(place: usize, mask: u64) -> u64 {
     related::<D>(&CHILDREN, place, mask)
 }

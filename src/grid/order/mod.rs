@@ -1,12 +1,13 @@
 //! The order in which a node adds up what reaches it.
 //!
-//! Each contribution has a Morton key, and the sum follows the binary tree of these keys: the keys fall into those
-//! with and without the highest bit in which any of them differ, the sums of both halves come first, and so on down
-//! to single keys. As a rank owns a segment of the curve, what it contributes to a node fills few whole subtrees, mostly
-//! one, and a neighbour needs only their sums.
+//! Each contribution has a Morton key, and the sum follows the binary tree of these keys: the keys fall into
+//! those with and without the highest bit in which any of them differ, the sums of both halves come first,
+//! and so on down to single keys. As a rank owns a segment of the curve, what it contributes to a node fills
+//! few whole subtrees, mostly one, and a neighbour needs only their sums.
 //!
-//! A contribution that is not there counts as zero. Adding a zero changes no other number, so it makes no difference whether
-//! it is added or passed over, but for the sign of a zero sum; sums therefore end with `+ 0.0`.
+//! A contribution that is not there counts as zero. Adding a zero changes no other number, so it makes no
+//! difference whether it is added or passed over, but for the sign of a zero sum; sums therefore end with
+//! `+ 0.0`.
 pub mod region;
 
 /// Where a contribution comes from.
@@ -64,7 +65,8 @@ pub(super) fn fold<T>(
     stack.pop().map(|(_, sum)| sum)
 }
 
-/// Adds what stands on top of the stack to what is below, down to the first that parts higher than `separation`.
+/// Adds what stands on top of the stack to what is below, down to the first that parts higher than
+/// `separation`.
 fn merge<T>(stack: &mut Vec<(u32, T)>, separation: u32, add: &impl Fn(&mut T, &T)) {
     while stack.last().is_some_and(|(last, _)| *last <= separation) {
         if let Some((_, sum)) = stack.pop()
@@ -75,7 +77,8 @@ fn merge<T>(stack: &mut Vec<(u32, T)>, separation: u32, add: &impl Fn(&mut T, &T
     }
 }
 
-/// Calls `each` for the largest subtrees whose keys all have one owner. `keys` are sorted; equal ones have one owner.
+/// Calls `each` for the largest subtrees whose keys all have one owner. `keys` are sorted; equal ones have
+/// one owner.
 pub(super) fn each_subtree<T>(
     terms: &[T],
     key: &impl Fn(&T) -> u64,

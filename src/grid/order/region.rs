@@ -1,13 +1,14 @@
 //! Regions: the nodes of a block that the same bins reach, and the order of these bins.
 //!
-//! Along one axis nodes 0 and 1 of a block lie in the arenas of the bins below it and at it, node 2 in that of the bin
-//! at it alone, node 3 in those at it and above it. So a block has `3^D` regions, each reached by the bins of up to
-//! `2^D` blocks, a cube of them. Region `i` has along each axis the part that digit `axis` of `i` in base 3 names.
-//! A bin's *position* is the offset number (see [`crate::grid::mask::offset`]) of its block from the block of nodes.
+//! Along one axis nodes 0 and 1 of a block lie in the arenas of the bins below it and at it, node 2 in that
+//! of the bin at it alone, node 3 in those at it and above it. So a block has `3^D` regions, each reached by
+//! the bins of up to `2^D` blocks, a cube of them. Region `i` has along each axis the part that digit `axis`
+//! of `i` in base 3 names. A bin's *position* is the offset number (see [`crate::grid::mask::offset`]) of its
+//! block from the block of nodes.
 //!
-//! The binary tree of Morton keys (see [`crate::grid::order`]) parts the two blocks along an axis at the highest
-//! bit in which their coordinates differ, so the cube falls apart along one axis after the other. Which axis comes when depends
-//! on the block's coordinate alone, in so few ways that tables hold them all.
+//! The binary tree of Morton keys (see [`crate::grid::order`]) parts the two blocks along an axis at the
+//! highest bit in which their coordinates differ, so the cube falls apart along one axis after the other.
+//! Which axis comes when depends on the block's coordinate alone, in so few ways that tables hold them all.
 use std::sync::LazyLock;
 
 use crate::grid::mask::{arena_overlap, bits, node_of_bit};
@@ -56,7 +57,8 @@ pub struct Slot {
     pub start: u16,
 }
 
-/// The bins that reach each region, in the order of the tree: neighbours `2 i` and `2 i + 1` come together first.
+/// The bins that reach each region, in the order of the tree: neighbours `2 i` and `2 i + 1` come together
+/// first.
 pub type Order = [[Slot; MOST_BINS]; MOST_REGIONS];
 
 /// Tables of all regions in 2D or 3D.
@@ -145,12 +147,12 @@ fn slot<const D: usize>(parts: &[&Part; D], number: usize, i: usize) -> Slot {
     Slot { position: offset_index::<D>(towards) as u8, start: start as u16 }
 }
 
-/// What the order of bins around a block depends on: whether its coordinates are odd, and, for each two axes, along which of
-/// them the bins on the even side of the block and beyond are parted first.
+/// What the order of bins around a block depends on: whether its coordinates are odd, and, for each two axes,
+/// along which of them the bins on the even side of the block and beyond are parted first.
 fn order_number<const D: usize>(coord: [u32; D]) -> usize {
     let mut number = 0;
-    // A block and its neighbour within the same parent differ in the lowest bit only, those across the parent's face in
-    // all bits up to this one.
+    // A block and its neighbour within the same parent differ in the lowest bit only, those across the
+    // parent's face in all bits up to this one.
     let highest: [u32; D] =
         std::array::from_fn(|axis| D as u32 * ((coord[axis] + 1) & !1).trailing_zeros() + axis as u32);
     for axis in 0..D {

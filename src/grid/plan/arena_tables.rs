@@ -124,7 +124,8 @@ impl<const D: usize> ArenaConstraints<D> {
         (nodes, usize::from(first))
     }
 
-    /// Copies moments into the arena from those of the block at offset number `index`, which are of the nodes `of_block`.
+    /// Copies moments into the arena from those of the block at offset number `index`, which are of the nodes
+    /// `of_block`.
     #[inline(always)]
     pub fn copy_block(&self, index: usize, of_block: u64, from: &[Row], arena: &mut [Row]) {
         let (nodes, first) = self.of_block(index);

@@ -43,8 +43,8 @@ fn potential_bins<'a, const D: usize>(
     bins
 }
 
-/// Bins that the particles of each own leaf can scatter to: first those inside it, then those of other leaves that
-/// parts of its boxes can reach, by level and curve position.
+/// Bins that the particles of each own leaf can scatter to: first those inside it, then those of other leaves
+/// that parts of its boxes can reach, by level and curve position.
 pub fn own_bins<const D: usize>(tree: &KnownTree<D>) -> Vec<Vec<Octant<D>>> {
     let all = (0..tree.leaves().len()).into_par_iter().with_min_len(16);
     let inner: Vec<Vec<Octant<D>>> = all.map(|leaf| inner_bins(tree, leaf)).collect();

@@ -1,6 +1,7 @@
 //! Which blocks hold the parents of constrained nodes: over these sums are restricted and values prolonged.
 //!
-//! Where the parents of a node lie is in a table for all blocks (`parent_table.rs`); a plan lists pairs of blocks only.
+//! Where the parents of a node lie is in a table for all blocks (`parent_table.rs`); a plan lists pairs of
+//! blocks only.
 use rustc_hash::FxHashMap;
 
 use super::needed_nodes::constrained_nodes;
@@ -144,8 +145,8 @@ impl<const D: usize> GridPlan<D> {
         }
     }
 
-    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along each axis; by row of
-    /// the first moments.
+    /// Second moments of the constraints, `S_j = Σ c (S_i + (x_i - x_j)²)` with `S = 0` on real nodes, along
+    /// each axis; by row of the first moments.
     pub(super) fn constraint_spread(&self) -> Vec<f64> {
         let table = ParentTable::of::<D>();
         let mut spread = vec![0.0; self.moments];

@@ -113,7 +113,8 @@ impl<const D: usize> KnownTree<D> {
         }
     }
 
-    /// Whether an octant in the neighbourhood `coord + {-1, 0, 1}^D` is known to hold leaves of a finer level.
+    /// Whether an octant in the neighbourhood `coord + {-1, 0, 1}^D` is known to hold leaves of a finer
+    /// level.
     pub fn is_beside_finer(&self, level: u8, coord: [u32; D]) -> bool {
         self.beside_finer.get(usize::from(level)).is_some_and(|beside| beside.contains(&coord))
     }

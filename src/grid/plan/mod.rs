@@ -101,7 +101,8 @@ pub struct GridPlan<const D: usize> {
     pub(super) parts: Csr<Part>,
     /// Per level, links to the parents of its constrained nodes.
     pub links: Vec<Links>,
-    /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis` upper).
+    /// Needed real nodes on faces of the domain: node and face bits (`1 << 2 axis` lower, `2 << 2 axis`
+    /// upper).
     pub face_nodes: Vec<(u32, u8)>,
     /// Number of rows of first moments.
     pub moments: usize,

@@ -1,7 +1,8 @@
 //! Which sums a rank asks of others.
 //!
-//! For every region of every block whose sums it needs, a rank knows all bins that may contribute, own and others. In the tree
-//! of their keys it looks for the largest subtrees of one owner: these are the pieces that it asks for.
+//! For every region of every block whose sums it needs, a rank knows all bins that may contribute, own and
+//! others. In the tree of their keys it looks for the largest subtrees of one owner: these are the pieces
+//! that it asks for.
 use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
@@ -196,8 +197,9 @@ const POSITIONS: [[u32; 3]; 3] = [
     [0o777, 0o777 << 9, 0o777 << 18],
 ];
 
-/// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies, or, if
-/// that is outside, where the leaf lies. So what a leaf contributes is together, and so is what a rank contributes.
+/// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies,
+/// or, if that is outside, where the leaf lies. So what a leaf contributes is together, and so is what a rank
+/// contributes.
 fn source_key<const D: usize>(leaf: &Octant<D>, block: &Octant<D>) -> (u64, u64) {
     let place = block.key();
     (if leaf.contains(block) { place } else { leaf.key() }, place)

@@ -48,7 +48,8 @@ pub(super) struct BlockSum<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> BlockSum<'a, D> {
-    /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and from other ranks.
+    /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and
+    /// from other ranks.
     pub(super) fn find(
         sources: Sources<'a, D>,
         scratch: &'a mut Irregular<D>,
@@ -147,8 +148,8 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         }
     }
 
-    /// Sums the regions in `wanted` along the fixed pattern; returns those left out because what reaches them does not
-    /// fit it. `MIXED` if more than whole arenas reaches these regions.
+    /// Sums the regions in `wanted` along the fixed pattern; returns those left out because what reaches them
+    /// does not fit it. `MIXED` if more than whole arenas reaches these regions.
     #[inline(never)]
     fn all_planes<const MIXED: bool>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
         if D == 3 {
@@ -311,8 +312,8 @@ impl<'a, const D: usize> BlockSum<'a, D> {
 }
 
 impl<const D: usize> Sources<'_, D> {
-    /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the processor to
-    /// foresee them.
+    /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the
+    /// processor to foresee them.
     pub(super) fn read_ahead(&self, block: usize) {
         for (position, &bin) in self.plan.bins_by_block.inner::<D>(block).iter().enumerate() {
             if bin == NO_BIN {

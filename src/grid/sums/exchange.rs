@@ -1,8 +1,8 @@
 //! Exchange of partial sums between ranks: one message per neighbour and step.
 //!
-//! A rank that sums up a node which bins of others reach has asked their owners, once per plan, for the sums of
-//! the largest subtrees (see [`crate::grid::order`]) that these own alone. In each step an owner adds up its arenas over
-//! these nodes and sends the sums of those that its particles touch.
+//! A rank that sums up a node which bins of others reach has asked their owners, once per plan, for the sums
+//! of the largest subtrees (see [`crate::grid::order`]) that these own alone. In each step an owner adds up
+//! its arenas over these nodes and sends the sums of those that its particles touch.
 use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
@@ -157,8 +157,8 @@ impl<const D: usize> ArenaExchange<D> {
         &self.sent
     }
 
-    /// Not collective. What neighbours need of the own arenas: a message for each. Most of it `fields` have from
-    /// the blocks asked for; the rest is added up here.
+    /// Not collective. What neighbours need of the own arenas: a message for each. Most of it `fields` have
+    /// from the blocks asked for; the rest is added up here.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>, fields: &NodeFields<D>) -> Vec<Vec<u8>> {
         let own = Sources { plan, arenas, received: None };
         let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();
@@ -253,7 +253,8 @@ fn pack<const D: usize>(
     append::<D>(piece, nodes, rows, (plan.blocks[block].with_moments, fields.moments_of(plan, block)), values)
 }
 
-/// Appends the sums at `nodes` to a message, from the rows and the first moments of the block, with the nodes that have such.
+/// Appends the sums at `nodes` to a message, from the rows and the first moments of the block, with the nodes
+/// that have such.
 fn append<const D: usize>(
     piece: &SentPiece,
     nodes: u64,

@@ -1,8 +1,8 @@
 //! Sums at nodes that more than whole arenas reach: bins outside their leaves, and sums of other ranks.
 //!
-//! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another rank are the
-//! only ones within a subtree of the pattern, what they add enters at one of its places, the others being empty. What
-//! does not fit is listed and added up along the tree of keys.
+//! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another
+//! rank are the only ones within a subtree of the pattern, what they add enters at one of its places, the
+//! others being empty. What does not fit is listed and added up along the tree of keys.
 use super::block_sum::{BlockSum, ZERO, ZEROS};
 use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::mask::{bits, offset_count, opposite};
@@ -71,7 +71,8 @@ impl<const D: usize> BlockSum<'_, D> {
         })
     }
 
-    /// Finds the places of all that reaches a region beside whole arenas; false if it does not fit the pattern.
+    /// Finds the places of all that reaches a region beside whole arenas; false if it does not fit the
+    /// pattern.
     #[inline(never)]
     pub(super) fn place(&mut self, region: usize) -> bool {
         let (here, nodes) = (self.regions.positions[region], self.regions.nodes[region]);

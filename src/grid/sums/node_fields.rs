@@ -1,4 +1,5 @@
-//! Node fields of one time step: sums of arenas, and what the gather reads; `restrict_prolong.rs` has restriction and prolongation.
+//! Node fields of one time step: sums of arenas, and what the gather reads; `restrict_prolong.rs` has
+//! restriction and prolongation.
 //!
 //! Every sum runs in the order that the plan fixes from tree and particles, so its bits do not depend on
 //! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
@@ -68,7 +69,8 @@ impl<const D: usize> NodeFields<D> {
         size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }
 
-    /// Not collective. Adds the mass of other material to that of these fields, which all hold velocities, and gives it the mean velocity.
+    /// Not collective. Adds the mass of other material to that of these fields, which all hold velocities,
+    /// and gives it the mean velocity.
     pub fn add_material(&mut self, other: &Self) {
         let nodes = block_nodes(D);
         let blocks = other.rows.chunks(nodes).zip(self.rows.chunks_mut(nodes)).enumerate();
@@ -133,8 +135,8 @@ impl<const D: usize> NodeFields<D> {
         });
     }
 
-    /// Not collective. Adds what other ranks have sent. Where their share and the own one are one subtree each, that is all; other
-    /// regions are added up anew.
+    /// Not collective. Adds what other ranks have sent. Where their share and the own one are one subtree
+    /// each, that is all; other regions are added up anew.
     pub fn add_received(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>) {
         if plan.pieces.is_empty() {
             return;
@@ -214,8 +216,9 @@ impl<const D: usize> NodeFields<D> {
         &self.moments[plan.moments_of(block)]
     }
 
-    /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins that
-    /// touch nodes with first moments these. Prefetches the same of the occupied bin that comes next, and returns that.
+    /// Not collective. Copies the nodes of `window` around a bin into its arena: velocities, and for bins
+    /// that touch nodes with first moments these. Prefetches the same of the occupied bin that comes next,
+    /// and returns that.
     pub fn load(
         &self,
         plan: &GridPlan<D>,
@@ -243,8 +246,8 @@ impl<const D: usize> NodeFields<D> {
         Some(next)
     }
 
-    /// Prefetches what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the processor to foresee
-    /// them.
+    /// Prefetches what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the
+    /// processor to foresee them.
     fn prefetch(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
         let (rows, nodes) = (self.rows.as_ptr().addr(), block_nodes(D));
         for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {
@@ -313,7 +316,8 @@ fn copy_rows<const D: usize>(shared: Shared<D>, block: &[Row], arena: &mut [Row]
 pub struct VelocityArena<const D: usize> {
     /// Velocity rows.
     pub rows: Vec<Row>,
-    /// First moments `V_j`, in the order of [`ArenaConstraints`](crate::grid::plan::arena_tables::ArenaConstraints).
+    /// First moments `V_j`, in the order of
+    /// [`ArenaConstraints`](crate::grid::plan::arena_tables::ArenaConstraints).
     pub moments: Vec<Row>,
 }
 

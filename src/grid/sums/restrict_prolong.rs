@@ -20,7 +20,8 @@ struct BlockMut<'a> {
 
 impl<const D: usize> NodeFields<D> {
     /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:
-    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent meets its children block by block along the curve.
+    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent meets its children block by block
+    /// along the curve.
     pub fn restrict(&mut self, plan: &GridPlan<D>) {
         for level in (1..plan.levels()).rev() {
             let links = &plan.links[level];
@@ -43,8 +44,9 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
-    /// Not collective. Gives the constrained nodes that the gather reads the values of their parents, coarsest
-    /// level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real nodes.
+    /// Not collective. Gives the constrained nodes that the gather reads the values of their parents,
+    /// coarsest level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real
+    /// nodes.
     pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         self.mark_needed(plan, arenas);
         for level in 1..plan.levels() {
@@ -62,8 +64,8 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
-    /// Not collective. Gives the constrained nodes that the gather reads the values `Σ c f_i` of their parents, once [`NodeFields::prolong`]
-    /// has found them. One value for each node.
+    /// Not collective. Gives the constrained nodes that the gather reads the values `Σ c f_i` of their
+    /// parents, once [`NodeFields::prolong`] has found them. One value for each node.
     pub fn prolong_values(&self, plan: &GridPlan<D>, values: &mut [f64]) {
         let nodes = block_nodes(D);
         for level in 1..plan.levels() {

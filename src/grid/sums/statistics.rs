@@ -31,10 +31,10 @@ struct Needed {
     moments: u64,
 }
 
-/// Not collective. Bytes that the surface between partitions needs: for every pair of ranks, the distinct nodes that the
-/// sender's particles touch and the receiver sums, each once, with momentum and mass, and with the first moments that it
-/// has. An exchange that keeps the order of sums sends a node once for every subtree of one owner in that order, so at
-/// least this.
+/// Not collective. Bytes that the surface between partitions needs: for every pair of ranks, the distinct
+/// nodes that the sender's particles touch and the receiver sums, each once, with momentum and mass, and with
+/// the first moments that it has. An exchange that keeps the order of sums sends a node once for every
+/// subtree of one owner in that order, so at least this.
 pub fn surface_bytes<const D: usize>(
     exchange: &ArenaExchange<D>,
     plan: &GridPlan<D>,

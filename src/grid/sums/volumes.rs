@@ -1,7 +1,7 @@
 //! Volumes of the basis functions of real nodes, `∫N_j`.
 //!
-//! Each cell of a leaf gives each of its corners the share `1/2^D` of its volume, and constrained nodes hand theirs to their parents. Away
-//! from level jumps and faces of the domain that makes the volume of a cell.
+//! Each cell of a leaf gives each of its corners the share `1/2^D` of its volume, and constrained nodes hand
+//! theirs to their parents. Away from level jumps and faces of the domain that makes the volume of a cell.
 use super::node_fields::NodeFields;
 use crate::grid::mask::{block_nodes, node_of_bit};
 use crate::grid::plan::ghost_layer::Cover;
@@ -76,8 +76,8 @@ const fn all_around(d: usize) -> u32 {
     (1 << (1 << d)) - 1
 }
 
-/// Which of the blocks of cells that meet at the lower corner of a block are leaves of its level: bit `Σ 2^k` over the axes k along which
-/// it lies below.
+/// Which of the blocks of cells that meet at the lower corner of a block are leaves of its level: bit `Σ 2^k`
+/// over the axes k along which it lies below.
 fn leaves_around<const D: usize>(plan: &GridPlan<D>, block: &Block<D>) -> u32 {
     let tree = &plan.tree;
     let is_leaf = |below: &u32| {

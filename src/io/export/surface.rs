@@ -1,7 +1,8 @@
 //! The surface of the material as a mesh of triangles, for renderers and for CAD.
 //!
-//! It is a level of the density that the particles make, each with a smooth kernel, cut out by marching cubes (`splashsurf_lib`;
-//! Löschner, Böttcher, Jeske, Bender 2023). All particles of the cut have one size: larger ones are taken as cubes of small ones.
+//! It is a level of the density that the particles make, each with a smooth kernel, cut out by marching cubes
+//! (`splashsurf_lib`; Löschner, Böttcher, Jeske, Bender 2023). All particles of the cut have one size: larger
+//! ones are taken as cubes of small ones.
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -17,7 +18,8 @@ use crate::io::whole_file::{system, write_in_pieces};
 const REACH: f64 = 4.0;
 /// Edge of the cubes, in half widths.
 const CUBE: f64 = 1.0;
-/// Density at the surface, as a part of that inside: a ball of 4,000 particles keeps its volume to 2 %, one of 270,000 to 0.3 %.
+/// Density at the surface, as a part of that inside: a ball of 4,000 particles keeps its volume to 2 %, one
+/// of 270,000 to 0.3 %.
 const LEVEL: f64 = 0.6;
 /// Particles, counted as small ones, that a surface is made from.
 const MOST: f64 = 3e7;

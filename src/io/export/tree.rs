@@ -1,7 +1,9 @@
-//! The tree as VTK's HyperTreeGrid (XML, version 2.0), which keeps the hierarchy: for filters and pictures by level.
+//! The tree as VTK's HyperTreeGrid (XML, version 2.0), which keeps the hierarchy: for filters and pictures by
+//! level.
 //!
-//! Each root octant is a tree. Its cells come level by level, families in the order of their parents, the first axis fastest within a
-//! family. A bit for each cell above the deepest level says whether it is refined.
+//! Each root octant is a tree. Its cells come level by level, families in the order of their parents, the
+//! first axis fastest within a family. A bit for each cell above the deepest level says whether it is
+//! refined.
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;

@@ -30,8 +30,8 @@ impl Writer {
         set.map(drop)
     }
 
-    /// Collective. Attaches a text to an object as a scalar of fixed length, in ASCII where that is enough: VTK expects
-    /// it.
+    /// Collective. Attaches a text to an object as a scalar of fixed length, in ASCII where that is enough:
+    /// VTK expects it.
     pub fn set_text(&self, object: &str, name: &str, text: &str) -> Result<(), FileError> {
         self.set_texts(object, &[(name, text)])
     }
@@ -118,7 +118,8 @@ impl Reader {
     pub fn text(&self, object: &str, name: &str) -> Result<String, FileError> {
         let _turn = library();
         let (attribute, full) = (self.open_attribute(object, name)?, format!("attribute {object}/{name}"));
-        // SAFETY: open attribute with one element of a string type of fixed length; the buffer is as long as that.
+        // SAFETY: open attribute with one element of a string type of fixed length; the buffer is as long as
+        // that.
         unsafe {
             let kind = self.wrap(H5Aget_type(attribute.id), H5Tclose, &full)?;
             // An element of variable length would be read as the address of its letters.

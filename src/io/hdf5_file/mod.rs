@@ -1,11 +1,12 @@
 //! Files of the HDF5 format: one file, laid out by one rank and filled by all.
 //!
-//! The only folder that calls HDF5's C functions, and it calls them for names, shapes and attributes alone. Data sets are
-//! contiguous, unfiltered and little-endian: rows stand in the file as they stand in memory, and every rank writes and
-//! reads its own with plain system calls, at the place that the library has given the data set. So no rank waits inside
-//! a library for one that has failed; the system's own reason for a failure is known; and whatever a file declares is
-//! compared with its size before memory is taken for it. Handles live no longer than the call or the file that they
-//! belong to. The library knows no threads: whoever calls it holds its lock (`library`).
+//! The only folder that calls HDF5's C functions, and it calls them for names, shapes and attributes alone.
+//! Data sets are contiguous, unfiltered and little-endian: rows stand in the file as they stand in memory,
+//! and every rank writes and reads its own with plain system calls, at the place that the library has given
+//! the data set. So no rank waits inside a library for one that has failed; the system's own reason for a
+//! failure is known; and whatever a file declares is compared with its size before memory is taken for it.
+//! Handles live no longer than the call or the file that they belong to. The library knows no threads:
+//! whoever calls it holds its lock (`library`).
 //!
 //! | file | concern |
 //! |---|---|
@@ -63,19 +64,22 @@ impl Drop for Handle {
     }
 }
 
-/// Starts the library. To be called before MPI starts where a program must survive a file that cannot be closed: a library
-/// for parallel files that starts later ends itself with MPI, and tries to write such a file again.
+/// Starts the library. To be called before MPI starts where a program must survive a file that cannot be
+/// closed: a library for parallel files that starts later ends itself with MPI, and tries to write such a
+/// file again.
 pub fn prepare() {
     drop(library());
 }
 
-/// Waits for the library, and keeps other threads out of it while the result lives. Starts it, once per process.
+/// Waits for the library, and keeps other threads out of it while the result lives. Starts it, once per
+/// process.
 fn library() -> impl Drop {
     static START: Once = Once::new();
     let turn = hdf5_sys::LOCK.lock();
     START.call_once(|| {
-        // SAFETY: plain calls, the first before all others. What stays open when the program ends could not be written,
-        // and trying again then would crash; error messages are fetched by us, so the library must not print them.
+        // SAFETY: plain calls, the first before all others. What stays open when the program ends could not
+        // be written, and trying again then would crash; error messages are fetched by us, so the library
+        // must not print them.
         unsafe {
             H5dont_atexit();
             H5open();

@@ -27,8 +27,9 @@ const MOST_COMPONENTS: u64 = 1 << 10;
 /// Bytes that are looked at together when a data set is gone through.
 const PIECE: u64 = 1 << 20;
 
-/// An existing file, opened for reading. What it declares is not believed: only groups and data sets of the file itself
-/// are looked at, only contiguous ones without filters, and none that would be longer than the file.
+/// An existing file, opened for reading. What it declares is not believed: only groups and data sets of the
+/// file itself are looked at, only contiguous ones without filters, and none that would be longer than the
+/// file.
 pub struct Reader {
     path: PathBuf,
     comm: Option<Comm>,
@@ -115,8 +116,8 @@ impl Reader {
         check(code, &self.path, "read", object)
     }
 
-    /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it; returns its
-    /// bytes. To be asked before memory is taken whose size the file declares.
+    /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it;
+    /// returns its bytes. To be asked before memory is taken whose size the file declares.
     pub(super) fn held_bytes(&self, object: &str, count: u64, element: usize) -> Result<u64, FileError> {
         match count.checked_mul(element as u64) {
             Some(bytes) if bytes <= self.size && usize::try_from(bytes).is_ok() => Ok(bytes),
@@ -132,16 +133,17 @@ impl Reader {
         matches!(self.leads_to(object), Ok(true))
     }
 
-    /// Not collective. Whether a path leads to an object. One that leads through a link to another place or file is
-    /// refused, and not followed.
+    /// Not collective. Whether a path leads to an object. One that leads through a link to another place or
+    /// file is refused, and not followed.
     pub(super) fn leads_to(&self, object: &str) -> Result<bool, FileError> {
         let _turn = library();
         let object = object.trim_matches('/');
         let ends = object.match_indices('/').map(|(at, _)| at).chain([object.len()]);
         for end in ends {
             let name = c_text(&object[..end]);
-            // SAFETY: open file, terminated name. The library fills the record when it succeeds; its kind is looked at as
-            // the number that it is in C, since links of user-defined kinds have numbers without a name.
+            // SAFETY: open file, terminated name. The library fills the record when it succeeds; its kind is
+            // looked at as the number that it is in C, since links of user-defined kinds have numbers without
+            // a name.
             #[allow(deprecated)]
             let is_hard = unsafe {
                 if H5Lexists(self.id(), name.as_ptr(), H5P_DEFAULT) <= 0 {
@@ -169,8 +171,8 @@ impl Reader {
             return Err(self.refuse(format!("data set {dataset} is missing")));
         }
         let name = c_text(dataset);
-        // SAFETY: open file, terminated name; identifiers are checked and closed by `wrap`, and `dims` is only filled when
-        // it is long enough.
+        // SAFETY: open file, terminated name; identifiers are checked and closed by `wrap`, and `dims` is
+        // only filled when it is long enough.
         unsafe {
             let set = self.wrap(H5Dopen2(self.id(), name.as_ptr(), H5P_DEFAULT), H5Dclose, dataset)?;
             let list = self.wrap(H5Dget_create_plist(set.id), H5Pclose, dataset)?;
@@ -208,7 +210,8 @@ impl Reader {
         }
     }
 
-    /// Collective on a shared file. Reads rows `offset .. offset + rows` of a data set of numbers of type `T`.
+    /// Collective on a shared file. Reads rows `offset .. offset + rows` of a data set of numbers of type
+    /// `T`.
     pub fn read_slab<T: Element>(&self, dataset: &str, offset: u64, rows: u64) -> Result<Vec<T>, FileError> {
         let read = self.stored(dataset).and_then(|stored| self.read_rows(dataset, stored, offset, rows));
         self.agree(read)

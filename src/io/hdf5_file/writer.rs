@@ -29,8 +29,8 @@ const MOST_COMPACT: std::ffi::c_uint = 255;
 
 /// A new file of all ranks. Rank 0 alone keeps names, shapes and attributes; every rank writes its own rows.
 ///
-/// Every method is collective and gives an error on all ranks if any rank fails, so that callers may use `?`. A file
-/// that is not wanted after all must be [abandoned](Writer::abandon).
+/// Every method is collective and gives an error on all ranks if any rank fails, so that callers may use `?`.
+/// A file that is not wanted after all must be [abandoned](Writer::abandon).
 pub struct Writer {
     path: PathBuf,
     comm: Comm,
@@ -40,9 +40,9 @@ pub struct Writer {
     rows: File,
 }
 
-/// The library's file. What is dropped before it is closed stays open to the end of the program: closing would write what
-/// the library still holds, and where space has run out the library takes the file apart, but keeps it, and crashes over
-/// it when it ends.
+/// The library's file. What is dropped before it is closed stays open to the end of the program: closing
+/// would write what the library still holds, and where space has run out the library takes the file apart,
+/// but keeps it, and crashes over it when it ends.
 struct Layout(hid_t);
 
 impl Layout {
@@ -54,8 +54,8 @@ impl Layout {
 }
 
 impl Writer {
-    /// Collective. Creates the file. One of that name goes; if it is a symbolic link, the link goes and what it leads
-    /// to stays.
+    /// Collective. Creates the file. One of that name goes; if it is a symbolic link, the link goes and what
+    /// it leads to stays.
     pub fn create(comm: &Comm, path: &Path) -> Result<Self, FileError> {
         let layout = if comm.rank() == 0 { lay_out(path).map(Some) } else { Ok(None) };
         let layout = agreed(Some(comm), layout)?;
@@ -121,8 +121,8 @@ impl Writer {
         linked.map(drop)
     }
 
-    /// Collective. Creates a data set of `global_rows` rows of `components` numbers (`0`: a plain list) and writes
-    /// this rank's `rows`, which begin at row `offset`. Ranks may have no rows.
+    /// Collective. Creates a data set of `global_rows` rows of `components` numbers (`0`: a plain list) and
+    /// writes this rank's `rows`, which begin at row `offset`. Ranks may have no rows.
     pub fn write_slab<T: Element>(
         &self,
         dataset: &str,
@@ -142,8 +142,8 @@ impl Writer {
         self.agree(written.map_err(failed))
     }
 
-    /// Collective. Hands everything to the operating system and closes the library's file. Returns this rank's own way
-    /// into the file, through which it can wait for the disk.
+    /// Collective. Hands everything to the operating system and closes the library's file. Returns this
+    /// rank's own way into the file, through which it can wait for the disk.
     pub fn close(self) -> Result<File, FileError> {
         let flushed = self.on_rank_0(|file, path| {
             // SAFETY: open file.
@@ -161,8 +161,8 @@ impl Writer {
     /// Not collective; after an error on any rank. Gives up an unwanted file; the caller removes it.
     pub fn abandon(self) {
         if self.layout.is_some() {
-            // The library keeps it open, so that its space would not come free by the removal. If giving that back fails
-            // too, the first error matters.
+            // The library keeps it open, so that its space would not come free by the removal. If giving that
+            // back fails too, the first error matters.
             let _ = self.rows.set_len(0);
         }
     }
@@ -178,8 +178,8 @@ fn lay_out(path: &Path) -> Result<Layout, FileError> {
         _ => {}
     }
     let name = c_path(path);
-    // SAFETY: fresh property lists, closed below, and a terminated name. Exclusive creation does not follow links. The
-    // root group keeps no timestamps, like all other objects.
+    // SAFETY: fresh property lists, closed below, and a terminated name. Exclusive creation does not follow
+    // links. The root group keeps no timestamps, like all other objects.
     let file = unsafe {
         let access = H5Pcreate(*H5P_CLS_FILE_ACCESS);
         // The 1.8 format carries checksums of its own metadata, which the older one does not.
@@ -216,8 +216,8 @@ fn add_dataset(
         let space = H5Screate_simple(rank, shape.as_ptr(), std::ptr::null());
         let space = Handle::new(space, H5Sclose).map_err(failed)?;
         let list = Handle::new(H5Pcreate(*H5P_CLS_DATASET_CREATE), H5Pclose).map_err(failed)?;
-        // A place at once. Contents are always written in full, so no fill values; no timestamps, so that equal
-        // contents give equal files.
+        // A place at once. Contents are always written in full, so no fill values; no timestamps, so that
+        // equal contents give equal files.
         H5Pset_alloc_time(list.id, H5D_ALLOC_TIME_EARLY);
         H5Pset_fill_time(list.id, H5D_FILL_TIME_NEVER);
         H5Pset_obj_track_times(list.id, 0);

@@ -16,7 +16,8 @@ pub struct Column<'a> {
 
 /// The open history file. Belongs to rank 0.
 ///
-/// The first column is the step, the second the time. Numbers are written with the digits that bring back the same bits.
+/// The first column is the step, the second the time. Numbers are written with the digits that bring back the
+/// same bits.
 #[derive(Debug)]
 pub struct History {
     lines: Lines,
@@ -51,9 +52,10 @@ impl History {
         Ok(Self { lines, columns: columns.len(), last: None })
     }
 
-    /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that the finished file
-    /// equals that of an uninterrupted run. What is damaged is cut out, and a warning names what is missing for that reason.
-    /// Starts a new file if there is none, or nothing of it is whole. Each step has so many `rows`.
+    /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that
+    /// the finished file equals that of an uninterrupted run. What is damaged is cut out, and a warning names
+    /// what is missing for that reason. Starts a new file if there is none, or nothing of it is whole. Each
+    /// step has so many `rows`.
     ///
     /// # Errors
     /// The file cannot be opened, or has other columns.

@@ -1,7 +1,7 @@
 //! Text files that grow by a line at a time and are mended after a crash.
 //!
-//! A machine that loses power may leave a file without its last lines, with half a line, with zero bytes in the place of
-//! lines, or empty. What is whole of it is kept.
+//! A machine that loses power may leave a file without its last lines, with half a line, with zero bytes in
+//! the place of lines, or empty. What is whole of it is kept.
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -35,8 +35,8 @@ impl Lines {
         Ok(Self { file, path: path.into() })
     }
 
-    /// Not collective. Opens a file to go on with. `judge` sees its whole lines, without the newline, from the first on;
-    /// one without a newline at the end goes.
+    /// Not collective. Opens a file to go on with. `judge` sees its whole lines, without the newline, from
+    /// the first on; one without a newline at the end goes.
     pub(super) fn resume(path: &Path, mut judge: impl FnMut(&[u8]) -> Verdict) -> Result<Self, FileError> {
         let failed = |source| system(path, "resume", source);
         let mut options = OpenOptions::new();

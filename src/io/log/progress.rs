@@ -52,8 +52,8 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A run from `start_time` to `end_time` (s), of which the user has been warned `warnings` times. `speaks` on rank 0 and
-    /// unless the user wants it quiet.
+    /// A run from `start_time` to `end_time` (s), of which the user has been warned `warnings` times.
+    /// `speaks` on rank 0 and unless the user wants it quiet.
     pub fn new(speaks: bool, start_time: f64, end_time: f64, warnings: usize) -> Self {
         let display = if !speaks {
             Display::Nothing
@@ -232,8 +232,8 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Names of the figures, and the figures below them, in at most so many columns: on a narrow terminal the least
-    /// important ones are left out.
+    /// Names of the figures, and the figures below them, in at most so many columns: on a narrow terminal the
+    /// least important ones are left out.
     fn fit(&self, columns: usize) -> String {
         let known = self.known;
         let levels = match known.levels {
@@ -318,7 +318,8 @@ mod tests {
         assert_eq!(remaining(Duration::from_secs(1), 0.0, 0.0), None);
     }
 
-    /// A run that goes on at half of its time says how far the whole run is, and estimates the rest by its own speed.
+    /// A run that goes on at half of its time says how far the whole run is, and estimates the rest by its
+    /// own speed.
     #[test]
     fn a_part_of_a_run_counts_from_its_start() {
         let progress = Progress::new(false, 1.0, 2.0, 0);

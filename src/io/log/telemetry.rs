@@ -87,7 +87,8 @@ pub struct PerRank {
     pub grid_bytes: Spread,
 }
 
-/// What dynamic refinement has done since the start of the run, changes of the tree since that of the process.
+/// What dynamic refinement has done since the start of the run, changes of the tree since that of the
+/// process.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Resampled {
     /// Changes of the tree.
@@ -142,8 +143,8 @@ pub struct Record {
     pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
     pub memory: Spread,
-    /// Relative difference between the mass on the real nodes and that of the particles in the last step, or in the
-    /// state itself before the first and at the end.
+    /// Relative difference between the mass on the real nodes and that of the particles in the last step, or
+    /// in the state itself before the first and at the end.
     pub mass_error: f64,
     /// Dynamic refinement, in jobs that have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -294,8 +295,8 @@ impl Telemetry {
         Ok(Self(Lines::create(path)?))
     }
 
-    /// Not collective. Goes on with the file of a run that goes on from `step`: its records stay; those of later steps and
-    /// what is damaged go. Starts a new file if there is none.
+    /// Not collective. Goes on with the file of a run that goes on from `step`: its records stay; those of
+    /// later steps and what is damaged go. Starts a new file if there is none.
     pub fn resume(path: &Path, step: u64) -> Result<Self, FileError> {
         /// What is looked at of a record.
         #[derive(Deserialize)]

@@ -124,7 +124,8 @@ pub(super) fn unit(a: [f64; 3]) -> [f64; 3] {
 }
 
 impl Camera {
-    /// Looks at `bounds`, which fill the given part of the image times `zoom`, with `focus` or their middle in its centre.
+    /// Looks at `bounds`, which fill the given part of the image times `zoom`, with `focus` or their middle
+    /// in its centre.
     pub(super) fn new(
         (flat, view): (bool, View),
         bounds: &Bounds,

@@ -111,8 +111,8 @@ impl Canvas {
         }
     }
 
-    /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that are wider than a
-    /// line. An ellipsis stands for what does not fit.
+    /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that
+    /// are wider than a line. An ellipsis stands for what does not fit.
     pub(super) fn lines(&self, size: f64, text: &str, width: i64, most: usize) -> Vec<String> {
         // Wide gaps between words stay, as they part what belongs together.
         let text = text.trim().replace(['\n', '\r', '\t'], " ");
@@ -202,7 +202,8 @@ impl Canvas {
         ))
     }
 
-    /// Not collective. Writes the image under a temporary name first: as SVG if marks were collected, else as PNG.
+    /// Not collective. Writes the image under a temporary name first: as SVG if marks were collected, else as
+    /// PNG.
     pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
         // In memory first, as a buffered writer hides the error of its last piece.
         let bytes = if self.marks.is_some() { self.svg().map(String::into_bytes) } else { self.png() };

@@ -93,8 +93,8 @@ pub(super) fn class(number: usize) -> Rgb {
     CLASSES.get(number).copied().unwrap_or_else(|| further(number - CLASSES.len()))
 }
 
-/// Colours for more classes or curves than a list has: hues go round by the golden ratio, which keeps them apart, on rings of
-/// five lightnesses and saturations.
+/// Colours for more classes or curves than a list has: hues go round by the golden ratio, which keeps them
+/// apart, on rings of five lightnesses and saturations.
 pub(crate) fn further(number: usize) -> Rgb {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     const RINGS: [(f64, f64); 5] = [(0.55, 0.82), (0.45, 0.56), (0.27, 0.89), (0.43, 0.77), (0.6, 0.56)];

@@ -64,8 +64,9 @@ impl Pen {
     }
 }
 
-/// Calls `each` with column, row and coverage (0 to 1) of the pixels of a text whose first letter begins at column 0 and whose
-/// capital letters have their tops at row 0. Characters that the font does not have are boxes. Returns the width, pixels.
+/// Calls `each` with column, row and coverage (0 to 1) of the pixels of a text whose first letter begins at
+/// column 0 and whose capital letters have their tops at row 0. Characters that the font does not have are
+/// boxes. Returns the width, pixels.
 pub(super) fn draw(size: f64, text: &str, mut each: impl FnMut(i64, i64, f32)) -> i64 {
     let mut pen = Pen::new(size);
     for character in text.chars() {

@@ -3,14 +3,15 @@
 //! Each rank draws its own particles into an image with depth; the nearest of all ranks is kept for
 //! each pixel, so a picture does not depend on the number of ranks.
 //!
-//! | file | what it does |
+//! | file | concern |
 //! |---|---|
-//! | this | what a picture is made of, and how it is put together |
-//! | `settings.rs` | what can be chosen |
-//! | `camera.rs`, `scene.rs`, `solids.rs`, `tree.rs` | from space to pixels; particles with their light; colliders; leaves |
+//! | this | the parts of a picture, and their composition |
+//! | `settings.rs` | options of a picture |
+//! | `camera.rs` | projection from space to pixels |
+//! | `scene.rs`, `solids.rs`, `tree.rs` | particles with their light; colliders; leaves |
 //! | `boxes.rs`, `arrows.rs` | widths of particles; vectors |
 //! | `canvas.rs`, `colour.rs`, `scales.rs`, `font.rs` | an image and its file; colours; legends; letters |
-//! | `source/` | what a file offers, and what follows from it |
+//! | `source/` | quantities of a file, and those derived from them |
 
 use std::path::{Path, PathBuf};
 
@@ -114,7 +115,8 @@ struct Drawing {
     vectors: Vectors,
 }
 
-/// Collective. Draws the particles of a run, coloured by `field` (of vectors the magnitude), and writes the picture as PNG on rank 0.
+/// Collective. Draws the particles of a run, coloured by `field` (of vectors the magnitude), and writes the
+/// picture as PNG on rank 0.
 pub fn draw<const D: usize>(
     comm: &Comm,
     view: &View<D>,
@@ -148,8 +150,8 @@ pub fn draw<const D: usize>(
     Ok(comm.agree(saved)?)
 }
 
-/// Not collective. Draws the particles of an output file, coloured by the quantity of this name: a field that the file
-/// shows, or what follows from its fields or its state.
+/// Not collective. Draws the particles of an output file, coloured by the quantity of this name: a field that
+/// the file shows, or what follows from its fields or its state.
 ///
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
@@ -323,8 +325,8 @@ impl Drawing {
         if low.iter().chain(&high).all(|x| x.is_finite()) { Bounds { low, high } } else { self.domain }
     }
 
-    /// What the picture shows: the particles with some room, rigid bodies that are not much larger, and the floor if it is
-    /// not far below.
+    /// What the picture shows: the particles with some room, rigid bodies that are not much larger, and the
+    /// floor if it is not far below.
     fn frame(&self, comm: Option<&Comm>) -> Bounds {
         let mut frame = self.bounds(comm);
         let extent = frame.extent();
@@ -346,7 +348,8 @@ impl Drawing {
         frame
     }
 
-    /// Collective on a shared drawing. The values between which the colours run, and whether there are values below and above.
+    /// Collective on a shared drawing. The values between which the colours run, and whether there are values
+    /// below and above.
     fn range(&self, comm: Option<&Comm>, given: Option<[f64; 2]>) -> ([f64; 2], [bool; 2]) {
         let values = || self.splats.iter().map(|splat| splat.value).filter(|value| value.is_finite());
         let low = min(comm, values().fold(f64::INFINITY, f64::min));
@@ -355,7 +358,8 @@ impl Drawing {
         ([from, to], [low < from, high > to])
     }
 
-    /// Collective on a shared drawing. The range `low` to `high` of all values without its outermost half percents.
+    /// Collective on a shared drawing. The range `low` to `high` of all values without its outermost half
+    /// percents.
     fn most(&self, [low, high]: [f64; 2], comm: Option<&Comm>) -> [f64; 2] {
         const BINS: usize = 1000;
         let classes = self.tint.classes;

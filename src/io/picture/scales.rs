@@ -87,7 +87,8 @@ impl Metric {
         (0..count).map(tick).collect()
     }
 
-    /// Ticks as close as their numbers have room: `needed` says how many pixels a number takes, `scale` how many a metre has.
+    /// Ticks as close as their numbers have room: `needed` says how many pixels a number takes, `scale` how
+    /// many a metre has.
     fn fitting(self, span: [f64; 2], scale: f64, needed: impl Fn(&str) -> i64) -> Vec<(f64, String)> {
         let mut spacing = nice((span[1] - span[0]) / 8.0);
         loop {
@@ -133,7 +134,8 @@ pub(super) fn axes(canvas: &mut Canvas, camera: &Camera, frame: &Bounds, paper: 
     canvas.text(right + length, bottom - length, 2.0, metric.name, ink);
 }
 
-/// Name and unit of a field beside the drawing, from the row `top` on; the column of both and the row below them.
+/// Name and unit of a field beside the drawing, from the row `top` on; the column of both and the row below
+/// them.
 fn heading(canvas: &mut Canvas, tint: &Tint, paper: &Paper, top: i64) -> (i64, i64) {
     let x = canvas.width as i64 - canvas.px(WIDTH);
     let mut row = top;

@@ -67,7 +67,8 @@ impl Raster {
         *pixel = (*pixel).max(key << 32 | shown);
     }
 
-    /// Draws a particle as an ellipsoid, or as a rectangle in a plane picture, so that boxes side by side leave no gap.
+    /// Draws a particle as an ellipsoid, or as a rectangle in a plane picture, so that boxes side by side
+    /// leave no gap.
     pub(super) fn splat(&mut self, camera: &Camera, splat: &Splat, flat: bool) {
         /// Least half axis, pixels.
         const LEAST: f64 = 0.75;
@@ -80,7 +81,8 @@ impl Raster {
             let from = (centre - reach).floor().max(0.0) as i64;
             from..((centre + reach).ceil() + 1.0).clamp(0.0, most as f64) as i64
         };
-        // The point o + s t of a ray is on the ellipsoid where a s² + 2 b s + c = 0; t points towards the viewer.
+        // The point o + s t of a ray is on the ellipsoid where a s² + 2 b s + c = 0; t points towards the
+        // viewer.
         let inverse = splat.radii.map(|radius| 1.0 / (radius * radius));
         let product = |u: &[f64; 3], v: &[f64; 3]| (0..3).map(|i| u[i] * v[i] * inverse[i]).sum::<f64>();
         let a = product(&camera.toward, &camera.toward);
@@ -137,8 +139,8 @@ impl Raster {
         }
     }
 
-    /// Paints the image; `colour` turns values between 0 and 1 into colours. Solids are seen where nothing is before
-    /// them, and hide particles behind them by half.
+    /// Paints the image; `colour` turns values between 0 and 1 into colours. Solids are seen where nothing is
+    /// before them, and hide particles behind them by half.
     pub(super) fn paint(
         &self,
         camera: &Camera,

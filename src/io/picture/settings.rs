@@ -131,8 +131,8 @@ impl Settings {
         self.range = self.range.or(Some(look.range));
     }
 
-    /// Pixels of a unit of the layout: letters and margins keep their size in pictures of usual sizes, and go with the size of
-    /// smaller and larger ones.
+    /// Pixels of a unit of the layout: letters and margins keep their size in pictures of usual sizes, and go
+    /// with the size of smaller and larger ones.
     pub(super) fn unit(&self) -> f64 {
         let share = (self.width as f64 / 1280.0).min(self.height as f64 / 800.0);
         match share {

@@ -163,7 +163,8 @@ fn inside(solid: &Solid, camera: &Camera, within: &Bounds, [column, row]: [f64; 
     (distance < 1.0).then_some((0.0, light))
 }
 
-/// Depth and brightness of a solid where the ray of a pixel meets it first within a box, by steps as long as the distance.
+/// Depth and brightness of a solid where the ray of a pixel meets it first within a box, by steps as long as
+/// the distance.
 fn trace(solid: &Solid, camera: &Camera, within: &Bounds, [column, row]: [f64; 2]) -> Option<(f64, f64)> {
     let foot = camera.point(column, row, 0.0);
     // Depths between which the ray lies in the box, and the axis of the face through which it enters.

@@ -109,7 +109,8 @@ fn microseconds_are_no_zero_seconds() {
     assert_eq!(caption(1.25e-5, 120, 4000), "t = 12.5 µs   step 120   4 000 particles");
 }
 
-/// A long name of a field is broken between words, so that no picture cuts it off; what has no room ends with an ellipsis.
+/// A long name of a field is broken between words, so that no picture cuts it off; what has no room ends with
+/// an ellipsis.
 #[test]
 fn long_names_stand_in_lines() {
     let canvas = Canvas::new([1280, 800], 1.0, LIGHT.paper);
@@ -149,8 +150,8 @@ fn texts(drawing: Drawing, settings: &Settings) -> Vec<([f64; 4], String)> {
     svg.split("<text").skip(1).map(one).collect()
 }
 
-/// Numbers at axes and scales and the lines of a title neither meet nor leave the picture, in domains of any size and place and in
-/// pictures of any size; no two ticks of an axis have the same number.
+/// Numbers at axes and scales and the lines of a title neither meet nor leave the picture, in domains of any
+/// size and place and in pictures of any size; no two ticks of an axis have the same number.
 #[test]
 fn texts_neither_meet_nor_leave_the_picture() {
     for (low, edge) in [

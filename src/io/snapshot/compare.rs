@@ -22,15 +22,16 @@ pub struct Digest {
     pub parts: Vec<(String, u32)>,
 }
 
-/// Not collective. Compares the checksums of all data sets of a file, with or without a state. Returns their number.
+/// Not collective. Compares the checksums of all data sets of a file, with or without a state. Returns their
+/// number.
 pub fn verify(path: &Path) -> Result<usize, FileError> {
     let file = Reader::open_alone(path)?;
     let header = Header::read(&file)?;
     checked::verify(&file, &header, |_, _| true)
 }
 
-/// Collective. Compares the checksums of the data sets that [`super::read`] does not read, each on one rank. An error is the
-/// same on all ranks.
+/// Collective. Compares the checksums of the data sets that [`super::read`] does not read, each on one rank.
+/// An error is the same on all ranks.
 pub fn verify_beside_state(comm: &Comm, path: &Path) -> Result<(), Disagreement> {
     let is_read = |name: &str| name.starts_with("state/") && name != state::JOB;
     let mine = |number: usize, name: &str| !is_read(name) && number % comm.size() == comm.rank();
@@ -56,8 +57,8 @@ pub fn leaves(file: &Reader, header: &Header) -> Result<Vec<(u8, u64)>, FileErro
     Ok(levels.into_iter().zip(counts).collect())
 }
 
-/// Not collective. Reads the whole state, verifies its checksums and digests it. Refuses a state that no run can have
-/// written.
+/// Not collective. Reads the whole state, verifies its checksums and digests it. Refuses a state that no run
+/// can have written.
 pub fn digest(path: &Path) -> Result<Digest, FileError> {
     let file = Reader::open_alone(path)?;
     let header = restartable(&file)?;

@@ -6,10 +6,11 @@ use super::header::Header;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::series::{Entry, Series};
 
-/// How names of files in ParaView's format end. Every ParaView that reads the format (5.11 and newer) opens `.hdf`;
-/// the longer `.vtkhdf` is unknown to 5.11.
+/// How names of files in ParaView's format end. Every ParaView that reads the format (5.11 and newer) opens
+/// `.hdf`; the longer `.vtkhdf` is unknown to 5.11.
 const ENDING: &str = ".hdf";
-/// Endings under which the files of a run are found; earlier versions of agimp ended their names in `.vtkhdf`.
+/// Endings under which the files of a run are found; earlier versions of agimp ended their names in
+/// `.vtkhdf`.
 const KNOWN_ENDINGS: [&str; 2] = [ENDING, ".vtkhdf"];
 
 /// Path of output number `number` of the run `name`.
@@ -32,7 +33,8 @@ pub fn tree_series_path(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.tree{ENDING}.series"))
 }
 
-/// Not collective. The entries of an index, or of the one that an earlier version has left in its place, if either can be read.
+/// Not collective. The entries of an index, or of the one that an earlier version has left in its place, if
+/// either can be read.
 pub fn listed(series: &Path) -> Option<Vec<Entry>> {
     KNOWN_ENDINGS.iter().find_map(|ending| {
         let name = file_name(series).strip_suffix(&format!("{ENDING}.series"))?;
@@ -69,8 +71,9 @@ pub struct Candidates {
 
 /// Not collective. The checkpoints and outputs of the run `name` that hold a restart state, by their headers.
 ///
-/// A directory may still hold files of an earlier run of that name. Outputs that the index of the run does not
-/// list are such files, as are files of a job with another digest if `job_digest` is given; neither counts.
+/// A directory may still hold files of an earlier run of that name. Outputs that the index of the run does
+/// not list are such files, as are files of a job with another digest if `job_digest` is given; neither
+/// counts.
 pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Result<Candidates, FileError> {
     let mut found = Candidates::default();
     let listed = listed(&series_path(directory, name));
@@ -117,9 +120,10 @@ pub fn at_stake(directory: &Path, name: &str, job_digest: u64) -> Result<Option<
     Ok(ends.into_iter().find(is_other).map(|path| AtStake::OtherJob(path.clone())))
 }
 
-/// Not collective. Of the checkpoints of the run `name` and the job with this digest, keeps the `keep` latest up to step
-/// `step`, which was just written. Those of later steps were left by an earlier run, and go too, as do temporary files of
-/// checkpoints that were never finished. Those of other jobs stay, as do those that cannot be read.
+/// Not collective. Of the checkpoints of the run `name` and the job with this digest, keeps the `keep` latest
+/// up to step `step`, which was just written. Those of later steps were left by an earlier run, and go too,
+/// as do temporary files of checkpoints that were never finished. Those of other jobs stay, as do those that
+/// cannot be read.
 pub fn remove_old_checkpoints(
     directory: &Path,
     name: &str,
@@ -144,8 +148,8 @@ pub fn remove_old_checkpoints(
     })
 }
 
-/// Not collective. Removes what earlier parts of the run `name` were writing when something killed them: files under temporary names.
-/// They are in nobody's way, so that one that cannot be removed stays.
+/// Not collective. Removes what earlier parts of the run `name` were writing when something killed them:
+/// files under temporary names. They are in nobody's way, so that one that cannot be removed stays.
 pub fn remove_unfinished(directory: &Path, name: &str) {
     let unfinished = files(directory).unwrap_or_default().into_iter();
     for path in unfinished.filter(|path| is_unfinished(file_name(path), name)) {
@@ -157,7 +161,8 @@ pub fn remove_unfinished(directory: &Path, name: &str) {
 const OTHERS: [&str; 6] =
     [".hdf.series", ".tree.hdf.series", ".report.json", ".ended.json", ".png", ".report.html"];
 
-/// Whether a file is one that the run `name` has not finished writing, and not one of another run whose name begins alike.
+/// Whether a file is one that the run `name` has not finished writing, and not one of another run whose name
+/// begins alike.
 fn is_unfinished(file: &str, name: &str) -> bool {
     let rest = file.strip_suffix(".part").and_then(|file| file.strip_prefix(name));
     let Some(rest) = rest else { return false };

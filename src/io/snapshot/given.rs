@@ -7,11 +7,12 @@ use super::intact::checked::Checked;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::particle::chunk::{Chunk, Tag};
 
-/// Not collective. The particles of a body of a file with restart state, or of its only body, in the order of the file: with all of their
-/// state, at places relative to `origin`, m.
+/// Not collective. The particles of a body of a file with restart state, or of its only body, in the order of
+/// the file: with all of their state, at places relative to `origin`, m.
 ///
 /// # Errors
-/// The file cannot be read, is damaged, of another dimension, has no restart state, or several bodies and none of this name.
+/// The file cannot be read, is damaged, of another dimension, has no restart state, or several bodies and
+/// none of this name.
 pub fn particles<const D: usize>(path: &Path, body: &str, origin: &[f64; D]) -> Result<Chunk<D>, FileError> {
     let file = Reader::open_alone(path)?;
     let header = Header::read(&file)?;

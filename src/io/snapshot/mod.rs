@@ -111,8 +111,8 @@ pub struct Restored<const D: usize> {
 }
 
 /// Collective. Writes particles, and the state if `options` ask for it, to `path`. After an error on any rank
-/// all ranks have it, and no file of that name has been made or changed; a state with numbers that are not finite is such
-/// an error.
+/// all ranks have it, and no file of that name has been made or changed; a state with numbers that are not
+/// finite is such an error.
 pub fn write<const D: usize>(
     comm: &Comm,
     path: &Path,
@@ -122,8 +122,8 @@ pub fn write<const D: usize>(
     start_write(comm, path, view, options)?.finish(comm)
 }
 
-/// Collective. As [`write()`], but does not wait for the disk: the file gets its name when the caller finishes what
-/// this returns.
+/// Collective. As [`write()`], but does not wait for the disk: the file gets its name when the caller
+/// finishes what this returns.
 pub fn start_write<const D: usize>(
     comm: &Comm,
     path: &Path,
@@ -164,8 +164,8 @@ pub fn write_tree<const D: usize>(comm: &Comm, path: &Path, view: &View<D>) -> R
 }
 
 /// Collective. Reads a file for a restart on any number of ranks. Refuses, with the reason, a file that is
-/// damaged, cut short, of another format or dimension, without the restart state, of another job, or with particles
-/// that cannot be.
+/// damaged, cut short, of another format or dimension, without the restart state, of another job, or with
+/// particles that cannot be.
 pub fn read<const D: usize>(
     comm: &Comm,
     path: &Path,
@@ -196,8 +196,8 @@ pub fn read<const D: usize>(
     state::read(&file, comm, &header, limits)
 }
 
-/// Not collective. Text of the job file of the run that wrote a file with a restart state; `None` if it holds none, or none
-/// that can be read.
+/// Not collective. Text of the job file of the run that wrote a file with a restart state; `None` if it holds
+/// none, or none that can be read.
 pub fn job_text(path: &Path) -> Option<String> {
     let file = Reader::open_alone(path).ok()?;
     let header = Header::read(&file).ok()?;

@@ -39,8 +39,8 @@ impl Outputs {
         Self::start(comm, directory, name, options, None)
     }
 
-    /// Collective. Goes on with output `next` after a restart from `time`; entries of the series after that time
-    /// are dropped with the next output.
+    /// Collective. Goes on with output `next` after a restart from `time`; entries of the series after that
+    /// time are dropped with the next output.
     pub fn resume(
         comm: &Comm,
         directory: &Path,
@@ -127,8 +127,8 @@ impl Outputs {
     }
 
     /// Collective. Writes a checkpoint and removes older ones but for the last `keep` (at least one,
-    /// with this), as well as those of later steps: they are of an earlier run. Those of other jobs stay. Returns the path that it will have when
-    /// it is on disk: see [`Outputs::settle`].
+    /// with this), as well as those of later steps: they are of an earlier run. Those of other jobs stay.
+    /// Returns the path that it will have when it is on disk: see [`Outputs::settle`].
     pub fn checkpoint<const D: usize>(
         &mut self,
         comm: &Comm,

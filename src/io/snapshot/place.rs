@@ -1,4 +1,5 @@
-//! Where the job file of a run lies, as its files say it: meshes and terrains that the job names lie beside it.
+//! Where the job file of a run lies, as its files say it: meshes and terrains that the job names lie beside
+//! it.
 use std::path::{Component, Path, PathBuf};
 
 use super::header::GROUP;
@@ -26,8 +27,8 @@ pub(super) fn write(file: &Writer, output: &Path, job: &Path) -> Result<(), File
     file.set_texts(GROUP, &texts)
 }
 
-/// Not collective. Where the job file of the run that wrote a file may be: relative to the file, then absolute. Empty where the
-/// file does not say it.
+/// Not collective. Where the job file of the run that wrote a file may be: relative to the file, then
+/// absolute. Empty where the file does not say it.
 pub fn job_files(output: &Path) -> Vec<PathBuf> {
     let Ok(file) = Reader::open_alone(output) else { return Vec::new() };
     let read = |name: &str| {

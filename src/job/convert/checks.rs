@@ -49,7 +49,8 @@ impl Checks<'_> {
         (self.position)(self.tree.locate(path).start)
     }
 
-    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is the same.
+    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is
+    /// the same.
     pub(crate) fn column_name<'a>(
         &mut self,
         name: &str,

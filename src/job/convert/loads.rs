@@ -12,7 +12,8 @@ use crate::quantity::record::{self, Column};
 use crate::quantity::{Expression, Quantity, Table};
 use crate::text::{excerpt, written as number};
 
-/// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and loads (four each) that a checkpoint's header has room for.
+/// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and
+/// loads (four each) that a checkpoint's header has room for.
 const MAX_SUMS: usize = 108;
 
 /// All loads, or faults.

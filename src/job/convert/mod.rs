@@ -50,7 +50,8 @@ mod stress;
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
 
-/// Converts and checks; `text` is what `file` and `tree` were made from, `position` gives line and column of its bytes.
+/// Converts and checks; `text` is what `file` and `tree` were made from, `position` gives line and column of
+/// its bytes.
 pub(super) fn convert(
     file: &JobFile,
     tree: &Node,

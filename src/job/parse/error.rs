@@ -76,7 +76,8 @@ pub enum JobError {
 const SHOWN: usize = 20;
 /// Faults after which no more are looked for.
 pub(in crate::job) const MOST: usize = 1000;
-/// Longest message, in characters. What it quotes of the file is shorter; only lists of what is possible come near.
+/// Longest message, in characters. What it quotes of the file is shorter; only lists of what is possible come
+/// near.
 const LONGEST: usize = 500;
 /// Longest key of a message, in characters.
 const LONGEST_KEY: usize = 100;
@@ -85,7 +86,8 @@ const NAMES: usize = 12;
 /// Longest text of the file that a message quotes, in characters.
 pub(in crate::job) const QUOTED: usize = 60;
 
-/// The faults found in one job file, in the order of the file; at least one, and not many more than a thousand.
+/// The faults found in one job file, in the order of the file; at least one, and not many more than a
+/// thousand.
 #[derive(Clone, Debug, thiserror::Error)]
 pub struct FaultList {
     /// Name of the file as given.
@@ -110,7 +112,8 @@ impl FaultList {
         position(self.source(fault).1, fault.span.start)
     }
 
-    /// `file:line:column: key: message` of one fault, or with the setting in the place of the file's; without characters that control a terminal.
+    /// `file:line:column: key: message` of one fault, or with the setting in the place of the file's; without
+    /// characters that control a terminal.
     pub fn headline(&self, fault: &Fault) -> String {
         let path = match &fault.setting {
             Some(typed) => excerpt(typed, LONGEST_KEY).into_owned(),

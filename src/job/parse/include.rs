@@ -1,8 +1,9 @@
 //! `include`: other files whose tables become part of a job.
 //!
-//! The text of the job and those of the files are taken apart at the headers of tables and put together anew: what stands ahead of
-//! the first header comes first; sections with the same header become one; all others follow, those of the job first. So what comes
-//! out is a job file like any other, and each byte of it still knows its file. A key that stands twice is a fault, as in one file.
+//! The text of the job and those of the files are taken apart at the headers of tables and put together anew:
+//! what stands ahead of the first header comes first; sections with the same header become one; all others
+//! follow, those of the job first. So what comes out is a job file like any other, and each byte of it still
+//! knows its file. A key that stands twice is a fault, as in one file.
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,7 +52,8 @@ struct Reader {
 }
 
 impl Whole {
-    /// The text of the job at `path` with all that it includes; as it is where it includes nothing, or is no TOML.
+    /// The text of the job at `path` with all that it includes; as it is where it includes nothing, or is no
+    /// TOML.
     ///
     /// # Errors
     /// A file cannot be read or is no TOML, or files include each other.
@@ -92,7 +94,8 @@ impl Whole {
         }
     }
 
-    /// Place of a byte of the whole in the job at `path`, with the text `lines`, or in the file that is included there.
+    /// Place of a byte of the whole in the job at `path`, with the text `lines`, or in the file that is
+    /// included there.
     pub(in crate::job) fn position(&self, byte: usize, path: &Path, lines: &Lines<'_>) -> Position {
         let (file, (line, column)) = match self.origin(byte) {
             (0, byte) => (path, lines.position(byte)),
@@ -120,7 +123,8 @@ impl Whole {
 /// The name of a file, and where it stands.
 type Named = (String, Range<usize>);
 
-/// Where the job says what it includes, and the names, if it does so in the right form. Another form is a fault of the schema.
+/// Where the job says what it includes, and the names, if it does so in the right form. Another form is a
+/// fault of the schema.
 fn names(tree: &Node) -> Option<(Range<usize>, Vec<Named>)> {
     let node = tree.get(KEY)?;
     let Value::Array(elements) = &node.value else { return None };
@@ -171,7 +175,8 @@ impl Reader {
         Ok(sections)
     }
 
-    /// Adds the sections of an included file; those with a header that is there already go on there, without it.
+    /// Adds the sections of an included file; those with a header that is there already go on there, without
+    /// it.
     fn join(&self, sections: &mut Vec<Section>, inner: Vec<Section>) {
         for section in inner {
             let known = section

@@ -1,4 +1,5 @@
-//! From text to a tree that knows where everything stands, checked against the schema; faults with their places.
+//! From text to a tree that knows where everything stands, checked against the schema; faults with their
+//! places.
 pub(super) mod error;
 pub(super) mod include;
 pub(super) mod settings;

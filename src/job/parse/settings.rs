@@ -1,7 +1,7 @@
 //! Values of a job that are set from outside: `--set key=value` and the like.
 //!
-//! A setting changes the text of the job, all else stays as it is; what comes out is a job file like any other. Places in
-//! it are mapped back to the file that the user has written.
+//! A setting changes the text of the job, all else stays as it is; what comes out is a job file like any
+//! other. Places in it are mapped back to the file that the user has written.
 use super::error::{Fault, QUOTED, names as listed};
 use super::source::Path;
 use crate::text::excerpt;
@@ -23,8 +23,8 @@ struct Setting {
 }
 
 impl Settings {
-    /// Adds `KEY=VALUE`. Parts of the key are set apart by dots; a part after that of an array is a number, or the name of an
-    /// element. The value is one of TOML; words need no quotes.
+    /// Adds `KEY=VALUE`. Parts of the key are set apart by dots; a part after that of an array is a number,
+    /// or the name of an element. The value is one of TOML; words need no quotes.
     ///
     /// # Errors
     /// It is not of that form; says what is.

@@ -70,7 +70,8 @@ impl std::fmt::Display for Path {
 }
 
 impl Node {
-    /// Parses the text of a file; the error has the place and the parser's words, or names what is not closed.
+    /// Parses the text of a file; the error has the place and the parser's words, or names what is not
+    /// closed.
     pub(crate) fn parse(text: &str) -> Result<Self, (Range<usize>, String)> {
         let table = DeTable::parse(text).map_err(|error| {
             let end = text.len();

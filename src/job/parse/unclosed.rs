@@ -1,8 +1,8 @@
 //! Where a brace, a bracket or a string opens that is never closed.
 //!
-//! A parser notices late that something is not closed: tables and arrays may go on over lines. So after its error the text is
-//! looked through once more, line by line, with what is open. A line that begins a table of the file, or a key inside an array,
-//! shows that what is open should have been closed before.
+//! A parser notices late that something is not closed: tables and arrays may go on over lines. So after its
+//! error the text is looked through once more, line by line, with what is open. A line that begins a table of
+//! the file, or a key inside an array, shows that what is open should have been closed before.
 use std::ops::Range;
 
 /// What is not closed: its first byte, and a message.
@@ -124,8 +124,8 @@ impl Scan<'_> {
         Some((opener..opener + 1, message))
     }
 
-    /// A string without end. Where another one ends just ahead of the parser's error, it is that one which lacks its quote, and the rest of the
-    /// line is read the wrong way round.
+    /// A string without end. Where another one ends just ahead of the parser's error, it is that one which
+    /// lacks its quote, and the rest of the line is read the wrong way round.
     fn quote(&self, at: usize) -> Option<Unclosed> {
         let is_other =
             self.text.get(self.string.end..self.error).is_some_and(|between| between.trim().is_empty());

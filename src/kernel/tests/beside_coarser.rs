@@ -1,8 +1,8 @@
 //! Hanging nodes beside coarser blocks.
 use super::*;
 
-/// Velocities around a block some of whose neighbours are coarser: random on real nodes, interpolated on constrained ones,
-/// with the first moments of these.
+/// Velocities around a block some of whose neighbours are coarser: random on real nodes, interpolated on
+/// constrained ones, with the first moments of these.
 struct BesideCoarser {
     is_hanging: Vec<bool>,
     velocity: Vec<Row>,
@@ -54,8 +54,8 @@ impl BesideCoarser {
     }
 }
 
-/// Hanging nodes with other factors and with first moments give the same: particles gather the same, and what they scatter
-/// does the same work in any motion of the real nodes.
+/// Hanging nodes with other factors and with first moments give the same: particles gather the same, and what
+/// they scatter does the same work in any motion of the real nodes.
 fn hanging_nodes_replace_moments<const D: usize>(coarse: u32, seed: u64) {
     let (materials, frame) = (materials(), frame::<D>());
     let scheme = scheme(&materials, Transfer::Apic);

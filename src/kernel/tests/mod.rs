@@ -321,8 +321,8 @@ fn divide_by_mass(arena: &mut [Row]) {
     }
 }
 
-/// Repeated steps of particles that move and deform: D changes on the way, the momenta do not. The stress takes part:
-/// symmetric stress has no total force and no torque.
+/// Repeated steps of particles that move and deform: D changes on the way, the momenta do not. The stress
+/// takes part: symmetric stress has no total force and no torque.
 fn steps_conserve<const D: usize>() {
     let (materials, frame) = (materials(), frame::<D>());
     let scheme = scheme(&materials, Transfer::Apic);

@@ -89,7 +89,8 @@ fn parts_of_a_box_equal_the_box() {
     parts_equal_the_whole::<3>();
 }
 
-/// First moments: scattered ones are `Σ w m C`, where second moments enter `C = B D⁻¹`; gathered ones add up in B.
+/// First moments: scattered ones are `Σ w m C`, where second moments enter `C = B D⁻¹`; gathered ones add up
+/// in B.
 fn moments_follow<const D: usize>() {
     let (materials, frame) = (materials(), frame::<D>());
     let scheme = scheme(&materials, Transfer::Apic);

@@ -25,8 +25,8 @@ pub enum Prescribed {
     Stress(f64),
 }
 
-/// What holds at the end of a step: the deformation gradient is `(I + γ e_x ⊗ e_y) exp(E)`, where γ and some components of E are
-/// prescribed, and the Cauchy stress has the other components.
+/// What holds at the end of a step: the deformation gradient is `(I + γ e_x ⊗ e_y) exp(E)`, where γ and some
+/// components of E are prescribed, and the Cauchy stress has the other components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Simple shear γ along x over y.
@@ -143,8 +143,9 @@ impl<'a> Controlled<'a> {
         next.point.stress.iter().all(|stress| stress.is_finite()).then_some(next)
     }
 
-    /// The point where the free components have the stresses that are asked for: by Newton's method with differences for
-    /// derivatives, and where that fails, as at kinks of a yield surface, by Broyden's from the elastic stiffness.
+    /// The point where the free components have the stresses that are asked for: by Newton's method with
+    /// differences for derivatives, and where that fails, as at kinks of a yield surface, by Broyden's from
+    /// the elastic stiffness.
     fn solve(&self, target: &Target, dt: f64) -> Result<Self, NoSolution> {
         let mut search = Search { start: self, target, dt, free: Vec::new() };
         let mut strain = self.strain;
@@ -349,7 +350,8 @@ mod tests {
         }
     }
 
-    /// Linear hardening in uniaxial stress: the Kirchhoff stress is `σ_y + H κ` with `κ = (a - σ_y/E) / (1 + H/E)`.
+    /// Linear hardening in uniaxial stress: the Kirchhoff stress is `σ_y + H κ` with
+    /// `κ = (a - σ_y/E) / (1 + H/E)`.
     #[test]
     fn a_bar_in_tension_follows_its_closed_form() {
         let material =
@@ -362,7 +364,8 @@ mod tests {
         assert!(bar.stress()[0].abs() < 1e-6);
     }
 
-    /// Mohr-Coulomb in triaxial compression under Cauchy stress: `N p + 2 c √N`, up to the volume in the term of cohesion.
+    /// Mohr-Coulomb in triaxial compression under Cauchy stress: `N p + 2 c √N`, up to the volume in the term
+    /// of cohesion.
     #[test]
     fn soil_fails_in_triaxial_compression_as_coulomb_says() {
         let material =

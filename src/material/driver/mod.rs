@@ -1,4 +1,5 @@
-//! A material point driven along a prescribed path: `mod.rs` of deformation, `control.rs` of strains and stresses.
+//! A material point driven along a prescribed path: `mod.rs` of deformation, `control.rs` of strains and
+//! stresses.
 use super::tensor::strain::Strain;
 use super::{HISTORIES, Material, State, Step};
 use crate::simd::{LANES, Lanes, Vector};

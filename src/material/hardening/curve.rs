@@ -148,8 +148,8 @@ impl Curve {
         self.length.is_some()
     }
 
-    /// Names of the history variables of a frictional model: plastic shear strain, plastic volume, and temperature or, with
-    /// `books_apart`, the volume that has opened.
+    /// Names of the history variables of a frictional model: plastic shear strain, plastic volume, and
+    /// temperature or, with `books_apart`, the volume that has opened.
     pub(crate) fn frictional_history(&self, books_apart: bool) -> &'static [&'static str] {
         match (self.temperature(), books_apart) {
             (Some(_), _) => &["plastic_shear_strain", "plastic_volume", "temperature"],
@@ -240,8 +240,8 @@ impl Curve {
         }
     }
 
-    /// Part of the way from the strength of the undeformed material to the residual one that is still to go, 1 to 0: what
-    /// other parameters that soften with this strength follow. 1 for laws that do not soften.
+    /// Part of the way from the strength of the undeformed material to the residual one that is still to go,
+    /// 1 to 0: what other parameters that soften with this strength follow. 1 for laws that do not soften.
     #[inline(always)]
     pub(crate) fn progress<V: Vector>(&self, strain: V, step: &Step) -> V {
         let one = V::splat(1.0);

@@ -1,4 +1,5 @@
-//! Hardening: the strength of a plastic model as a function of its plastic strain κ, of the rate of κ and of temperature.
+//! Hardening: the strength of a plastic model as a function of its plastic strain κ, of the rate of κ and of
+//! temperature.
 //!
 //! | kind | strength `Y(κ)`, with `Y₀` the strength of the undeformed material |
 //! |---|---|
@@ -12,8 +13,9 @@
 //! | `exponential_softening` | `Y_r + (Y₀ - Y_r) e^(-κ/κ_r)` |
 //! | `johnson_cook` | `(Y₀ + B κ^n)(1 + C ln⟨κ̇/κ̇₀⟩)(1 - T*^m)` |
 //!
-//! Softening localises in a band about a cell wide, so the strain that it takes is scaled by the size of cells: with
-//! `length` L, cells of edge h soften over `κ_r L/h`, and the work per area of the band does not depend on h.
+//! Softening localises in a band about a cell wide, so the strain that it takes is scaled by the size of
+//! cells: with `length` L, cells of edge h soften over `κ_r L/h`, and the work per area of the band does not
+//! depend on h.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -40,8 +42,8 @@ impl Default for Hardening {
     }
 }
 
-/// A hardening law: strength Y as a function of plastic strain κ. The strength Y₀ of the undeformed material is a key of the
-/// model (`yield_stress`, `cohesion`).
+/// A hardening law: strength Y as a function of plastic strain κ. The strength Y₀ of the undeformed material
+/// is a key of the model (`yield_stress`, `cohesion`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum HardeningLaw {
@@ -86,8 +88,8 @@ pub enum HardeningLaw {
     },
     /// Strength follows points, linearly between them, and is constant beyond the last.
     Table {
-        /// Pairs of plastic strain and strength (Pa), strains above 0 and increasing. The first point is strain 0 with the
-        /// strength of the undeformed material, and is not listed.
+        /// Pairs of plastic strain and strength (Pa), strains above 0 and increasing. The first point is
+        /// strain 0 with the strength of the undeformed material, and is not listed.
         #[schemars(extend("minItems" = 1, "maxItems" = 64), inner(inner(range(min = 0.0, max = 1e13))))]
         points: Vec<[f64; 2]>,
     },
@@ -99,8 +101,9 @@ pub enum HardeningLaw {
         /// Plastic strain at which it is reached.
         #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0.0))]
         strain: f64,
-        /// Edge of the cells for which `strain` holds, m: others take more or less strain, such that a shear band of a
-        /// cell's width takes the same work. Without it all cells take the same strain, and results depend on their size.
+        /// Edge of the cells for which `strain` holds, m: others take more or less strain, such that a shear
+        /// band of a cell's width takes the same work. Without it all cells take the same strain, and results
+        /// depend on their size.
         #[serde(default)]
         #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
         length: Option<f64>,
@@ -113,14 +116,16 @@ pub enum HardeningLaw {
         /// Plastic strain after which 37 % of the loss are to come.
         #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0.0))]
         strain: f64,
-        /// Edge of the cells for which `strain` holds, m: others take more or less strain, such that a shear band of a
-        /// cell's width takes the same work. Without it all cells take the same strain, and results depend on their size.
+        /// Edge of the cells for which `strain` holds, m: others take more or less strain, such that a shear
+        /// band of a cell's width takes the same work. Without it all cells take the same strain, and results
+        /// depend on their size.
         #[serde(default)]
         #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
         length: Option<f64>,
     },
     /// Strength depends on strain, its rate and temperature, and plastic work heats (Johnson and Cook 1983):
-    /// `Y = (Y₀ + B κ^n)(1 + C ln(rate/reference_rate))(1 - T*^m)`, `T* = (T - reference)/(melting - reference)`.
+    /// `Y = (Y₀ + B κ^n)(1 + C ln(rate/reference_rate))(1 - T*^m)`,
+    /// `T* = (T - reference)/(melting - reference)`.
     JohnsonCook {
         /// B, increase at a plastic strain of 1, Pa.
         #[schemars(range(min = 0.0, max = 1e13))]
@@ -174,7 +179,8 @@ fn most() -> f64 {
 }
 
 impl Hardening {
-    /// Checks what the ranges of single keys cannot say. `initial` is the strength of the undeformed material, Pa.
+    /// Checks what the ranges of single keys cannot say. `initial` is the strength of the undeformed
+    /// material, Pa.
     pub(super) fn check(&self, initial: f64) -> Result<(), OutOfRange> {
         let fail = |key: &str, value: f64, range: String| {
             Err(OutOfRange { key: format!("hardening.{key}"), value, range })
@@ -220,7 +226,8 @@ impl Hardening {
         }
     }
 
-    /// As [`Hardening::check`] for cohesion (Pa) of a model with these angles of friction and dilation, degrees.
+    /// As [`Hardening::check`] for cohesion (Pa) of a model with these angles of friction and dilation,
+    /// degrees.
     pub(super) fn check_frictional(
         &self,
         cohesion: f64,

@@ -66,7 +66,8 @@ pub struct Parameters {
     /// How the cohesion changes with plastic strain: a number is the modulus of linear hardening, Pa.
     #[serde(default)]
     pub hardening: Hardening,
-    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |dev d_p|^h` (Perzyna 1966). 0: no overstress.
+    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |dev d_p|^h`
+    /// (Perzyna 1966). 0: no overstress.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e13))]
     pub viscosity: f64,
@@ -304,7 +305,8 @@ impl<V: Vector> Cone<'_, V> {
         [value * self.law.strength, slope * (self.law.strength * root)]
     }
 
-    /// Increment at which a load, less by `stiffness` for each, meets the strength of the cone; `first` is that at the start.
+    /// Increment at which a load, less by `stiffness` for each, meets the strength of the cone; `first` is
+    /// that at the start.
     #[inline(always)]
     fn slip(&self, [load, first]: [V; 2], stiffness: f64, active: V::Mask) -> V {
         let least = V::splat(f64::MIN_POSITIVE);
@@ -316,7 +318,8 @@ impl<V: Vector> Cone<'_, V> {
     }
 }
 
-/// What is left of a load after an increment of the norm of the plastic shear strain, beyond the strength then, Pa.
+/// What is left of a load after an increment of the norm of the plastic shear strain, beyond the strength
+/// then, Pa.
 struct Excess<'a, V> {
     cone: &'a Cone<'a, V>,
     load: V,
@@ -370,7 +373,8 @@ impl Cohesive {
         apex.min(V::splat(3.0 * self.tension))
     }
 
-    /// Any cohesion, dilation, cut-off, hardening and overstress: `f = |dev τ| + α tr τ - k`, flow along `|dev τ| + β tr τ`.
+    /// Any cohesion, dilation, cut-off, hardening and overstress: `f = |dev τ| + α tr τ - k`, flow along
+    /// `|dev τ| + β tr τ`.
     #[inline(always)]
     fn respond<V: Vector>(&self, solid: &Hencky, state: &mut State<V>, step: &Step) {
         let zero = V::splat(0.0);

@@ -1,8 +1,8 @@
 //! The constitutive models, one file each, and the list of them.
 //!
-//! A file holds the parameters of a model as they stand in a job file, with ranges and units, and its law. A line of the
-//! list below makes it a choice of the job file and of `agimp material`, with schema, checks and reference, and has it
-//! tested and benchmarked with the rest.
+//! A file holds the parameters of a model as they stand in a job file, with ranges and units, and its law. A
+//! line of the list below makes it a choice of the job file and of `agimp material`, with schema, checks and
+//! reference, and has it tested and benchmarked with the rest.
 //!
 //! | file | model |
 //! |---|---|
@@ -40,7 +40,8 @@ pub trait Model: Law {
     /// The model with these parameters and the density of the undeformed material, kg/m³.
     fn new(parameters: &Self::Parameters, density: f64) -> Self;
 
-    /// The same, as the solver calls it: a model may choose a law with less history for parameters that need no more.
+    /// The same, as the solver calls it: a model may choose a law with less history for parameters that need
+    /// no more.
     fn boxed(parameters: &Self::Parameters, density: f64) -> Box<dyn Material>
     where
         Self: Sized + 'static,
@@ -53,8 +54,9 @@ pub trait Model: Law {
         Ok(())
     }
 
-    /// Sets of parameters, in the form of a job file, that between them take every way through the law: for tests and
-    /// benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
+    /// Sets of parameters, in the form of a job file, that between them take every way through the law: for
+    /// tests and benches. Strengths are such that some percent of strain makes it flow; densities are 1000
+    /// kg/m³.
     fn examples() -> &'static [&'static str];
 }
 
@@ -68,7 +70,8 @@ macro_rules! materials {
             $($(#[$description])* $name(<$law as Model>::Parameters),)*
         }
 
-        /// History variables that each particle has room for: as many as the model with most of them asks for.
+        /// History variables that each particle has room for: as many as the model with most of them asks
+        /// for.
         pub const HISTORIES: usize = {
             let mut most = super::PLASTIC_VOLUME + 1;
             $(if <$law as Law>::HISTORIES > most {

@@ -1,11 +1,13 @@
-//! Soil and rock: Hencky elasticity with Mohr-Coulomb yield, in Kirchhoff stress, tension positive, `τ₁ ≥ τ₂ ≥ τ₃`:
-//! `f = (τ₁ - τ₃) + (τ₁ + τ₃) sin φ - 2c cos φ`.
+//! Soil and rock: Hencky elasticity with Mohr-Coulomb yield, in Kirchhoff stress, tension positive,
+//! `τ₁ ≥ τ₂ ≥ τ₃`: `f = (τ₁ - τ₃) + (τ₁ + τ₃) sin φ - 2c cos φ`.
 //!
-//! Flow is along the same with the dilation angle ψ in place of φ, exact on edges and at the apex (`coulomb.rs`). With
-//! `flow = "radial"` the deviator shrinks instead and the mean stays: isochoric, as Drucker-Prager's.
+//! Flow is along the same with the dilation angle ψ in place of φ, exact on edges and at the apex
+//! (`coulomb.rs`). With `flow = "radial"` the deviator shrinks instead and the mean stays: isochoric, as
+//! Drucker-Prager's.
 //!
-//! Cohesion hardens or softens with `κ = √(2/3) |dev ε_p|`; angles may soften with it. Where the material opens (apex, cut-off),
-//! the volume that it gains is booked and given back on compression (Tampubolon et al. 2017).
+//! Cohesion hardens or softens with `κ = √(2/3) |dev ε_p|`; angles may soften with it. Where the material
+//! opens (apex, cut-off), the volume that it gains is booked and given back on compression (Tampubolon et al.
+//! 2017).
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +86,8 @@ fn yes() -> bool {
 #[derive(Clone, Debug)]
 pub struct MohrCoulomb(pub(super) Properties);
 
-/// The same where the pyramid depends on the state, or does not: kernels of their own, which are smaller and faster.
+/// The same where the pyramid depends on the state, or does not: kernels of their own, which are smaller and
+/// faster.
 #[derive(Clone, Debug)]
 struct Only<const HARDENS: bool>(MohrCoulomb);
 

@@ -1,5 +1,5 @@
-//! Metal and undrained clay: Hencky elasticity with Tresca yield, in Kirchhoff stress: `τ₁ - τ₃ ≤ σ_y`, associated flow; the
-//! limit of Mohr-Coulomb without friction, with cohesion `σ_y / 2`.
+//! Metal and undrained clay: Hencky elasticity with Tresca yield, in Kirchhoff stress: `τ₁ - τ₃ ≤ σ_y`,
+//! associated flow; the limit of Mohr-Coulomb without friction, with cohesion `σ_y / 2`.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

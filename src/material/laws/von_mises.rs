@@ -1,5 +1,5 @@
-//! Metal: Hencky elasticity with von Mises yield, isotropic hardening and, if asked for, viscous overstress; radial return in
-//! logarithmic strains (Simo 1992).
+//! Metal: Hencky elasticity with von Mises yield, isotropic hardening and, if asked for, viscous overstress;
+//! radial return in logarithmic strains (Simo 1992).
 //!
 //! `f = q - σ_y(κ)` with `q = √(3/2) |dev τ|` and `κ̇ = √(2/3) |d_p|`. Linear hardening has the closed form
 //! `Δκ = f / (3μ + H)`; otherwise `q - 3μ Δκ = σ_y(κ + Δκ, Δκ/Δt, T)` is solved for `Δκ`.
@@ -34,10 +34,12 @@ pub struct Parameters {
     /// Initial yield stress in uniaxial tension, Pa; above 0.
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub yield_stress: f64,
-    /// How the yield stress changes with plastic strain: a number is the modulus of linear hardening, Pa; 0 is perfect plasticity.
+    /// How the yield stress changes with plastic strain: a number is the modulus of linear hardening, Pa; 0
+    /// is perfect plasticity.
     #[serde(default)]
     pub hardening: Hardening,
-    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |d_p|^h` (Perzyna 1966). 0: no overstress.
+    /// Viscosity η of the overstress, Pa s^h: `|dev τ|` exceeds its value at yield by `η |d_p|^h` (Perzyna
+    /// 1966). 0: no overstress.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e13))]
     pub viscosity: f64,
@@ -74,7 +76,8 @@ impl Overstress {
         (viscosity > 0.0).then_some(Self { viscosity, exponent })
     }
 
-    /// In a step of `dt` (s) with a plastic increment of this norm, above 0, and its derivative by the increment, Pa.
+    /// In a step of `dt` (s) with a plastic increment of this norm, above 0, and its derivative by the
+    /// increment, Pa.
     #[inline(always)]
     pub(super) fn of<V: Vector>(self, increment: V, dt: f64) -> [V; 2] {
         let rate = increment * (1.0 / dt);

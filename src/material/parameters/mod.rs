@@ -70,8 +70,8 @@ pub enum NotAModel {
 impl FromStr for Parameters {
     type Err = NotAModel;
 
-    /// Reads and checks the keys of a model as in a job file: `model = "hencky", young = 1e6, poisson = 0.3`, or the same
-    /// on lines of their own.
+    /// Reads and checks the keys of a model as in a job file: `model = "hencky", young = 1e6, poisson = 0.3`,
+    /// or the same on lines of their own.
     fn from_str(text: &str) -> Result<Self, NotAModel> {
         #[derive(Deserialize)]
         struct Inline {

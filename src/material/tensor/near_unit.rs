@@ -1,13 +1,13 @@
 //! Functions of symmetric tensors near the unit tensor, without eigenvectors.
 //!
-//! By the theorem of Cayley and Hamilton a tensor Y without trace obeys `Y³ = q Y + d I` with `q = tr(Y²)/2` and
-//! `d = det Y`. So all powers, and with them every power series, are sums of I, Y and Y², and a step of Horner's scheme
-//! takes two multiply-adds for the whole tensor.
+//! By the theorem of Cayley and Hamilton a tensor Y without trace obeys `Y³ = q Y + d I` with `q = tr(Y²)/2`
+//! and `d = det Y`. So all powers, and with them every power series, are sums of I, Y and Y², and a step of
+//! Horner's scheme takes two multiply-adds for the whole tensor.
 use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, each};
 
-/// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most 0.82 times as
-/// large, and what the series leave out is below 2e-18.
+/// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most
+/// 0.82 times as large, and what the series leave out is below 2e-18.
 const LIMIT: f64 = 0.2;
 
 /// `ln(1 + x) = x - x²/2 + x³/3 - …`

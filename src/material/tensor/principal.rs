@@ -1,12 +1,14 @@
 //! Principal values of a deviator, and tensors with the same principal directions, without eigenvectors.
 //!
-//! The eigenvalue of the greatest magnitude stands alone: the other two are no nearer to it than `√(3/2)` of the norm, so its
-//! projector `n ⊗ n` is a well-conditioned polynomial in the tensor. What is left lies in the plane across `n` and has
-//! eigenvalues of equal size and opposite sign, exact for equal and nearly equal ones.
+//! The eigenvalue of the greatest magnitude stands alone: the other two are no nearer to it than `√(3/2)` of
+//! the norm, so its projector `n ⊗ n` is a well-conditioned polynomial in the tensor. What is left lies in
+//! the plane across `n` and has eigenvalues of equal size and opposite sign, exact for equal and nearly equal
+//! ones.
 use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, VectorMask, each};
 
-/// `cos(arccos(x)/3)` for x from 0 to 1 as a polynomial in `x - 1/2`: Chebyshev interpolation, errors below 1e-16.
+/// `cos(arccos(x)/3)` for x from 0 to 1 as a polynomial in `x - 1/2`: Chebyshev interpolation, errors below
+/// 1e-16.
 const COSINE_OF_THIRD: [f64; 20] = [
     0.939_692_620_785_908_4,
     0.131_643_614_544_899_48,
@@ -58,8 +60,8 @@ pub(crate) struct Lone<V> {
 
 /// A deviator taken apart. It is `norm` times a tensor U of unit norm.
 ///
-/// `P = (U² + lone U + (lone² - 1/2) I) inverse` is the projector on the direction of `lone`, and `R = U + lone/2 I - 3/2 lone P` what U
-/// has in the plane across, with eigenvalues `half` and `-half`.
+/// `P = (U² + lone U + (lone² - 1/2) I) inverse` is the projector on the direction of `lone`, and
+/// `R = U + lone/2 I - 3/2 lone P` what U has in the plane across, with eigenvalues `half` and `-half`.
 pub(crate) struct Principal<V> {
     /// Frobenius norm of the deviator.
     norm: V,
@@ -98,7 +100,8 @@ impl<V: Vector> Lone<V> {
         Self { norm, unit, value, angle: x }
     }
 
-    /// Eigenvalues of the deviator, greatest first, each wrong by at most 1e-7 of the norm where two are nearly equal.
+    /// Eigenvalues of the deviator, greatest first, each wrong by at most 1e-7 of the norm where two are
+    /// nearly equal.
     #[inline(always)]
     pub(crate) fn nearly_sorted(&self) -> [V; 3] {
         let half = (self.value * self.value).neg_mul_add(V::splat(0.75), V::splat(0.5));
@@ -106,8 +109,8 @@ impl<V: Vector> Lone<V> {
     }
 }
 
-/// Eigenvalues, greatest first, of a deviator with this norm: those of the unit tensor are `lone` and, on both sides of `-lone/2` at
-/// the distance `half`, the other two.
+/// Eigenvalues, greatest first, of a deviator with this norm: those of the unit tensor are `lone` and, on
+/// both sides of `-lone/2` at the distance `half`, the other two.
 #[inline(always)]
 fn sorted<V: Vector>(norm: V, lone: V, half: V) -> [V; 3] {
     let zero = V::splat(0.0);

@@ -1,7 +1,8 @@
 //! Logarithmic strains of elastic tensors and the way back: what all models in Hencky strains share.
 //!
-//! Elastic strains of metals and soils are small, so most tensors are near a multiple of the unit tensor and need no
-//! eigenvectors (`near_unit.rs`). The others are decomposed; which way a particle goes follows from its own state.
+//! Elastic strains of metals and soils are small, so most tensors are near a multiple of the unit tensor and
+//! need no eigenvectors (`near_unit.rs`). The others are decomposed; which way a particle goes follows from
+//! its own state.
 use super::eigen::{Eigen, Symmetric, decompose};
 use super::near_unit::TraceFree;
 use crate::material::State;
@@ -21,7 +22,8 @@ pub(crate) struct Strain<V = Lanes> {
     far: Option<Far>,
 }
 
-/// Lanes that were decomposed. They are rare, and a function of their own has not the registers that a kernel may have.
+/// Lanes that were decomposed. They are rare, and a function of their own has not the registers that a kernel
+/// may have.
 struct Far {
     lanes: Mask,
     eigen: Eigen,
@@ -58,9 +60,9 @@ impl<V: Vector> Strain<V> {
         elastic
     }
 
-    /// Writes the final state, which has another trace of the strain and `kept` times its deviator where `changed` and
-    /// the trial one elsewhere: elastic tensor, stress, wave speed. Lanes in `unstrained` get exactly the unit tensor, and
-    /// lanes that have not changed keep the bits of the trial tensor.
+    /// Writes the final state, which has another trace of the strain and `kept` times its deviator where
+    /// `changed` and the trial one elsewhere: elastic tensor, stress, wave speed. Lanes in `unstrained` get
+    /// exactly the unit tensor, and lanes that have not changed keep the bits of the trial tensor.
     #[inline(always)]
     pub(crate) fn finish(
         &self,
@@ -75,7 +77,8 @@ impl<V: Vector> Strain<V> {
         solid.load(state, trace, &deviator);
     }
 
-    /// Writes the elastic tensor of the final state as [`Strain::finish`] does; returns trace and deviator of its strain.
+    /// Writes the elastic tensor of the final state as [`Strain::finish`] does; returns trace and deviator of
+    /// its strain.
     #[inline(always)]
     pub(crate) fn rewrite(
         &self,
@@ -119,8 +122,8 @@ pub(crate) fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: boo
 #[cold]
 #[inline(never)]
 fn far_tensor_of(tensor: &mut Symmetric, lanes: Mask, trace: Lanes, deviator: &Symmetric, plane: bool) {
-    // Rotations want a positive definite matrix; unlike eigenvalues of b, those of a strain are needed to the same absolute
-    // accuracy.
+    // Rotations want a positive definite matrix; unlike eigenvalues of b, those of a strain are needed to the
+    // same absolute accuracy.
     let squares = each(*deviator, |component| component * component);
     let shear = squares[3] + squares[4] + squares[5];
     let shift = (squares[0] + squares[1] + squares[2] + shear + shear).sqrt() * 2.0 + Lanes::splat(1e-9);
@@ -137,8 +140,8 @@ fn far_tensor_of(tensor: &mut Symmetric, lanes: Mask, trace: Lanes, deviator: &S
     }
 }
 
-/// Writes the final state of a return that changes principal strains one by one: this trace and this deviator where
-/// `changed`, the trial ones elsewhere. Lanes that have not changed keep the bits of the trial tensor.
+/// Writes the final state of a return that changes principal strains one by one: this trace and this deviator
+/// where `changed`, the trial ones elsewhere. Lanes that have not changed keep the bits of the trial tensor.
 #[inline(always)]
 pub(crate) fn finish<V: Vector>(
     trial: &Strain<V>,

@@ -1,7 +1,7 @@
 //! What some particles carry for loads: the area of the surface that they stand for, or a share of a force.
 //!
-//! Only particles at the surface of a body do, so only leaves with such particles have columns for it. A chunk without columns
-//! is the same as one with zeros.
+//! Only particles at the surface of a body do, so only leaves with such particles have columns for it. A
+//! chunk without columns is the same as one with zeros.
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::{Chunk, TILE};

@@ -14,7 +14,8 @@ impl<const D: usize> Chunk<D> {
         p
     }
 
-    /// Appends a particle given by the words of its columns, with its identifier, its packed tag and the words of what it carries.
+    /// Appends a particle given by the words of its columns, with its identifier, its packed tag and the
+    /// words of what it carries.
     pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64, carried: &[u64]) {
         // What all particles of a leaf carry nothing of needs no columns.
         if carried.iter().any(|&word| word != 0) {
@@ -96,8 +97,8 @@ impl<const D: usize> Chunk<D> {
         first
     }
 
-    /// Removes the particles `gone` (ascending). The last of those that stay fill the gaps in order, so that the cost
-    /// depends on the number removed and the new order on nothing else.
+    /// Removes the particles `gone` (ascending). The last of those that stay fill the gaps in order, so that
+    /// the cost depends on the number removed and the new order on nothing else.
     pub fn remove(&mut self, gone: &[u32]) {
         self.revision = None;
         let len = self.len - gone.len();
@@ -123,7 +124,8 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
-    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the material has left.
+    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the
+    /// material has left.
     fn give_back(&mut self) {
         if self.len == 0 {
             *self = Self::new();
@@ -142,9 +144,9 @@ impl<const D: usize> Chunk<D> {
         out
     }
 
-    /// Makes this chunk the particles `source[q]` of another, of which it has the identifiers, tags and these columns. Other columns keep what
-    /// they hold, which is zero in a chunk that only ever is filled in this way. Keeps its memory from one time to the next. Whole tiles are copied
-    /// fastest.
+    /// Makes this chunk the particles `source[q]` of another, of which it has the identifiers, tags and these
+    /// columns. Other columns keep what they hold, which is zero in a chunk that only ever is filled in this
+    /// way. Keeps its memory from one time to the next. Whole tiles are copied fastest.
     pub fn gather_columns(&mut self, other: &Self, source: &[u32], columns: &[usize]) {
         if source.len() > self.capacity {
             let capacity = (source.len() + source.len() / 8).next_multiple_of(TILE);

@@ -1,7 +1,7 @@
 //! The particles of one leaf, in tiles of eight: an array of structures of arrays.
 //!
-//! A tile holds one line of the cache for each component of its particles, one after the other. A batch of a kernel is a
-//! tile, so that all that it reads and writes lies together, at offsets that the compiler knows.
+//! A tile holds one line of the cache for each component of its particles, one after the other. A batch of a
+//! kernel is a tile, so that all that it reads and writes lies together, at offsets that the compiler knows.
 //!
 //! Order inside a chunk is part of the result: sums over particles run in this order, so it is
 //! changed only by rules that depend on tree and particles (see `ARCHITECTURE.md`, "Canonical
@@ -40,12 +40,12 @@ pub const TILE: usize = 8;
 #[repr(C, align(64))]
 struct Line([f64; TILE]);
 
-/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags, then what particles carry for
-/// loads, in leaves with such particles (see [`Chunk::carried`]).
+/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags, then what
+/// particles carry for loads, in leaves with such particles (see [`Chunk::carried`]).
 ///
-/// All lie in one block, with room for whole tiles; lanes of the last tile behind the last particle hold anything. Leaves
-/// at the surface of a moving body become fuller or emptier all the time; in the heap each size that they pass through
-/// would leave a hole that is too small for the next.
+/// All lie in one block, with room for whole tiles; lanes of the last tile behind the last particle hold
+/// anything. Leaves at the surface of a moving body become fuller or emptier all the time; in the heap each
+/// size that they pass through would leave a hole that is too small for the next.
 #[derive(Clone, Debug, Default)]
 pub struct Chunk<const D: usize> {
     len: usize,
@@ -157,8 +157,8 @@ impl<const D: usize> Chunk<D> {
         &mut self.lines_mut()[p / TILE * Layout::<D>::REALS..][..Layout::<D>::REALS]
     }
 
-    /// All tiles and tags at once, for kernels that write the former, undeformed half widths excepted, and read the
-    /// latter.
+    /// All tiles and tags at once, for kernels that write the former, undeformed half widths excepted, and
+    /// read the latter.
     pub fn tiles_mut_and_tags(&mut self) -> (&mut [[f64; TILE]], &[u64]) {
         self.revision = None;
         let (tiles, words) = self.block.split_at_mut(self.capacity / TILE * Layout::<D>::REALS);
@@ -183,7 +183,8 @@ impl<const D: usize> Chunk<D> {
         }
     }
 
-    /// Values in a column of [`TILE`] particles from `first` on; what lies behind the last particle is of no use.
+    /// Values in a column of [`TILE`] particles from `first` on; what lies behind the last particle is of no
+    /// use.
     #[inline(always)]
     pub fn values(&self, column: usize, first: usize) -> [f64; TILE] {
         let line = first / TILE * Layout::<D>::REALS + column;
@@ -234,7 +235,8 @@ impl<const D: usize> Chunk<D> {
         self.widest.known().unwrap_or_else(|| self.column(Layout::<D>::HALF).greatest())
     }
 
-    /// Finds the greatest half width if something may have changed it, for [`Chunk::greatest_half`] to have it at hand.
+    /// Finds the greatest half width if something may have changed it, for [`Chunk::greatest_half`] to have
+    /// it at hand.
     pub fn note_greatest_half(&mut self) {
         if self.widest.known().is_none() {
             self.widest = Widest::of(self.column(Layout::<D>::HALF));

@@ -4,8 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{Layout, TILE};
 
-/// Names what the first particles of a chunk hold: as long as a chunk has the revision that it once had, these particles are what
-/// they were, where they were. Appending keeps it, every other change ends it, and no two contents have the same.
+/// Names what the first particles of a chunk hold: as long as a chunk has the revision that it once had,
+/// these particles are what they were, where they were. Appending keeps it, every other change ends it, and
+/// no two contents have the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Revision(NonZeroU64);
 
@@ -17,7 +18,8 @@ impl Revision {
 }
 
 /// Where a chunk lies in memory: from the chunk that comes next, kernels fetch the first lines while they
-/// are still at work on this one. Holds no borrow; an address that is no longer right costs time and nothing else.
+/// are still at work on this one. Holds no borrow; an address that is no longer right costs time and nothing
+/// else.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     /// Address of the first tile; 0 if there are no particles.

@@ -123,7 +123,8 @@ fn what_particles_carry_goes_with_them() {
     assert_eq!(plain.carried_columns(), 0);
 }
 
-/// Whole tiles and single particles, from one time to the next; columns that are not gathered stay zero as room grows.
+/// Whole tiles and single particles, from one time to the next; columns that are not gathered stay zero as
+/// room grows.
 #[test]
 fn some_columns_are_gathered() {
     let mut chunk = Chunk::<2>::new();

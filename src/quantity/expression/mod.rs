@@ -1,4 +1,5 @@
-//! Expressions of place and time, such as `0.1 * sin(2 * pi * x) * exp(-t / 0.5)`; X, Y, Z are the place in the undeformed body.
+//! Expressions of place and time, such as `0.1 * sin(2 * pi * x) * exp(-t / 0.5)`; X, Y, Z are the place in
+//! the undeformed body.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -7,8 +8,8 @@
 //! | `program` | tokens to a program in postfix order, and its value |
 //! | this | expressions, and what they say where they have no value |
 //!
-//! Two forms that readers read differently are made plain: `-x^2` is `-(x^2)` as on paper, and chains such as `a^b^c` or `a * -b` ask
-//! for parentheses.
+//! Two forms that readers read differently are made plain: `-x^2` is `-(x^2)` as on paper, and chains such as
+//! `a^b^c` or `a * -b` ask for parentheses.
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::Place;
@@ -41,14 +42,16 @@ pub struct Expression {
 }
 
 impl Clone for Expression {
-    /// A copy that knows nothing of the values of the original: where one asks for values that the other does not need, only one fails.
+    /// A copy that knows nothing of the values of the original: where one asks for values that the other does
+    /// not need, only one fails.
     fn clone(&self) -> Self {
         let (text, key) = (self.text.clone(), self.key.clone());
         Self { text, program: self.program.clone(), used: self.used, key, lost: OnceLock::new() }
     }
 }
 
-/// Variables of an evaluation without a finite value, and what came out: of several the least, so that it is the same on any threads.
+/// Variables of an evaluation without a finite value, and what came out: of several the least, so that it is
+/// the same on any threads.
 type Lost = ([f64; VARIABLES.len()], f64);
 
 /// Why a text is no expression.
@@ -113,8 +116,8 @@ impl Expression {
         Self { key, ..self }
     }
 
-    /// Value at a place (m) and a time (s). Not a finite number where the expression has none, as `ln(-1)`: see
-    /// [`Expression::not_finite`].
+    /// Value at a place (m) and a time (s). Not a finite number where the expression has none, as `ln(-1)`:
+    /// see [`Expression::not_finite`].
     pub fn at(&self, place: &Place, t: f64) -> f64 {
         let ([x, y, z], [at_x, at_y, at_z]) = (place.now, place.undeformed);
         let variables = [x, y, z, t, at_x, at_y, at_z];

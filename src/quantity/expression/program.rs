@@ -1,4 +1,5 @@
-//! From tokens to a program in postfix order, and its value: linear in the length of the text (Dijkstra's shunting yard).
+//! From tokens to a program in postfix order, and its value: linear in the length of the text (Dijkstra's
+//! shunting yard).
 use super::tokens::{Fault, Token};
 use super::words::{Binary, Function, Meaning, Unary, VARIABLES, operator};
 

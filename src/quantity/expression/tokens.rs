@@ -12,8 +12,8 @@ pub(super) enum Token<'a> {
     Sign(&'a str),
 }
 
-/// The tokens of a text with the bytes where they begin. Refuses unknown names, parentheses without their counterparts and strange
-/// characters.
+/// The tokens of a text with the bytes where they begin. Refuses unknown names, parentheses without their
+/// counterparts and strange characters.
 pub(super) fn tokens(text: &str) -> Result<Vec<(usize, Token<'_>)>, Fault> {
     let bytes = text.as_bytes();
     let (mut found, mut at, mut open) = (Vec::new(), 0, Vec::new());

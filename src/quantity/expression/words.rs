@@ -1,4 +1,5 @@
-//! What the names and signs of expressions mean. All functions are `libm`'s, so values do not depend on the machine.
+//! What the names and signs of expressions mean. All functions are `libm`'s, so values do not depend on the
+//! machine.
 
 use crate::quantity::smooth_step;
 
@@ -77,8 +78,8 @@ pub(super) fn meaning(name: &str) -> Option<Meaning> {
     }
 }
 
-/// An operator between two operands and its rank: the higher binds first, equal ones from left to right. Division binds before
-/// multiplication: `a * b / c` is `a * (b / c)`.
+/// An operator between two operands and its rank: the higher binds first, equal ones from left to right.
+/// Division binds before multiplication: `a * b / c` is `a * (b / c)`.
 pub(super) fn operator(sign: &str) -> Option<(u8, Binary)> {
     Some(match sign {
         "<=" => (0, |a, b| truth(a <= b)),

@@ -98,8 +98,8 @@ pub fn published(law: CollapseLaw, aspect: f64, radius: f64) -> [Published; 2] {
     [lube(law, aspect, radius), lajeunesse(law, aspect, radius)]
 }
 
-/// Lube et al.: J. Fluid Mech. 508 (2004) for cylinders, Phys. Rev. E 72 (2005) for columns between walls. `a` is the aspect ratio.
-/// The run-out laws count from the initial edge.
+/// Lube et al.: J. Fluid Mech. 508 (2004) for cylinders, Phys. Rev. E 72 (2005) for columns between walls.
+/// `a` is the aspect ratio. The run-out laws count from the initial edge.
 fn lube(law: CollapseLaw, a: f64, radius: f64) -> Published {
     let (runout, height) = match law {
         CollapseLaw::Axisymmetric => (
@@ -123,8 +123,9 @@ fn lube(law: CollapseLaw, a: f64, radius: f64) -> Published {
     Published { authors: "Lube et al.", edge, height: height.map(|height| radius * height) }
 }
 
-/// Lajeunesse et al.: Phys. Fluids 16 (2004) for cylinders, 17 (2005) for columns between walls. `a` is the aspect ratio. Their
-/// heights; where the top has fallen, the run-out of the cone or wedge of that height and of the initial volume.
+/// Lajeunesse et al.: Phys. Fluids 16 (2004) for cylinders, 17 (2005) for columns between walls. `a` is the
+/// aspect ratio. Their heights; where the top has fallen, the run-out of the cone or wedge of that height and
+/// of the initial volume.
 fn lajeunesse(law: CollapseLaw, a: f64, radius: f64) -> Published {
     let (limit, fallen) = match law {
         CollapseLaw::Axisymmetric => (0.74, 0.74),

@@ -57,8 +57,8 @@ pub(super) fn begin<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>
     solver.maxima = problem.maps.iter().map(Map::nothing).collect();
 }
 
-/// Takes over what is booked of fluxes, on rank 0, where tracks are, and the maxima of maps from the file at `path`. What the file lacks begins
-/// here.
+/// Takes over what is booked of fluxes, on rank 0, where tracks are, and the maxima of maps from the file at
+/// `path`. What the file lacks begins here.
 pub(super) fn restore<const D: usize>(
     rank: usize,
     problem: &Problem<D>,

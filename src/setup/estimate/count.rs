@@ -1,12 +1,14 @@
 //! Leaves and particles of a job's tree, counted without building it.
 //!
-//! A part of the tree whose leaves all have one level, and which no body or one body fills, is counted by arithmetic. What
-//! is left are surfaces: of bodies, of regions, and of the layers by which a graded tree falls off around a region. Those
-//! are followed down to the leaves, coarse parts first, until a bound on the work is reached.
+//! A part of the tree whose leaves all have one level, and which no body or one body fills, is counted by
+//! arithmetic. What is left are surfaces: of bodies, of regions, and of the layers by which a graded tree
+//! falls off around a region. Those are followed down to the leaves, coarse parts first, until a bound on the
+//! work is reached.
 //!
-//! A graded tree needs no list of its leaves. A split of level `m` makes the parents of its neighbours split, these make
-//! the parents of theirs, and so on; so an octant of level `l` is split just when a region splits an octant of a level
-//! `m ≥ l` that lies within its box grown by `h_l - h_m` on all sides, where `h` are the edges of octants.
+//! A graded tree needs no list of its leaves. A split of level `m` makes the parents of its neighbours split,
+//! these make the parents of theirs, and so on; so an octant of level `l` is split just when a region splits
+//! an octant of a level `m ≥ l` that lies within its box grown by `h_l - h_m` on all sides, where `h` are the
+//! edges of octants.
 use super::LevelCount;
 use crate::geometry::{Aabb, Shape, Side};
 use crate::grid::mask::{offset, offset_count};
@@ -18,7 +20,8 @@ use std::rc::Rc;
 
 /// Parts of the tree that are looked at. A part takes about a hundred bytes.
 const MOST_PARTS: u64 = 500_000;
-/// Work for all parts, in comparisons of a point or a box with a plane or an edge of a shape, a few nanoseconds each.
+/// Work for all parts, in comparisons of a point or a box with a plane or an edge of a shape, a few
+/// nanoseconds each.
 const MOST_WORK: u64 = 60_000_000;
 /// Octants that are looked at for one question about a split. Beyond, the answer is yes.
 const MOST_LOOKS: usize = 2_000;
@@ -48,7 +51,8 @@ struct Part<const D: usize> {
     bodies: Rc<[u32]>,
 }
 
-/// Not collective. Counts the leaves of the tree that the job asks for, and the points that bodies have in them.
+/// Not collective. Counts the leaves of the tree that the job asks for, and the points that bodies have in
+/// them.
 ///
 /// # Errors
 /// Two bodies share a lattice point.
@@ -240,7 +244,8 @@ impl<const D: usize> Counter<'_, D> {
         let depth = last - octant.level;
         let (lo, hi) = self.within(octant, depth);
         self.work += price;
-        // Shapes that are classified by distance reach cells by the balls around them, which stick out of the box.
+        // Shapes that are classified by distance reach cells by the balls around them, which stick out of the
+        // box.
         let beyond = match is_exact(&region.shape) {
             true => 0.0,
             false => 0.51 * ((D as f64).sqrt() - 1.0) * problem.leaf_edge(last),
@@ -274,7 +279,8 @@ impl<const D: usize> Counter<'_, D> {
         false
     }
 
-    /// The octants `depth` levels below the octant's own that lie in its box grown by its edge less one of theirs.
+    /// The octants `depth` levels below the octant's own that lie in its box grown by its edge less one of
+    /// theirs.
     fn within(&self, octant: &Octant<D>, depth: u8) -> ([u32; D], [u32; D]) {
         let fine = 1_u32 << depth;
         let roots = self.problem.brick.roots.map(|n| n << (octant.level + depth));

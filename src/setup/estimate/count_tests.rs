@@ -109,7 +109,8 @@ fn counts_equal_those_of_the_explicit_tree_in_space() {
     }
 }
 
-/// A tree of 10^14 leaves is counted by arithmetic where it is uniform, and bounded from below where it is not.
+/// A tree of 10^14 leaves is counted by arithmetic where it is uniform, and bounded from below where it is
+/// not.
 #[test]
 fn trees_without_end_are_counted_or_bounded() {
     let disc = "{ kind = \"circle\", centre = [2.5, 1.3], radius = 0.45 }";

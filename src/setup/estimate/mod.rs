@@ -60,8 +60,8 @@ pub struct Estimate {
     pub checkpoint_bytes: f64,
 }
 
-/// Particles that one core advances by a step in a second, in 2D and in 3D: two thirds of what docs/performance.md has, for
-/// machines that are slower and cores that share their memory.
+/// Particles that one core advances by a step in a second, in 2D and in 3D: two thirds of what
+/// docs/performance.md has, for machines that are slower and cores that share their memory.
 const PARTICLE_STEPS_PER_SECOND: [f64; 2] = [12e6, 5.5e6];
 
 /// Bytes that each rank takes with next to no particles: the program itself and its libraries.
@@ -111,7 +111,8 @@ impl Estimate {
         PROGRAM + self.memory / f64::from(ranks)
     }
 
-    /// Seconds of wall time on some cores if particles and time step stay what they are at the start; roughly.
+    /// Seconds of wall time on some cores if particles and time step stay what they are at the start;
+    /// roughly.
     pub fn wall_time(&self, cores: u32) -> f64 {
         let steps = self.total_particles() as f64 * self.steps;
         steps / (self.particle_steps_per_second * f64::from(cores))
@@ -140,8 +141,8 @@ impl Estimate {
     }
 }
 
-/// Not collective. Counts the leaves of the tree and the points that bodies have in them, with a bound on the work: see
-/// [`Estimate::is_cut`].
+/// Not collective. Counts the leaves of the tree and the points that bodies have in them, with a bound on the
+/// work: see [`Estimate::is_cut`].
 ///
 /// # Errors
 /// Two bodies share a lattice point, or the steps cannot be counted.
@@ -172,8 +173,9 @@ pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, Estima
     Ok(estimate)
 }
 
-/// Not collective. The first time step (s) and the number of such steps to the end, on leaves of the finest level that the
-/// job's regions and criteria ask for: criteria may make any leaf as fine as they want, which shortens the step of all.
+/// Not collective. The first time step (s) and the number of such steps to the end, on leaves of the finest
+/// level that the job's regions and criteria ask for: criteria may make any leaf as fine as they want, which
+/// shortens the step of all.
 ///
 /// # Errors
 /// One of them is not a finite number above 0.
@@ -225,9 +227,9 @@ const fn state_bytes<const D: usize>() -> f64 {
 
 /// Bytes of memory of particles and leaves of all ranks together; about.
 ///
-/// What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
-/// plan, filled ones node fields, arenas and half a page of particles; where levels meet there are more blocks and bins,
-/// and moments of constrained nodes.
+/// What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their
+/// part of the plan, filled ones node fields, arenas and half a page of particles; where levels meet there
+/// are more blocks and bins, and moments of constrained nodes.
 fn memory<const D: usize>(particles: u64, levels: &[LevelCount]) -> f64 {
     let rows = 7_f64.powi(D as i32);
     let levels = levels.iter().map(|level| {
@@ -236,7 +238,8 @@ fn memory<const D: usize>(particles: u64, levels: &[LevelCount]) -> f64 {
     particles as f64 * state_bytes::<D>() + rows * levels.sum::<f64>()
 }
 
-/// Bytes of memory of all ranks that no tree of the job without criteria exceeds: leaves and particles of the finest level in the whole domain.
+/// Bytes of memory of all ranks that no tree of the job without criteria exceeds: leaves and particles of the
+/// finest level in the whole domain.
 pub fn greatest_memory<const D: usize>(problem: &Problem<D>) -> f64 {
     let edge = problem.leaf_edge(problem.finest_level());
     let leaves = problem.size().iter().map(|size| (size / edge).ceil()).product::<f64>();

@@ -93,7 +93,8 @@ fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
 /// Times of a run at which the place of a moving collider is looked at.
 const TIMES: u32 = 256;
 
-/// Whether a collider is outside the domain, by more than a cell, at all times of a run. Nothing is said of free bodies.
+/// Whether a collider is outside the domain, by more than a cell, at all times of a run. Nothing is said of
+/// free bodies.
 fn stays_outside<const D: usize>(problem: &Problem<D>, collider: &Collider<D>) -> bool {
     let edge = problem.cell_edge(problem.tree.base_level);
     let size = problem.size();

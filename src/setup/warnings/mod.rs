@@ -20,7 +20,8 @@ const MANY_STEPS: f64 = 1e6;
 /// Longest name that is quoted, in characters.
 const NAME: usize = 60;
 
-/// Not collective. Warnings about a job that takes about this number of steps, each with the key that it is about.
+/// Not collective. Warnings about a job that takes about this number of steps, each with the key that it is
+/// about.
 pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String> {
     let mut all = Vec::new();
     faces(problem, &mut all);

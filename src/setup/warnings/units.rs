@@ -111,7 +111,8 @@ fn of_body<const D: usize>(
     }
 }
 
-/// Greatest acceleration of gravity times the height of a body along it, m²/s²; roughly, and only as exact as it takes to compare it with `limit`.
+/// Greatest acceleration of gravity times the height of a body along it, m²/s²; roughly, and only as exact as
+/// it takes to compare it with `limit`.
 fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f64) -> f64 {
     if body.given.is_some() {
         return 0.0;

@@ -1,9 +1,10 @@
 //! Partition of leaves by their cost.
 //!
-//! When to make a new one: like a debtor who settles when what is owed equals the fee, ranks take new cuts when the time
-//! that the present ones have lost since they were made reaches what a new partition takes. While imbalance grows
-//! evenly, that is the interval with the least sum of both. The partition with which a run starts is a guess; it is
-//! replaced as soon as costs are measured, if that takes away half of the imbalance.
+//! When to make a new one: like a debtor who settles when what is owed equals the fee, ranks take new cuts
+//! when the time that the present ones have lost since they were made reaches what a new partition takes.
+//! While imbalance grows evenly, that is the interval with the least sum of both. The partition with which a
+//! run starts is a guess; it is replaced as soon as costs are measured, if that takes away half of the
+//! imbalance.
 use std::time::Instant;
 
 use partition::{CutAt, Cuts};
@@ -77,8 +78,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Collective. Measures costs and partitions anew if that pays. Changes no bit of the state. Returns whether
-    /// leaves have moved.
+    /// Collective. Measures costs and partitions anew if that pays. Changes no bit of the state. Returns
+    /// whether leaves have moved.
     pub fn balance(&mut self) -> bool {
         self.agree_on_costs();
         let now = self.imbalance().0;
@@ -100,7 +101,8 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Cuts the curve anew by current costs, moves leaves with their particles and rebuilds the
-    /// grid where tree or partition have changed. Changes no bit of the state. Returns whether leaves have moved.
+    /// grid where tree or partition have changed. Changes no bit of the state. Returns whether leaves have
+    /// moved.
     pub fn rebalance(&mut self) -> bool {
         let cuts = self.plan_partition();
         self.move_leaves(cuts)

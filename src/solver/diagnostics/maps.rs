@@ -8,8 +8,8 @@ use crate::solver::state::Solver;
 const PIECE: f64 = (1_u64 << 40) as f64;
 
 impl<const D: usize> Solver<D> {
-    /// Collective. Takes over depths and speeds of the present state where they are larger than those so far. Volumes are cut to whole
-    /// multiples of 2^-80 of the domain, so that sums are exact.
+    /// Collective. Takes over depths and speeds of the present state where they are larger than those so far.
+    /// Volumes are cut to whole multiples of 2^-80 of the domain, so that sums are exact.
     pub fn note_maps(&mut self, maps: &[Map]) {
         let roots = self.forest.brick().roots;
         let domain = roots.iter().map(|&n| f64::from(n) * self.physics.root_edge).product::<f64>();

@@ -12,7 +12,8 @@ use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
-/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress and plastic strain.
+/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress and plastic
+/// strain.
 const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1;
 
 /// Sums and extremes over particles of one or more leaves.

@@ -1,7 +1,8 @@
 //! Exact sums over particles and real nodes, for history and checks.
 //!
-//! Sums over nodes are exact before they are rounded once. Particles are added up leaf by leaf, in their order and with twice
-//! the usual precision, and the sums of the leaves exactly. So no sum depends on ranks and threads.
+//! Sums over nodes are exact before they are rounded once. Particles are added up leaf by leaf, in their
+//! order and with twice the usual precision, and the sums of the leaves exactly. So no sum depends on ranks
+//! and threads.
 use partition::comm::Comm;
 use rayon::prelude::*;
 
@@ -92,8 +93,9 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Not collective. Has the next step add up the mass on nodes and of particles once nodes have their sums; on all ranks
-    /// or none. That is much cheaper than [`Solver::grid_totals`], which scatters once more.
+    /// Not collective. Has the next step add up the mass on nodes and of particles once nodes have their
+    /// sums; on all ranks or none. That is much cheaper than [`Solver::grid_totals`], which scatters once
+    /// more.
     pub fn weigh_next_step(&mut self) {
         self.is_to_weigh = true;
     }
@@ -137,8 +139,8 @@ impl<const D: usize> Solver<D> {
         self.weighed.iter_mut().for_each(|weighed| weighed.nodes = nodes.clone());
     }
 
-    /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the latter, when a
-    /// step weighed them last; `None` if none has since the last call.
+    /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the
+    /// latter, when a step weighed them last; `None` if none has since the last call.
     pub fn weighed_mass_error(&mut self) -> Option<f64> {
         let Weighed { particles, nodes } = self.weighed.take()?;
         let mut sums = [nodes, particles];
@@ -159,7 +161,8 @@ fn together(mut sum: ExactSum, other: ExactSum) -> ExactSum {
     sum
 }
 
-/// How much the mass on the nodes differs from that of the particles, as a share of it; 0 where there is no mass.
+/// How much the mass on the nodes differs from that of the particles, as a share of it; 0 where there is no
+/// mass.
 pub fn mass_error(nodes: f64, particles: f64) -> f64 {
     if nodes == particles { 0.0 } else { (nodes - particles) / particles }
 }

@@ -1,8 +1,9 @@
 //! Particles that are followed.
 //!
-//! A track has an identifier. It follows the particles of its family: the one with this identifier, one that holds it since a merge has
-//! undone a split, or all into which it has split. Once a merge of strangers has taken the identifier away, the track goes on with the
-//! particle nearest to the place where the history showed it last.
+//! A track has an identifier. It follows the particles of its family: the one with this identifier, one that
+//! holds it since a merge has undone a split, or all into which it has split. Once a merge of strangers has
+//! taken the identifier away, the track goes on with the particle nearest to the place where the history
+//! showed it last.
 use rayon::prelude::*;
 
 use super::probes::{Partial, of_leaf, reduced};
@@ -20,7 +21,8 @@ impl<const D: usize> Solver<D> {
             .collect();
     }
 
-    /// Collective. The particle nearest to a place, m; of several the one with the least identifier, and `u64::MAX` of none.
+    /// Collective. The particle nearest to a place, m; of several the one with the least identifier, and
+    /// `u64::MAX` of none.
     fn nearest(&self, track: &Track<D>, place: &[f64; D]) -> u64 {
         let counts = |body| track.bodies.as_ref().is_none_or(|bodies| bodies.contains(&body));
         let distance = |x: &[f64; D]| (0..D).fold(0.0, |sum: f64, a| (x[a] - place[a]).powi(2) + sum);

@@ -41,8 +41,8 @@ impl<const D: usize> FaceRules<D> {
         Self { leaving: physics.leaving, outflow, origin: physics.origin }
     }
 
-    /// What becomes of a particle at a position relative to the lower corner of the domain, m; `None`: it is in the domain
-    /// `[0, extent)`.
+    /// What becomes of a particle at a position relative to the lower corner of the domain, m; `None`: it is
+    /// in the domain `[0, extent)`.
     pub(super) fn of(&self, position: &[f64; D], extent: &[f64; D]) -> Option<Crossing> {
         let (mut crosses, mut flows_out, mut is_far) = (false, false, false);
         for axis in 0..D {

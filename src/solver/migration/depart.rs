@@ -1,7 +1,7 @@
 //! Particles are taken out of leaves that they have left.
 //!
-//! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are split, beside the
-//! others: to make room for their children among these would copy the leaf.
+//! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are
+//! split, beside the others: to make room for their children among these would copy the leaf.
 use super::crossings::{Crossed, Crossing, FaceRules, Gone, face_name, farthest_beyond};
 use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
@@ -125,9 +125,9 @@ impl<const D: usize> Borders<D> {
         (to != tree.first_own() + leaf).then_some(Destination::Leaf(to as u32))
     }
 
-    /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to another or to
-    /// none. With `resampling`, particles that enter a leaf finer than they were made for become their children, which
-    /// go each their own way; those that stay come last in the leaf.
+    /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to
+    /// another or to none. With `resampling`, particles that enter a leaf finer than they were made for
+    /// become their children, which go each their own way; those that stay come last in the leaf.
     pub(in crate::solver) fn depart(
         &self,
         tree: &KnownTree<D>,

@@ -12,8 +12,8 @@ use crate::probe::{Flux, Section};
 pub struct Fluxes {
     /// Where mass is counted.
     pub sections: Vec<Section>,
-    /// Mass that has left the domain beyond each of them, less that beyond it at the start and what stages have added there since,
-    /// or that has crossed an opening, kg; this rank's part.
+    /// Mass that has left the domain beyond each of them, less that beyond it at the start and what stages
+    /// have added there since, or that has crossed an opening, kg; this rank's part.
     pub sums: Vec<ExactSum>,
 }
 
@@ -48,8 +48,9 @@ impl Fluxes {
         numbered.filter(|(_, section)| matches!(section, Section::Opening { .. })).collect()
     }
 
-    /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 the material that is there is none that has passed: at
-    /// the start, and behind the start of a stage; with +1 before it, what a stage changes passes nothing.
+    /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 the material that is
+    /// there is none that has passed: at the start, and behind the start of a stage; with +1 before it, what
+    /// a stage changes passes nothing.
     pub fn add_beyond<const D: usize>(&mut self, chunks: &[Chunk<D>], sign: f64) {
         for (section, sum) in self.sections.iter().zip(&mut self.sums) {
             let leaves = chunks.par_iter().with_min_len(16).map(|chunk| {

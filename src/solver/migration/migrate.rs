@@ -1,8 +1,8 @@
 //! Particles change leaves, and with them ranks.
 //!
-//! Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order in which `depart.rs` took them out.
-//! Ranks hold contiguous segments of the curve, so appending the messages of lower ranks, then the own moves, then the
-//! messages of higher ranks gives that order on every partition.
+//! Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order in
+//! which `depart.rs` took them out. Ranks hold contiguous segments of the curve, so appending the messages of
+//! lower ranks, then the own moves, then the messages of higher ranks gives that order on every partition.
 use partition::comm::{Comm, NeighbourExchange, Traffic};
 use rayon::prelude::*;
 
@@ -77,8 +77,8 @@ pub struct Moved {
 }
 
 impl<const D: usize> Migration<D> {
-    /// Not collective. `neighbours` must be those of the plan's arena exchange; particles have up to `carried` columns of what they
-    /// carry for loads.
+    /// Not collective. `neighbours` must be those of the plan's arena exchange; particles have up to
+    /// `carried` columns of what they carry for loads.
     pub(in crate::solver) fn new(
         comm: &Comm,
         plan: &GridPlan<D>,
@@ -97,8 +97,9 @@ impl<const D: usize> Migration<D> {
         self.exchange.traffic()
     }
 
-    /// Collective over neighbours. Moves every particle into the leaf that contains it; see [`Borders::depart`] and
-    /// [`Migration::arrive`]. Particles of other leaves than `may_stray` says must be in theirs.
+    /// Collective over neighbours. Moves every particle into the leaf that contains it; see
+    /// [`Borders::depart`] and [`Migration::arrive`]. Particles of other leaves than `may_stray` says must be
+    /// in theirs.
     ///
     /// # Errors
     /// As those of [`Migration::arrive`].
@@ -121,8 +122,8 @@ impl<const D: usize> Migration<D> {
         self.arrive(tree, chunks, departed, splits, crossings)
     }
 
-    /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the places given
-    /// with them, which must be in or next to their leaf; they stay where they are in space.
+    /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the
+    /// places given with them, which must be in or next to their leaf; they stay where they are in space.
     pub(in crate::solver) fn gather(
         &mut self,
         tree: &KnownTree<D>,
@@ -141,8 +142,9 @@ impl<const D: usize> Migration<D> {
         self.arrive(tree, chunks, departed, &mut Vec::new(), &mut Crossings::default())
     }
 
-    /// Collective over neighbours. Appends what has departed from each own leaf, here and on other ranks, to where it
-    /// goes. Appends what splits on the way did to `splits`, and books those that crossed faces of the domain in `crossings`.
+    /// Collective over neighbours. Appends what has departed from each own leaf, here and on other ranks, to
+    /// where it goes. Appends what splits on the way did to `splits`, and books those that crossed faces of
+    /// the domain in `crossings`.
     ///
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed

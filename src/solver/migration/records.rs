@@ -4,7 +4,8 @@ use rayon::prelude::*;
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, TILE};
 
-/// Words of one particle: a word for the way (where it goes), columns, identifier, tag, and columns of what particles carry.
+/// Words of one particle: a word for the way (where it goes), columns, identifier, tag, and columns of what
+/// particles carry.
 pub(super) const fn record_words<const D: usize>(carried: usize) -> usize {
     Layout::<D>::REALS + 3 + carried
 }
@@ -24,8 +25,8 @@ pub(super) fn push_record<const D: usize>(
         .extend((0..carried).map(|column| chunk.carried(column).get(p).map_or(0, |value| value.to_bits())));
 }
 
-/// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given. Chunks know
-/// their greatest half width afterwards.
+/// Not collective. Appends each record to the chunk given with it; those of one chunk in the order given.
+/// Chunks know their greatest half width afterwards.
 pub(super) fn append_all<const D: usize>(chunks: &mut [Chunk<D>], arrivals: &[(u32, &[u64])]) {
     // Sorted, so that chunks can take theirs at the same time.
     let by_chunk = Csr::new(chunks.len(), arrivals.iter().copied());

@@ -7,8 +7,8 @@ use crate::adaptivity::surroundings::MassRange;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
-    /// Collective. The value of each criterion (inner) in each own leaf (outer); all zero for leaves without particles.
-    /// [`Solver::survey_now`], or a step after which this is due, comes before.
+    /// Collective. The value of each criterion (inner) in each own leaf (outer); all zero for leaves without
+    /// particles. [`Solver::survey_now`], or a step after which this is due, comes before.
     pub(super) fn indicators(&mut self) -> Vec<Value> {
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
         let criteria = &adaptivity.criteria;

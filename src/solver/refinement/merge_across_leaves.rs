@@ -11,9 +11,9 @@ use crate::solver::migration::migrate::Moved;
 use crate::solver::state::{Solver, StepError};
 
 impl<const D: usize> Solver<D> {
-    /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and those that did not merge go
-    /// back. Faces across one combination of axes are tried at a time, in turn from call to call. All particles must be
-    /// in their leaves. Returns whether any rank merged any.
+    /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and
+    /// those that did not merge go back. Faces across one combination of axes are tried at a time, in turn
+    /// from call to call. All particles must be in their leaves. Returns whether any rank merged any.
     ///
     /// # Errors
     /// On all ranks when a particle could not be moved.
@@ -58,8 +58,8 @@ impl<const D: usize> Solver<D> {
         Ok(self.comm.any(merged))
     }
 
-    /// Collective over neighbours. Moves particles of the wanted leaves that are not in their leaf to the one that contains
-    /// them. None may be coarser than that.
+    /// Collective over neighbours. Moves particles of the wanted leaves that are not in their leaf to the one
+    /// that contains them. None may be coarser than that.
     pub(super) fn send_home(&mut self, is_wanted: impl Fn(usize) -> bool + Sync) -> Result<Moved, StepError> {
         let root_edge = self.physics.root_edge;
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).enumerate().with_min_len(16);
@@ -73,7 +73,8 @@ impl<const D: usize> Solver<D> {
         self.gather_in_leaves(&strayed)
     }
 
-    /// Collective over neighbours. Moves particles of each own leaf into the leaves that contain the places with them.
+    /// Collective over neighbours. Moves particles of each own leaf into the leaves that contain the places
+    /// with them.
     fn gather_in_leaves(&mut self, wanted: &[Vec<(u32, [f64; D])>]) -> Result<Moved, StepError> {
         let (grid, chunks) = (&mut self.grid, &mut self.chunks);
         Ok(grid.migration.gather(&grid.plan.tree, chunks, wanted)?)

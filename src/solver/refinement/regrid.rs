@@ -18,12 +18,12 @@ use crate::solver::state::{Solver, StepError};
 /// A region with the level that all leaves which meet it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
 
-/// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What creeps at
-/// rest shall not refine its surroundings.
+/// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What
+/// creeps at rest shall not refine its surroundings.
 const CREEP: f64 = 0.025;
 
-/// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves that
-/// overlap it.
+/// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves
+/// that overlap it.
 fn grown<const D: usize>(octant: &Octant<D>, [below, above]: [[u32; D]; 2]) -> Region<D> {
     let (lower, upper) = (octant.lower(), octant.upper());
     Region {
@@ -56,8 +56,9 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective. After a step: changes the tree where the job's criteria want it, and splits and merges particles,
-    /// if the step is one at which this is due. Everything follows from the state alone. Returns whether anything changed.
+    /// Collective. After a step: changes the tree where the job's criteria want it, and splits and merges
+    /// particles, if the step is one at which this is due. Everything follows from the state alone. Returns
+    /// whether anything changed.
     ///
     /// # Errors
     /// On all ranks when any rank failed.
@@ -93,8 +94,8 @@ impl<const D: usize> Solver<D> {
         let mut merged = is_due && self.comm.any(reports.iter().any(|report| report.merged > 0));
         self.regrid_timers.end(Part::Merge);
         if is_other || merged {
-            // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of merged ones
-            // do not, but for rounding.
+            // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of
+            // merged ones do not, but for rounding.
             let is_merged = |leaf: usize| reports.get(leaf).is_some_and(|report| report.merged > 0);
             let may_stray = |leaf: usize| split_in.get(leaf) == Some(&true) || is_merged(leaf);
             let moved: Result<Moved, StepError> = match is_other {
@@ -129,8 +130,8 @@ impl<const D: usize> Solver<D> {
         Ok(is_other || merged)
     }
 
-    /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether the
-    /// tree had to change. Particles of a changed tree are to be made anew.
+    /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether
+    /// the tree had to change. Particles of a changed tree are to be made anew.
     pub fn regrid_before_start(&mut self) -> bool {
         let Some(steps) = self.physics.adaptivity.as_ref().map(|adaptivity| adaptivity.every) else {
             return false;
@@ -151,9 +152,9 @@ impl<const D: usize> Solver<D> {
         self.phases = phases;
     }
 
-    /// Collective. Refines and coarsens, and moves particles to the leaves that contain them; the partition stays. If
-    /// any leaf of any rank changed: the level of the leaf that each own leaf's particles come from. The next time is in
-    /// `steps`.
+    /// Collective. Refines and coarsens, and moves particles to the leaves that contain them; the partition
+    /// stays. If any leaf of any rank changed: the level of the leaf that each own leaf's particles come
+    /// from. The next time is in `steps`.
     fn change_tree(&mut self, steps: u64) -> Option<Vec<u8>> {
         let wishes = self.wishes(steps);
         self.regrid_timers.end(Part::Criteria);
@@ -263,8 +264,8 @@ impl<const D: usize> Solver<D> {
         .collect()
     }
 
-    /// Collective. The tree with own leaves refined to what is requested, families coarsened by one level where nothing
-    /// objects, and balanced. `marks` are those of the first pass.
+    /// Collective. The tree with own leaves refined to what is requested, families coarsened by one level
+    /// where nothing objects, and balanced. `marks` are those of the first pass.
     fn followed(&self, adaptivity: &Adaptivity<D>, requests: &[Request<D>], marks: &[Mark]) -> Forest<D> {
         let mut forest = self.forest.clone();
         if !forest.adapt(&self.comm, marks) {
@@ -278,7 +279,8 @@ impl<const D: usize> Solver<D> {
         forest
     }
 
-    /// Moves particles from old leaves to those that contain them now. Returns the level of the old leaf of each.
+    /// Moves particles from old leaves to those that contain them now. Returns the level of the old leaf of
+    /// each.
     fn move_to_leaves(&mut self, old: &[Octant<D>]) -> Vec<u8> {
         let new = self.forest.leaves();
         let mut sources = std::mem::take(&mut self.chunks);

@@ -30,8 +30,8 @@ impl<const D: usize> Solver<D> {
         each.collect()
     }
 
-    /// Not collective. Who is to be tried in each own leaf. While the grid is not that of the tree, leaves count as not
-    /// beside finer ones.
+    /// Not collective. Who is to be tried in each own leaf. While the grid is not that of the tree, leaves
+    /// count as not beside finer ones.
     pub(super) fn turns(&self) -> Vec<RetrySlot> {
         let every = self.physics.adaptivity.as_ref().map_or(1, |adaptivity| adaptivity.every);
         let regrid = self.clock.step / every;
@@ -48,8 +48,9 @@ impl<const D: usize> Solver<D> {
         each.collect()
     }
 
-    /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the cells that
-    /// the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any was split.
+    /// Not collective. Splits particles that are too large for their leaf. `from[i]` is the level of the
+    /// cells that the affine state in leaf i comes from, if the tree has changed. Returns in which leaves any
+    /// was split.
     pub(super) fn split_particles(&mut self, looks: &[BackoffState], from: Option<&[u8]>) -> Vec<bool> {
         let scheme = self.physics.scheme();
         let extent = self.grid.plan.extent();
@@ -75,7 +76,8 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
-    /// finer leaf, in the wanted leaves; strangers only on demand. Returns per leaf those that are to be named.
+    /// finer leaf, in the wanted leaves; strangers only on demand. Returns per leaf those that are to be
+    /// named.
     pub(super) fn merge_in_leaves(
         &mut self,
         among_strangers: bool,
@@ -114,7 +116,8 @@ impl<const D: usize> Solver<D> {
         reports
     }
 
-    /// Collective. Merges particles in leaves that are coarser than they are. Returns what was done in each own leaf.
+    /// Collective. Merges particles in leaves that are coarser than they are. Returns what was done in each
+    /// own leaf.
     pub(super) fn merge_particles(&mut self, looks: &[BackoffState]) -> Vec<Merged> {
         let reports = self.merge_in_leaves(true, |leaf| looks[leaf].due);
         // Groups that are no family get roots of their own, counted along the curve.
@@ -146,8 +149,8 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]): with that the grid needs
-    /// not be made anew for them.
+    /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]):
+    /// with that the grid needs not be made anew for them.
     pub(in crate::solver) fn reach_of_merges(&self) -> u32 {
         let Some(adaptivity) = self.physics.adaptivity.as_ref().filter(|a| a.merge.is_some()) else {
             return 0;

@@ -13,7 +13,8 @@ use crate::simd::Lanes;
 /// Particle lists of the bins of one rank.
 #[derive(Clone, Debug, Default)]
 pub struct BinLists<const D: usize> {
-    /// Of leaves beside finer ones, and of others that have needed lists. For the rest nothing is read or kept.
+    /// Of leaves beside finer ones, and of others that have needed lists. For the rest nothing is read or
+    /// kept.
     leaves: Vec<Option<Box<LeafBins<D>>>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
@@ -31,10 +32,11 @@ pub struct BinMissing {
 
 /// Half widths of the boxes of a chunk, and their bound.
 pub trait BoxWidths<const D: usize>: Sync {
-    /// Half widths of the boxes of up to `LANES` particles in a leaf with cells of edge `cell`, m; lanes behind the last
-    /// are of no use.
+    /// Half widths of the boxes of up to `LANES` particles in a leaf with cells of edge `cell`, m; lanes
+    /// behind the last are of no use.
     fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D];
-    /// Bounds on the half widths of `LANES` particles from `first` on, m; lanes behind the last particle are of no use.
+    /// Bounds on the half widths of `LANES` particles from `first` on, m; lanes behind the last particle are
+    /// of no use.
     fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes;
     /// Asks for what [`BoxWidths::of_batch`] will read of the `LANES` particles from `first` on.
     fn read_ahead(&self, _chunk: &Chunk<D>, _first: usize) {}
@@ -183,7 +185,8 @@ impl<const D: usize> BinLists<D> {
         })
     }
 
-    /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along the axes.
+    /// Whether a leaf finer than own leaf `leaf` lies within `distance` (m) of a point in it, measured along
+    /// the axes.
     pub fn is_finer_within(&self, leaf: usize, x: &[f64; D], distance: f64) -> bool {
         let is_near = |near: &NearLeaf<D>| {
             (0..D).all(|a| x[a] > near.lower[a] - distance && x[a] < near.upper[a] + distance)
@@ -217,8 +220,8 @@ impl<const D: usize> OfLeaf<'_, D> {
         self.bins.as_deref().filter(|_| self.sorted)
     }
 
-    /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are gone: what it looks
-    /// at is still in the cache.
+    /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are
+    /// gone: what it looks at is still in the cache.
     pub(crate) fn presort(
         self,
         plan: &GridPlan<D>,
@@ -237,7 +240,8 @@ impl<const D: usize> OfLeaf<'_, D> {
     }
 }
 
-/// Whether particles of a leaf may belong elsewhere than whole in its own bin. `bins` are those of the leaf, if it has any.
+/// Whether particles of a leaf may belong elsewhere than whole in its own bin. `bins` are those of the leaf,
+/// if it has any.
 fn may_need_lists<const D: usize>(
     bins: Option<&LeafBins<D>>,
     chunk: &Chunk<D>,

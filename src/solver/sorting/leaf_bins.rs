@@ -2,8 +2,8 @@
 //!
 //! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
 //! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
-//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are compared with the finer
-//! leaves around.
+//! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are compared
+//! with the finer leaves around.
 //! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
 //! same way; its weights are the mean of theirs.
 
@@ -20,8 +20,8 @@ use crate::particle::group::Group;
 use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 
-/// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss would cost
-/// more than it saves.
+/// Particles of a leaf from which on its own bin counts as touching all nodes: to find out which these miss
+/// would cost more than it saves.
 const fn touches_all_nodes(d: usize) -> usize {
     if d == 2 { 32 } else { 128 }
 }
@@ -35,7 +35,8 @@ pub struct LeafBins<const D: usize> {
     pub cut: Vec<u32>,
     /// Finer leaves around.
     pub(in crate::solver) finer: Vec<NearLeaf<D>>,
-    /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any of them.
+    /// All leaves around: where there are finer ones, or once boxes are wide; parts of boxes may lie in any
+    /// of them.
     around: Vec<NearLeaf<D>>,
     /// Beside finer leaves.
     pub(super) faces: Option<LeafFaces<D>>,
@@ -98,7 +99,8 @@ impl<const D: usize> LeafBins<D> {
         self.faces.is_some()
     }
 
-    /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the leaf's own bin.
+    /// Sorts the particles of a leaf. Returns whether there is anything to list: if not, all are whole in the
+    /// leaf's own bin.
     pub(in crate::solver) fn sort(
         &mut self,
         chunk: &Chunk<D>,
@@ -158,8 +160,9 @@ impl<const D: usize> LeafBins<D> {
         looked.map(|()| true)
     }
 
-    /// Classifies the particles now, while they are in the cache, so that the next [`LeafBins::sort`] only classifies those that
-    /// are appended until then. Any other change of the chunk ends its revision, and `sort` begins anew.
+    /// Classifies the particles now, while they are in the cache, so that the next [`LeafBins::sort`] only
+    /// classifies those that are appended until then. Any other change of the chunk ends its revision, and
+    /// `sort` begins anew.
     pub(in crate::solver) fn presort(
         &mut self,
         chunk: &mut Chunk<D>,
@@ -338,9 +341,9 @@ impl<const D: usize> LeafBins<D> {
         Ok(())
     }
 
-    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel sees
-    /// an overlap that is none here, it would reach for nodes that do not exist within finer leaves. `faces` are those
-    /// of the leaf, for boxes at most a cell wide.
+    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel
+    /// sees an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
+    /// `faces` are those of the leaf, for boxes at most a cell wide.
     fn finest_level(
         &self,
         own: &NearLeaf<D>,

@@ -1,7 +1,8 @@
-//! What lies across the faces of a leaf beside finer ones, so that boxes need not be compared with every leaf around.
+//! What lies across the faces of a leaf beside finer ones, so that boxes need not be compared with every leaf
+//! around.
 //!
-//! Along each axis a box stays within its leaf, or crosses the lower or the upper face, or both: at most `4^D` cases,
-//! each with its answer in a table.
+//! Along each axis a box stays within its leaf, or crosses the lower or the upper face, or both: at most
+//! `4^D` cases, each with its answer in a table.
 use std::cmp::Ordering;
 
 use partition::Octant;
@@ -64,8 +65,8 @@ pub(super) struct LeafFaces<const D: usize> {
 }
 
 impl<const D: usize> LeafFaces<D> {
-    /// The sides of `leaf`, which is the octant `here` with cells of edge `cell` and has the given bins; `near` are the
-    /// finer leaves around.
+    /// The sides of `leaf`, which is the octant `here` with cells of edge `cell` and has the given bins;
+    /// `near` are the finer leaves around.
     pub(super) fn new(
         leaf: NearLeaf<D>,
         here: Octant<D>,
@@ -73,8 +74,8 @@ impl<const D: usize> LeafFaces<D> {
         near: &[NearLeaf<D>],
         bins: &[Bin<D>],
     ) -> Self {
-        // Finest level in each direction, among the leaves that touch this one. A box at most a cell wide reaches
-        // half a cell beyond, less than the depth of a leaf one level finer.
+        // Finest level in each direction, among the leaves that touch this one. A box at most a cell wide
+        // reaches half a cell beyond, less than the depth of a leaf one level finer.
         let mut towards = [Side::Own; 27];
         for other in near {
             let along: [Option<i32>; D] = std::array::from_fn(|axis| {
@@ -119,8 +120,8 @@ impl<const D: usize> LeafFaces<D> {
         Self { sides, decisive, lower: leaf.lower, upper: leaf.upper, slack: leaf.slack(), middle, children }
     }
 
-    /// Lanes whose boxes may scatter elsewhere than on the leaf's own level, given bounds on their half widths.
-    /// `position` gives coordinates along an axis.
+    /// Lanes whose boxes may scatter elsewhere than on the leaf's own level, given bounds on their half
+    /// widths. `position` gives coordinates along an axis.
     #[inline(always)]
     pub(super) fn undecided(&self, half: Lanes, position: impl Fn(usize) -> Lanes) -> u32 {
         let mut lanes = 0;
@@ -140,7 +141,8 @@ impl<const D: usize> LeafFaces<D> {
         lanes
     }
 
-    /// Faces that a box crosses, or touches up to round-off: bit `2 axis` for the lower and `2 axis + 1` for the upper one.
+    /// Faces that a box crosses, or touches up to round-off: bit `2 axis` for the lower and `2 axis + 1` for
+    /// the upper one.
     pub(super) fn faces(&self, centre: &[f64; D], half: &[f64; D]) -> usize {
         (0..D).fold(0, |faces, axis| {
             let above_lower = self.lower[axis] <= centre[axis] - half[axis] - self.slack[axis];
@@ -149,8 +151,8 @@ impl<const D: usize> LeafFaces<D> {
         })
     }
 
-    /// Bins, counted within the leaf, of the boxes of a batch that are whole and on the leaf's own level or one finer: half widths
-    /// are compared with these limits of both levels.
+    /// Bins, counted within the leaf, of the boxes of a batch that are whole and on the leaf's own level or
+    /// one finer: half widths are compared with these limits of both levels.
     #[inline(always)]
     pub(super) fn bins(
         &self,
@@ -217,7 +219,8 @@ mod tests {
         KnownTree::whole(Brick { roots: [2; D] }, leaves.collect())
     }
 
-    /// Small boxes on all faces, edges and corners of all coarse leaves are on the level of the finest leaf that they overlap.
+    /// Small boxes on all faces, edges and corners of all coarse leaves are on the level of the finest leaf
+    /// that they overlap.
     fn sides_are_those_of_the_leaves<const D: usize>() {
         let tree = tree::<D>();
         let all: Vec<NearLeaf<D>> =

@@ -18,7 +18,8 @@ pub struct Reaction {
     pub torque: [f64; 3],
 }
 
-/// Exact sums of some things on this rank, `N` for each, of which some go over the time since a row of the history.
+/// Exact sums of some things on this rank, `N` for each, of which some go over the time since a row of the
+/// history.
 #[derive(Clone, Debug, Default)]
 pub struct ExactSums<const N: usize> {
     /// Sums of each thing.
@@ -61,7 +62,8 @@ impl<const N: usize> ExactSums<N> {
     }
 }
 
-/// The colliders, and per collider impulse and angular impulse since the last row, from the nodes of this rank.
+/// The colliders, and per collider impulse and angular impulse since the last row, from the nodes of this
+/// rank.
 #[derive(Clone, Debug)]
 pub struct Contacts<const D: usize> {
     /// State of each collider; the same on all ranks.
@@ -86,8 +88,8 @@ impl<const D: usize> Contacts<D> {
 /// Components of the impulse on a face.
 pub const FACE_SUMS: usize = 3;
 
-/// Sums of a load, and of a contact between bodies: three components of the impulse since the last row (kg m/s), and the work since the start (J), of the nodes
-/// that this rank counts.
+/// Sums of a load, and of a contact between bodies: three components of the impulse since the last row (kg
+/// m/s), and the work since the start (J), of the nodes that this rank counts.
 pub const LOAD_SUMS: usize = 4;
 
 /// A load's force on one particle in one step.
@@ -117,11 +119,12 @@ pub struct CarriedTotals {
 /// Mean force and work of a load, or of a contact between bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceAndWork {
-    /// Mean force on the material, or on the first side of a contact, since the last row of the history, N; in plane strain per metre of
-    /// thickness.
+    /// Mean force on the material, or on the first side of a contact, since the last row of the history, N;
+    /// in plane strain per metre of thickness.
     pub force: [f64; 3],
-    /// Work on the material, or on both sides of a contact, since the start, J: impulse times the velocity with which the step moves the
-    /// material, or one side along the other. Friction takes away, so its work is below 0.
+    /// Work on the material, or on both sides of a contact, since the start, J: impulse times the velocity
+    /// with which the step moves the material, or one side along the other. Friction takes away, so its work
+    /// is below 0.
     pub work: f64,
 }
 

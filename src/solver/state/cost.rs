@@ -1,9 +1,9 @@
 //! What leaves cost: integers from measured time, the same on all ranks.
 //!
-//! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the material of the
-//! particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of each class; the leaf's arena
-//! counts as some particles more. Steps in which nodes are summed and updated give the cost of a leaf beside them. Costs
-//! steer the partition, which changes no bit of the state.
+//! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the
+//! material of the particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of
+//! each class; the leaf's arena counts as some particles more. Steps in which nodes are summed and updated
+//! give the cost of a leaf beside them. Costs steer the partition, which changes no bit of the state.
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 use crate::solver::state::leaf_data::MEASURE_EVERY;
@@ -28,8 +28,9 @@ pub enum Kind {
 
 pub(in crate::solver) const KINDS: usize = 3;
 
-/// What the arena of a leaf with so many particles costs in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter
-/// in sand that has a free surface, and 24 in 2D; less where few particles touch a part of it.
+/// What the arena of a leaf with so many particles costs in scatter and gather, in particles. Measured: 46 to
+/// 158 in 3D, the latter in sand that has a free surface, and 24 in 2D; less where few particles touch a part
+/// of it.
 pub(in crate::solver) fn arena_cost(d: usize, particles: u64) -> u64 {
     particles.min(if d == 2 { 24 } else { 64 })
 }

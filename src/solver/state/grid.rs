@@ -120,7 +120,8 @@ impl<const D: usize> Grid<D> {
         std::iter::once(&self.fields).chain(self.others.iter().map(|other| &other.fields))
     }
 
-    /// All material on one velocity field, where there are several: masses add up, velocities are those of its momentum.
+    /// All material on one velocity field, where there are several: masses add up, velocities are those of
+    /// its momentum.
     pub(in crate::solver) fn fields_together(&self) -> Option<NodeFields<D>> {
         let (first, rest) = self.others.split_first()?;
         let mut together = self.fields.clone();
@@ -134,8 +135,8 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any. With `group`: those of its
-    /// particles alone.
+    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any.
+    /// With `group`: those of its particles alone.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan; the caller makes it collective.
@@ -157,8 +158,9 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Collective over neighbours. Calls `scatter` with each bin that has members and its arena, on any thread, and leaves the
-    /// sums of the arenas of all ranks on real nodes. No bit depends on the order in which bins scatter.
+    /// Collective over neighbours. Calls `scatter` with each bin that has members and its arena, on any
+    /// thread, and leaves the sums of the arenas of all ranks on real nodes. No bit depends on the order in
+    /// which bins scatter.
     pub(in crate::solver) fn scatter_and_sum<S: Default>(
         &mut self,
         phases: &mut Phases,
@@ -266,7 +268,8 @@ pub(in crate::solver) struct BetweenBodies<const D: usize> {
 
 /// Where the bodies of a velocity field are near those of others.
 pub(in crate::solver) struct Solids<const D: usize> {
-    /// By own leaf, copies of the particles there that have volumes for masses. They keep their memory from step to step.
+    /// By own leaf, copies of the particles there that have volumes for masses. They keep their memory from
+    /// step to step.
     pub(in crate::solver) copies: Vec<Chunk<D>>,
     /// Of which particles these are copies.
     pub(in crate::solver) members: Vec<Vec<u32>>,
@@ -283,7 +286,8 @@ impl<const D: usize> Solids<D> {
 /// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct Increments {
-    /// What is taken off the new velocity to get what particles take: v_0 (FLIP), or `-Σ v_k` over k from 1 (XPIC).
+    /// What is taken off the new velocity to get what particles take: v_0 (FLIP), or `-Σ v_k` over k from 1
+    /// (XPIC).
     pub(in crate::solver) base: Block<Row>,
     /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
     pub rows: Block<Row>,

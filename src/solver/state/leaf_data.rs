@@ -7,12 +7,12 @@ use crate::particle::Chunk;
 use crate::particle::chunk::Place;
 use crate::solver::state::phases::thread_time;
 
-/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to ask for the
-/// processor time takes as long as several particles.
+/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to
+/// ask for the processor time takes as long as several particles.
 pub(in crate::solver) const MEASURE_EVERY: u64 = 32;
 
-/// What is noted of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset together when
-/// these change.
+/// What is noted of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset
+/// together when these change.
 #[derive(Debug, Default)]
 pub struct LeafData<const D: usize> {
     /// Greatest sum of wave speed and particle speed after the last step, m/s; 0 if that is not known.

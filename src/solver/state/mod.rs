@@ -130,7 +130,8 @@ pub struct Solver<const D: usize> {
     pub contacts: Contacts<D>,
     /// What is booked of the loads.
     pub load_sums: ExactSums<LOAD_SUMS>,
-    /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none where nobody asks.
+    /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none
+    /// where nobody asks.
     pub face_sums: ExactSums<FACE_SUMS>,
     /// What is booked of contact between bodies.
     pub body_sums: ExactSums<LOAD_SUMS>,
@@ -142,7 +143,8 @@ pub struct Solver<const D: usize> {
     pub(super) near: Vec<Vec<Near<D>>>,
     /// The way to equilibrium.
     pub relaxation: Relaxation,
-    /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for equilibrium.
+    /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for
+    /// equilibrium.
     pub(super) motion: [ExactSum; 3],
     /// Wall time by phase since the last report.
     pub phases: Phases,

@@ -4,7 +4,8 @@ use crate::grid::mask::block_nodes;
 use crate::grid::sums::volumes::NodeVolumes;
 use crate::memory::Block;
 
-/// Shares of the basis functions of the nodes of a block that lie outside colliders; nothing where all are whole.
+/// Shares of the basis functions of the nodes of a block that lie outside colliders; nothing where all are
+/// whole.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct OpenShares(pub(in crate::solver) Vec<f64>);
 
@@ -18,7 +19,8 @@ pub(in crate::solver) struct NodeFill {
     pub(in crate::solver) dirty: Vec<bool>,
     /// Per block, what colliders that never move leave open; `None` until it is asked for.
     pub(in crate::solver) open: Vec<Option<OpenShares>>,
-    /// Where bodies of unlike density share a velocity field, by field: sums of reference volumes, m³, by node; empty elsewhere.
+    /// Where bodies of unlike density share a velocity field, by field: sums of reference volumes, m³, by
+    /// node; empty elsewhere.
     pub(in crate::solver) scattered: Vec<Vec<f64>>,
 }
 

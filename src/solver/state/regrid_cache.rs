@@ -7,8 +7,8 @@ use partition::Mark;
 pub(in crate::solver) struct Wish<const D: usize> {
     /// Levels, a bit each; each has its own width of buffer.
     pub(in crate::solver) levels: u32,
-    /// Way that the material can go down and up along each axis until the tree changes next, in edges of the finest
-    /// leaves that the job can have. Fractions would not change which leaves it meets.
+    /// Way that the material can go down and up along each axis until the tree changes next, in edges of the
+    /// finest leaves that the job can have. Fractions would not change which leaves it meets.
     pub(in crate::solver) way: [[u32; D]; 2],
 }
 

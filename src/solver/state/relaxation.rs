@@ -17,11 +17,13 @@ pub struct Relaxation {
     pub phase: RelaxPhase,
 }
 
-/// Share of its velocity that material keeps after a step from rest, as the length of this step is that share of others.
+/// Share of its velocity that material keeps after a step from rest, as the length of this step is that share
+/// of others.
 ///
-/// A mode of frequency ω and amplitude a at rest is at `a (1 - ω² Δt² / 2)` after a step of Δt/√2, as leapfrog would have it with its first
-/// velocity, `ω² Δt a / 2`, half a step later. That is 1/√2 of what the step gives. With it positions are `a cos nθ`, so at no stop is a
-/// mode further from its equilibrium than at the one before, for all steps that are stable at all.
+/// A mode of frequency ω and amplitude a at rest is at `a (1 - ω² Δt² / 2)` after a step of Δt/√2, as
+/// leapfrog would have it with its first velocity, `ω² Δt a / 2`, half a step later. That is 1/√2 of what the
+/// step gives. With it positions are `a cos nθ`, so at no stop is a mode further from its equilibrium than at
+/// the one before, for all steps that are stable at all.
 pub(in crate::solver) const FROM_REST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// What a step on the way to equilibrium was.
@@ -37,9 +39,10 @@ pub enum RelaxPhase {
 }
 
 impl Relaxation {
-    /// After a step of length `dt` (s) in which nodes with this mass of material (kg) had a kinetic energy, and after a step from rest
-    /// `½ Δt² Σ f² / m` of the forces on them, J. The second differs from the first with mass scaling alone, where the root mean square of
-    /// the velocities is one of the moving masses, and so too great. Returns a factor for all velocities: 0 where they are to be set to 0, and
+    /// After a step of length `dt` (s) in which nodes with this mass of material (kg) had a kinetic energy,
+    /// and after a step from rest `½ Δt² Σ f² / m` of the forces on them, J. The second differs from the
+    /// first with mass scaling alone, where the root mean square of the velocities is one of the moving
+    /// masses, and so too great. Returns a factor for all velocities: 0 where they are to be set to 0, and
     /// [`FROM_REST`] after a step from rest.
     pub(in crate::solver) fn note(&mut self, [kinetic, pulled]: [f64; 2], mass: f64, dt: f64) -> f64 {
         // Nothing is at rest.
@@ -90,8 +93,8 @@ impl std::fmt::Display for Relaxation {
 mod tests {
     use super::*;
 
-    /// An undamped oscillator of 1 kg and 1 rad/s: velocities go at the first step past each peak, and what is left of the amplitude is
-    /// what it moved since the peak.
+    /// An undamped oscillator of 1 kg and 1 rad/s: velocities go at the first step past each peak, and what
+    /// is left of the amplitude is what it moved since the peak.
     #[test]
     fn an_oscillator_comes_to_rest() {
         let (mut x, mut v, dt) = (1.0_f64, 0.0, 0.01);
@@ -112,7 +115,8 @@ mod tests {
         );
     }
 
-    /// No stop adds to a mode, however few steps its period has: two oscillators, of which one decides about the stops.
+    /// No stop adds to a mode, however few steps its period has: two oscillators, of which one decides about
+    /// the stops.
     #[test]
     fn no_mode_grows_from_stop_to_stop() {
         for share in 1..200 {

@@ -77,7 +77,8 @@ fn assert_levels(solver: &Solver<2>, fine: u8, is_fine: impl Fn(&Filled<2>) -> b
     }
 }
 
-/// Leaves that meet the stripe between two places along x are fine, those further from it than a leaf are coarse.
+/// Leaves that meet the stripe between two places along x are fine, those further from it than a leaf are
+/// coarse.
 fn assert_stripe(solver: &Solver<2>, (from, to): (f64, f64)) {
     for leaf in filled(solver) {
         let distance = (leaf.lower[0] - to).max(from - leaf.upper[0]);
@@ -164,7 +165,8 @@ fn velocity_gradient() {
     });
 }
 
-/// A square hits the floor and flows there; another one rests. Whether leaves are fine where the material has flowed.
+/// A square hits the floor and flows there; another one rests. Whether leaves are fine where the material has
+/// flowed.
 fn flows(comm: &Comm, criterion: &str, has_flowed: f64) {
     let squares = body("left", "metal", ([0.25, 0.25], [0.75, 0.75]), "")
         + &body("right", "metal", ([1.25, 0.03], [1.75, 0.53]), "velocity = [0, -3]");

@@ -18,7 +18,8 @@ pub(crate) fn on_ranks(module: &str, test: &str, ranks: &[usize], body: impl Fn(
     }
 }
 
-/// A job with one body of an elastic material in a domain of leaves of 0.25 m on level 0; its last table is `time`.
+/// A job with one body of an elastic material in a domain of leaves of 0.25 m on level 0; its last table is
+/// `time`.
 pub(crate) fn one_body(dimension: usize, size: &str, adaptivity: &str, model: &str, body: &str) -> String {
     format!(
         r#"

@@ -12,8 +12,8 @@ const STEP: f64 = 3e-4;
 /// Steps in which the slab passes once.
 const STEPS_PER_SWEEP: u64 = 40;
 
-/// A job in which a slab as thick as a leaf goes to and fro; outside of the body at the start and from the end of the
-/// last sweep on.
+/// A job in which a slab as thick as a leaf goes to and fro; outside of the body at the start and from the
+/// end of the last sweep on.
 fn job(dimension: usize, body: &str, sweeps: usize) -> String {
     let zeros = ", 0".repeat(dimension - 1);
     let mut rows = String::new();
@@ -44,9 +44,9 @@ fn energy<const D: usize>(solver: &Solver<D>) -> f64 {
     totals.kinetic + totals.elastic
 }
 
-/// Sweeps so often, looking after each; the tree must change `changes` times or more, and not more than the share `loss` of the
-/// energy may be lost without an entry in the books: children that wait in coarse cells for their siblings lose by the transfers what a
-/// merge would have booked, in space more than in the plane.
+/// Sweeps so often, looking after each; the tree must change `changes` times or more, and not more than the
+/// share `loss` of the energy may be lost without an entry in the books: children that wait in coarse cells
+/// for their siblings lose by the transfers what a merge would have booked, in space more than in the plane.
 fn sweeps<const D: usize>(comm: &Comm, body: &str, sweeps: usize, changes: u64, loss: f64)
 where
     Problem<D>: TryFrom<AnyProblem>,

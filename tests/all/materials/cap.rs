@@ -1,4 +1,5 @@
-//! Cam-clay, non-associated Cam-clay and snow (`driver_camclay_paths.json`, `driver_nacc.json`, `driver_snow.json`).
+//! Cam-clay, non-associated Cam-clay and snow (`driver_camclay_paths.json`, `driver_nacc.json`,
+//! `driver_snow.json`).
 use super::*;
 
 fn clay(case: &Value, preconsolidation: f64) -> Box<dyn Material> {
@@ -55,8 +56,8 @@ fn compress<'a>(point: &Point<'a>, axial: f64, lateral: f64) -> Point<'a> {
     at(strain)
 }
 
-/// Drained and undrained triaxial compression at several ratios of overconsolidation, to near the critical state. The implicit
-/// step is of first order: twice a fine solution less a coarse one is the limit.
+/// Drained and undrained triaxial compression at several ratios of overconsolidation, to near the critical
+/// state. The implicit step is of first order: twice a fine solution less a coarse one is the limit.
 #[test]
 fn cam_clay_drained_and_undrained() {
     for case in data("driver_camclay_paths.json")["cases"].as_array().unwrap() {

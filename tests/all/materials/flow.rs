@@ -1,4 +1,5 @@
-//! Dense granular flow, fluids and Bingham flow (`driver_mu_i.json`, `driver_fluid.json`, `driver_perzyna.json`).
+//! Dense granular flow, fluids and Bingham flow (`driver_mu_i.json`, `driver_fluid.json`,
+//! `driver_perzyna.json`).
 use super::*;
 
 fn grains(case: &Value) -> Box<dyn Material> {
@@ -128,7 +129,8 @@ fn fluids_without_tension_part() {
     assert!((point.stress[0] / (-0.003_f64).exp() + pressure).abs() < 1e-6 * pressure, "{:?}", point.stress);
 }
 
-/// Bingham and Herschel-Bulkley between plates: steady simple shear of von Mises with overstress, up to the elastic strain.
+/// Bingham and Herschel-Bulkley between plates: steady simple shear of von Mises with overstress, up to the
+/// elastic strain.
 #[test]
 fn bingham_flow_between_plates() {
     for case in data("driver_perzyna.json")["cases"].as_array().unwrap() {

@@ -1,5 +1,5 @@
-//! Von Mises with hardening, rates and temperature (`driver_von_mises_hardening.json`, `driver_johnson_cook.json`,
-//! `driver_perzyna.json`).
+//! Von Mises with hardening, rates and temperature (`driver_von_mises_hardening.json`,
+//! `driver_johnson_cook.json`, `driver_perzyna.json`).
 use super::*;
 
 fn hardening(case: &Value) -> String {
@@ -119,8 +119,8 @@ fn johnson_cook_in_one_step() {
     }
 }
 
-/// Backward Euler is of first order: twice a fine solution less a coarse one is the limit. The error of a reference
-/// implementation at its number of steps is in the file; ours is compared with the limit.
+/// Backward Euler is of first order: twice a fine solution less a coarse one is the limit. The error of a
+/// reference implementation at its number of steps is in the file; ours is compared with the limit.
 #[test]
 fn johnson_cook_in_pure_shear_at_four_rates() {
     for case in data("driver_johnson_cook.json")["materials"].as_array().unwrap() {

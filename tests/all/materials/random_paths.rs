@@ -1,5 +1,5 @@
-//! What holds along any path: numbers stay finite, plastic work is not negative, stress turns with the material, and is the
-//! derivative of the energy where nothing flows; yield functions hold after every step.
+//! What holds along any path: numbers stay finite, plastic work is not negative, stress turns with the
+//! material, and is the derivative of the energy where nothing flows; yield functions hold after every step.
 use agimp::material::eigen;
 use agimp::simd::{Lanes, Vector};
 
@@ -35,7 +35,8 @@ impl Random {
         ]
     }
 
-    /// A stretch with random axes and strains of up to this size; strains of every third are equal or nearly so.
+    /// A stretch with random axes and strains of up to this size; strains of every third are equal or nearly
+    /// so.
     fn stretch(&mut self, size: f64) -> Matrix {
         let mut strain = [self.within(size), self.within(size), self.within(size)];
         match (self.next() * 9.0) as u32 {

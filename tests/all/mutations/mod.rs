@@ -1,5 +1,6 @@
-//! Claim: no job text and no state file makes the program panic, wait or fill the memory. Texts and files are mutated from
-//! good ones with fixed seeds; each goes through what `agimp check` and `agimp info` do, in this process.
+//! Claim: no job text and no state file makes the program panic, wait or fill the memory. Texts and files are
+//! mutated from good ones with fixed seeds; each goes through what `agimp check` and `agimp info` do, in this
+//! process.
 //!
 //! The long forms are run by hand:
 //! `cargo test --release --test all -- --ignored --nocapture mutations`; `AGIMP_MUTATIONS` sets the number of

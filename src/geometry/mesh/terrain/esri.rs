@@ -2,8 +2,8 @@
 use super::raster::checked_size;
 use super::{MOST, Placing, Raster};
 
-/// Reads a header of `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` (or `dx` and `dy`) and
-/// `NODATA_value`, and rows of values from north to south.
+/// Reads a header of `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` (or
+/// `dx` and `dy`) and `NODATA_value`, and rows of values from north to south.
 pub(super) fn parse(text: &str, placing: &Placing) -> Result<Raster, String> {
     // Some programs put a mark of the order of bytes first.
     let mut lines = text.trim_start_matches('\u{feff}').lines().peekable();

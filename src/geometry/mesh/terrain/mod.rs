@@ -54,7 +54,8 @@ impl Terrain {
         above
     }
 
-    /// This terrain under a layer whose thickness a raster of the same cells gives, m, measured upwards; none where it has no value.
+    /// This terrain under a layer whose thickness a raster of the same cells gives, m, measured upwards; none
+    /// where it has no value.
     ///
     /// # Errors
     /// The raster has other cells, or a thickness below 0.
@@ -88,7 +89,8 @@ impl Terrain {
         Ok(above)
     }
 
-    /// The terrain with heights between those of the raster, on a cubic surface through them (Catmull and Rom 1974).
+    /// The terrain with heights between those of the raster, on a cubic surface through them (Catmull and Rom
+    /// 1974).
     ///
     /// # Errors
     /// It has too many.
@@ -127,7 +129,8 @@ impl Terrain {
         (self.columns.max(self.rows) - 1) as f64 * self.cell
     }
 
-    /// The surface between the heights, two triangles for each cell, closed by walls down to `base`, m, which lies below all heights.
+    /// The surface between the heights, two triangles for each cell, closed by walls down to `base`, m, which
+    /// lies below all heights.
     pub fn solid_above(&self, base: f64) -> Triangles {
         let (columns, rows) = (self.columns, self.rows);
         let place = |i: usize, j: usize, z: f64| {
@@ -237,7 +240,8 @@ mod tests {
         }
     }
 
-    /// Forms that other programs write: a mark of the order of bytes, `dx` and `dy`; a hole in the first cell, declared or not.
+    /// Forms that other programs write: a mark of the order of bytes, `dx` and `dy`; a hole in the first
+    /// cell, declared or not.
     #[test]
     fn forms_of_other_programs() {
         let (text, whole) = (slope(), parse(&slope()).unwrap());
@@ -264,8 +268,8 @@ mod tests {
         );
     }
 
-    /// A smooth surface goes through the heights, keeps planes, and is nearer to a sine than triangles are: 0.0065 of its height for 8
-    /// heights to a wave, against 0.076.
+    /// A smooth surface goes through the heights, keeps planes, and is nearer to a sine than triangles are:
+    /// 0.0065 of its height for 8 heights to a wave, against 0.076.
     #[test]
     fn a_smooth_surface_is_nearer() {
         let wave = |x: f64| (std::f64::consts::TAU * x / 8.0).sin();

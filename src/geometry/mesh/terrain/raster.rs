@@ -21,7 +21,8 @@ pub struct Raster {
 /// What a job says of a raster beside its file.
 #[derive(Clone, Debug, Default)]
 pub struct Placing {
-    /// Distance of neighbours in place of that of the file, m: the south-western value then stands at the origin.
+    /// Distance of neighbours in place of that of the file, m: the south-western value then stands at the
+    /// origin.
     pub cell: Option<f64>,
     /// Array of a file with several.
     pub array: Option<String>,
@@ -30,7 +31,8 @@ pub struct Placing {
 /// Greatest magnitude of a value; what is larger stands for none.
 const GREATEST: f64 = 1e9;
 
-/// The least whole number of 16 bits stands for none whatever a file says of others: no ground lies so deep, and many programs write it.
+/// The least whole number of 16 bits stands for none whatever a file says of others: no ground lies so deep,
+/// and many programs write it.
 const HOLE: f64 = -32768.0;
 
 /// What stands for no value in a file that does not say.

@@ -1,4 +1,5 @@
-//! What the particles of a file can be coloured by: the fields that it shows, and what follows from them or from its state.
+//! What the particles of a file can be coloured by: the fields that it shows, and what follows from them or
+//! from its state.
 
 use super::super::Tint;
 use super::numbers;
@@ -38,8 +39,8 @@ macro_rules! rules {
     };
 }
 
-/// All rules. Stress is Cauchy's, with components xx, yy, zz, xy, yz, xz; that of the state is Kirchhoff's, with xz and yz
-/// the other way round. Principal stresses descend, tension is positive.
+/// All rules. Stress is Cauchy's, with components xx, yy, zz, xy, yz, xz; that of the state is Kirchhoff's,
+/// with xz and yz the other way round. Principal stresses descend, tension is positive.
 const RULES: &[Rule] = rules! {
     "velocity" ["m/s"] 3 <- "state/particles/velocity": |r, out| out.extend(padded(r[0]));
     "speed" ["m/s"] 1 <- "velocity": |r, out| out.push(magnitude(r[0]));

@@ -1,7 +1,8 @@
 //! Averages of stress over cells and leaves, and principal stresses.
 //!
-//! Stresses of single particles differ from neighbour to neighbour where material flows; their mean by volume over a cell does not. Sums go
-//! over the particles of one leaf in their order, which is the same on any ranks.
+//! Stresses of single particles differ from neighbour to neighbour where material flows; their mean by volume
+//! over a cell does not. Sums go over the particles of one leaf in their order, which is the same on any
+//! ranks.
 use super::fields::{mean, von_mises};
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
@@ -81,8 +82,8 @@ mod tests {
     use super::*;
     use crate::particle::chunk::{Layout, Tag};
 
-    /// Four particles in each of two cells, with pressures that alternate about 10 Pa and 20 Pa: the cells have the means, and the leaf
-    /// has the mean of both.
+    /// Four particles in each of two cells, with pressures that alternate about 10 Pa and 20 Pa: the cells
+    /// have the means, and the leaf has the mean of both.
     #[test]
     fn stripes_within_cells_cancel() {
         let mut chunk = Chunk::<2>::new();

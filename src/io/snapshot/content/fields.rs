@@ -13,8 +13,8 @@ use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 /// Names of the components of vectors and tensors, by their number, in the order of the files.
 pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
 
-/// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit (empty for pure numbers), values of all
-/// particles of a view in order.
+/// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit
+/// (empty for pure numbers), values of all particles of a view in order.
 macro_rules! fields {
     ($($(#[doc = $meaning:literal])+ $field:ident, $name:literal, $unit:literal, $values:expr;)*) => {
         /// A field of the particles that an output file can show.
@@ -56,7 +56,8 @@ fields! {
     Velocity, "velocity", "m/s", |view| each(view, 3, |chunk, p, out| out.extend(velocity(chunk, p)));
     /// Displacement since the particle came, m; followed only where a job asks for this field.
     Displacement, "displacement", "m", |view| each(view, 3, |chunk, p, out| out.extend(displacement(view, chunk, p)));
-    /// Total logarithmic strain, elastic and plastic, since the particle came; components as those of `stress`; followed only where a job asks for it.
+    /// Total logarithmic strain, elastic and plastic, since the particle came; components as those of
+    /// `stress`; followed only where a job asks for it.
     Strain, "strain", "", |view| each(view, 6, |chunk, p, out| out.extend(total_strain(view, chunk, p)));
     /// Equivalent total strain, √(2/3 e : e) of its deviator e; followed only where a job asks for it.
     EquivalentStrain, "equivalent_strain", "", |view| scalars(view, |chunk, p| equivalent(&total_strain(view, chunk, p)));
@@ -90,7 +91,8 @@ fields! {
     Stress2, "stress_2", "Pa", |view| scalars(view, |chunk, p| principal(&cauchy_stress(chunk, p))[1]);
     /// Least principal Cauchy stress, Pa; tension is positive.
     Stress3, "stress_3", "Pa", |view| scalars(view, |chunk, p| principal(&cauchy_stress(chunk, p))[2]);
-    /// Cauchy stress, Pa, averaged by volume over the particles of the same cell; components as those of `stress`.
+    /// Cauchy stress, Pa, averaged by volume over the particles of the same cell; components as those of
+    /// `stress`.
     StressCell, "stress_cell", "Pa", |view| Values::Real(cell_stresses(view).concat(), 6);
     /// Pressure of the Cauchy stress averaged over the cell, Pa; compression is positive.
     PressureCell, "pressure_cell", "Pa",
@@ -102,8 +104,8 @@ fields! {
     Mass, "mass", "kg", |view| scalars(view, |chunk, p| chunk.column(Layout::<D>::MASS)[p]);
     /// Density, kg/m³.
     Density, "density", "kg/m³", |view| scalars(view, density);
-    /// Pressure of contact with other bodies, Pa, at particles within reach of the surface: a mean over the last steps, in which a step counts a twentieth
-    /// less than the next; found only where a job asks for it.
+    /// Pressure of contact with other bodies, Pa, at particles within reach of the surface: a mean over the
+    /// last steps, in which a step counts a twentieth less than the next; found only where a job asks for it.
     ContactPressure, "contact_pressure", "Pa", |view| scalars(view, |chunk, p| contact_pressure(view, chunk, p));
     /// Volume over reference volume, det F.
     VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
@@ -151,8 +153,8 @@ impl Values {
         }
     }
 
-    /// What follows from a finite state may be too great for a number. It is not a number then, which programs leave out of ranges of
-    /// colours, and no reason to end a run.
+    /// What follows from a finite state may be too great for a number. It is not a number then, which
+    /// programs leave out of ranges of colours, and no reason to end a run.
     pub(crate) fn without_infinities(mut self) -> Self {
         match &mut self {
             Self::Real(values, _) => {
@@ -206,7 +208,8 @@ fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
 }
 
-/// Of a particle: first columns of the pressure of contact, of the total strain and of the displacement, as far as its leaf has them.
+/// Of a particle: first columns of the pressure of contact, of the total strain and of the displacement, as
+/// far as its leaf has them.
 fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usize>; 3] {
     view.followed.first_columns::<D>(chunk.carried_columns())
 }

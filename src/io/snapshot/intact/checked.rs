@@ -1,7 +1,7 @@
 //! Data sets with a checksum over all ranks, and this rank's place in them.
 //!
-//! The header holds the names of all data sets of its file with their checksums, under a checksum of its own. So no data set can
-//! be lost, changed or take the place of another without notice.
+//! The header holds the names of all data sets of its file with their checksums, under a checksum of its own.
+//! So no data set can be lost, changed or take the place of another without notice.
 
 use partition::comm::Comm;
 
@@ -175,8 +175,8 @@ fn compare(file: &Reader, header: &Header, dataset: &str, crc: u32) -> Result<()
     }
 }
 
-/// Not collective. Compares the checksums of those data sets in the header's list that `is_meant` by number and name.
-/// Returns how many they are.
+/// Not collective. Compares the checksums of those data sets in the header's list that `is_meant` by number
+/// and name. Returns how many they are.
 pub(in crate::io::snapshot) fn verify(
     file: &Reader,
     header: &Header,

@@ -57,7 +57,8 @@ const WIDEST: f64 = 1e9;
 /// Greatest number of a particle, in its unit.
 const GREATEST: f64 = 1e30;
 
-/// Finite numbers that a run can have; masses and half widths above 0. `values` has `width` numbers for each particle.
+/// Finite numbers that a run can have; masses and half widths above 0. `values` has `width` numbers for each
+/// particle.
 pub(in crate::io::snapshot) fn reals(name: &str, values: &[f64], width: usize) -> Result<(), String> {
     let positive = ["mass", "half_width"].contains(&name);
     let most = if name == "half_width" { WIDEST } else { GREATEST };

@@ -207,7 +207,8 @@ fn meeting(
     None
 }
 
-/// The table of a body that is free along some axes only: each of its motions is along another one, or a rotation of what does not turn by itself.
+/// The table of a body that is free along some axes only: each of its motions is along another one, or a
+/// rotation of what does not turn by itself.
 fn driven<const D: usize>(
     checks: &mut Checks,
     table: Table<D>,
@@ -242,7 +243,8 @@ fn driven<const D: usize>(
     Some(table)
 }
 
-/// Inertia about the centre of mass, `∫ (|r|² 1 - r rᵀ) ρ dV`, kg m²; in 2D of one metre of thickness and about z alone.
+/// Inertia about the centre of mass, `∫ (|r|² 1 - r rᵀ) ρ dV`, kg m²; in 2D of one metre of thickness and
+/// about z alone.
 fn tensor<const D: usize>(moments: &Moments<D>, mass: f64) -> [[f64; 3]; 3] {
     let density = mass / moments.volume;
     let second = |i: usize, j: usize| if i < D && j < D { density * moments.second[i][j] } else { 0.0 };

@@ -115,7 +115,8 @@ fn collider<const D: usize>(
     })
 }
 
-/// Whether nothing is left of a bounded boolean shape. One that is thinner than a millionth of its size, or takes too long to look at, passes.
+/// Whether nothing is left of a bounded boolean shape. One that is thinner than a millionth of its size, or
+/// takes too long to look at, passes.
 fn has_no_point<const D: usize>(shape: &Shape<D>, bounds: &Aabb<D>) -> bool {
     let size = (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(0.0, f64::max);
     let mut boxes = MOST_BOXES;

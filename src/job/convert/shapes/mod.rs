@@ -113,7 +113,8 @@ impl Checks<'_> {
         }
     }
 
-    /// The mesh of a file, placed as a shape of kind `mesh` says, whose path and that of the file's name are given.
+    /// The mesh of a file, placed as a shape of kind `mesh` says, whose path and that of the file's name are
+    /// given.
     pub(super) fn mesh<const D: usize>(
         &mut self,
         shape: &Written,
@@ -145,7 +146,8 @@ impl Checks<'_> {
         }
     }
 
-    /// The solid of the triangles of a file with its origin at a point, m from the lower corner of the domain.
+    /// The solid of the triangles of a file with its origin at a point, m from the lower corner of the
+    /// domain.
     pub(super) fn solid<const D: usize>(
         &mut self,
         mut triangles: Triangles,

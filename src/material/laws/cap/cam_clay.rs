@@ -1,11 +1,13 @@
 //! Clay: modified Cam-clay (Roscoe and Burland 1968) in finite strain, with bilogarithmic compression.
 //!
 //! With `e = -tr ε` of the logarithmic strains, elastic and plastic, in Kirchhoff stress:
-//! `p = p_r exp(e_e / κ)`, `dev τ = 2G dev ε_e`, `f = q²/M² + p (p - p_c)`, associated, `p_c = p_c0 exp(e_p / (λ - κ))`.
+//! `p = p_r exp(e_e / κ)`, `dev τ = 2G dev ε_e`, `f = q²/M² + p (p - p_c)`, associated,
+//! `p_c = p_c0 exp(e_p / (λ - κ))`.
 //!
-//! The implicit step has one unknown, the stress ratio `η = q/p` at its end: the ellipse gives `p_c/p = 1 + η²/M²`, whose logarithm
-//! is linear in the plastic volume, so volume and stress follow from η, and what is left is the direction of flow,
-//! `2η Δe_p = (M² - η²) Δe_q`. The root is bracketed by the critical state and the ratio without plastic volume.
+//! The implicit step has one unknown, the stress ratio `η = q/p` at its end: the ellipse gives
+//! `p_c/p = 1 + η²/M²`, whose logarithm is linear in the plastic volume, so volume and stress follow from η,
+//! and what is left is the direction of flow, `2η Δe_p = (M² - η²) Δe_q`. The root is bracketed by the
+//! critical state and the ratio without plastic volume.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -106,8 +108,8 @@ struct Candidate<V> {
 }
 
 impl CamClay {
-    /// `ratio`: η. `log`: logarithms of the trial pressure, and of the preconsolidation pressure over it. `strain`: trial
-    /// `q / 3G`.
+    /// `ratio`: η. `log`: logarithms of the trial pressure, and of the preconsolidation pressure over it.
+    /// `strain`: trial `q / 3G`.
     #[inline(always)]
     fn at<V: Vector>(&self, ratio: V, [log, distance]: [V; 2], strain: V) -> Candidate<V> {
         let square = self.slope * self.slope;
@@ -162,8 +164,8 @@ impl Law for CamClay {
             let scale =
                 critical.compression.abs() + critical.pressure * (self.slope / (3.0 * self.shear)) + strain;
             let noise = scale * (0.25 * f64::EPSILON * self.slope);
-            // Positive below the root: (M² - η²) Δe_q is more than 2η Δe_p on the wet side, and on the dry side both are
-            // negative and the volume is more.
+            // Positive below the root: (M² - η²) Δe_q is more than 2η Δe_p on the wet side, and on the dry
+            // side both are negative and the volume is more.
             let function = |above: V| self.at(base + above, [log, distance], strain).residual;
             let ratio = base + root::newton(function, guess, high, noise, flows);
             let end = self.at(ratio, [log, distance], strain);

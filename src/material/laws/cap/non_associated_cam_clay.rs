@@ -1,9 +1,10 @@
 //! Non-associated Cam-clay (Wolper et al. 2019): matter that softens as it opens and so fractures.
 //!
 //! `τ = μ J^(-2/3) dev b + κ/2 (J² - 1) I`, `p = -κ/2 (J² - 1)`, `q = √(3/2) |dev τ|`;
-//! `y = (1 + 2β) q² + M² (p + β p₀)(p - p₀)` with `p₀ = κ (10⁻⁵ + sinh(ξ max(ε_c, 0)))`, ε_c the strain to which it is consolidated.
-//! Beyond the tips of the ellipse the stress returns to them; else its deviator shrinks to the ellipse at constant pressure. ε_c
-//! changes by the volume that is lost, as if the stress had gone straight to the centre. p₀ is that of the start of the step.
+//! `y = (1 + 2β) q² + M² (p + β p₀)(p - p₀)` with `p₀ = κ (10⁻⁵ + sinh(ξ max(ε_c, 0)))`, ε_c the strain to
+//! which it is consolidated. Beyond the tips of the ellipse the stress returns to them; else its deviator
+//! shrinks to the ellipse at constant pressure. ε_c changes by the volume that is lost, as if the stress had
+//! gone straight to the centre. p₀ is that of the start of the step.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -109,7 +110,8 @@ impl NonAssociatedCamClay {
                 state.stress[c] = state.stress[c] - pressure;
             }
         }
-        // Along a principal direction of stretch s, ρ₀ c² = μ J^(-2/3) (5/9 tr b - s²/3) + κ/2 (J² + 1); across it, less than μ J^(-2/3) s².
+        // Along a principal direction of stretch s, ρ₀ c² = μ J^(-2/3) (5/9 tr b - s²/3) + κ/2 (J² + 1);
+        // across it, less than μ J^(-2/3) s².
         let isochoric = (parts.mean * (5.0 / 3.0)).max(greatest_bound(b)) * shear;
         let modulus = (parts.square + one).mul_add(V::splat(0.5 * self.kappa), isochoric);
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
@@ -211,7 +213,8 @@ impl Law for NonAssociatedCamClay {
         _consolidation: Option<Consolidation>,
         _history: &mut [f64; HISTORIES],
     ) -> Option<[f64; 3]> {
-        // κ/2 (J² - 1) = J σ_m; dev b = J^(5/3) dev σ / μ, and the mean m of b makes the product of m + dev b J².
+        // κ/2 (J² - 1) = J σ_m; dev b = J^(5/3) dev σ / μ, and the mean m of b makes the product of m + dev b
+        // J².
         let mean = stress.iter().sum::<f64>() / 3.0;
         // The form without a difference of two large numbers.
         let root = (mean * mean + self.kappa * self.kappa).sqrt();

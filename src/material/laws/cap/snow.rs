@@ -1,5 +1,5 @@
-//! Snow (Stomakhin et al. 2013): fixed corotated elasticity whose principal stretches stay between `1 - θ_c` and `1 + θ_s`, and
-//! whose moduli grow by `exp(ξ (1 - J_p))` as it is compacted.
+//! Snow (Stomakhin et al. 2013): fixed corotated elasticity whose principal stretches stay between `1 - θ_c`
+//! and `1 + θ_s`, and whose moduli grow by `exp(ξ (1 - J_p))` as it is compacted.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,9 @@
-//! Weakly compressible Newtonian fluid: pressure of Tait's equation `p = K/γ (J^-γ - 1)` and viscous stress `2 η dev D`.
+//! Weakly compressible Newtonian fluid: pressure of Tait's equation `p = K/γ (J^-γ - 1)` and viscous stress
+//! `2 η dev D`.
 //!
-//! The elastic tensor is `J^(2/3) I`, so the deviator of the trial strain is that of the step alone, `Δt dev D`. The
-//! viscous stress is explicit in time: a cell of edge h lets a velocity diffuse in `3 h² / (8 ν)`, which bounds the step as if waves
-//! were faster by `8 ν / (3 h)`.
+//! The elastic tensor is `J^(2/3) I`, so the deviator of the trial strain is that of the step alone,
+//! `Δt dev D`. The viscous stress is explicit in time: a cell of edge h lets a velocity diffuse in
+//! `3 h² / (8 ν)`, which bounds the step as if waves were faster by `8 ν / (3 h)`.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +18,8 @@ use crate::simd::{Vector, VectorMask, each};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Bulk modulus K at rest, Pa; above 0. Sound travels at `sqrt(K / density)`; ten times the greatest velocity keeps changes of
-    /// density near one percent.
+    /// Bulk modulus K at rest, Pa; above 0. Sound travels at `sqrt(K / density)`; ten times the greatest
+    /// velocity keeps changes of density near one percent.
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub bulk_modulus: f64,
     /// Exponent γ of Tait's equation.

@@ -1,9 +1,10 @@
-//! Dense granular flow: Hencky elasticity with a friction that grows with the inertial number (Jop, Forterre and Pouliquen 2006;
-//! Dunatunga and Kamrin 2015).
+//! Dense granular flow: Hencky elasticity with a friction that grows with the inertial number (Jop, Forterre
+//! and Pouliquen 2006; Dunatunga and Kamrin 2015).
 //!
-//! While it flows `|dev τ|/√2 = μ(I) p` with `μ = μ_s + (μ_2 - μ_s)/(1 + I_0/I)`, `I = γ̇ d/√(p/ρ_s)` and `γ̇ = √2 |dev d_p|`;
-//! flow keeps the volume. The implicit step is a quadratic equation for the stress. Where the grains come apart, there is no
-//! stress, and the volume that is gained is booked and given back before it carries stress again.
+//! While it flows `|dev τ|/√2 = μ(I) p` with `μ = μ_s + (μ_2 - μ_s)/(1 + I_0/I)`, `I = γ̇ d/√(p/ρ_s)` and
+//! `γ̇ = √2 |dev d_p|`; flow keeps the volume. The implicit step is a quadratic equation for the stress.
+//! Where the grains come apart, there is no stress, and the volume that is gained is booked and given back
+//! before it carries stress again.
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use schemars::JsonSchema;
