@@ -402,6 +402,15 @@ fn problems_of_practice_have_jobs_and_their_keys_are_there() {
     }
 }
 
+/// README says how many lines of the verification fail, as the page does.
+#[test]
+fn the_readme_counts_the_lines_that_fail() {
+    let page = text(Path::new("docs/verification.md"));
+    let line = page.lines().find(|line| line.ends_with(" fail.")).expect("a count");
+    let count = line.trim_end_matches(" fail.");
+    assert!(text(Path::new("README.md")).contains(count), "README.md does not say {count:?}");
+}
+
 /// Each study has a quick form, and one command runs all of them.
 #[test]
 fn every_study_has_a_quick_form() {
