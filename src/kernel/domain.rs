@@ -258,7 +258,7 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
     half
 }
 
-/// Half widths of one box over its undeformed one, as [`whole_of_batch`] has them where a box follows the
+/// Half widths of one box over its undeformed one, as `whole_of_batch` has them where a box follows the
 /// volume: for pictures. `elastic` is the left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
 pub fn stretches_of_one(
     elastic: &[f64; 6],

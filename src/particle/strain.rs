@@ -4,7 +4,7 @@
 //! their digits. A step with the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In
 //! plane strain no component out of the plane changes.
 //!
-//! Material that is stirred without end is strained without end. Components of e stop at [`GREATEST`], and
+//! Material that is stirred without end is strained without end. Components of e stop at `GREATEST`, and
 //! the least stretch is not taken below what rounding leaves of it beside the greatest: strains stay finite
 //! for any motion.
 use super::chunk::Chunk;
