@@ -84,7 +84,7 @@ fn all_flow(material: &dyn Material, step: &Step) -> Option<Vec<State>> {
     })
 }
 
-/// What tells an example from others: its keys without the elastic ones.
+/// Keys of an example that tell it from others: all but the elastic ones.
 fn name(example: &str) -> String {
     let own = |key: &&str| !key.starts_with("young") && !key.starts_with("poisson");
     let keys: Vec<&str> = example.split(", ").filter(own).collect();

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::{Comm, Forest, MAX_LEVEL, Octant};
 
-/// What to do with a leaf.
+/// Fate of a leaf in the next change of the tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mark {
     /// Leave it.

@@ -1,4 +1,4 @@
-//! What makes a forest valid, and its checksum.
+//! Validity of a forest, and its checksum.
 
 use crate::{Brick, Comm, Disagreement, Forest, Octant};
 
@@ -30,7 +30,7 @@ pub enum ForestError {
     Differ,
 }
 
-/// What can be wrong on one rank; becomes the text of a [`Disagreement`].
+/// Fault in the forest of one rank; its text becomes that of a [`Disagreement`].
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 enum Fault {
     #[error("leaf {0} lies outside the brick or is too deep")]

@@ -13,8 +13,8 @@
 //! | `search.rs` | leaves of any rank near given boxes |
 //! | `check.rs` | validity and checksum |
 //!
-//! What is deliberately absent: no rank stores anything that grows with the number of leaves of
-//! all ranks, and no call sends a message from every rank to every rank.
+//! Deliberately absent: no rank stores anything that grows with the number of leaves of all ranks, and no
+//! call sends a message from every rank to every rank.
 mod adapt;
 mod balance;
 mod check;

@@ -20,7 +20,7 @@ struct Boundary {
     key: u64,
 }
 
-/// What every rank reports of its leaves, as five integers.
+/// Number of integers that every rank reports of its leaves.
 const SUMMARY: usize = 5;
 
 /// Where the curve is to be cut, and what each rank then gets. The same on all ranks.

@@ -8,7 +8,7 @@
 pub struct BenchJob {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it is.
+    /// Description, for the table of results.
     pub title: &'static str,
     /// Steps before the measurement, for the state to be a usual one.
     pub warm_up: u64,

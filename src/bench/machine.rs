@@ -1,4 +1,4 @@
-//! What the machine can do: memory bandwidth and arithmetic of one core, measured in place.
+//! Limits of the machine: memory bandwidth and arithmetic of one core, measured in place.
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 

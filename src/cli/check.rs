@@ -51,7 +51,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     once(world.as_ref(), report)
 }
 
-/// What all ranks agree on, if there are several.
+/// The result on which all ranks agree, if there are several; the own one otherwise.
 fn once<T>(world: Option<&World>, result: Result<T, Failure>) -> Result<T, Failure> {
     match world {
         Some(world) => together(world.comm(), result),

@@ -140,8 +140,7 @@ fn conclude(
     }
 }
 
-/// What the user wants to know when the run is over: where the results are, what the run has taken, and the
-/// commands that show more.
+/// Summary after a run: where the results are, its effort, and the commands that show more.
 fn print(
     out: &mut impl Write,
     summary: &Summary,

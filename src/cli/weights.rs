@@ -49,7 +49,7 @@ struct Case {
     half: Vec<f64>,
 }
 
-/// What the command prints.
+/// The printed result.
 #[derive(Debug, Default, Serialize)]
 pub struct Output {
     /// One entry per case, in the order of the input.

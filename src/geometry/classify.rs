@@ -158,7 +158,7 @@ mod tests {
     }
 
     proptest! {
-        /// What the classification is sure of holds for every point of the box.
+        /// A side of which the classification is sure is that of every point of the box.
         #[test]
         fn classification_is_conservative(
             lower in prop::array::uniform3(-0.2_f64..1.0),

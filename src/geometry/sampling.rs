@@ -81,7 +81,7 @@ impl<const D: usize> Tile<D> {
         let leaf = along_leaf as f64;
         let start = |cell: usize, a: usize| {
             let x = LOOSE.mul_add(part(mixed((cell * D + a) as u64)), lattice[cell][a]);
-            // What would leave its leaf is turned back at the face.
+            // A point beyond its leaf is reflected at the face.
             let first = (lattice[cell][a] / leaf).floor() * leaf;
             let inside = (x - first).abs();
             first + if inside > leaf { 2.0 * leaf - inside } else { inside }

@@ -19,7 +19,7 @@ pub struct Patch<const D: usize> {
     pub is_on_face: bool,
 }
 
-/// What [`patches`] needs to know of points.
+/// The region whose surface [`patches`] finds, as functions of a point.
 pub struct Region<'a, const D: usize> {
     /// Whether a point is in the region.
     pub inside: &'a (dyn Fn(&[f64; D]) -> bool + Sync),
@@ -112,7 +112,7 @@ fn share_of_face<const D: usize>(
     (best.0, best.2)
 }
 
-/// What a set has of a line.
+/// Intersection of a line of unit length with a set.
 #[derive(Clone, Copy, Debug, Default)]
 struct Line {
     /// Share of its length.

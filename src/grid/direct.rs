@@ -48,7 +48,7 @@ pub fn unconstrained_weights<const D: usize>(
     collected(tree, root_edge, centre, half, |_, place, share, nodes| add(place, share, nodes))
 }
 
-/// What nodes collect if `hand` says who gets the shares of the corners of all cells.
+/// Weights and gradients by node, where `hand` distributes the shares of the corners of all cells.
 fn collected<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
@@ -91,7 +91,7 @@ struct Interval {
     middle: [f64; 2],
 }
 
-/// What the corners of a leaf's cells get, cell by cell.
+/// Shares of a leaf's cells for their corners, cell by cell.
 fn in_leaf<const D: usize>(
     leaf: &Octant<D>,
     root_edge: f64,

@@ -35,9 +35,9 @@ pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Curves that share two axes.
 pub(crate) struct Chart {
-    /// What the horizontal axis shows, with its unit.
+    /// Quantity on the horizontal axis, with its unit.
     pub across: String,
-    /// What the vertical axis shows.
+    /// Quantity on the vertical axis.
     pub up: String,
     /// Whether 0 belongs to both axes.
     pub from_zero: bool,

@@ -1,4 +1,4 @@
-//! What the files of a run show at one time: particles with their fields, and leaves. For viewers and
+//! State of a run at one time, from its files: particles with their fields, and leaves. For viewers and
 //! exports; not collective.
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::snapshot::{Header, PointField};
 
 /// Particles of an output or checkpoint file.
 pub struct Frame {
-    /// What the file says about itself.
+    /// The header of the file.
     pub header: Header,
     /// Positions, m; the third component is 0 in plane strain.
     pub positions: Vec<[f64; 3]>,

@@ -12,7 +12,7 @@ pub enum Format {
     Apng,
     /// GIF of 256 colours for each frame.
     Gif,
-    /// What ffmpeg makes of the ending of the name.
+    /// By `ffmpeg`, in the format of the name's ending.
     Ffmpeg,
 }
 
@@ -113,7 +113,7 @@ impl Movie {
                 if self.before.is_empty() {
                     writer.write_image_data(&pixels)?;
                 } else {
-                    // What differs from the frame before is enough.
+                    // The rectangle that differs from the frame before is enough.
                     let [x, y, w, h] = changed(&self.before, &pixels, width);
                     writer.set_frame_position(0, 0)?;
                     writer.set_frame_dimension(w as u32, h as u32)?;

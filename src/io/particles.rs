@@ -31,7 +31,7 @@ pub enum TableError {
     Line {
         /// From 1.
         line: u64,
-        /// What is wrong.
+        /// The fault in it.
         reason: String,
     },
     /// It has no row.
@@ -139,7 +139,7 @@ const PARAVIEW: [(&str, &[&str]); 4] = [
     ("f", &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"]),
 ];
 
-/// What follows the name of a field and a colon or underscore, in small letters.
+/// Component in a column's name: its part after the field's name and a colon or underscore, in small letters.
 fn component(name: &str, field: &str) -> Option<String> {
     let name = name.to_ascii_lowercase();
     Some(name.strip_prefix(field)?.strip_prefix([':', '_'])?.to_owned())

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::hdf5_file::FileError;
 use super::whole_file::write_whole;
 
-/// What stands where a raster has no value.
+/// Text for a raster's places without value.
 const NO_VALUE: &str = "-9999";
 
 /// Values on a regular grid, in rows from south to north, from west to east in each; 0 is no value.

@@ -30,7 +30,7 @@ pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
     }
 }
 
-/// What the operating system refused, with the file and what was tried.
+/// Error of the operating system, with the file and the refused operation.
 pub(super) fn system(path: &Path, action: &'static str, source: std::io::Error) -> FileError {
     FileError::System { path: path.into(), action, source }
 }

@@ -1,4 +1,4 @@
-//! What differs between two jobs, among the keys that decide the state.
+//! Differences between two jobs, among the keys that decide the state.
 use serde_json::Value;
 
 use super::convert::settings::deciding;

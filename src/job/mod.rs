@@ -139,7 +139,7 @@ fn parse_edited(
     if !faults.is_empty() {
         return Err(faults);
     }
-    // What the schema accepts, the types accept; should they ever differ, the parser's words count.
+    // The types accept all that the schema accepts; should they ever differ, the parser's words count.
     let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
     let lines = Lines::of(original);

@@ -60,7 +60,7 @@ impl AnyProblem {
         }
     }
 
-    /// What the run writes, and where.
+    /// Outputs of the run, and their directory.
     pub fn output(&self) -> &OutputSetup {
         match self {
             Self::Two(problem) => &problem.output,
@@ -128,7 +128,7 @@ pub struct Problem<const D: usize> {
     pub load_places: Vec<Position>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
-    /// What is beyond those that absorb waves.
+    /// Material beyond the faces that absorb waves.
     pub absorbing: AbsorbingFaces<D>,
     /// Which of them the job names; the others have the default.
     pub named_faces: [[bool; 2]; D],
@@ -142,7 +142,7 @@ pub struct Problem<const D: usize> {
     pub load_stages: Vec<InStages>,
     /// Stages in which each collider is there.
     pub collider_stages: Vec<InStages>,
-    /// What happens to particles that leave the domain.
+    /// Treatment of particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.
     pub time: TimeSetup,
@@ -162,7 +162,7 @@ pub struct Problem<const D: usize> {
     pub history_every: u64,
     /// Whether it has the forces on the faces of the domain.
     pub face_forces: bool,
-    /// What it measures of the material.
+    /// Measurements of the material.
     pub probes: Vec<Probe<D>>,
     /// Particles that it follows.
     pub tracks: Vec<Track<D>>,
@@ -318,9 +318,9 @@ pub struct Stage<const D: usize> {
     pub gravity: Option<Gravity<D>>,
     /// New conditions on faces.
     pub faces: [[Option<Contact>; 2]; D],
-    /// What is beyond those of them that absorb waves.
+    /// Material beyond the new faces that absorb waves.
     pub absorbing: AbsorbingFaces<D>,
-    /// What happens from now on to particles that leave the domain.
+    /// New treatment of particles that leave the domain.
     pub leaving: Option<LeavingPolicy>,
     /// Whether all material is at rest at the start.
     pub at_rest: bool,
@@ -370,7 +370,7 @@ impl InStages {
 pub struct InitialStress {
     /// Place of its table in the files of the job, for messages.
     pub place: Position,
-    /// What it is.
+    /// The stress itself.
     pub kind: StressKind,
     /// Whether a stress outside the yield surface returns to it; else it is an error.
     pub relax: bool,
@@ -378,8 +378,7 @@ pub struct InitialStress {
     pub consolidation: Option<Consolidation>,
 }
 
-/// What the stress of a body is at the start. Levels are in the coordinates of the job, along the axis of
-/// gravity.
+/// Stress of a body at the start. Levels are in the coordinates of the job, along the axis of gravity.
 #[derive(Clone, Debug)]
 pub enum StressKind {
     /// The weight above, Pa, with this ratio of horizontal to vertical stress, under a surface (found:
@@ -438,7 +437,7 @@ pub struct OutputSetup {
     pub every: Option<f64>,
     /// Particle fields beside the position.
     pub fields: Vec<Field>,
-    /// What particles carry for the fields.
+    /// Quantities that particles carry for the fields.
     pub followed: Followed,
     /// Whether each output file carries the complete state, so that a run can restart from it.
     pub restart: bool,

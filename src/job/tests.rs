@@ -89,7 +89,7 @@ fn faults_of_included_files_name_these() {
     assert!(wrong.contains(&format!("column_collapse.toml:{}:1: time.edn", line + 1)), "{wrong}");
     let wrong = text(&job, &[&materials, "[time]\nend = 2\n"].concat()).unwrap_err();
     assert!(wrong.contains("materials.toml:") && wrong.contains("a second time"), "{wrong}");
-    // What only the first state shows is said of the file too.
+    // Faults that only the first state shows name the included file as well.
     let start = JOB.find("[[bodies]]").unwrap();
     let end = start + JOB[start..].find("[time]").unwrap();
     write("bodies.toml", &format!("# A column.\n{}", &JOB[start..end]));

@@ -21,7 +21,7 @@ pub(super) struct Batch {
     lanes: u32,
     /// The tile whose lanes are those of the batch; brought together from several otherwise.
     tile: Option<u32>,
-    /// What a later batch will read.
+    /// Data of a later batch, to be prefetched.
     ahead: Place,
 }
 

@@ -36,7 +36,7 @@ struct Visit {
 pub struct ConstrainedNodes {
     /// Those without moments.
     pub hanging: HangingNodes,
-    /// What stencils visit, by base of the stencil (see [`super::stencil_bases`]).
+    /// Nodes with moments of each stencil, by its base (see [`super::stencil_bases`]).
     visits: Csr<Visit>,
     /// Second moments, by row of the first moments.
     second: Vec<f64>,

@@ -149,7 +149,7 @@ pub(super) struct AtWall<'a, V, const D: usize> {
 }
 
 impl<V: Vector, const D: usize> AtWall<'_, V, D> {
-    /// What particles that move to `moved` keep of the columns of B, where that is not all for all of them.
+    /// Factors of the columns of B of particles that move to `moved`; `None` if all are 1.
     ///
     /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept,
     /// C grows like `1/d`, and a particle that drifts to the wall would come with ever faster nodes and pass

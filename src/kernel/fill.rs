@@ -1,5 +1,5 @@
-//! What keeps fluids in their volume: bounded void, a shift out of overfull nodes, and volumes that approach
-//! the mean of their cell.
+//! Remedies that keep fluids in their volume: bounded void, a shift out of overfull nodes, and volumes that
+//! approach the mean of their cell.
 //!
 //! The volume ratio J of a particle is right on average, but positions drift away from it: flow that
 //! compresses along one line and widens along another gathers particles, and the gaps between them have no
@@ -48,11 +48,11 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// What is no fluid.
+    /// No fluid.
     pub const NONE: Self = Self { way: 0.0, widest: f64::INFINITY, weight: 0.0 };
 }
 
-/// What the advance of particles needs to keep fluids in their volume.
+/// Data with which the advance of particles keeps fluids in their volume.
 #[derive(Clone, Copy, Debug)]
 pub struct Filling<'a> {
     /// By material.

@@ -1,4 +1,4 @@
-//! What particles gather from the nodes of their stencils; see [`super::g2p`].
+//! Sums that particles gather from the nodes of their stencils; see [`super::g2p`].
 use super::batch::{Batch, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
@@ -15,7 +15,7 @@ pub struct Moments<'a> {
     pub first: &'a [Row],
 }
 
-/// What the nodes of an arena offer.
+/// Values at the nodes of an arena that particles gather.
 #[derive(Clone, Copy)]
 pub struct Fields<'a> {
     /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.

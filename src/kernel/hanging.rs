@@ -1,8 +1,7 @@
 //! Hanging nodes: here, constrained nodes all of whose parents are real.
 //!
-//! What APIC must see are the weights of real nodes. Of a hanging node j with weight w, along an axis k on
-//! which its coordinate is odd, its parents lie one cell h away on either side, and beside `w v_j d_k` they
-//! add
+//! APIC needs the weights of real nodes. Of a hanging node j with weight w, along an axis k on which its
+//! coordinate is odd, its parents lie one cell h away on either side, and beside `w v_j d_k` they add
 //! ```text
 //! w Σ c v_i (x_i - x_j)_k = w h/2 (v_(j+k) - v_(j-k)) = ± w h (v_(j±k) - v_j)
 //! ```
@@ -175,8 +174,8 @@ impl HangingNodes {
         }
     }
 
-    /// What B of a lane gets more, divided by the edge of a cell: column by column. `nodes` begin with the
-    /// first of the stencil.
+    /// Additional part of B of a lane, divided by the edge of a cell: column by column. `nodes` begin with
+    /// the first of the stencil.
     #[inline(always)]
     pub(super) fn gather<const D: usize>(
         &self,
@@ -212,7 +211,7 @@ fn alike<T: Copy + PartialEq>(values: impl Iterator<Item = T>) -> impl Iterator<
 struct BoxFactors<const D: usize> {
     /// Weights, 0 outside the box.
     weight: [[F64x4; 3]; D],
-    /// What comes in place of weight times (node - particle), in cells.
+    /// Factors that replace weight times (node - particle), in cells.
     arm: [[F64x4; 3]; D],
 }
 

@@ -44,8 +44,8 @@ pub const fn stencil_bases(d: usize) -> usize {
     BASES.pow(d as u32)
 }
 
-/// What a node carries: `(px, py, pz, m)` while scattering, `(vx, vy, vz, unused)` while gathering.
-/// In plane strain the z lane is 0.
+/// Values of a node: `(px, py, pz, m)` while scattering, `(vx, vy, vz, unused)` while gathering. In plane
+/// strain the z lane is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Row(pub [f64; 4]);
@@ -145,7 +145,7 @@ impl Default for BoxPolicy {
     }
 }
 
-/// What the kernels need to know of the run. The same for all particles.
+/// Properties of the run that the kernels use. The same for all particles.
 pub struct Scheme<'a> {
     /// Box policy.
     pub boxes: BoxPolicy,

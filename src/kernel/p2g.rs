@@ -43,7 +43,7 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// What scattering a bin of particles into the arena of its block needs.
+/// Input and output of the scatter of a bin of particles into the arena of its block.
 pub struct Scatter<'a, const D: usize> {
     /// Memory of the thread.
     pub scratch: &'a mut Scratch<D>,
@@ -51,13 +51,13 @@ pub struct Scatter<'a, const D: usize> {
     pub chunk: &'a Chunk<D>,
     /// The block.
     pub frame: &'a Frame<D>,
-    /// What holds for all particles.
+    /// Properties of the run, the same for all particles.
     pub scheme: &'a Scheme<'a>,
     /// The step that turns internal forces into impulses, s.
     pub dt: f64,
     /// Rows (momentum, mass) of the nodes.
     pub arena: &'a mut [Row],
-    /// What constrained nodes need, where there are any: first moments, or other factors (see
+    /// Sums of constrained nodes, where there are any: first moments, or other factors (see
     /// [`super::hanging`]).
     pub moments: Option<MomentSums<'a>>,
 }

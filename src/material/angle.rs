@@ -7,7 +7,7 @@ pub(super) struct Angle {
     /// Sine and cosine at the start.
     pub sine: f64,
     pub cosine: f64,
-    /// What softens away, radians.
+    /// Decrease from the start to the residual state, radians.
     pub softens: f64,
 }
 

@@ -33,7 +33,8 @@ pub(super) struct Returned<V: Vector> {
     pub opens: V::Mask,
 }
 
-/// What follows from a pyramid and the elastic constants: for pyramids that do not change, once for all.
+/// Coefficients of the return map, from a pyramid and the elastic constants. Pyramids that do not change have
+/// them computed once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slopes<V> {
     /// Stress per flow on the face between 1 and 3, along 1, 2 and 3, Pa.
@@ -78,7 +79,7 @@ impl<V: Copy> Slopes<V> {
 }
 
 impl<V: Vector> Pyramid<V> {
-    /// What follows from it.
+    /// The coefficients of the return map.
     #[inline(always)]
     pub(super) fn slopes(&self, elastic: &Lame) -> Slopes<V> {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));

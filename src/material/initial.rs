@@ -49,7 +49,7 @@ pub enum NoState {
     Yields {
         /// Shear stress `√(3/2) |dev σ|` and pressure after yield, Pa.
         found: [f64; 2],
-        /// What was asked for.
+        /// Requested shear stress and pressure, Pa.
         asked: [f64; 2],
     },
 }

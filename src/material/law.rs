@@ -1,5 +1,5 @@
-//! What a constitutive model is: the state that it updates, the trait that it implements ([`Law`]) and the
-//! trait that the solver calls ([`Material`]).
+//! Constitutive models: the state that they update, the trait that they implement ([`Law`]) and the trait
+//! that the solver calls ([`Material`]).
 use super::initial::Consolidation;
 use super::laws::hencky::Hencky;
 use super::tensor::eigen::Symmetric;
@@ -66,7 +66,7 @@ impl State {
     }
 }
 
-/// What a law gets to know of the step.
+/// Arguments of a law beside the state.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Length of the step, s; 0 for an update without increment, in which nothing flows by its rate.

@@ -1,4 +1,4 @@
-//! What holds for every model of the list.
+//! Properties that every model of the list has.
 use proptest::prelude::*;
 
 use super::laws::{Visitor, for_each_law};

@@ -1,7 +1,7 @@
-//! What particles carry of what has happened to them.
+//! Quantities that particles carry of their past.
 use super::strain;
 
-/// What particles carry of what has happened to them, in columns behind those of loads.
+/// Quantities that particles carry of their past, in columns behind those of loads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Followed {
     /// Mean pressure of contact with other bodies.
@@ -10,7 +10,7 @@ pub struct Followed {
     pub motion: Motion,
 }
 
-/// What particles carry of their motion since they came.
+/// Quantities that particles carry of their motion since they came.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Motion {
     /// Nothing.

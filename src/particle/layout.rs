@@ -1,4 +1,4 @@
-//! What a particle consists of: real-valued columns and a tag.
+//! Columns of a particle: real values and a tag.
 use crate::material;
 
 /// Column numbers of the real-valued components of a particle in `D` dimensions.

@@ -78,7 +78,7 @@ fn distance(x: &[f64], point: &[f64; 3], normal: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    /// What crosses the plane beside the opening does not count; what comes back counts against.
+    /// Mass that crosses the plane beside the opening does not count; mass that comes back counts against.
     #[test]
     fn ways_lead_through_an_opening_or_past_it() {
         let bounds = [[1.0, -1.0, 0.0], [2.0, 1.0, 0.0]];

@@ -13,7 +13,7 @@ pub struct Line<const D: usize> {
     pub points: Vec<[f64; D]>,
     /// Bodies that count, by index; all without.
     pub bodies: Option<Vec<u16>>,
-    /// What its table shows, each once.
+    /// Columns of its table, each once.
     pub quantities: Vec<Sampled>,
 }
 
@@ -46,7 +46,7 @@ impl Sampled {
         Self::PlasticStrain,
     ];
 
-    /// What a probe measures as well.
+    /// The measurement of a probe of the same quantity, if there is one.
     fn mean(self) -> Option<Measured> {
         match self {
             Self::VolumeFraction | Self::Density => None,
@@ -58,8 +58,8 @@ impl Sampled {
     }
 }
 
-/// What there is about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the
-/// edge of a cell.
+/// Material about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the edge
+/// of a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const D: usize> {
     /// Level of the finest leaf that holds the point.

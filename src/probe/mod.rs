@@ -1,4 +1,4 @@
-//! What a run measures of the material. Sums are exact, so they do not depend on ranks.
+//! Measurements of the material during a run. Sums are exact, so they do not depend on ranks.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -30,7 +30,7 @@ pub struct Probe<const D: usize> {
     pub region: Option<Shape<D>>,
     /// Bodies that it measures, by index; all without.
     pub bodies: Option<Vec<u16>>,
-    /// What it measures, each once.
+    /// Quantities that it measures, each once.
     pub quantities: Vec<Measured>,
 }
 

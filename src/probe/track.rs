@@ -10,7 +10,7 @@ pub struct Track<const D: usize> {
     pub point: [f64; D],
     /// Bodies that count, by index; all without.
     pub bodies: Option<Vec<u16>>,
-    /// What the history shows of it, each once.
+    /// Quantities in the history, each once.
     pub quantities: Vec<Measured>,
 }
 

@@ -26,12 +26,12 @@ pub enum RecordError {
     /// It cannot be read.
     #[error("it cannot be read: {0}")]
     System(#[from] std::io::Error),
-    /// What is wrong in a line.
+    /// A line is wrong.
     #[error("line {line}: {reason}")]
     Line {
         /// The line, from 1.
         line: u64,
-        /// What was found and what is expected.
+        /// Found and expected text, in words.
         reason: String,
     },
     /// No rows.

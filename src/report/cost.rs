@@ -4,10 +4,10 @@ use std::path::Path;
 use super::panels::Panel;
 use crate::io::log::telemetry::Record;
 
-/// What a phase has cost.
+/// Wall time of a phase.
 #[derive(Debug)]
 pub(super) struct PhaseCost {
-    /// What it does.
+    /// Description of its work.
     pub words: String,
     /// Wall seconds, mean over the ranks.
     pub mean: f64,
@@ -27,7 +27,7 @@ pub(super) struct Cost {
     pub ranks: u64,
 }
 
-/// What the phases do.
+/// Names of phases and descriptions of their work.
 const WORDS: [(&str, &str); 10] = [
     ("sort", "sort particles beside level jumps"),
     ("scatter", "particles to grid (P2G)"),

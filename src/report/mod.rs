@@ -39,7 +39,7 @@ use sections::{collapse, costs, ending, facts, files, job, remarks, table};
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
 
-/// What goes into a page.
+/// Options of a page.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Quantity that colours the pictures, as for `agimp plot`; `None` for plastic strain if there is any,
@@ -122,7 +122,7 @@ fn filled(marks: [(&str, &str); 6]) -> String {
     page + rest
 }
 
-/// What the files of a run say.
+/// Content of the files of a run.
 struct Run {
     history: History,
     cost: Cost,
@@ -130,7 +130,7 @@ struct Run {
     state: State,
     /// Outputs in order of time.
     outputs: Vec<PathBuf>,
-    /// What the last output says about itself, and the text of the job in it.
+    /// The header of the last output, and the text of the job in it.
     header: Option<Header>,
     job_text: Option<String>,
     /// The same as a table; empty if there is none.

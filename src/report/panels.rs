@@ -6,7 +6,7 @@ use super::history::{Column, History};
 pub(super) struct Panel {
     pub title: String,
     pub unit: String,
-    /// What it is drawn over, and its unit.
+    /// Quantity on the horizontal axis, and its unit.
     pub across: (String, String),
     pub is_logarithmic: bool,
     /// Names and points.

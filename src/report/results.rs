@@ -100,7 +100,7 @@ impl Results {
         Some((path, step, time))
     }
 
-    /// What the run says of itself, if it has finished.
+    /// Report of the run (`JOB.report.json`), if it has finished.
     pub(super) fn report(&self) -> Option<Report> {
         serde_json::from_slice(&std::fs::read(report::path(&self.directory, &self.name)).ok()?).ok()
     }
@@ -139,7 +139,7 @@ impl Results {
     }
 }
 
-/// What an output says about itself.
+/// Header of an output, if it can be read.
 pub(super) fn header(output: &Path) -> Option<Header> {
     Header::read(&Reader::open_alone(output).ok()?).ok()
 }

@@ -13,7 +13,7 @@ pub(super) fn section(body: &mut String, id: &str, title: &str) {
     let _ = write!(body, "</section>\n<section id=\"{id}\">\n<h2>{title}</h2>\n");
 }
 
-/// What one wants to know first.
+/// Summary: time, steps, sizes and cost of the run.
 pub(super) fn facts(body: &mut String, run: &Run) {
     let last = |name: &str| run.history.last(name);
     let mut facts: Vec<(&str, String)> = Vec::new();
@@ -235,7 +235,7 @@ pub(super) fn job(body: &mut String, run: &Run) {
     }
 }
 
-/// What is in the directory.
+/// Files in the directory, by kind, with their number and size.
 pub(super) fn files(body: &mut String, results: &Results) {
     section(body, "files", "Files");
     let directory = html(&results.directory.display().to_string());

@@ -122,7 +122,7 @@ pub(crate) fn lock(path: &Path, what: &'static str) -> Result<Held, Refusal> {
             }
             Err(TryLockError::WouldBlock) => {
                 let mut holder = String::new();
-                // What cannot be read is left out.
+                // Bytes that cannot be read are left out.
                 let _ = file.take(200).read_to_string(&mut holder);
                 let holder = holder.trim().escape_debug().to_string();
                 return Err(Refusal::Taken { path: path.into(), what, holder });
@@ -147,7 +147,7 @@ pub fn holder(path: &Path) -> Option<String> {
     match file.try_lock_shared() {
         Err(TryLockError::WouldBlock) => {
             let mut holder = String::new();
-            // What cannot be read is left out.
+            // Bytes that cannot be read are left out.
             let _ = file.take(200).read_to_string(&mut holder);
             Some(holder.trim().escape_debug().to_string())
         }

@@ -19,7 +19,7 @@ pub struct Options {
     pub speaks: bool,
     /// Threads of this rank.
     pub threads: usize,
-    /// What the user has been warned of before the run, for its report.
+    /// Warnings before the run, for its report.
     pub warnings: Vec<String>,
 }
 
@@ -35,7 +35,7 @@ pub enum Outcome {
     },
 }
 
-/// What a run has taken.
+/// Effort of a run: steps, time and particles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Steps done since the start.
@@ -50,10 +50,10 @@ pub struct Effort {
     pub warnings: usize,
 }
 
-/// What a finished run leaves.
+/// Results of a finished run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// What it has taken.
+    /// Its effort.
     pub effort: Effort,
     /// The last output, to look at.
     pub last_output: Option<PathBuf>,
@@ -91,13 +91,13 @@ pub enum RunError {
         step: u64,
         /// Time, s.
         time: f64,
-        /// What failed.
+        /// The failure.
         source: Box<RunError>,
     },
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// What the run was asked for cannot be done, and nothing has been written.
+    /// The request cannot be fulfilled, and nothing has been written.
     #[error("{0}")]
     Refused(String),
 }

@@ -32,7 +32,7 @@ pub struct Recorder<'a, const D: usize> {
     last_row: Option<u64>,
     /// Values of the row of the present step, on rank 0, as far as they are known.
     last_values: Vec<f64>,
-    /// What is known for the report of the run.
+    /// Report of the run, as far as it is known.
     report: Report,
     began: Instant,
     since: Instant,
@@ -151,7 +151,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         row: bool,
         record: bool,
     ) -> Result<(), RunError> {
-        // What this takes counts as output, not as steps.
+        // Wall time of this call counts as output, not as steps.
         let start = Instant::now();
         let mut mass_error = solver.weighed_mass_error();
         let mut written = Ok(());

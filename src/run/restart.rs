@@ -50,7 +50,7 @@ const CROSSINGS: [&str; 3] = ["put_back", "deleted", "left"];
 /// Names of the masses deleted and left.
 const CROSSED_MASSES: [&str; 2] = ["deleted_mass", "left_mass"];
 
-/// What output files hold.
+/// Optional contents of output files.
 pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
     let output = &problem.output;
     snapshot::Options { fields: output.fields.clone(), single: false, restart: output.restart }
@@ -371,7 +371,7 @@ fn restored<const D: usize>(
 /// Counters that no run reaches.
 const MOST: u64 = 1 << 53;
 
-/// What no run can have counted is refused, whatever the checksum of the header says.
+/// Refuses counts that no run can reach, whatever the checksum of the header says.
 fn check_counts<const D: usize>(scalars: &Scalars) -> Result<(), String> {
     for (name, count) in &scalars.counts {
         let most = if name == LEDGER[3] { ids::roots(D) } else { MOST };

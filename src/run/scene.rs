@@ -1,4 +1,4 @@
-//! What pictures show beside the fields of particles: colliders where they are, and how wide boxes are.
+//! Surroundings of the particles in pictures: colliders where they are, and how wide boxes are.
 use std::path::{Path, PathBuf};
 
 use super::restart;

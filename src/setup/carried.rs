@@ -1,5 +1,5 @@
-//! What particles carry for loads at the start: the surface that they stand for, and their shares of point
-//! forces.
+//! Columns that particles carry for loads at the start: the surface that they stand for, and their shares of
+//! point forces.
 //!
 //! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box;
 //! where the box has none, since its centre is not in the body, to the first particle inwards. Bodies against
@@ -95,7 +95,7 @@ struct Share<const D: usize> {
     numbers: Vec<f64>,
 }
 
-/// What own particles carry of a load on surfaces, in the order of the known leaves.
+/// Shares of own particles in a load on surfaces, in the order of the known leaves.
 fn surface_shares<const D: usize>(
     problem: &Problem<D>,
     tree: &KnownTree<D>,

@@ -162,7 +162,7 @@ impl Up {
     }
 }
 
-/// What stands on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density,
+/// Material on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density,
 /// kg/m³.
 #[derive(Clone, Debug, Default)]
 struct Standing(Vec<[f64; 3]>);
@@ -189,7 +189,7 @@ impl<const D: usize> Default for Columns<D> {
 }
 
 impl<const D: usize> Columns<D> {
-    /// What stands on the vertical line through a point. Layers thinner than `interval` (m) may be missed.
+    /// Material on the vertical line through a point. Layers thinner than `interval` (m) may be missed.
     fn at(&mut self, problem: &Problem<D>, stage: usize, up: Up, x: &[f64; D], interval: f64) -> &Standing {
         let mut foot = *x;
         foot[up.axis] = 0.0;

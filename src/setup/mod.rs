@@ -21,12 +21,12 @@ pub mod seed;
 pub mod stages;
 pub mod warnings;
 
-/// What is solved in the first stage of a run.
+/// Physics of the first stage of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     stages::physics(problem, &[0.0])
 }
 
-/// What no stage changes.
+/// Physics of the job without the changes of stages.
 fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     Physics {
         stage_starts: vec![0.0],

@@ -1,4 +1,4 @@
-//! What the stages of a run change: physics, and the particles that come and go.
+//! Changes by the stages of a run: physics, and the particles that come and go.
 use partition::comm::{Comm, Disagreement};
 
 use super::seed::check_counts;
@@ -7,7 +7,7 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
 
-/// What is solved in the last of the stages that began at these times, s.
+/// Physics of the last of the stages that began at these times, s.
 pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<D> {
     let mut physics = super::constant_physics(problem);
     for (stage, &start) in problem.stages.iter().zip(starts) {
@@ -63,7 +63,7 @@ fn density_of_field<const D: usize>(problem: &Problem<D>, physics: &Physics<D>, 
     all.iter().all(|density| *density == first).then_some(first)
 }
 
-/// What the particles of a body are made of in a stage.
+/// Material of the particles of a body in a stage.
 pub(super) fn material_of<const D: usize>(problem: &Problem<D>, body: usize, stage: usize) -> usize {
     let changes = problem.stages[..=stage].iter().flat_map(|stage| &stage.materials);
     changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
@@ -143,7 +143,7 @@ mod tests {
         crate::job::parse(text, path).expect("a job").try_into().expect("in 2D")
     }
 
-    /// What a stage changes stays; loads and colliders have the time since the first of their stages.
+    /// Changes of a stage outlast it; the clocks of loads and colliders start with the first of their stages.
     #[test]
     fn changes_stay_and_clocks_begin_with_the_first_stage() {
         let problem = job();

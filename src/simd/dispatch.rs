@@ -10,7 +10,7 @@ use super::lanes::Lanes;
 
 /// Work that is worth being compiled for several instruction sets.
 pub trait Kernel {
-    /// What it gives.
+    /// The result.
     type Output;
 
     /// Does the work. To be marked `inline(always)`, and so is all that it calls with vectors: functions of

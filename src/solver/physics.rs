@@ -1,4 +1,4 @@
-//! What is solved.
+//! The problem that the solver solves.
 use std::ops::Range;
 
 use crate::adaptivity::Adaptivity;
@@ -13,7 +13,7 @@ use crate::particle::group::Group;
 use crate::particle::strain;
 use crate::quantity::{NotFinite, Quantity};
 
-/// What is solved: the same on every rank, constant over a stage of the run.
+/// The problem that the solver solves: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
     /// Lower corner of the domain in the coordinates of the job, m; all positions are relative to it.
     pub origin: [f64; D],
@@ -33,7 +33,7 @@ pub struct Physics<const D: usize> {
     pub faces: [[Contact; 2]; D],
     /// Bodies whose particles come with the affine state of APIC, from another run.
     pub with_moments: Vec<u16>,
-    /// What is beyond those that absorb waves.
+    /// Material beyond the faces that absorb waves.
     pub absorbing: AbsorbingFaces<D>,
     /// Whether the forces on these faces are summed up.
     pub face_forces: bool,
@@ -43,7 +43,7 @@ pub struct Physics<const D: usize> {
     pub body_contacts: BodyContacts,
     /// Dynamic refinement; `None`: tree and particles keep their sizes.
     pub adaptivity: Option<Adaptivity<D>>,
-    /// What happens to particles that leave the domain where no face is an outflow.
+    /// Treatment of particles that leave the domain where no face is an outflow.
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
@@ -58,13 +58,13 @@ pub struct Physics<const D: usize> {
     pub f_bar: bool,
     /// Whether surface nodes are tied.
     pub ties: bool,
-    /// What particles carry of what has happened to them.
+    /// Quantities that particles carry of their past.
     pub followed: Followed,
     /// Choice of the time step.
     pub control: StepControl,
 }
 
-/// What a run asks of an equilibrium.
+/// Criteria of equilibrium, and the mass scaling on the way to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equilibrium {
     /// Greatest root mean square of the velocities at a peak of the kinetic energy, m/s.
@@ -193,7 +193,7 @@ impl<const D: usize> Physics<D> {
         (!field_of_body.is_empty()).then_some(Group { field: field as u8, field_of_body })
     }
 
-    /// What the kernels need to know.
+    /// Properties of the run that the kernels use.
     pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
         let scheme = Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials);
         Scheme { f_bar: self.f_bar, shares: self.load_columns(), ..scheme }

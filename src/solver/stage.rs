@@ -6,11 +6,11 @@ use crate::solver::state::Solver;
 use crate::solver::state::relaxation::Relaxation;
 use crate::solver::step::relax::stop;
 
-/// What a stage changes in the particles. Lists go over the bodies of the job.
+/// Changes of the particles at the start of a stage. Lists go over the bodies of the job.
 pub struct Change<const D: usize> {
     /// Whether the particles of a body go.
     pub is_removed: Vec<bool>,
-    /// What the particles of a body are made of.
+    /// Material of the particles of each body.
     pub materials: Vec<u16>,
     /// Whether all particles are at rest.
     pub at_rest: bool,
@@ -23,7 +23,7 @@ pub struct Change<const D: usize> {
 impl<const D: usize> Solver<D> {
     /// Collective. The lowest root that no particle has; see [`crate::adaptivity::resample::ids`].
     pub fn next_root(&self) -> u64 {
-        // What merges have used and given up counts as well.
+        // Roots that merges have used and given up count as well.
         if self.physics.adaptivity.is_some() { self.ledger.next_root } else { self.first_free_root() }
     }
 

@@ -14,11 +14,11 @@ pub(super) struct Column {
     pub name: String,
     /// The field that it is from.
     pub source: PointField,
-    /// What of the field it is.
+    /// The part of the field.
     pub part: Part,
 }
 
-/// What of a field a column is.
+/// Part of a field that a column has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// All of it.
@@ -159,7 +159,7 @@ impl Scale {
         place.round().clamp(0.0, most) as u16
     }
 
-    /// What a level stands for.
+    /// Value of a level.
     #[cfg(test)]
     pub(super) fn value(&self, level: u16) -> f64 {
         if self.integer {
@@ -170,7 +170,7 @@ impl Scale {
     }
 }
 
-/// What a first look at all frames finds.
+/// Bounds over all frames, from a first pass over them.
 pub(super) struct LeafMaxima {
     /// Lower and upper corner of the box round all particles, m.
     pub bounds: [[f64; 3]; 2],
@@ -184,7 +184,7 @@ pub(super) struct LeafMaxima {
     samples: Vec<Vec<f64>>,
 }
 
-/// What all frames have in common.
+/// Properties that all frames share.
 pub(super) struct First {
     pub header: crate::io::snapshot::Header,
     pub domain: [[f64; 3]; 2],

@@ -1,4 +1,4 @@
-//! What the page knows beside the numbers, as JSON.
+//! Metadata of the page, as JSON.
 use std::path::Path;
 
 use serde::Serialize;

@@ -27,7 +27,7 @@ mod pack;
 use columns::{Column, LeafMaxima};
 use meta::{FrameMeta, Meta};
 
-/// What goes into a view.
+/// Options of a view.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Title; the page shows it above all.

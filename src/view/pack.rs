@@ -89,7 +89,7 @@ fn along_curve(position: [u16; 3]) -> u64 {
 mod tests {
     use super::*;
 
-    /// What the page does with a column.
+    /// Decoding of a column, as the page does it.
     fn undo<const BYTES: usize>(bytes: &[u8]) -> Vec<u64> {
         let n = bytes.len() / BYTES;
         let mask = if BYTES == 8 { u64::MAX } else { (1 << (8 * BYTES)) - 1 };

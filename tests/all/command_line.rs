@@ -1,4 +1,4 @@
-//! What users type: subcommands, their options, and how they end.
+//! The command line: subcommands, their options, and how they end.
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -44,7 +44,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// What `agimp material` prints: the names of the columns and the rows.
+/// Output of `agimp material`: the names of the columns and the rows.
 fn drive(model: &str, path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let directory = tempfile::tempdir().unwrap();
     let text = printed(&agimp(directory.path(), &["material", "--model", model, path]));
@@ -310,7 +310,7 @@ const JOB: &str = "version = 1\ndimension = 2\ntitle = \"TITLE\"\ndomain = { siz
     time = { end = 2e-3 }\n\
     bodies = [{ name = \"BODY\", material = \"MATERIAL\", shape = { kind = \"box\", min = [0, 0], max = [0.5, 0.5] } }]\n";
 
-/// What `agimp check` says of a text: exit code, standard output and standard error.
+/// Answer of `agimp check` to a job: exit code, standard output and standard error.
 fn check(text: &str) -> (i32, String, String) {
     let directory = tempfile::tempdir().unwrap();
     std::fs::write(directory.path().join("job.toml"), text).unwrap();
@@ -590,7 +590,7 @@ fn settings_decide_what_is_run() {
     printed(&run(&["--end", "2e-3", "--out", "set", "--restart", "latest"]));
     printed(&run(&["--out", "whole"]));
     assert_eq!(file("set/job.history.csv"), file("whole/job.history.csv"));
-    // What a run warns of is not said again by its restart.
+    // A restart does not repeat the warnings of the run.
     let again = run(&["--end", "2e-3", "--out", "set", "--restart", "latest"]);
     let message = String::from_utf8_lossy(&again.stderr).into_owned();
     assert!(again.status.code() == Some(0) && !message.contains("boundaries"), "{message}");

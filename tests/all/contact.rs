@@ -6,7 +6,7 @@ use crate::common::history::History;
 use crate::common::launch::{run, succeed};
 use crate::common::restart;
 
-/// What all jobs here have; all faces let slip.
+/// Common part of all jobs here; all faces let slip.
 fn head(dimension: usize, gravity: &str, size: &str, root_edge: f64, level: u32) -> String {
     let faces: String = ["x", "y", "z"][..dimension]
         .iter()
@@ -52,7 +52,7 @@ fn way(history: &History, direction: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What holds a block on an incline of 30 degrees: gravity that turns, or a surface that does.
+/// Ways to incline a block by 30 degrees: gravity that turns, or a surface that does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Incline {
     Face,
@@ -393,8 +393,8 @@ fn momentum_balances_and_ranks_and_restarts_change_no_bit() {
     }
 }
 
-/// What begins inside a collider that acts on particles stays there at rest: no energy comes from nowhere.
-/// Under gravity it never has more than at the start.
+/// Material that begins inside a collider that acts on particles stays there at rest: no energy comes from
+/// nowhere. Under gravity it never has more than at the start.
 #[test]
 fn material_inside_a_collider_is_not_thrown_out() {
     let sill = "[[colliders]]\nname = 'sill'\nacts_on = 'particles'\nshape = { kind = 'circle', centre = [0.45, 0.05], radius = 0.08 }\n";

@@ -6,7 +6,7 @@ use crate::common::launch::{run, succeed};
 use crate::common::restart;
 use crate::common::runs::particles;
 
-/// What all jobs here have.
+/// Common part of all jobs here.
 const RUBBER: &str = "version = 1\ndimension = 2\n[output]\npicture = false\n\
     [[materials]]\nname = 'rubber'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e6\npoisson = 0.3\n";
 

@@ -39,7 +39,7 @@ impl Copy {
     fn new() -> Self {
         let directory = tempfile::tempdir().expect("temporary directory");
         let here = directory.path();
-        // What commands may write to or what differs is copied; the rest is only looked at.
+        // Files that commands may write or that differ are copied; the others are only read.
         for folder in ["jobs", "docs"] {
             for path in files(Path::new(folder)) {
                 let to = here.join(&path);
@@ -117,7 +117,7 @@ fn shortened(job: &str) -> String {
     short
 }
 
-/// What README's first job sets up for all that follows.
+/// Environment that README's first job sets up for all that follows.
 fn environment() -> String {
     let readme = text(Path::new("README.md"));
     let lines: Vec<&str> =
@@ -282,8 +282,8 @@ fn links_lead_somewhere() {
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
 }
 
-/// What a link of a paper leads to, from the top of the repository; none for other sites and places in the
-/// paper itself.
+/// Target of a link of a paper, from the top of the repository; none for other sites and places in the paper
+/// itself.
 fn target(paper: &Path, link: &str) -> Option<PathBuf> {
     let file = link.split('#').next().unwrap_or_default();
     if file.is_empty() || link.contains("://") || link.starts_with("mailto:") {

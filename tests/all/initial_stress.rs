@@ -189,7 +189,7 @@ fn same_results_on_any_ranks_and_across_restart() {
     restart::assert_same_on_any_ranks(&text.replace("picture = false", ""), "ground", |_, _| ());
 }
 
-/// What is wrong with a stress is said with its key, and what would be right.
+/// The message for a wrong stress names its key, the fault, and what would be right.
 #[test]
 fn wrong_stresses_are_refused_with_their_key() {
     let k0 = "{ kind = 'geostatic', k0 = 0.5 }";

@@ -63,7 +63,7 @@ fn scramble(a: u64, b: u64) -> u64 {
     (x ^ x >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) ^ x >> 7
 }
 
-/// What a run would own.
+/// Data that a run would own.
 struct Run<const D: usize> {
     leaves: Vec<Octant<D>>,
     chunks: Vec<Chunk<D>>,

@@ -145,7 +145,7 @@ fn same_results_on_any_ranks_and_across_restart() {
     restart::assert_same_on_any_ranks(&job, "body", |_, _| ());
 }
 
-/// What is wrong with a load is said with its key, and what would be right.
+/// The message for a wrong load names its key, the fault, and what would be right.
 #[test]
 fn wrong_loads_are_refused_with_their_key() {
     let cases = [

@@ -45,7 +45,7 @@ mod warnings;
 mod weights_exact;
 mod weights_properties;
 
-/// What [`common::scenarios`] launches: the scenarios of all modules.
+/// The test that [`common::scenarios`] launches: the scenarios of all modules.
 #[test]
 #[ignore = "started by other tests"]
 fn worker() {

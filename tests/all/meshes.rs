@@ -194,7 +194,7 @@ fn hills() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What the job has to say of the arrays.
+/// Keys that the arrays need in the job.
 fn hill_keys(name: &str) -> &'static str {
     match &name[5..] {
         "npy" => ", cell = 0.25",

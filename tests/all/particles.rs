@@ -55,7 +55,7 @@ fn a_lattice_from_a_table_is_a_box() {
     }
 }
 
-/// What was stretched by 1 % has the stress of a Hencky solid at the start, and its undeformed volume; given
+/// A block stretched by 1 % has the stress of a Hencky solid at the start, and its undeformed volume; given
 /// this stress it has the stretch.
 #[test]
 fn stretch_and_stress_belong_together() {

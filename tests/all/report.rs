@@ -160,7 +160,7 @@ fn a_run_that_fails_has_a_page_that_says_why_and_from_where_to_go_on() {
     // The same later, with another eye.
     succeed(here, &["report", "out/press", "--colour", "velocity_y"]);
     assert!(page(here).contains("left the domain at") && page(here).contains("Coloured by velocity y"));
-    // What has been said of the end holds no longer than that.
+    // The record of the end lasts no longer than that.
     let output =
         agimp(here, &["run", "press.toml", "--set", "output.report=true", "--end", "0.005", "--quiet"]);
     assert!(output.status.success(), "{}", told(&output));

@@ -158,7 +158,7 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// What a job did.
+/// Figures of a job.
 #[derive(Debug, Default)]
 struct Course {
     /// Most energy above that of the start and the work of the plate, J.

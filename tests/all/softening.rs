@@ -8,7 +8,7 @@ use crate::common::launch;
 use crate::common::launch::{run, succeed};
 use band::Band;
 
-/// What a run of the study's specimen ends with.
+/// Results of a run of the study's specimen.
 struct Outcome {
     /// Greatest load on the plate and that at the end, N.
     peak: f64,

@@ -93,7 +93,7 @@ fn impulses_are_those_of_the_definition_while_particles_split_and_merge() {
             |row: usize| history.column("kinetic_energy")[row] + history.column("elastic_energy")[row];
         let gained = energy(history.column("time").len() - 1) - energy(0);
         println!("{name}: work {work}, energy gained {gained}");
-        // What APIC and merges dissipate is missing.
+        // The difference is dissipation by APIC and merges.
         assert!(gained < 1.02 * work && gained > 0.8 * work, "{name}: {work} against {gained}");
     }
 }
@@ -318,7 +318,7 @@ fn a_thick_cylinder_widens_as_lame_says() {
     assert!((force / 5000.0 - 1.0).abs() < 2e-3, "{force}");
 }
 
-/// What is wrong with a load is said with its key, and what would be right; by `check` and by `run`.
+/// The message for a wrong load names its key, the fault, and what would be right; by `check` and by `run`.
 #[test]
 fn wrong_loads_are_refused_with_their_key() {
     let cases = [

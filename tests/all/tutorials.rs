@@ -146,7 +146,7 @@ fn every_tutorial_is_followed() {
     assert!(tutorials >= 4, "{tutorials}");
 }
 
-/// What these tests take for the same, and what not.
+/// Texts that these tests take for the same, and texts that they do not.
 #[test]
 fn lines_are_compared_by_words() {
     let shows = |shown, printed| shows(&words(shown), &words(printed));

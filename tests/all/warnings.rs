@@ -1,4 +1,4 @@
-//! What `agimp check` and `agimp run` warn of, and what they refuse since the machine is too small.
+//! Warnings of `agimp check` and `agimp run`, and their refusals where the machine is too small.
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Instant;

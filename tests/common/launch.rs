@@ -227,7 +227,7 @@ pub(crate) fn contents(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), read(entry.path()))).collect()
 }
 
-/// What a run to the end leaves, but for times measured and the text of the job. Files with a state stand
+/// Results of a run to the end, but for times measured and the text of the job. Files with a state stand
 /// there with their digests, other outputs with the checksums of all their data sets but that text; of
 /// checkpoints the last counts.
 pub(crate) fn results(directory: &Path, name: &str) -> BTreeMap<String, Vec<u8>> {
@@ -259,10 +259,10 @@ fn sums(path: &Path) -> Option<Vec<u8>> {
     Some(format!("{:08x} {sums:?}", header.state_checksum()).into_bytes())
 }
 
-/// What has to be the same however a run was carried out.
+/// Results that have to be the same however a run was carried out.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Outcome {
-    /// What `agimp digest --parts` prints of the last output.
+    /// Output of `agimp digest --parts` for the last output.
     pub digest: String,
     /// The whole history.
     pub history: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What tests of papers share: their files, their fenced blocks, and a shell for the commands in them.
+//! Code that tests of papers share: their files, their fenced blocks, and a shell for the commands in them.
 //!
 //! An HTML comment before a block says what differs from its words: `<!-- test: needs: PROGRAMS -->` passes
 //! over the block where one of them is missing, `<!-- test: quick: OLD => NEW; REASON -->` replaces words,
@@ -45,7 +45,7 @@ pub(crate) struct Block {
     pub(crate) language: String,
     /// The last line before it that is not empty and no note.
     pub(crate) before: String,
-    /// What the comment before it says after `test:`.
+    /// Text of the comment before it, after `test:`.
     pub(crate) note: Option<String>,
     pub(crate) text: String,
 }

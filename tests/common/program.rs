@@ -1,4 +1,4 @@
-//! What tests of subcommands share: the program, what it says, a browser, and a body for a job.
+//! Code that tests of subcommands share: the program, its output, a browser, and a body for a job.
 use std::path::Path;
 use std::process::{Command, Output};
 

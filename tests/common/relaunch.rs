@@ -3,7 +3,7 @@
 use super::mpirun;
 use partition::comm::{Comm, World, is_launched};
 
-/// What a process prints that has found the test it was started for.
+/// Line that a process prints once it has found the test it was started for.
 const STARTED: &str = "this process runs the test";
 
 /// Runs `body` on one thread if this process is one of those that [`relaunch`] started; says whether it is.

@@ -1,4 +1,4 @@
-//! What tests of whole runs share: how a run is started, and what it leaves.
+//! Code that tests of whole runs share: how a run is started, and its results.
 
 use std::path::Path;
 

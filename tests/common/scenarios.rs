@@ -6,7 +6,7 @@ use partition::{Comm, World};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-/// What each rank runs.
+/// Function that each rank runs.
 pub(crate) type Scenario = fn(&Comm);
 
 /// Environment variable that names the scenario of a launched process.
@@ -65,7 +65,7 @@ pub(crate) fn fails(scenario: &str, ranks: usize, explanation: &str) {
     let output = launch(scenario, ranks);
     let duration = start.elapsed();
     let stderr = String::from_utf8_lossy(&output.stderr);
-    // What the harness prints may stand on the same line: some launchers make one stream of both.
+    // Output of the harness may be on the same line: some launchers make one stream of both.
     let lines: Vec<&str> = stderr.lines().filter_map(|line| Some(&line[line.find("agimp: ")?..])).collect();
     assert!(!output.status.success(), "{scenario} must fail");
     assert_eq!(lines.len(), 1, "one message in:\n{stderr}");

@@ -1,5 +1,5 @@
-//! What a crash of the machine may leave: tables without their last rows, with garbage or empty, and damaged
-//! states. A run goes on from what is whole, and says what it has passed over.
+//! Remains of a crash of the machine: tables without their last rows, with garbage or empty, and damaged
+//! states. A run continues from the files that are whole, and names those that it has passed over.
 use std::path::Path;
 
 use agimp::text::quantity;
@@ -31,7 +31,7 @@ fn rows(history: &[u8]) -> Vec<String> {
     String::from_utf8_lossy(history).lines().map(str::to_owned).collect()
 }
 
-/// What is left of the history, how many of its lines (header and rows) are whole, and the warning.
+/// Rest of the history, the number of its whole lines (header and rows), and the warning.
 type Case<'a> = (&'a str, Option<&'a [u8]>, usize, Option<String>);
 
 #[test]
@@ -172,8 +172,8 @@ fn flipped(directory: &Path, whole: &[u8], group: &str) -> Vec<u8> {
     panic!("no changed bit was noticed")
 }
 
-/// What a killed run leaves at its very end: `--restart latest` gives the report of an uninterrupted run,
-/// nothing that was half written stays, and a good report stays good. Where the history is lost as well, the
+/// A killed run may leave its very end undone. `--restart latest` gives the report of an uninterrupted run,
+/// no file that was half written stays, and a good report stays good. Where the history is lost as well, the
 /// report has the state.
 #[test]
 fn a_run_that_is_over_has_its_report_again() {

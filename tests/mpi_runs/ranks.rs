@@ -1,4 +1,4 @@
-//! What single ranks hold and send when there are many, and how evenly they share the work.
+//! Sizes and traffic of single ranks when there are many, and the evenness of their work.
 use std::path::Path;
 
 use serde_json::Value;

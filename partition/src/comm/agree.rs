@@ -5,7 +5,7 @@ use std::fmt::Display;
 use super::Comm;
 use super::environment::host;
 
-/// What every rank gets from [`Comm::agree`] if some rank has failed.
+/// Error that every rank gets from [`Comm::agree`] if some rank has failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("rank {rank}{}: {message}", .host.as_ref().map_or(String::new(), |host| format!(" on host {host}")))]
 pub struct Disagreement {

@@ -1,8 +1,7 @@
-//! Settings of the MPI library in environment variables, made before it starts, and what its launcher sets
-//! for ranks.
+//! Environment variables: settings of the MPI library, made before it starts, and those that launchers give
+//! to ranks.
 //!
-//! What must be known before `mpirun` itself starts (running as root, more ranks than cores) stands in
-//! `jobs/environment`.
+//! Settings that `mpirun` itself needs (running as root, more ranks than cores) are in `jobs/environment`.
 
 /// Not collective. Whether a launcher has started this process as one of its ranks: `mpirun` of Open MPI or
 /// MPICH, or `srun` through PMI or PMIx. A process that none has started is alone.

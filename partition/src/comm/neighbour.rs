@@ -9,7 +9,7 @@ use mpi::traits::Communicator;
 use super::request::{Incoming, Mode, Outgoing, Patience};
 use super::{Comm, tag};
 
-/// What an exchange has sent since it was created.
+/// Messages and bytes that an exchange has sent since its creation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Messages sent.

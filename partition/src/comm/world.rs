@@ -97,7 +97,7 @@ pub struct Comm {
     size: usize,
 }
 
-/// What clones of a [`Comm`] share. Fields drop in this order: the communicators before MPI.
+/// State that clones of a [`Comm`] share. Fields drop in this order: the communicators before MPI.
 struct Shared {
     communicator: SimpleCommunicator,
     /// Of the ranks that share the memory of this machine.

@@ -20,7 +20,7 @@ pub struct Arguments {
     verify: bool,
 }
 
-/// What the file holds.
+/// Contents of an output file.
 struct Contents {
     header: Header,
     size: u64,

@@ -47,7 +47,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         settings.collect = has_ending(&out, "svg");
         if let Some(look) = &look {
             settings.share(look);
-            // What a clip leaves of one of them may be nothing.
+            // A clip common to all files may remove all particles of one of them.
             settings.may_be_empty = true;
         }
         draw_file(file, &looks.colour, &settings, &scene, &out).map_err(failed)?;

@@ -109,7 +109,7 @@ enum MaterialError {
         path: PathBuf,
         /// Row, counted from 1 without header and comments.
         row: usize,
-        /// What is wrong with it.
+        /// The fault in it.
         reason: String,
     },
     /// A stress of a row cannot be had.
@@ -174,7 +174,7 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
         Drive::Deformation(rows) => deform(material.as_ref(), &rows, args, &place, &mut table),
         Drive::Control(rows) => control(material.as_ref(), &rows, args, &place, &mut table),
     };
-    // What came before the error is shown as well.
+    // Rows before the error are printed as well.
     table.write(out)?;
     driven?;
     match &args.plot {

@@ -7,7 +7,7 @@ use super::{MaterialError, read};
 use crate::material::driver::Matrix;
 use crate::material::driver::control::{COMPONENTS, Prescribed, Target};
 
-/// What a file prescribes.
+/// Loading path from a file.
 #[derive(Debug)]
 pub(super) enum Drive {
     /// Total deformations.
@@ -21,7 +21,7 @@ pub(super) enum Drive {
 pub(super) struct Row {
     /// Time since the start, s.
     pub time: f64,
-    /// What holds then.
+    /// Strain or stress, by component, at that time.
     pub target: Target,
 }
 

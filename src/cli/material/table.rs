@@ -15,7 +15,7 @@ pub(super) struct Stage<'a> {
     pub point: &'a Point<'a>,
 }
 
-/// What a picture shows of a state.
+/// Invariants of a state for charts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Invariants {
     /// Strain of volume `tr ε` and of shear `√(2/3) |dev ε|`.

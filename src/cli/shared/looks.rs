@@ -129,7 +129,7 @@ impl Looks {
         job.ok()
     }
 
-    /// What is drawn beside the fields of the particles of outputs of one run, such as this one.
+    /// Colliders and widths of boxes for pictures of the outputs of one run, of which this is one.
     pub(in crate::cli) fn scene(&self, output: &Path) -> impl Fn(&Header) -> Scene + use<> {
         let (job, is_bare) = (self.job(output), self.bare);
         move |header| {

@@ -1,4 +1,4 @@
-//! What several subcommands need.
+//! Code that several subcommands share.
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -15,11 +15,11 @@ const NAME: usize = 60;
 /// Bodies that are listed.
 const MOST_BODIES: usize = 100;
 
-/// What is known of the first state of a job.
+/// Known properties of the first state of a job.
 pub(in crate::cli) struct Start<'a> {
     /// Whether the counts are of the tree that the job's criteria make.
     pub is_refined: bool,
-    /// What particles carry of each load that they carry; empty if that is not known.
+    /// Totals of the surface and forces that particles carry, by load; empty if unknown.
     pub carried: &'a [CarriedTotals],
 }
 
@@ -175,7 +175,7 @@ fn plural(ranks: u32) -> String {
     if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
 }
 
-/// What particles carry of a load, with its force at a time, s.
+/// Particles, surface and force of a load that particles carry, in words; the force is that at `time`, s.
 fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String {
     let area = match (totals.area, D) {
         (Some(area), 2) => format!(", {} of surface", quantity(area, "m")),
@@ -187,7 +187,6 @@ fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String
     format!("on {particles} particles{area}, force ({force}) at {}", quantity(time, "s"))
 }
 
-/// What a load does, and where and when.
 /// The stages in which something acts, in words, if it names them.
 fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String {
     stages.0.as_ref().map_or_else(String::new, |stages| {

@@ -61,10 +61,10 @@ pub struct Arguments {
 struct Run {
     /// Values in the order of the keys.
     values: Vec<String>,
-    /// What is given to `--set`.
+    /// Arguments of `--set`.
     settings: Vec<String>,
     directory: PathBuf,
-    /// What its results must say: digest of the job and end of the run, s.
+    /// Expected in its results: digest of the job and end of the run, s.
     digest: u64,
     end: f64,
 }

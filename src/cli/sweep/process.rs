@@ -1,4 +1,4 @@
-//! What the directory of a run holds, and the process of the run.
+//! Directory and process of one run of a sweep.
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -25,7 +25,7 @@ pub(super) enum Ended {
     Failed(&'static str),
 }
 
-/// What the directory of a run that is not finished holds.
+/// Contents of the directory of an unfinished run.
 #[derive(Debug, PartialEq, Eq)]
 enum Held {
     /// Nothing that could be lost, or something of which `agimp run` says what it is.
@@ -36,7 +36,7 @@ enum Held {
     OtherJob(PathBuf),
 }
 
-/// What the directory of a run of the job `name` holds.
+/// Contents of the directory of a run of the job `name`.
 fn held(run: &Run, name: &str) -> Result<Held, FileError> {
     if !run.directory.is_dir() {
         return Ok(Held::Nothing);

@@ -56,7 +56,7 @@ struct Surface {
     inside: Inside,
 }
 
-/// What says on which side of the surface a point is.
+/// Test by which a point is inside the surface or not.
 enum Inside {
     /// The normals of a closed surface.
     Normals,
@@ -66,7 +66,7 @@ enum Inside {
     Nothing,
 }
 
-/// What triangles are taken for.
+/// Interpretation of a set of triangles.
 #[derive(Clone, Copy, PartialEq)]
 enum Filling {
     /// The solid that they close.

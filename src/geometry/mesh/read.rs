@@ -38,9 +38,9 @@ pub enum ReadError {
     /// It is damaged.
     #[error("it is not a valid {kind} file: {reason}")]
     Damaged {
-        /// What it should be.
+        /// The expected format.
         kind: &'static str,
-        /// What the reader says.
+        /// The message of the reader.
         reason: String,
     },
 }

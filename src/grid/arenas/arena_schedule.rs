@@ -12,7 +12,7 @@ use crate::kernel::{Row, arena_nodes};
 /// threads rarely wait for the last ones.
 const BYTES_PER_THREAD: usize = 64 * size_of::<Row>() * arena_nodes(3);
 
-/// What bins and blocks have to do with other ranks.
+/// Bins and blocks whose arenas or sums other ranks need.
 #[derive(Clone, Debug, Default)]
 pub struct Seam {
     /// Bins that other ranks need.

@@ -147,8 +147,8 @@ fn slot<const D: usize>(parts: &[&Part; D], number: usize, i: usize) -> Slot {
     Slot { position: offset_index::<D>(towards) as u8, start: start as u16 }
 }
 
-/// What the order of bins around a block depends on: whether its coordinates are odd, and, for each two axes,
-/// along which of them the bins on the even side of the block and beyond are parted first.
+/// Number of the order of bins around a block. Its bits: whether each coordinate is odd, and, for each two
+/// axes, along which of them the bins on the even side of the block and beyond are parted first.
 fn order_number<const D: usize>(coord: [u32; D]) -> usize {
     let mut number = 0;
     // A block and its neighbour within the same parent differ in the lowest bit only, those across the

@@ -11,7 +11,7 @@ use crate::kernel::{Row, arena_nodes};
 /// First moments in the arena of a bin: block by block around the bin, node by node in the order of bits.
 #[derive(Clone, Debug)]
 pub struct ArenaConstraints<const D: usize> {
-    /// What the kernels need of them.
+    /// Tables for the kernels.
     pub nodes: ConstrainedNodes,
     /// Per offset number of a block, its nodes with moments in the arena, and the first row of these.
     parts: Vec<(u64, u16)>,

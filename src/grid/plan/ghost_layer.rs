@@ -7,7 +7,7 @@ use crate::csr::starts;
 use crate::grid::mask::{offset, offset_count, shifted};
 use crate::kernel::BLOCK;
 
-/// What covers an octant, as far as this rank knows.
+/// Leaves that cover an octant, as far as this rank knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cover {
     /// The octant lies outside the domain.
@@ -42,7 +42,7 @@ pub struct KnownTree<const D: usize> {
     beside_finer: Vec<FxHashSet<[u32; D]>>,
 }
 
-/// What the ghost layer has to allow for, the same on every rank.
+/// Requirements on the ghost layer, the same on every rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Allowance {
     /// Half width of the widest boxes in cells of the leaf that holds them, rounded up, if any is wider
@@ -275,7 +275,7 @@ impl<const D: usize> KnownTree<D> {
         (key - self.keys[candidate] < self.leaves[candidate].volume()).then_some(candidate)
     }
 
-    /// What covers the octant of `level` at `coord`.
+    /// Leaves that cover the octant of `level` at `coord`.
     pub fn cover(&self, level: u8, coord: [u32; D]) -> Cover {
         if !self.contains(level, coord) {
             return Cover::Outside;

@@ -249,7 +249,7 @@ impl<const D: usize> Builder<'_, D> {
         mask & nodes_in_domain(self.tree, level, coord)
     }
 
-    /// What must be known and is not.
+    /// Regions whose leaves this rank needs and does not know.
     fn missing(&self) -> Vec<Region<D>> {
         if self.tree.is_whole() {
             return Vec::new();

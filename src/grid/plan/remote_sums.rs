@@ -14,7 +14,7 @@ use crate::grid::mask::{box_offsets, offset, offset_count, shifted};
 use crate::grid::order::each_subtree;
 use crate::grid::order::region::Regions;
 
-/// What another rank's bins in a subtree contribute to nodes of a block.
+/// Sum of another rank's bins in a subtree, at nodes of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
     /// The other rank.
@@ -32,7 +32,7 @@ pub struct Piece {
     pub last: u64,
 }
 
-/// What a piece adds to a region.
+/// Contribution of a piece to a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
     /// The region.

@@ -26,7 +26,7 @@ pub(super) struct Sources<'a, const D: usize> {
     pub received: Option<&'a ReceivedSums<D>>,
 }
 
-/// What reaches one block in this step.
+/// Sources of the sum of one block in this step.
 pub(super) struct BlockSum<'a, const D: usize> {
     pub(in crate::grid) plan: &'a GridPlan<D>,
     pub(in crate::grid) arenas: &'a Arenas<D>,

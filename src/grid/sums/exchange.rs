@@ -64,7 +64,7 @@ struct Place {
     first_moment: usize,
 }
 
-/// What a message says of each piece in two bits.
+/// Nodes of a piece that a message has values of; two bits.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Extent {
     /// No particle touches it.
@@ -117,7 +117,7 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.neighbours()
     }
 
-    /// What own bins and blocks have to do with other ranks.
+    /// Own bins and blocks whose arenas or sums other ranks need.
     pub fn seam(&self, plan: &GridPlan<D>) -> Seam {
         // Of these blocks neighbours need sums of all own bins that reach some nodes.
         let mut is_asked = vec![false; plan.blocks.len()];
@@ -152,7 +152,7 @@ impl<const D: usize> ArenaExchange<D> {
         self.exchange.traffic()
     }
 
-    /// What each neighbour needs of the own bins.
+    /// The pieces of own bins that each neighbour needs.
     pub(super) fn sent(&self) -> &[Vec<SentPiece>] {
         &self.sent
     }
@@ -202,7 +202,7 @@ impl<const D: usize> ArenaExchange<D> {
 }
 
 impl SentPiece {
-    /// What reaches the block of the piece from the bins that it asks for.
+    /// Sources of the sum of the piece: its block, and the bins that it asks for.
     pub(super) fn find<'a, const D: usize>(
         &self,
         own: Sources<'a, D>,
@@ -346,7 +346,7 @@ impl<const D: usize> ReceivedSums<D> {
     }
 }
 
-/// What is left of the numbers of a message.
+/// Rest of the numbers of a message.
 struct Values<'a>(&'a [u8]);
 
 impl Values<'_> {

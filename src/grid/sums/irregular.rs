@@ -23,7 +23,7 @@ pub(super) struct Other {
     pub origin: Origin,
 }
 
-/// What takes the place of an arena in the pattern of a region.
+/// A sum that takes the place of an arena in the pattern of a region.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     /// The place.
@@ -31,12 +31,12 @@ pub(super) struct Placed {
     pub origin: Origin,
 }
 
-/// What else than whole arenas reaches a block; memory that a thread reuses from block to block.
+/// Sources of the sum of a block beside whole arenas. A thread reuses the memory from block to block.
 #[derive(Debug)]
 pub(super) struct Irregular<const D: usize> {
     /// Bins outside their leaves.
     pub outer: Vec<Other>,
-    /// What takes the place of arenas in the present region.
+    /// Sums that take the place of arenas in the present region.
     pub placed: Vec<Placed>,
     /// Rows of other ranks in the present region, by place, at the distances that they have in an arena.
     pub pieces: Vec<Row>,
@@ -182,7 +182,7 @@ impl<const D: usize> BlockSum<'_, D> {
         self.scratch.terms = terms;
     }
 
-    /// What a term adds to the nodes of a region, in the order of their bits.
+    /// Contribution of a term to the nodes of a region, in the order of their bits.
     #[inline(always)]
     fn rows_of(&self, term: &Term, nodes: u64) -> [Row; MOST_BINS] {
         let mut rows = [ZERO; MOST_BINS];

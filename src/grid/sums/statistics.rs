@@ -1,4 +1,4 @@
-//! What a rank holds of the tree and sends of its grid, and what of that other ranks need at least.
+//! Sizes of tree and grid on a rank, bytes that it sends, and the least that other ranks need of these.
 use rustc_hash::FxHashMap;
 
 use super::block_sum::Sources;
@@ -24,7 +24,7 @@ pub struct Statistics {
     pub grid_bytes: u64,
 }
 
-/// What one receiver needs of a block: nodes, and their first moments.
+/// Nodes of a block that one receiver needs, and those whose first moments it needs.
 #[derive(Clone, Copy)]
 struct Needed {
     rows: u64,

@@ -8,7 +8,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::content::fields::{COMPONENTS, Values};
 use crate::io::whole_file::{system, write_in_pieces};
 
-/// What a file is written as.
+/// Format of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Stanford PLY, binary, single precision: points with their radii, for renderers.

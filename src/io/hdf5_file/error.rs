@@ -13,7 +13,7 @@ pub enum FileError {
     Hdf5 {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The refused operation.
         action: &'static str,
         /// The data set, group or attribute.
         object: String,
@@ -39,7 +39,7 @@ pub enum FileError {
     System {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The refused operation.
         action: &'static str,
         /// The system's own words.
         source: std::io::Error,
@@ -49,7 +49,7 @@ pub enum FileError {
     Refused {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault in its contents.
         reason: String,
     },
     /// One or more ranks failed; all ranks hold the message of the lowest of them.

@@ -89,7 +89,7 @@ fn library() -> impl Drop {
     turn
 }
 
-/// What the library has last complained about.
+/// Last error of the library.
 struct Complaint {
     /// Its own words, innermost first.
     words: String,

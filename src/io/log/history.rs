@@ -117,7 +117,7 @@ impl History {
     }
 }
 
-/// What has been seen of a file that a run goes on with.
+/// Findings in the file of a run that continues.
 #[derive(Default)]
 struct Seen {
     has_header: bool,

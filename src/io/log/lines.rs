@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::{create_new, system};
 
-/// What becomes of a line of a file that a run goes on with.
+/// Fate of a line in the file of a run that continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
     /// It stays.

@@ -1,4 +1,4 @@
-//! What a run says as it goes: text files that grow line by line, and the terminal.
+//! Output of a running job: text files that grow line by line, and the terminal.
 //!
 //! | file | what it has |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! What a user sees while the run goes on: a row of figures on a terminal, a line now and then elsewhere.
+//! Progress of a run for its user: a row of figures on a terminal, a line now and then elsewhere.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -24,7 +24,7 @@ enum Display {
     Lines(Box<dyn Write>),
 }
 
-/// What changes with the telemetry.
+/// Figures that change with each record of telemetry.
 #[derive(Clone, Debug, Default)]
 struct Known {
     particles: u64,
@@ -217,7 +217,7 @@ fn console_columns() -> usize {
 /// Name, width, figure, and how much it matters: the greater the number, the earlier it goes.
 type Figure = (&'static str, usize, String, i32);
 
-/// What a terminal shows of the present state.
+/// Row of figures of the present state, on a terminal.
 struct Row<'a> {
     /// Share of the run.
     done: f64,

@@ -64,7 +64,7 @@ pub struct LevelCount {
     pub particles: u64,
 }
 
-/// What single ranks hold and send.
+/// Sizes and traffic of single ranks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PerRank {
     /// Own leaves.
@@ -87,7 +87,7 @@ pub struct PerRank {
     pub grid_bytes: Spread,
 }
 
-/// What dynamic refinement has done since the start of the run, changes of the tree since that of the
+/// Totals of dynamic refinement: particles since the start of the run, changes of the tree since that of the
 /// process.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Resampled {
@@ -139,7 +139,7 @@ pub struct Record {
     /// New partitions since the start of this process.
     #[serde(default)]
     pub partitions: u64,
-    /// What single ranks hold and send.
+    /// Sizes and traffic of single ranks.
     pub per_rank: PerRank,
     /// Resident memory per rank, bytes.
     pub memory: Spread,
@@ -170,13 +170,13 @@ pub struct Contribution<'a, const D: usize> {
     pub wall_seconds: f64,
     /// Names and wall seconds of the phases since the last record; the same names on all ranks.
     pub phases: &'a [(&'static str, f64)],
-    /// What this rank has sent since the last record.
+    /// Messages and bytes that this rank has sent since the last record.
     pub traffic: Traffic,
     /// Leaves of this rank.
     pub leaves: &'a [Octant<D>],
     /// Their particles.
     pub chunks: &'a [Chunk<D>],
-    /// What this rank holds and sends.
+    /// Sizes and traffic of this rank.
     pub statistics: Statistics,
     /// Largest cost of a rank over the mean cost (the same on all ranks).
     pub imbalance: f64,
@@ -298,7 +298,7 @@ impl Telemetry {
     /// Not collective. Goes on with the file of a run that goes on from `step`: its records stay; those of
     /// later steps and what is damaged go. Starts a new file if there is none.
     pub fn resume(path: &Path, step: u64) -> Result<Self, FileError> {
-        /// What is looked at of a record.
+        /// The part of a record that decides whether it stays.
         #[derive(Deserialize)]
         struct Step {
             step: u64,

@@ -12,7 +12,7 @@ use crate::particle::volume::symmetric;
 /// Cells of a leaf along an axis.
 const CELLS: f64 = 4.0;
 
-/// What half widths follow from, beside the state of the particles.
+/// Data from which half widths follow, beside the state of the particles.
 #[derive(Clone, Debug)]
 pub struct Boxes {
     /// How boxes follow the deformation.

@@ -30,7 +30,7 @@ impl Bounds {
         }
     }
 
-    /// What lies in both; empty where `low` is above `high`.
+    /// Intersection of both; empty where `low` is above `high`.
     pub(super) fn cut(&self, other: &Self) -> Self {
         Self {
             low: std::array::from_fn(|axis| self.low[axis].max(other.low[axis])),

@@ -124,7 +124,7 @@ pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     })
 }
 
-/// What is not data.
+/// Colours of all but the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Paper {
     pub paper: Rgb,

@@ -51,7 +51,7 @@ pub use solids::{Distance, Solid};
 use source::derived::{Source, is_class, magnitude};
 use tree::leaves;
 
-/// What a picture shows of a run beside the fields of its particles.
+/// Surroundings of the particles in a picture.
 #[derive(Debug, Default)]
 pub struct Scene {
     /// Rigid bodies.
@@ -63,7 +63,7 @@ pub struct Scene {
 /// The scene at the time of a file.
 pub type SceneOf<'a> = dyn Fn(&Header) -> Scene + 'a;
 
-/// What the colours of a picture mean.
+/// Meaning of the colours of a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Tint {
     /// Name of the quantity.
@@ -97,7 +97,7 @@ impl Tint {
 const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
 /// Most lines of a title.
 const TITLE_LINES: usize = 3;
-/// What balls are larger than the boxes of their particles, so that no gaps are seen between them.
+/// Radius of balls over the half width of the particles' boxes, so that no gaps are seen between them.
 const LARGER: f64 = 1.2;
 
 /// The particles of one rank and what all ranks know.
@@ -241,7 +241,7 @@ pub fn survey(
     Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]], longest: 0.0 }))
 }
 
-/// What a file shows of a quantity, and its time, s.
+/// Drawing of a quantity of a file, and its time, s.
 fn drawing(
     from: &Path,
     name: &str,
@@ -325,8 +325,8 @@ impl Drawing {
         if low.iter().chain(&high).all(|x| x.is_finite()) { Bounds { low, high } } else { self.domain }
     }
 
-    /// What the picture shows: the particles with some room, rigid bodies that are not much larger, and the
-    /// floor if it is not far below.
+    /// Default frame: the particles with some room, rigid bodies that are not much larger, and the floor if
+    /// it is not far below.
     fn frame(&self, comm: Option<&Comm>) -> Bounds {
         let mut frame = self.bounds(comm);
         let extent = frame.extent();
@@ -459,7 +459,7 @@ impl Drawing {
         let is_near = settings.zoom != 1.0 || settings.focus.is_some();
         let frame = if self.flat && is_near { plot.visible(&camera, &frame) } else { frame };
         if is_near {
-            // What does not fit makes room for axes and legend.
+            // Particles beyond the frame give way to axes and legend.
             plot.clear_around(&mut canvas, &camera, self.flat.then_some(&frame), paper.paper);
         }
         self.arrow_of_scale(&mut canvas, settings);

@@ -20,7 +20,7 @@ pub(super) struct Plot {
 }
 
 impl Plot {
-    /// What is seen of the frame of a plane picture.
+    /// Visible part of the frame of a plane picture.
     pub(super) fn visible(&self, camera: &Camera, frame: &Bounds) -> Bounds {
         let low = camera.point(self.columns[0], self.rows[1], 0.0);
         let high = camera.point(self.columns[1], self.rows[0], 0.0);

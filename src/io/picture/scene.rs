@@ -23,7 +23,7 @@ impl Splat {
     }
 }
 
-/// What a pixel shows.
+/// Foremost object in a pixel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Seen {
     Nothing,
@@ -201,7 +201,7 @@ impl Raster {
     }
 }
 
-/// What is seen, with depths in pixels.
+/// Foremost objects by pixel, with depths in pixels.
 struct Surface {
     width: usize,
     height: usize,
@@ -281,7 +281,7 @@ impl Surface {
                 if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
                     let near = y as usize * self.width + x as usize;
                     if matches!(self.seen[near], Seen::Particle(_) | Seen::Solid) {
-                        // What is far before it is another thing, whose edge throws no shade.
+                        // A neighbour far in front is another object, whose edge casts no shade.
                         let step = self.depth[near] - self.depth[at];
                         let rise = step / reach as f64 - if reach > 8 { 1.0 } else { 2.5 };
                         hidden += rise.clamp(0.0, 4.0) * (1.0 - (step - 50.0) / 50.0).clamp(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! What can be chosen of a picture.
+//! Options of a picture.
 use super::Direction;
 use super::camera::numbers;
 use super::colour::{DARK, LIGHT, Map, Paper};
@@ -26,7 +26,7 @@ pub struct Settings {
     pub map: Map,
     /// Whether the paper is dark.
     pub dark: bool,
-    /// What is left out.
+    /// Part of space that is left out.
     pub clip: Option<Clip>,
     /// Axes whose lower face of the domain is a plane of symmetry, at which all is mirrored.
     pub mirror: [bool; 3],
@@ -83,13 +83,13 @@ impl Clip {
 /// A place in space, from two or three numbers separated by commas.
 ///
 /// # Errors
-/// What was expected.
+/// The text is no position; the message names the expected form.
 pub fn place(text: &str) -> Result<[f64; 3], String> {
     let two = || numbers::<2>(text).map(|[x, y]| [x, y, 0.0]);
     numbers::<3>(text).or_else(two).ok_or_else(|| "expected a position in m, such as 0.5,0,0.2".into())
 }
 
-/// What a series of pictures shares.
+/// Options that the pictures of a series share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Values of the first and the last colour.

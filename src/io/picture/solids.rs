@@ -24,7 +24,7 @@ impl std::fmt::Debug for Solid {
 }
 
 impl Solid {
-    /// What lies above a plane across an axis, and its mirror image.
+    /// The part above a plane across an axis, with its mirror image.
     pub(super) fn mirrored(self, axis: usize, plane: f64) -> Self {
         let Self { distance: own, mut triangles, bounds: [mut low, mut high] } = self;
         let images: Vec<_> = triangles
@@ -48,7 +48,7 @@ impl Solid {
     }
 }
 
-/// What the solids show in each pixel.
+/// Depth and brightness of the solids by pixel.
 pub(super) struct Layer {
     /// Depth of the surface, m; minus infinity where there is none.
     pub depth: Vec<f64>,

@@ -13,7 +13,7 @@ use super::intact::sane::{self, Limits};
 use crate::checksum::fnv1a;
 use crate::io::hdf5_file::{Element, FileError, Reader};
 
-/// What identifies the state in a file, whatever the ranks that wrote it.
+/// Digest of the state in a file, independent of the ranks that wrote it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Digest {
     /// One number for all of it.
@@ -250,7 +250,7 @@ fn diff_in<const D: usize>(files: &[Reader; 2], headers: &[Header; 2]) -> Result
     Ok(found)
 }
 
-/// What particles carry, in so many columns; zeros if the file has other columns.
+/// Surface and forces that particles carry, in so many columns; zeros if the file has other columns.
 fn carried_of(file: &Reader, header: &Header, columns: usize) -> Result<Vec<f64>, FileError> {
     let rows = header.particles;
     match carried_columns(file, header)? == columns {

@@ -42,15 +42,15 @@ pub fn listed(series: &Path) -> Option<Vec<Entry>> {
     })
 }
 
-/// What stands before the ending of a file of a run.
+/// Name of a file of a run, without its ending.
 fn stem(name: &str) -> Option<&str> {
     KNOWN_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending))
 }
 
-/// What stands between the name and number of an output and the ending of its tree.
+/// Part of a name between the number of an output and the ending of its tree.
 const TREE: &str = ".tree";
 
-/// What stands between the name of a run and the step of a checkpoint.
+/// Part of a name between the run and the step of a checkpoint.
 const CHECKPOINT: &str = ".checkpoint_";
 
 /// Path of the checkpoint of a step.
@@ -98,7 +98,7 @@ pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Resu
     Ok(found)
 }
 
-/// What a run that starts anew would destroy.
+/// Results that a run would destroy if it started anew.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AtStake {
     /// Checkpoints, the latest of which is this one.
@@ -157,7 +157,7 @@ pub fn remove_unfinished(directory: &Path, name: &str) {
     }
 }
 
-/// What files of a run have behind its name, but for outputs, trees, checkpoints and maps.
+/// Ends of file names of a run, but for outputs, trees, checkpoints and maps.
 const OTHERS: [&str; 6] =
     [".hdf.series", ".tree.hdf.series", ".report.json", ".ended.json", ".png", ".report.html"];
 
@@ -173,7 +173,7 @@ fn is_unfinished(file: &str, name: &str) -> bool {
         || rest.starts_with(".map_") && rest.ends_with(".asc")
 }
 
-/// What a file of a run is, by its name.
+/// Kind of a file of a run, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Checkpoint,

@@ -1,4 +1,4 @@
-//! What a file says about itself: who wrote it, of which job, when, and how much is in it.
+//! Header of a file: who wrote it, of which job, when, and how much is in it.
 
 use partition::{MAX_LEVEL, Octant};
 
@@ -288,7 +288,7 @@ impl Header {
         Ok(header)
     }
 
-    /// What no run can have written is refused, even if its checksum is right.
+    /// Refuses headers that no run can have written, even if the checksum is right.
     fn check(&self) -> Result<(), String> {
         let Self { dimension, origin, root_edge, roots, time, dt, step, .. } = self;
         if !(2..=3).contains(dimension) {

@@ -50,7 +50,7 @@ pub struct View<'a, const D: usize> {
     pub leaves: &'a [Octant<D>],
     /// Particles of each leaf.
     pub chunks: &'a [Chunk<D>],
-    /// What particles carry of what has happened to them.
+    /// Quantities that particles carry of their past.
     pub followed: Followed,
     /// Extra values per leaf; the same names on all ranks.
     pub leaf_fields: &'a [(String, Vec<f64>)],
@@ -86,7 +86,7 @@ pub struct View<'a, const D: usize> {
     pub scalars: &'a Scalars,
 }
 
-/// What goes into a file.
+/// Optional contents of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Fields of the particles for ParaView.

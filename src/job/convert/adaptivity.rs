@@ -11,7 +11,7 @@ use crate::job::problem::{Body, BoxPolicy, TreeSetup};
 use crate::job::schema::job_file::JobFile;
 use crate::text::written as number;
 
-/// What the conversion needs of the rest of the job.
+/// Parts of the job that the conversion of its adaptivity depends on.
 pub(super) struct Context<'a, const D: usize> {
     pub file: &'a JobFile,
     pub space: &'a Space<D>,

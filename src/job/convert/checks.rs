@@ -1,4 +1,4 @@
-//! What all conversions need: faults with their places, and the domain.
+//! State that all conversions share: faults with their places, and the domain.
 use crate::geometry::written::Vector;
 use crate::job::parse::error::{Fault, MOST, Position, QUOTED, names};
 use crate::job::parse::source::{Node, Path};
@@ -18,7 +18,7 @@ pub(in crate::job) struct Checks<'t> {
     pub files: u64,
     /// Whether shapes may be sheets: boxes that are flat along one axis, and meshes that are not closed.
     pub takes_sheets: bool,
-    /// What is wrong so far.
+    /// Faults so far.
     pub faults: Vec<Fault>,
 }
 
@@ -120,7 +120,7 @@ impl Checks<'_> {
         (numbers.len() == names.len()).then_some(Some(numbers))
     }
 
-    /// What a file that the job names holds, or a fault.
+    /// Contents of a file that the job names, or a fault.
     pub(crate) fn read<T, E: std::fmt::Display>(
         &mut self,
         file: &str,

@@ -11,8 +11,8 @@ use crate::job::schema::job_file::JobFile;
 /// Most velocity fields of a job.
 const MAX_FIELDS: usize = 250;
 
-/// What holds between two bodies: the law, the number of the contact, and whether the first body is on a
-/// later side of it.
+/// Contact of two bodies: the law, the number of the contact, and whether the first body is on a later side
+/// of it.
 type Law = (PairLaw, u16, bool);
 
 /// All contacts between bodies, or faults.

@@ -42,7 +42,7 @@ pub(in crate::job) fn faces<const D: usize>(
     Some(std::array::from_fn(|a| all[a].map(|face| face.as_ref().map(condition))))
 }
 
-/// What is beyond those faces that absorb waves.
+/// Material beyond each face that absorbs waves.
 pub(in crate::job) fn absorbing<const D: usize>(
     checks: &mut Checks,
     boundaries: &file::Boundaries,
@@ -62,7 +62,7 @@ pub(in crate::job) fn absorbing<const D: usize>(
     Some(sides)
 }
 
-/// What happens to particles that leave the domain.
+/// Treatment of particles that leave the domain.
 pub(in crate::job) fn leaving(written: file::Leaving) -> LeavingPolicy {
     match written {
         file::Leaving::Error => LeavingPolicy::Error,
@@ -172,7 +172,7 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
     }
 }
 
-/// What particles carry for the fields of the output.
+/// Quantities that particles carry for the fields of the output.
 pub(super) fn followed(output: &Output) -> Followed {
     let motion = match output.has_any(&[Field::Strain, Field::EquivalentStrain]) {
         true => Motion::Strain,

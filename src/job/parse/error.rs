@@ -1,4 +1,4 @@
-//! What can be wrong with a job file, and where.
+//! Faults in a job file, and their places.
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ impl fmt::Display for Position {
 pub struct Fault {
     /// Path of the key, such as `bodies[0].shape.radius`; empty for faults of the whole file.
     pub key: String,
-    /// What was found and what would be right.
+    /// Found and expected value, in words.
     pub message: String,
     /// Bytes of the file's text that the fault is about.
     pub span: Range<usize>,

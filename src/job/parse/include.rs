@@ -29,14 +29,14 @@ pub struct Included {
 /// The text of a job with all that it includes.
 #[derive(Debug)]
 pub(in crate::job) struct Whole {
-    /// What came out.
+    /// The text with all files included.
     pub text: String,
     sources: Vec<Arc<Included>>,
     /// Where each piece begins in `text`, its source, and where it begins there.
     pieces: Vec<(usize, usize, usize)>,
 }
 
-/// What stands between two headers, in pieces of sources.
+/// Text between two headers, in pieces of sources.
 struct Section {
     /// The header, without spaces; `None` if no other section can continue it.
     header: Option<String>,

@@ -253,7 +253,7 @@ fn element(count: usize, names: Vec<Option<String>>, key: &str) -> Result<usize,
 /// A text that settings have changed.
 #[derive(Clone, Debug)]
 pub(in crate::job) struct Edited {
-    /// What came out.
+    /// The changed text.
     pub text: String,
     edits: Vec<Edit>,
     /// Paths of the keys that are set, with the settings as typed.

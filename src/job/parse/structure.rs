@@ -82,7 +82,7 @@ impl<'s> Layers<'s> {
         }
     }
 
-    /// What the value means: the innermost description, which is that of the key.
+    /// Meaning of the value: the innermost description, which is that of the key.
     fn description(&self) -> Option<String> {
         // Line breaks of the source are no part of the sentence.
         self.keyword("description").and_then(Value::as_str).map(|text| text.replace('\n', " "))

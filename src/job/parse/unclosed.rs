@@ -5,10 +5,11 @@
 //! the file, or a key inside an array, shows that what is open should have been closed before.
 use std::ops::Range;
 
-/// What is not closed: its first byte, and a message.
+/// Opening sign that is not closed: its first byte, and a message.
 pub(super) type Unclosed = (Range<usize>, String);
 
-/// What opens ahead of a parser's error (a byte of the text) and is never closed, if that explains the error.
+/// The sign that opens ahead of a parser's error (a byte of the text) and is never closed, if that explains
+/// the error.
 pub(super) fn find(text: &str, error: usize) -> Option<Unclosed> {
     Scan { text, error, open: Vec::new(), string: 0..0 }.run()
 }
@@ -140,7 +141,7 @@ impl Scan<'_> {
     }
 }
 
-/// What stands between two signs that begin and end a text.
+/// Text between two signs.
 fn inside(text: &str, open: char, close: char) -> Option<&str> {
     text.strip_prefix(open)?.strip_suffix(close)
 }
@@ -202,7 +203,7 @@ mod tests {
         }
     }
 
-    /// What else may be wrong keeps the parser's words.
+    /// Other faults keep the parser's words.
     #[test]
     fn other_faults_are_not_taken_for_it() {
         for (text, at) in [

@@ -308,7 +308,7 @@ fn checksum<const D: usize>() -> u64 {
     hash
 }
 
-/// What the kernels' memory holds of other bins changes no bit, whatever it is.
+/// Remains of other bins in the kernels' memory change no bit.
 #[test]
 fn bits_do_not_depend_on_earlier_bins() {
     let (materials, frame) = (materials(), frame::<3>());

@@ -16,7 +16,7 @@ const REACH: f64 = 0.2;
 /// Greatest strain in which a solution is looked for.
 const FAR: f64 = 20.0;
 
-/// What is prescribed of a component.
+/// Prescribed value of a component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Prescribed {
     /// Logarithmic strain since the start.
@@ -25,8 +25,8 @@ pub enum Prescribed {
     Stress(f64),
 }
 
-/// What holds at the end of a step: the deformation gradient is `(I + γ e_x ⊗ e_y) exp(E)`, where γ and some
-/// components of E are prescribed, and the Cauchy stress has the other components.
+/// Prescribed state at the end of a step. The deformation gradient is `(I + γ e_x ⊗ e_y) exp(E)`, where γ and
+/// some components of E are prescribed; the other components are those of the Cauchy stress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Simple shear γ along x over y.

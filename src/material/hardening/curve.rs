@@ -12,7 +12,7 @@ pub(crate) struct Curve {
     kind: Kind,
     /// Edge of the cells for which strains of softening hold, m.
     length: Option<f64>,
-    /// What strengths of the law are multiplied with.
+    /// Factor of the strengths of the law.
     factor: f64,
 }
 
@@ -62,7 +62,7 @@ struct JohnsonCook {
     heat: f64,
 }
 
-/// What strength depends on besides the plastic strain: the increment in which it comes, and the temperature.
+/// Arguments of the strength besides the plastic strain: its increment, and the temperature.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flow<V> {
     /// Increment of the plastic strain in this step.

@@ -88,7 +88,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// What there is beside dry friction.
+/// Properties beyond dry friction.
 #[derive(Clone, Debug)]
 struct Cohesive {
     /// Bulk modulus, Pa.
@@ -252,7 +252,7 @@ impl Law for Dry {
             kept = apart.select(zero, flows.select(one - excess / norm, one));
             let slip = apart.select(norm, flows.select(excess, zero));
             state.history[PLASTIC_STRAIN] = shear + slip;
-            // What the elastic part gives up; nothing is booked any more once the material is closed.
+            // Volume that the elastic part gives up; none is left once the material is closed.
             let opened = gain + trial.trace;
             let closed = if self.correction == 0.0 { gain } else { zero };
             state.history[PLASTIC_VOLUME] = apart.select(opened, changed.select(closed, gain));
@@ -318,8 +318,7 @@ impl<V: Vector> Cone<'_, V> {
     }
 }
 
-/// What is left of a load after an increment of the norm of the plastic shear strain, beyond the strength
-/// then, Pa.
+/// Excess of a load over the strength after an increment of the norm of the plastic shear strain, Pa.
 struct Excess<'a, V> {
     cone: &'a Cone<'a, V>,
     load: V,
@@ -340,7 +339,7 @@ impl<V: Vector> Function<V, [V; 2]> for Excess<'_, V> {
 }
 
 impl Cohesive {
-    /// What the parameters ask for beside dry friction, if anything.
+    /// The properties beyond dry friction; `None` for dry friction alone.
     fn new(p: &Parameters, lame: Lame, density: f64) -> Option<Self> {
         let cohesion = Curve::new(&p.hardening, p.cohesion, density);
         let overstress = Overstress::new(p.viscosity, p.rate_exponent);

@@ -114,7 +114,7 @@ macro_rules! materials {
     };
 }
 
-/// What [`for_each_law`] calls.
+/// Callback of [`for_each_law`].
 #[cfg(test)]
 pub(super) trait Visitor {
     /// An example and its law.

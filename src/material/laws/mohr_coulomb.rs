@@ -91,7 +91,7 @@ pub struct MohrCoulomb(pub(super) Properties);
 #[derive(Clone, Debug)]
 struct Only<const HARDENS: bool>(MohrCoulomb);
 
-/// What the parameters say.
+/// Properties that follow from the parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Properties {
     solid: Hencky,

@@ -71,7 +71,7 @@ pub(super) struct Overstress {
 }
 
 impl Overstress {
-    /// What there is, if anything: η, Pa s^h, and h.
+    /// With η, Pa s^h, and h; `None` without viscosity.
     pub(super) fn new(viscosity: f64, exponent: f64) -> Option<Self> {
         (viscosity > 0.0).then_some(Self { viscosity, exponent })
     }
@@ -178,7 +178,7 @@ impl Law for VonMises {
     }
 }
 
-/// What is left of a trial stress after an increment of the plastic strain, beyond the strength then, Pa.
+/// Excess of a trial stress over the strength after an increment of the plastic strain, Pa.
 struct Excess<'a, V> {
     law: &'a VonMises,
     step: &'a Step,

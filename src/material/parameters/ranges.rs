@@ -9,7 +9,7 @@ use super::{OutOfRange, Parameters};
 pub(crate) fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
     // Made once: a job may have thousands of materials.
     static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Parameters).to_value());
-    // What is not finite has no form in JSON, and comes as null.
+    // JSON has no form for numbers that are not finite; they come as null.
     let value = serde_json::to_value(parameters).unwrap_or_default();
     Ranges { root: &SCHEMA }.look(&SCHEMA, &value, "")
 }

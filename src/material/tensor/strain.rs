@@ -291,7 +291,7 @@ mod tests {
         }
     }
 
-    /// What is no deformation must not pass for one near the unit tensor.
+    /// A tensor that is no deformation must not pass for one near the unit tensor.
     #[test]
     fn indefinite_tensors_are_decomposed() {
         let zero = Lanes::splat(0.0);

@@ -1,4 +1,5 @@
-//! What some particles carry for loads: the area of the surface that they stand for, or a share of a force.
+//! Columns that some particles carry for loads: the area of the surface that they stand for, or a share of a
+//! force.
 //!
 //! Only particles at the surface of a body do, so only leaves with such particles have columns for it. A
 //! chunk without columns is the same as one with zeros.
@@ -12,12 +13,12 @@ impl<const D: usize> Chunk<D> {
         self.carried
     }
 
-    /// What particles carry in a column; empty if the chunk does not have it, and so zero.
+    /// Values of the particles in a column; empty if the chunk does not have it, and so zero.
     pub fn carried(&self, column: usize) -> &[f64] {
         if column < self.carried { cast_slice(self.words(Self::CARRIED + column)) } else { &[] }
     }
 
-    /// What particles carry in a column, mutable; empty if the chunk does not have it.
+    /// Values of the particles in a column, mutable; empty if the chunk does not have it.
     pub fn carried_mut(&mut self, column: usize) -> &mut [f64] {
         self.revision = None;
         if column < self.carried { cast_slice_mut(self.words_mut(Self::CARRIED + column)) } else { &mut [] }

@@ -17,7 +17,7 @@ impl<const D: usize> Chunk<D> {
     /// Appends a particle given by the words of its columns, with its identifier, its packed tag and the
     /// words of what it carries.
     pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64, carried: &[u64]) {
-        // What all particles of a leaf carry nothing of needs no columns.
+        // A leaf whose particles carry zeros alone needs no columns for them.
         if carried.iter().any(|&word| word != 0) {
             self.carry(carried.len());
         }

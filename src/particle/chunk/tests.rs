@@ -79,7 +79,7 @@ fn the_last_fill_the_gaps() {
     assert!(chunk.is_empty());
 }
 
-/// What particles carry goes wherever they go, and columns come with the first that carries anything.
+/// Carried values go wherever their particles go, and columns come with the first that is not zero.
 #[test]
 fn what_particles_carry_goes_with_them() {
     let tag = Tag { material: 0, body: 0, level: 0 };

@@ -62,7 +62,7 @@ pub struct ExpressionError {
     pub text: String,
     /// Column of the fault, from 1.
     pub column: usize,
-    /// What was found and what is expected.
+    /// Found and expected text, in words.
     pub reason: String,
 }
 
@@ -79,7 +79,7 @@ pub struct NotFinite {
     pub text: String,
     /// Values of its variables, in words.
     pub at: String,
-    /// What came out.
+    /// The value.
     pub value: f64,
 }
 

@@ -92,7 +92,7 @@ impl Program {
     }
 }
 
-/// What waits for its end or its second operand.
+/// Operation that waits for its end or its second operand.
 enum Waiting<'a> {
     /// A parenthesis, of a function with its name and the number of arguments that have begun.
     Parenthesis(Option<(&'a str, Function, usize)>),
@@ -100,7 +100,7 @@ enum Waiting<'a> {
     Operator(u8, Binary),
 }
 
-/// What has been read so far.
+/// State of the parser.
 #[derive(Default)]
 struct Parser<'a> {
     steps: Vec<Step>,

@@ -1,4 +1,4 @@
-//! What the names and signs of expressions mean. All functions are `libm`'s, so values do not depend on the
+//! Meaning of names and signs in expressions. All functions are `libm`'s, so values do not depend on the
 //! machine.
 
 use crate::quantity::smooth_step;
@@ -32,7 +32,7 @@ impl Function {
     }
 }
 
-/// What a name stands for.
+/// Meaning of a name.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Meaning {
     /// The variable of this number.
@@ -43,7 +43,7 @@ pub(super) enum Meaning {
     Function(Function),
 }
 
-/// What a name stands for, if it is known.
+/// Meaning of a name, if it is known.
 pub(super) fn meaning(name: &str) -> Option<Meaning> {
     if let Some(number) = VARIABLES.iter().position(|variable| *variable == name) {
         return Some(Meaning::Variable(number as u8));

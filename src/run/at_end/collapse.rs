@@ -21,7 +21,7 @@ pub struct Collapse {
     pub edge: f64,
     /// Height of the deposit at the centre, m.
     pub height: f64,
-    /// What the published laws give.
+    /// Predictions of the published laws.
     pub laws: [Published; 2],
 }
 
@@ -93,7 +93,7 @@ pub fn evaluate<const D: usize>(
     }
 }
 
-/// What the published laws give for a column with this aspect ratio and radius (half width), m.
+/// Predictions of the published laws for a column with this aspect ratio and radius (half width), m.
 pub fn published(law: CollapseLaw, aspect: f64, radius: f64) -> [Published; 2] {
     [lube(law, aspect, radius), lajeunesse(law, aspect, radius)]
 }

@@ -11,7 +11,7 @@ use crate::run::RunError;
 pub struct Ending {
     /// The message that the user has got.
     pub reason: String,
-    /// What may help.
+    /// Advice.
     pub advice: String,
     /// Whether it was asked to stop.
     pub is_stop: bool,
@@ -21,14 +21,14 @@ pub struct Ending {
     pub time: f64,
 }
 
-/// What helps a run that has become unstable.
+/// Advice for a run that has become unstable.
 const UNSTABLE: &str = "Check the last output where the speed is greatest (agimp plot --colour speed, agimp view). If the material is stretched or compressed beyond the range of its law, change the job there: a stiffer or plastic material, a slower load, finer cells. Otherwise try a smaller Courant number (time.cfl, for example half of it), or damping.";
-/// What helps where a file cannot be written.
+/// Advice where a file cannot be written.
 const FILE: &str =
     "Free space on the disk, or give this user permission to write there; then continue from the last state.";
-/// What helps where material has left the domain.
+/// Advice where material has left the domain.
 const LEFT: &str = "Check the last output where material has reached that face. If it is expected there, open the face (kind outflow) or set boundaries.leaving; otherwise use a larger domain, or find out why the material moves so far.";
-/// What helps in all other cases.
+/// Advice in all other cases.
 const OTHER: &str = "Correct what the message names; then continue from the last state, or start again if the job must change.";
 
 impl Ending {

@@ -1,4 +1,4 @@
-//! What a run leaves when it ends.
+//! Results that a run leaves when it ends.
 //!
 //! | file | what it has |
 //! |---|---|

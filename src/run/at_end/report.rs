@@ -8,7 +8,7 @@ use super::collapse::Collapse;
 use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::write_whole;
 
-/// What a finished run says of itself. Quantities are in SI units.
+/// Report of a finished run. Quantities are in SI units.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     /// Program and version.
@@ -39,9 +39,9 @@ pub struct Report {
     pub history: BTreeMap<String, (Option<f64>, String)>,
     /// Evaluation of a column collapse.
     pub column_collapse: Option<ColumnCollapse>,
-    /// What the run has said on its way.
+    /// Messages during the run.
     pub messages: Vec<String>,
-    /// What it has warned of.
+    /// Warnings during the run.
     pub warnings: Vec<String>,
     /// Index of the outputs.
     pub outputs: PathBuf,

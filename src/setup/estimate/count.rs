@@ -26,7 +26,7 @@ const MOST_WORK: u64 = 60_000_000;
 /// Octants that are looked at for one question about a split. Beyond, the answer is yes.
 const MOST_LOOKS: usize = 2_000;
 
-/// What is counted, and whether it is all.
+/// Counts, and whether they are complete.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Tally {
     /// Particles of each body.
@@ -379,7 +379,7 @@ impl<const D: usize> Counter<'_, D> {
         }
     }
 
-    /// What is certain of a part that is not looked at.
+    /// Counts the leaves that a part has at least, without a closer look.
     fn leave(&mut self, part: &Part<D>) {
         if part.settled.is_none() {
             self.add_leaves(part, part.level.max(self.problem.tree.base_level));

@@ -1,4 +1,4 @@
-//! What a job will cost, found without running it.
+//! Cost of a job, estimated without running it.
 use self::count::Tally;
 use super::seed::{SeedError, check_finite};
 use crate::grid::mask::{offset, offset_count};
@@ -225,11 +225,11 @@ const fn state_bytes<const D: usize>() -> f64 {
     8.0 * (Layout::<D>::REALS + 2) as f64
 }
 
-/// Bytes of memory of particles and leaves of all ranks together; about.
+/// Memory of particles and leaves of all ranks together, bytes; approximate.
 ///
-/// What was measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their
-/// part of the plan, filled ones node fields, arenas and half a page of particles; where levels meet there
-/// are more blocks and bins, and moments of constrained nodes.
+/// Measured (docs/performance.md, "Memory"), in bytes for each row of an arena: leaves have their part of the
+/// plan, filled ones node fields, arenas and half a page of particles; where levels meet there are more
+/// blocks and bins, and moments of constrained nodes.
 fn memory<const D: usize>(particles: u64, levels: &[LevelCount]) -> f64 {
     let rows = 7_f64.powi(D as i32);
     let levels = levels.iter().map(|level| {

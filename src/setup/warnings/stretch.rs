@@ -68,7 +68,7 @@ fn spread<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> f64 {
     if bounds.lower[0] <= bounds.upper[0] { bounds.half_diagonal() } else { 0.0 }
 }
 
-/// What holds a part of a body, and moves it.
+/// A load or collider that grips a part of a body, and moves it.
 struct Grip<const D: usize> {
     /// In words.
     name: String,

@@ -33,7 +33,7 @@ pub fn cut_at<const D: usize>(adaptivity: Option<&Adaptivity<D>>) -> CutAt {
     if adaptivity.is_some() { CutAt::Families } else { CutAt::Leaves }
 }
 
-/// What the decision to partition anew rests on; the same on all ranks.
+/// Figures on which the decision for a new partition rests; the same on all ranks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Prospect {
     /// Imbalance now.

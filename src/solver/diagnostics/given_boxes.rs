@@ -38,7 +38,7 @@ pub struct GivenParticle<const D: usize> {
     pub energy: f64,
 }
 
-/// What a real node has.
+/// A real node with its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RealNode<const D: usize> {
     /// Position in cells of the finest level, `2^-(MAX_LEVEL + 2)` root edges.

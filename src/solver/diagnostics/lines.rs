@@ -1,4 +1,4 @@
-//! What lines show.
+//! Sums over the material about the points of lines.
 use rayon::prelude::*;
 
 use super::probes::{of_leaf, reduced};

@@ -1,4 +1,4 @@
-//! What is measured of a state.
+//! Measurements of a state.
 pub mod given_boxes;
 pub mod lines;
 pub mod maps;

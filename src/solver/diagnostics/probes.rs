@@ -1,4 +1,4 @@
-//! What probes read.
+//! Readings of probes.
 use partition::comm::Comm;
 use rayon::prelude::*;
 
@@ -66,7 +66,7 @@ pub(super) fn reduced<const D: usize>(
     each.map(|(sums, greatest)| readings(|i| sums[i].to_f64(), greatest)).collect()
 }
 
-/// What a probe reads, of its sums and greatest values.
+/// Readings of a probe from its sums and greatest values.
 fn readings<const D: usize>(of: impl Fn(usize) -> f64, greatest: &[f64]) -> Readings<D> {
     Readings {
         mass: of(0),

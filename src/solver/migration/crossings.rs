@@ -10,7 +10,7 @@ use crate::text::{count, quantity};
 /// How far beyond a face of the domain rounding may take a particle, as a share of the domain's edge.
 const ROUNDING: f64 = 1e-12;
 
-/// What happens to particles that cross the faces of the domain.
+/// Rules for particles that cross the faces of the domain.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct FaceRules<const D: usize> {
     /// At faces that are no outflow.
@@ -21,7 +21,7 @@ pub(in crate::solver) struct FaceRules<const D: usize> {
     pub origin: [f64; D],
 }
 
-/// What becomes of a particle outside the domain.
+/// Fate of a particle outside the domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Crossing {
     /// It is put back to the face.
@@ -41,8 +41,8 @@ impl<const D: usize> FaceRules<D> {
         Self { leaving: physics.leaving, outflow, origin: physics.origin }
     }
 
-    /// What becomes of a particle at a position relative to the lower corner of the domain, m; `None`: it is
-    /// in the domain `[0, extent)`.
+    /// Fate of a particle at a position relative to the lower corner of the domain, m; `None`: it is in the
+    /// domain `[0, extent)`.
     pub(super) fn of(&self, position: &[f64; D], extent: &[f64; D]) -> Option<Crossing> {
         let (mut crosses, mut flows_out, mut is_far) = (false, false, false);
         for axis in 0..D {

@@ -41,7 +41,7 @@ pub struct Borders<const D: usize> {
     carried: usize,
 }
 
-/// What has been taken out of one leaf.
+/// Particles taken out of one leaf.
 #[derive(Debug, Default)]
 pub(in crate::solver) struct Departed {
     /// Records of the particles that go to other leaves, in their order.
@@ -257,7 +257,7 @@ impl<const D: usize> Borders<D> {
     }
 }
 
-/// What of a particle's state cannot be, with its value.
+/// Quantity of a particle that material cannot have, with its value.
 fn unsound_quantity<const D: usize>(chunk: &Chunk<D>, p: usize) -> Option<(&'static str, f64)> {
     let value = |column: usize| chunk.column(column)[p];
     let symmetric = |first: usize| first..first + Layout::<D>::SYMMETRIC;

@@ -7,7 +7,7 @@ use crate::exact_sum::ExactSum;
 use crate::particle::{Chunk, Layout};
 use crate::probe::{Flux, Section};
 
-/// What is booked of the fluxes of a job.
+/// Masses counted for the fluxes of a job.
 #[derive(Clone, Debug, Default)]
 pub struct Fluxes {
     /// Where mass is counted.

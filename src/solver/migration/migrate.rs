@@ -46,7 +46,7 @@ pub enum MigrateError {
         id: u64,
         /// Position in the coordinates of the job, m.
         position: Vec<f64>,
-        /// What cannot be.
+        /// The impossible quantity.
         quantity: &'static str,
         /// Its value, SI units.
         value: f64,

@@ -227,7 +227,7 @@ impl<const D: usize> Solver<D> {
             let mut widest = None;
             for level in (0..=MAX_LEVEL).rev().filter(|level| wishes[leaf].levels >> level & 1 == 1) {
                 let buffer = adaptivity.buffer << (MAX_LEVEL - level);
-                // What is wanted finer as far away needs no second request.
+                // A request for a finer level over the same distance implies this one.
                 if widest.replace(buffer) != Some(buffer) {
                     let growth =
                         way.map(|side| side.map(|way| buffer.saturating_add(way.saturating_mul(edge))));

@@ -1,4 +1,4 @@
-//! What one bin takes of a leaf.
+//! Particles of a leaf that belong to one bin.
 use crate::grid::plan::Bin;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::SubBox;

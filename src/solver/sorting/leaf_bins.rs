@@ -58,7 +58,7 @@ pub(in crate::solver) struct Scratch {
     undecided: Vec<u32>,
 }
 
-/// What sorting needs to know beside the particles.
+/// Input of sorting beside the particles.
 pub(in crate::solver) struct Sorting<'a, const D: usize, W> {
     pub plan: &'a GridPlan<D>,
     pub widths: &'a W,
@@ -287,7 +287,7 @@ impl<const D: usize> LeafBins<D> {
         half: [f64; D],
         given: bool,
     ) -> Result<u32, ()> {
-        // What lies across the faces is known as far as boxes up to a cell wide can reach.
+        // Tables of the leaves across the faces hold for boxes up to a cell wide.
         let faces = faces.filter(|_| is_narrow(half, plan.cell(own.level)));
         let level = self.finest_level(own, faces, centre, half);
         if !given && is_narrow(half, plan.cell(level)) {

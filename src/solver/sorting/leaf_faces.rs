@@ -1,5 +1,5 @@
-//! What lies across the faces of a leaf beside finer ones, so that boxes need not be compared with every leaf
-//! around.
+//! Tables of the leaves across the faces of a leaf beside finer ones, so that boxes need not be compared with
+//! every leaf around.
 //!
 //! Along each axis a box stays within its leaf, or crosses the lower or the upper face, or both: at most
 //! `4^D` cases, each with its answer in a table.

@@ -1,4 +1,5 @@
-//! What is booked of colliders, faces and loads on the way.
+//! Impulse and work of colliders, faces and loads, summed since the last row of the history or since the
+//! start.
 use partition::comm::Comm;
 
 use crate::boundary::ColliderState;
@@ -70,7 +71,7 @@ pub struct Contacts<const D: usize> {
     pub states: Vec<ColliderState<D>>,
     /// Points of each that may touch another; none if no free body feels others.
     pub features: Vec<Features<D>>,
-    /// What is booked of them.
+    /// Impulse (kg m/s) and angular impulse (kg m²/s) on each since the last row of the history.
     pub sums: ExactSums<SUMS>,
 }
 
@@ -105,7 +106,7 @@ pub(in crate::solver) struct ParticlePush<const D: usize> {
     pub way: [f64; D],
 }
 
-/// What particles carry of a load.
+/// Totals of a load that particles carry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CarriedTotals {
     /// Particles that carry any.
@@ -146,7 +147,7 @@ pub(in crate::solver) struct Near<const D: usize> {
     pub collider: u32,
     /// Where it was; where it was held back, if it was, m.
     pub place: [f64; D],
-    /// What it gave to the collider there, kg m/s.
+    /// Impulse that it gave to the collider there, kg m/s.
     pub impulse: [f64; D],
 }
 

@@ -1,4 +1,4 @@
-//! What leaves cost: integers from measured time, the same on all ranks.
+//! Cost of leaves: integers from measured time, the same on all ranks.
 //!
 //! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the
 //! material of the particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of
@@ -28,14 +28,13 @@ pub enum Kind {
 
 pub(in crate::solver) const KINDS: usize = 3;
 
-/// What the arena of a leaf with so many particles costs in scatter and gather, in particles. Measured: 46 to
-/// 158 in 3D, the latter in sand that has a free surface, and 24 in 2D; less where few particles touch a part
-/// of it.
+/// Cost of the arena of a leaf in scatter and gather, in particles. Measured: 46 to 158 in 3D, the latter in
+/// sand that has a free surface, and 24 in 2D; less where few particles touch a part of it.
 pub(in crate::solver) fn arena_cost(d: usize, particles: u64) -> u64 {
     particles.min(if d == 2 { 24 } else { 64 })
 }
 
-/// What the nodes of a leaf with particles cost before anything is measured, in particles.
+/// Cost of the nodes of a leaf with particles before anything is measured, in particles.
 const fn node_cost(d: usize) -> u64 {
     if d == 2 { 6 } else { 40 }
 }

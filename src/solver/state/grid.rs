@@ -1,4 +1,4 @@
-//! What lives on the grid for one tree and one partition.
+//! The grid of one tree and one partition: plan, arenas, node fields and exchanges.
 use partition::Forest;
 use partition::comm::{Comm, Pending, Traffic};
 use rayon::prelude::*;
@@ -130,7 +130,7 @@ impl<const D: usize> Grid<D> {
         Some(together)
     }
 
-    /// What the particles scattered last.
+    /// Arenas of the last scatter.
     pub fn arenas(&self) -> &Arenas<D> {
         &self.arenas
     }
@@ -258,7 +258,7 @@ impl<const D: usize> VelocityField<D> {
     }
 }
 
-/// What contact between bodies needs to know of the nodes of one plan.
+/// Nodal data for contact between bodies, for one plan.
 pub(in crate::solver) struct BetweenBodies<const D: usize> {
     /// Volumes of the basis functions of real nodes, m³ (in plane strain m²), by node.
     pub(in crate::solver) volumes: Vec<f64>,
@@ -273,7 +273,7 @@ pub(in crate::solver) struct Solids<const D: usize> {
     pub(in crate::solver) copies: Vec<Chunk<D>>,
     /// Of which particles these are copies.
     pub(in crate::solver) members: Vec<Vec<u32>>,
-    /// What these scatter: volumes and their gradients.
+    /// Sums that the copies scatter: volumes and their gradients.
     pub(in crate::solver) field: VelocityField<D>,
 }
 
@@ -286,8 +286,8 @@ impl<const D: usize> Solids<D> {
 /// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct Increments {
-    /// What is taken off the new velocity to get what particles take: v_0 (FLIP), or `-Σ v_k` over k from 1
-    /// (XPIC).
+    /// Base of the increments, which is subtracted from the new velocity: v_0 (FLIP), or `-Σ v_k` over k from
+    /// 1 (XPIC).
     pub(in crate::solver) base: Block<Row>,
     /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
     pub rows: Block<Row>,

@@ -1,8 +1,8 @@
-//! What the current partition has cost.
+//! Cost of the current partition.
 use crate::solver::state::phases::thread_time;
 use std::time::Duration;
 
-/// What the current partition has cost, in seconds of processor time.
+/// Cost of the current partition, in seconds of processor time.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct LastPartition {
     /// Of making it; at first of building the grid.

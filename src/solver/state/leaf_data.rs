@@ -1,4 +1,4 @@
-//! What is noted of each own leaf beside its particles.
+//! Data of each own leaf beside its particles.
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,8 +11,8 @@ use crate::solver::state::phases::thread_time;
 /// ask for the processor time takes as long as several particles.
 pub(in crate::solver) const MEASURE_EVERY: u64 = 32;
 
-/// What is noted of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset
-/// together when these change.
+/// Data of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset together
+/// when these change.
 #[derive(Debug, Default)]
 pub struct LeafData<const D: usize> {
     /// Greatest sum of wave speed and particle speed after the last step, m/s; 0 if that is not known.
@@ -118,7 +118,7 @@ mod tests {
         }
     }
 
-    /// What was noted of other leaves is never taken for that of these, not even if there are as many.
+    /// Data of other leaves are never taken for those of these, not even if there are as many.
     #[test]
     fn one_reset_forgets_all_that_was_noted() {
         let mut data = LeafData::<2>::default();

@@ -88,18 +88,18 @@ pub struct Clock {
     pub bound: f64,
 }
 
-/// What a step did on this rank.
+/// Results of a step, on this rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepReport {
     /// Particles that changed leaf.
     pub moved: Moved,
-    /// What any rank asked for.
+    /// Requests of all ranks together.
     pub granted: Requests,
     /// Whether the equilibrium is reached that the job asks for.
     pub settled: bool,
 }
 
-/// What a rank wants all ranks to do after a step.
+/// Requests of a rank to all ranks, after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
     /// Stop.
@@ -118,7 +118,7 @@ pub(in crate::solver) struct Weighed {
 /// Particles, tree and clock of one rank, and what advances them.
 pub struct Solver<const D: usize> {
     pub(super) comm: Comm,
-    /// What is solved.
+    /// The problem.
     pub physics: Physics<D>,
     /// The distributed tree.
     pub forest: Forest<D>,
@@ -128,12 +128,13 @@ pub struct Solver<const D: usize> {
     pub clock: Clock,
     /// Where the colliders are, and their reactions.
     pub contacts: Contacts<D>,
-    /// What is booked of the loads.
+    /// Impulse of each load since the last row of the history, and its work since the start.
     pub load_sums: ExactSums<LOAD_SUMS>,
     /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none
     /// where nobody asks.
     pub face_sums: ExactSums<FACE_SUMS>,
-    /// What is booked of contact between bodies.
+    /// Impulse of each contact between bodies since the last row of the history, and its work since the
+    /// start.
     pub body_sums: ExactSums<LOAD_SUMS>,
     /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
     pub shift_sums: ExactSums<1>,
@@ -149,7 +150,7 @@ pub struct Solver<const D: usize> {
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,
-    /// What is noted of each own leaf.
+    /// Data of each own leaf.
     pub(super) leaf_data: LeafData<D>,
     /// Particles that crossed the faces of the domain so far.
     pub crossings: Crossings,
@@ -163,9 +164,9 @@ pub struct Solver<const D: usize> {
     pub regrids: u64,
     /// Where the time of regrids went since the start of this process.
     pub regrid_timers: RegridTimers,
-    /// What regrids remember; nothing that a bit depends on.
+    /// Data kept from one regrid to the next; no bit of the state depends on it.
     pub(super) regrid_cache: RegridCache<D>,
-    /// What grids of earlier trees and partitions have sent.
+    /// Messages and bytes that grids of earlier trees and partitions have sent.
     pub(super) sent_before: Traffic,
     /// Least bytes that these nodes need, as of the last step that was weighed.
     pub(super) surface_bytes: u64,

@@ -1,8 +1,8 @@
-//! What regrids remember from one time to the next.
+//! Data kept from one regrid to the next.
 use crate::adaptivity::surroundings::Surroundings;
 use partition::Mark;
 
-/// What a leaf wants for itself and the leaves around.
+/// Levels that the criteria ask for in a leaf and around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::solver) struct Wish<const D: usize> {
     /// Levels, a bit each; each has its own width of buffer.
@@ -16,7 +16,7 @@ impl<const D: usize> Wish<D> {
     pub(in crate::solver) const NONE: Self = Self { levels: 0, way: [[0; D]; 2] };
 }
 
-/// What regrids remember from one time to the next. It saves work and changes no bit.
+/// Data kept from one regrid to the next. It saves work and changes no bit.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct RegridCache<const D: usize> {
     /// See there.
@@ -25,13 +25,13 @@ pub(in crate::solver) struct RegridCache<const D: usize> {
     pub(in crate::solver) settled: Option<SettledTree<D>>,
 }
 
-/// What was wanted when nothing came of it.
+/// Requests at the last regrid, which left the tree as it is.
 #[derive(Clone, Debug)]
 pub(in crate::solver) struct SettledTree<const D: usize> {
     /// Revision of the forest.
     pub(in crate::solver) revision: u64,
     /// Wishes of own leaves.
     pub(in crate::solver) wishes: Vec<Wish<D>>,
-    /// What requests from everywhere meant for them.
+    /// Marks of own leaves from the requests of all ranks.
     pub(in crate::solver) marks: Vec<Mark>,
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 pub enum Part {
     /// Values of the criteria and what leaves want.
     Criteria,
-    /// What wishes mean for the leaves around, and the changed and balanced tree.
+    /// Marks of the leaves around, and the changed and balanced tree.
     Tree,
     /// Particles into new leaves, and splits.
     Split,

@@ -13,7 +13,7 @@ pub struct Relaxation {
     pub acceleration: f64,
     /// Times that velocities were set to 0.
     pub stops: u64,
-    /// What the last step was.
+    /// Kind of the last step.
     pub phase: RelaxPhase,
 }
 
@@ -26,7 +26,7 @@ pub struct Relaxation {
 /// the one before, for all steps that are stable at all.
 pub(in crate::solver) const FROM_REST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// What a step on the way to equilibrium was.
+/// Kind of a step on the way to equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RelaxPhase {
     /// The kinetic energy has risen.
@@ -51,7 +51,7 @@ impl Relaxation {
         if was_at_rest {
             self.acceleration = root_mean_square(pulled) / dt;
         }
-        // What does not move at all is at rest too.
+        // Material that does not move at all is at rest too.
         let is_peak = !was_at_rest && (kinetic < self.kinetic || kinetic == 0.0);
         if is_peak {
             self.speed = root_mean_square(self.kinetic);

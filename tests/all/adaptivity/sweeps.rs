@@ -1,4 +1,4 @@
-//! What is conserved while refinement sweeps back and forth over a body that moves and spins.
+//! Conservation while refinement sweeps back and forth over a body that moves and spins.
 use std::fmt::Write;
 
 use agimp::job::{AnyProblem, Problem};

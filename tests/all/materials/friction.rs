@@ -83,7 +83,7 @@ fn tresca_returns_to_faces_and_edges() {
     }
 }
 
-/// What opens at the apex closes again before it carries stress; dilation does not.
+/// Volume that opens at the apex closes again before the material carries stress; dilation does not.
 #[test]
 fn volume_that_has_opened_is_given_back() {
     let elastic = serde_json::json!({"E": 1e7, "nu": 0.3});

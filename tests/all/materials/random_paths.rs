@@ -1,4 +1,4 @@
-//! What holds along any path: numbers stay finite, plastic work is not negative, stress turns with the
+//! Properties along any path: numbers stay finite, plastic work is not negative, stress turns with the
 //! material, and is the derivative of the energy where nothing flows; yield functions hold after every step.
 use agimp::material::eigen;
 use agimp::simd::{Lanes, Vector};
@@ -283,7 +283,7 @@ fn yield_functions_hold() {
                 point.dt = 1e-4;
                 point.deform(&random.stretch(size));
                 let [excess, strength] = (surface.of)(&point);
-                // What is left of a strain that is gone is not known better than its rounding.
+                // The remainder of a strain that is gone is not known better than its rounding.
                 let known = strength.max(1e-4 * material.wave_speed().powi(2) * 1000.0 * size);
                 assert!(excess <= 1e-10 * known, "{}: path {path}: {excess} of {strength}", surface.text);
             }

@@ -47,7 +47,7 @@ fn memory() -> [u64; 2] {
     })
 }
 
-/// What the cases took at most.
+/// Greatest time and memory of the cases.
 #[derive(Default)]
 struct Worst {
     seconds: f64,
@@ -107,7 +107,7 @@ fn jobs() -> Vec<String> {
     paths.iter().map(|path| std::fs::read_to_string(path).expect("a job")).collect()
 }
 
-/// What `agimp check` does before it needs MPI. Returns whether the job is accepted.
+/// The part of `agimp check` before MPI. Returns whether the job is accepted.
 fn check(bytes: Vec<u8>) -> bool {
     fn look<const D: usize>(problem: &Problem<D>) -> bool {
         match estimate(problem) {

@@ -172,7 +172,7 @@ pub(crate) fn mutated_text(random: &mut Random, jobs: &[String]) -> Vec<u8> {
     for _ in 0..=random.below(3) {
         text = once(random, text, jobs);
     }
-    // What is not UTF-8 comes last.
+    // Bytes that are not UTF-8 come last.
     match random.below(12) {
         0 => bytes(random, text.into_bytes()),
         _ => text.into_bytes(),

@@ -27,7 +27,7 @@ pub(super) fn parse(bytes: &[u8], placing: &Placing) -> Result<Raster, String> {
         return Err("its elements are structures; expected numbers".into());
     };
     let wide = kind.size_field();
-    // What the header declares has to be there.
+    // The file must be long enough for the heights that its header declares.
     if wide.saturating_mul((size[0] * size[1]) as u64) > bytes.len() as u64 {
         return Err(format!("it ends before its {} x {} heights are complete", size[0], size[1]));
     }

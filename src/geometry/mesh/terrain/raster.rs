@@ -18,7 +18,7 @@ pub struct Raster {
     pub(super) corner: [f64; 2],
 }
 
-/// What a job says of a raster beside its file.
+/// Keys of a job that complement the file of a raster.
 #[derive(Clone, Debug, Default)]
 pub struct Placing {
     /// Distance of neighbours in place of that of the file, m: the south-western value then stands at the
@@ -35,7 +35,7 @@ const GREATEST: f64 = 1e9;
 /// and many programs write it.
 const HOLE: f64 = -32768.0;
 
-/// What stands for no value in a file that does not say.
+/// Value without data, for files that declare none.
 const NONE: f64 = -9999.0;
 
 impl Raster {

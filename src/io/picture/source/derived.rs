@@ -1,5 +1,5 @@
-//! What the particles of a file can be coloured by: the fields that it shows, and what follows from them or
-//! from its state.
+//! Quantities that can colour the particles of a file: its fields, and those derived from them or from its
+//! state.
 
 use super::super::Tint;
 use super::numbers;

@@ -1,4 +1,4 @@
-//! What a picture takes from an output file. All of it has the right checksum.
+//! Reading of output files for pictures. All of it has the right checksum.
 //!
 //! | file | what it reads |
 //! |---|---|
@@ -10,7 +10,7 @@ use crate::io::hdf5_file::{FileError, Kind, Reader};
 use crate::io::snapshot::Header;
 use crate::io::snapshot::intact::checked::Checked;
 
-/// What is wrong with a file of the tree, where particles are asked for.
+/// Message for a file of the tree where particles are required.
 pub(in crate::io) const NO_PARTICLES: &str = "found no particles: a file of the tree (NAME_000001.tree.hdf); expected the output beside it (NAME_000001.hdf)";
 
 /// Cells of a leaf along an axis.

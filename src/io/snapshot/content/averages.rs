@@ -41,7 +41,7 @@ pub(in crate::io::snapshot) fn over_cells<const D: usize>(
     cells.iter().map(|&cell| sums[cell].mean()).collect()
 }
 
-/// What the file of the tree shows of the stress in a leaf.
+/// Stress in a leaf, for the file of the tree.
 pub(in crate::io::snapshot) struct LeafAverage {
     /// Volume of the material over that of the leaf.
     pub volume_fraction: f64,

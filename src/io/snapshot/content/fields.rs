@@ -37,7 +37,7 @@ macro_rules! fields {
                 match self { $(Self::$field => $unit,)* }
             }
 
-            /// What it is, in a sentence.
+            /// Description, a sentence.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$field => concat!($($meaning),+).trim_ascii(),)* }
             }
@@ -153,8 +153,8 @@ impl Values {
         }
     }
 
-    /// What follows from a finite state may be too great for a number. It is not a number then, which
-    /// programs leave out of ranges of colours, and no reason to end a run.
+    /// Infinite values as NaN. A value that follows from a finite state may overflow; programs leave NaN out
+    /// of ranges of colours, and it is no reason to end a run.
     pub(crate) fn without_infinities(mut self) -> Self {
         match &mut self {
             Self::Real(values, _) => {
@@ -214,7 +214,7 @@ fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usi
     view.followed.first_columns::<D>(chunk.carried_columns())
 }
 
-/// What a particle carries in a column; 0 where there is none.
+/// Carried value of a particle in a column; 0 where there is none.
 fn carried<const D: usize>(chunk: &Chunk<D>, column: Option<usize>, p: usize) -> f64 {
     column.and_then(|column| chunk.carried(column).get(p).copied()).unwrap_or(0.0)
 }

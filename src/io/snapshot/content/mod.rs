@@ -1,4 +1,4 @@
-//! What is in a file.
+//! Contents of a file.
 //!
 //! | file | what it has |
 //! |---|---|

@@ -17,7 +17,7 @@ pub(in crate::io::snapshot) struct Columns {
     pub name: &'static str,
     /// Unit, empty for pure numbers.
     pub unit: &'static str,
-    /// What it is, in a sentence.
+    /// Description, a sentence.
     pub meaning: &'static str,
     /// First column.
     pub first: usize,

@@ -1,4 +1,4 @@
-//! What a state must be beside whole: what no run can have written is refused, whatever its checksums say.
+//! Plausibility of a state: one that no run can have written is refused, whatever its checksums say.
 
 use partition::{MAX_LEVEL, Octant};
 

@@ -185,7 +185,7 @@ pub(super) fn free_body<const D: usize>(
     }
 }
 
-/// What a body does to other colliders: friction and restitution, if it meets them.
+/// Friction and restitution of a body in collisions with other colliders; `None` if it passes through them.
 fn meeting(
     checks: &mut Checks,
     collides: Option<bool>,

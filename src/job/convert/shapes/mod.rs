@@ -173,7 +173,7 @@ impl Checks<'_> {
         }
     }
 
-    /// What a shape without a volume needs, if it is that of a collider.
+    /// Advice for a shape without a volume, if it is that of a collider.
     fn sheet_hint(&self, path: &Path) -> &'static str {
         let is_collider = path.to_string().starts_with("colliders") && !self.takes_sheets;
         if is_collider { "; with acts_on = \"particles\" a collider may be a sheet" } else { "" }

@@ -97,13 +97,13 @@ impl Model for CamClay {
     }
 }
 
-/// What the stress ratio at the end of a step says.
+/// Final state for a trial value of the stress ratio η.
 #[derive(Clone, Copy)]
 struct Candidate<V> {
     /// Increment of the plastic compression.
     compression: V,
     pressure: V,
-    /// What is left of `(M² - η²) Δe_q - 2η Δe_p`, and its derivative by η.
+    /// Residual `(M² - η²) Δe_q - 2η Δe_p`, and its derivative by η.
     residual: [V; 2],
 }
 

@@ -77,7 +77,7 @@ impl Model for Snow {
 }
 
 impl Snow {
-    /// What the moduli are multiplied with.
+    /// Factor of the elastic moduli, `exp(ξ (1 - J_p))`; `volume_log` is `ln J_p`.
     #[inline(always)]
     fn stiffening<V: Vector>(&self, volume_log: V) -> V {
         exp((V::splat(1.0) - exp(volume_log)) * self.exponent)
@@ -103,7 +103,7 @@ impl Law for Snow {
         let (least, greatest) = (V::splat(self.least), V::splat(self.greatest));
         let eigen = decompose(&state.elastic, step.plane);
         let trial = each(eigen.value, V::sqrt);
-        // What is not a number stays so.
+        // NaN stays NaN.
         let stretch = each(trial, |s| s.lt(least).select(least, greatest.lt(s).select(greatest, s)));
         let yields = |k: usize| trial[k].lt(least) | greatest.lt(trial[k]);
         let changed = yields(0) | yields(1) | yields(2);
