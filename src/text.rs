@@ -194,9 +194,9 @@ pub fn excerpt(text: &str, most: usize) -> Cow<'_, str> {
     }
 }
 
-/// Longest word for which a similar one is looked for, in characters.
+/// Longest word for which a similar one is searched, in characters.
 const LONGEST_WORD: usize = 100;
-/// Most words that are looked at for a similar one.
+/// Most words that are compared with it.
 const MOST_WORDS: usize = 1000;
 
 /// The known word nearest to `word`, if it is near enough to be meant.

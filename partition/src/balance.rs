@@ -1,11 +1,11 @@
 //! 2:1 balance over faces, edges and corners.
 //!
 //! Leaves that touch differ by one level at most. Stated for octants that are not leaves: if `p` is
-//! subdivided, then the parent of every neighbour of `p` (same level) is subdivided, because its
-//! children touch the children of `p` or lie one level above them. The smallest balanced tree that
-//! contains a given one is therefore found by adding subdivided octants until the rule holds. Each
-//! application leads one level up, so that one sweep from fine to coarse settles a rank. What
-//! concerns octants of other ranks is sent to their owners, and again until no rank sends.
+//! subdivided, then the parent of every neighbour of `p` (same level) is subdivided, because its children
+//! touch the children of `p` or lie one level above them. The smallest balanced tree that contains a given
+//! one is therefore found by adding subdivided octants until the rule holds. Each application leads one level
+//! up, so that one sweep from fine to coarse completes a rank. Requests for octants of other ranks go to
+//! their owners; ranks sweep again until none sends.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -47,7 +47,7 @@ struct Ripple<'a, const D: usize> {
     rank: usize,
     /// Codes of octants in leaves of this rank that must be subdivided.
     added: HashSet<u64>,
-    /// By level: subdivided octants whose neighbours have not been looked at.
+    /// By level: subdivided octants whose neighbours have not been checked.
     work: Vec<Vec<Octant<D>>>,
     /// Codes that have been sent.
     sent: HashSet<u64>,

@@ -27,9 +27,9 @@ impl<const D: usize> Region<D> {
         (0..D).all(|a| self.lo[a] <= self.hi[a] && low[a] <= self.hi[a] && self.lo[a] <= high[a])
     }
 
-    /// Octants that cover all leaves' shares of the region: of one level, at most two along each
-    /// axis unless they are roots. Every leaf that meets the region contains one of them or lies
-    /// in one and meets the region there.
+    /// Octants that cover all leaves' shares of the region: of one level, at most two along each axis unless
+    /// they are roots. Every leaf that intersects the region contains one of them, or lies in one and
+    /// intersects the region there.
     fn cover(&self, brick: &Brick<D>) -> Vec<Octant<D>> {
         let size = brick.lattice_size();
         if (0..D).any(|a| self.lo[a] > self.hi[a] || self.lo[a] > size[a]) {
@@ -61,9 +61,9 @@ impl<const D: usize> Region<D> {
 }
 
 impl<const D: usize> Forest<D> {
-    /// Collective. All leaves of any rank whose closed box meets a query's closed box, with their
-    /// owners; in curve order, each once. Each query goes only to the ranks that own leaves where
-    /// it lies, so the cost does not grow with the size of the tree.
+    /// Collective. All leaves of any rank whose closed box intersects a query's closed box, with their
+    /// owners; in curve order, each once. Each query goes only to the ranks that own leaves where it lies, so
+    /// the cost does not grow with the size of the tree.
     pub fn leaves_in(&self, comm: &Comm, queries: &[Region<D>]) -> Vec<(Octant<D>, usize)> {
         let mut outgoing: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for query in queries {
@@ -102,8 +102,8 @@ impl<const D: usize> Forest<D> {
         result
     }
 
-    /// Collective. Hands each request, a region with a value, to all ranks that own leaves which meet the
-    /// region. Returns the requests that concern leaves of this rank: by sending rank, then in its order.
+    /// Collective. Hands each request, a region with a value, to all ranks that own leaves which intersect
+    /// the region. Returns the requests that concern leaves of this rank: by sending rank, then in its order.
     pub fn to_owners(&self, comm: &Comm, requests: &[(Region<D>, u32)]) -> Vec<(Region<D>, u32)> {
         let mut outgoing: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for (region, value) in requests {
@@ -127,8 +127,8 @@ impl<const D: usize> Forest<D> {
             .collect()
     }
 
-    /// Not collective. Calls `found` with the index of each leaf of this rank that meets the
-    /// region, each once, in no particular order.
+    /// Not collective. Calls `found` with the index of each leaf of this rank that intersects the region,
+    /// each once, in no particular order.
     pub fn own_leaves_in(&self, region: &Region<D>, found: &mut impl FnMut(usize)) {
         // Leaves larger than an octant of the cover, which may contain several of those.
         let mut large = Vec::new();
@@ -156,7 +156,7 @@ impl<const D: usize> Forest<D> {
         }
     }
 
-    /// Reports the leaves `first..end`, all strictly inside `octant`, that meet the region.
+    /// Reports the leaves `first..end`, all strictly inside `octant`, that intersect the region.
     fn descend(
         &self,
         region: &Region<D>,
@@ -165,7 +165,7 @@ impl<const D: usize> Forest<D> {
         end: usize,
         found: &mut impl FnMut(usize),
     ) {
-        // For a handful of leaves looking at each is quicker than more bisection.
+        // For a handful of leaves, testing each is quicker than more bisection.
         if end - first <= 2 * Octant::<D>::CHILDREN || octant.level == MAX_LEVEL {
             (first..end).filter(|&i| region.meets(&self.leaves[i])).for_each(found);
             return;
@@ -182,7 +182,7 @@ impl<const D: usize> Forest<D> {
         }
     }
 
-    /// The ranks that own leaves which meet the region.
+    /// The ranks that own leaves which intersect the region.
     fn owners_of(&self, region: &Region<D>) -> BTreeSet<usize> {
         let mut owners = BTreeSet::new();
         let mut open = region.cover(&self.brick);

@@ -82,7 +82,7 @@ fn report<const D: usize>(
     Ok(())
 }
 
-/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both look at
+/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both depend on
 /// the particles themselves.
 const MOST_MEMORY: f64 = 90e6;
 

@@ -194,7 +194,7 @@ mod tests {
             assert!(!title(template.text).is_empty(), "{}", template.name);
             for full in [false, true] {
                 let text = template.text(full).map_err(|failure| failure.to_string()).expect(template.name);
-                // Files are looked for where the project has them.
+                // Files are opened where the project has them.
                 let path = Path::new("jobs").join(template.name);
                 let faults = job::parse(&text, &path).err().unwrap_or_default();
                 assert!(faults.is_empty(), "{}: {faults:?}", template.name);

@@ -2,11 +2,11 @@
 use super::{Aabb, Shape, Side};
 use std::collections::VecDeque;
 
-/// Boxes looked at for one pair of shapes.
+/// Boxes tested for one pair of shapes.
 const BUDGET: usize = 20_000;
 
-/// A point of the box `common` that lies deeper than `slack` (m) in both shapes. Takes the boxes that it
-/// looks at, at most twenty thousand, off `budget`; what is not found then is thin.
+/// A point of the box `common` that lies deeper than `slack` (m) in both shapes. Subtracts the boxes that it
+/// tests, at most twenty thousand, from `budget`; an overlap that it does not find is thin.
 pub fn common_point<const D: usize>(
     pair: [&Shape<D>; 2],
     common: Aabb<D>,

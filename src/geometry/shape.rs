@@ -1,4 +1,4 @@
-//! The shape type and what can be asked of it.
+//! The shape type and its queries.
 use super::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };

@@ -31,11 +31,11 @@ pub struct Region<'a, const D: usize> {
     pub project: &'a (dyn Fn(&[f64; D]) -> [f64; D] + Sync),
 }
 
-/// How far beside a face membership is looked at, as a share of the edge of the box.
+/// Distance from a face at which membership is tested, as a share of the edge of the box.
 const BESIDE: f64 = 1e-7;
-/// Parts of a line that are looked at alone.
+/// Parts of a line that are tested one by one.
 const PARTS: usize = 4;
-/// Areas below this share of a face do not count: they come of looking beside faces.
+/// Areas below this share of a face do not count: they come from tests beside faces.
 const LEAST: f64 = 1e-6;
 
 /// Pieces of the surface of a region in a box of equal edges.

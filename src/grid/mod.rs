@@ -1,8 +1,8 @@
 //! Grid of the octree: blocks of nodes, bins of particles, constraints between levels, and the
 //! exchange that completes node sums across ranks.
 //!
-//! The grid of one rank is described by a [`GridPlan`], which depends on tree and partition only, and
-//! filled each time step in a [`NodeFields`]. See `ARCHITECTURE.md`, "Node sums".
+//! The grid of one rank is described by a [`GridPlan`], which depends on tree and partition only, and filled
+//! each time step in a [`NodeFields`]. See `docs/design/node-sums.md`.
 //!
 //! | room | what it holds, from the bottom up |
 //! |---|---|

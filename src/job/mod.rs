@@ -1,4 +1,4 @@
-//! Job files: what a run is asked to do.
+//! Job files: the input of a run.
 //!
 //! A file is parsed to a tree that knows where everything stands ([`load`]), checked against the
 //! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a

@@ -248,7 +248,7 @@ pub struct TreeSetup<const D: usize> {
     pub base_level: u8,
     /// Whether neighbours may differ by one level at most, over faces, edges and corners.
     pub graded: bool,
-    /// Regions with a deeper level; a leaf is split while it meets one whose level it has not reached.
+    /// Regions with a deeper level; a leaf is split while it intersects one whose level it has not reached.
     pub regions: Vec<Region<D>>,
 }
 

@@ -3,7 +3,7 @@ use super::Select;
 use crate::particle::chunk::{Chunk, Layout, Place, TILE};
 use crate::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level};
 
-/// How far ahead tiles are asked for, in particles, in the next chunk where this one ends.
+/// Distance ahead at which tiles are prefetched, in particles; in the next chunk where this one ends.
 const AHEAD: usize = 2 * TILE;
 
 /// How many tiles have their pages looked up at a time, as many tiles before they are used.
@@ -70,8 +70,8 @@ impl<'a, const D: usize> Batches<'a, D> {
     }
 
     /// To be called after each batch was taken. Tiles run through a page after every few of them. The
-    /// processor finds several pages at the same time, but waits for each that a single line is asked for on.
-    /// In line: with a call between batches, constants would not stay in registers.
+    /// processor translates several pages at the same time, but waits for each page of which a single line is
+    /// requested. In line: with a call between batches, constants would not stay in registers.
     #[inline(always)]
     pub(super) fn look_up_pages(&self) {
         let is_due = self.taken % (GROUP * TILE) == TILE && self.len > GROUP * TILE;
@@ -315,7 +315,7 @@ impl Batch {
     }
 }
 
-/// Whether particles are those of a tile in order. All are looked at: members of a family come in any order.
+/// Whether particles are those of a tile in order. All are compared: members of a family come in any order.
 #[inline(always)]
 fn is_tile(list: &[u32; LANES]) -> bool {
     let begins = list[0].is_multiple_of(TILE as u32);

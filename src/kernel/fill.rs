@@ -8,13 +8,13 @@
 //! ```text
 //! φ = Σ w φ_j,   s = Σ e_j ∇w
 //! ```
-//! 1. *Void.* A fluid without tension that has widened, J > 1, pushes with nothing. It may fill the void that
-//!    the grid has around it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
+//! 1. *Void.* A fluid without tension that has widened, J > 1, has no pressure. It may fill the void that the
+//!    grid has around it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
 //! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain
 //!    the excess: `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
 //! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell,
-//!    as far as J̄ - J is more than weight makes of half a cell, `J g h / 2c²`. The energy is convex in J, so
-//!    it falls.
+//!    as far as J̄ - J exceeds the change over half a cell that weight explains, `J g h / 2c²`. The energy is
+//!    convex in J, so it falls.
 //!
 //! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed
 //! of sound. `docs/design/fluid-volume.md` says what each part does, and what else was tried.

@@ -155,9 +155,9 @@ pub struct Scheme<'a> {
     pub transfer: Transfer,
     /// Materials by index (see [`crate::particle::chunk::Tag`]).
     pub materials: &'a [Box<dyn Material>],
-    /// Whether any of them flows. If not, no particle is asked.
+    /// Whether any of them flows. If not, no particle is tested for it.
     pub is_plastic: bool,
-    /// Whether all of them flow. If so, no particle is asked either.
+    /// Whether all of them flow. If so, no particle is tested for it either.
     pub is_all_plastic: bool,
     /// History variables that they use.
     pub histories: usize,

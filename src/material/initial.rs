@@ -1,9 +1,9 @@
 //! States under a given stress, for bodies that do not start without one.
 //!
 //! All models are isotropic, so stress and elastic strain have the same principal directions, and a law has
-//! to invert three numbers only ([`Law::strain_under`](super::Law::strain_under)). What it answers is put
-//! through an update, which yields where the stress lies outside the yield surface: no law says where that is
-//! a second time.
+//! to invert three numbers only ([`Law::strain_under`](super::Law::strain_under)). Its answer goes through an
+//! update, which yields where the stress lies outside the yield surface: so no law states its yield surface
+//! twice.
 use super::eigen::{Symmetric, decompose};
 use super::{HISTORIES, Material, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Lanes, Vector};
@@ -184,7 +184,7 @@ fn principal(stress: &[f64; 6], plane: bool) -> ([f64; 3], [[f64; 3]; 3]) {
     if stress[3..] == [0.0; 3] {
         return ([stress[0], stress[1], stress[2]], unit);
     }
-    // Rotations want a positive definite matrix.
+    // Rotations require a positive definite matrix.
     let shift = 2.0 * norm(stress);
     let mut shifted: Symmetric<Lanes> = stress.map(Lanes::splat);
     for normal in &mut shifted[..3] {

@@ -198,7 +198,7 @@ pub trait Material: std::fmt::Debug + Send + Sync {
 
     /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None`
     /// where there are none. The volume is that of these strains and of the plastic volume in `history`,
-    /// which holds the initial values; a law that is consolidated changes them to what is asked for.
+    /// which holds the initial values; a law that is consolidated changes them to the requested values.
     fn strain_under(
         &self,
         stress: [f64; 3],

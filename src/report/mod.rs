@@ -1,6 +1,6 @@
 //! `NAME.report.html`: a run on one page, from the files that it has written so far.
 //!
-//! | file | what it does |
+//! | file | content |
 //! |---|---|
 //! | this | what goes into the page |
 //! | `sections.rs` | its words, numbers and tables |
@@ -10,7 +10,7 @@
 //! | `along.rs` | curves along lines of points |
 //! | `panels.rs` | columns of the history that belong into one chart |
 //! | `cost.rs` | where the time went, balance and memory, from telemetry |
-//! | `page.html`, `page.css` | frame and looks of the page |
+//! | `page.html`, `page.css` | frame and style of the page |
 //!
 //! Runs that go on, and runs that have ended by a fault, are shown as far as they have come.
 use std::fmt::Write as _;
@@ -107,7 +107,7 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
     ]))
 }
 
-/// The page with its marks replaced. What replaces a mark may look like another one.
+/// The page with its marks replaced. A text that replaces a mark may contain another one.
 fn filled(marks: [(&str, &str); 6]) -> String {
     let (mut page, mut rest) = (String::new(), PAGE);
     let next = |rest: &str| {
@@ -167,7 +167,7 @@ impl Run {
         end.as_float().or_else(|| end.as_integer().map(|end| end as f64))
     }
 
-    /// A word for the looks of the page, and a sentence.
+    /// A class for the style of the page, and a sentence.
     fn state(&self) -> (&'static str, String) {
         let time = self.history.last("time").map_or("its start".into(), |time| quantity(time, "s"));
         let end = self.end().map_or(String::new(), |end| format!(" of {}", quantity(end, "s")));

@@ -75,7 +75,7 @@ impl<const D: usize> Run<'_, D> {
         Ok(())
     }
 
-    /// Collective. What a state holds beside particles and tree.
+    /// Collective. Scalars of a state, beside particles and tree.
     pub(super) fn scalars(&self, next_output: u64, output_step: Option<u64>) -> Scalars {
         let mut scalars = restart::scalars(self.comm, self.problem, &self.solver, next_output, output_step);
         scalars.counts.extend(self.recorder.last_row().map(|step| (restart::ROW_STEP.into(), step)));

@@ -182,7 +182,7 @@ impl<'a, const D: usize> Run<'a, D> {
     }
 
     /// Collective. Steps until the end time is reached, or until it is asked to stop. No step is shortened to
-    /// meet the end, so that a run to a later end takes the same steps.
+    /// hit the end, so that a run to a later end takes the same steps.
     fn advance(&mut self, stop: &StopRequest) -> Result<Outcome, RunError> {
         while !self.is_over() {
             if self.stage_is_over() {

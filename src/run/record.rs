@@ -40,7 +40,7 @@ pub struct Recorder<'a, const D: usize> {
     since_traffic: Traffic,
 }
 
-/// Collective. What rank 0 knows.
+/// Collective. The step that rank 0 knows.
 fn on_all_ranks(comm: &Comm, known: Option<u64>) -> Option<u64> {
     let mut known = [known.map_or(0, |step| step + 1)];
     comm.max_u64(&mut known);
@@ -121,7 +121,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
     }
 
-    /// Not collective. Has the next step note what its record needs.
+    /// Not collective. Has the next step measure the mass error, if its record needs it.
     fn prepare(&self, solver: &mut Solver<D>) {
         if (solver.clock.step + 1).is_multiple_of(self.problem.telemetry_every) {
             solver.weigh_next_step();

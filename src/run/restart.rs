@@ -186,7 +186,7 @@ fn restore_relaxation<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars)
 
 /// Names of the counters of splits and merges.
 const LEDGER: [&str; 4] = ["splits", "merges", "particles_merged_away", "next_root"];
-/// Names of the energies booked by splits and merges.
+/// Names of the energies that splits and merges have removed.
 const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
 
 /// Takes over the ledger of splits and merges; the sums are on rank 0. `None` if the file lacks one.
@@ -206,7 +206,7 @@ fn restore_ledger<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: 
     Some(())
 }
 
-/// Takes over what is booked of particles that crossed faces, on rank 0. `None` if the file lacks one.
+/// Takes over the counts and masses of particles that crossed faces, on rank 0. `None` if the file lacks one.
 fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     let [put_back, deleted, left] = CROSSINGS.map(|name| scalars.count(name));
     let [of_deleted, of_left] = CROSSED_MASSES.map(|name| scalars.exact(name).and_then(ExactSum::from_words));

@@ -4,12 +4,12 @@ use std::time::Instant;
 use crate::job::Problem;
 use crate::job::problem::CheckpointSetup;
 
-/// Times of outputs and checkpoints. Steps are never shortened to meet them, so that the state of a run does
+/// Times of outputs and checkpoints. Steps are never shortened to hit them, so that the state of a run does
 /// not depend on what is written of it: a file is due after the first step that reaches its time.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     output_every: Option<f64>,
-    /// Simulated time until which outputs have been looked for, s.
+    /// Simulated time up to which outputs are done, s.
     looked_until: f64,
     checkpoint: CheckpointSetup,
     next_checkpoint: f64,

@@ -95,7 +95,7 @@ pub fn solver_within<const D: usize, R>(
         return Ok(Err(refusal));
     }
     let mut solver = seeded(comm, problem, forest)?;
-    // Criteria look at particles, and finer leaves have other particles: until the tree stays.
+    // Criteria depend on particles, and finer leaves have other particles: until the tree stays.
     let mut passes = 0;
     while passes < MAX_LEVEL && solver.regrid_before_start() {
         let mut forest = solver.forest;
@@ -159,7 +159,7 @@ fn new_particles<const D: usize>(
     Ok(chunks)
 }
 
-/// Collective. The tree that the job asks for before its criteria are looked at; level by level, so that
+/// Collective. The tree that the job asks for before its criteria are evaluated; level by level, so that
 /// `fits` may refuse it before it is there.
 fn first_forest<const D: usize, R>(
     comm: &Comm,

@@ -33,7 +33,7 @@ pub fn widest<K: Kernel>(kernel: K) -> K::Output {
                 && is_x86_feature_detected!("avx512cd")
         });
         if *HAS_AVX512 {
-            // SAFETY: the processor has the features, as was just asked.
+            // SAFETY: the processor has the features, as was just tested.
             return unsafe { wide(kernel) };
         }
     }

@@ -183,7 +183,8 @@ impl<const D: usize> Solver<D> {
         advanced: Result<Moved, StepError>,
         requests: Requests,
     ) -> Result<StepReport, Disagreement> {
-        // Ahead of the bound, which looks at gravity after the step; instead of what has come of the value.
+        // Reported ahead of the bound, which needs gravity after the step, and in place of later faults that
+        // the value has caused.
         let advanced = self.physics.not_finite().map_or(advanced, |fault| Err(fault.into()));
         let (bound, reach) = (self.local_bound(), self.reach_now());
         let outcome = advanced.and_then(|moved| match bound.is_nan() || bound <= 0.0 {

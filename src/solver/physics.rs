@@ -156,8 +156,8 @@ impl<const D: usize> Physics<D> {
         self.materials.iter().any(|material| material.is_fluid())
     }
 
-    /// Whether fluids are kept in their volume: not with mass scaling, as the masses of nodes then say
-    /// nothing of volumes.
+    /// Whether fluids are kept in their volume: not with mass scaling, since volumes do not follow from the
+    /// masses of nodes then.
     pub(in crate::solver) fn keeps_volumes(&self) -> bool {
         self.has_fluids() && !self.has_scaled_masses()
     }

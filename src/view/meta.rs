@@ -96,7 +96,7 @@ impl Meta {
             usual: survey.usual(number),
             names: names(column.source),
         };
-        // Without particles there is no box round them; the page then looks at the domain.
+        // Without particles there is no box round them; the page then shows the domain.
         let bounds = if survey.bounds[0][0].is_finite() { survey.bounds } else { domain };
         Self {
             title: printable(&options.title).into_owned(),

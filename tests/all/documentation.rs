@@ -79,7 +79,7 @@ impl Copy {
         let run =
             || papers::bash(self.directory.path(), &self.directory.path().join("bin"), environment, commands);
         let mut output = run();
-        // Displays may be taken by others between the look of `xvfb-run` and its start of the server.
+        // Displays may be taken by others between the check of `xvfb-run` and its start of the server.
         for _ in 0..if commands.contains("xvfb-run") { 4 } else { 0 } {
             if output.status.success() {
                 break;

@@ -227,9 +227,9 @@ fn a_silo_discharges_at_a_constant_rate() {
     assert!((0.7..1.3).contains(&(mean / law)), "C = {}", mean / law);
 }
 
-/// An output shows the state and changes nothing that the history measures: with refinement, which looks at
-/// the nodes for it, rows at outputs have the forces on faces and of loads that they have without outputs,
-/// and without refinement.
+/// An output shows the state and changes nothing that the history measures: with refinement, which computes
+/// nodes for it, rows at outputs have the forces on faces and of loads that they have without outputs, and
+/// without refinement.
 #[test]
 fn rows_at_outputs_have_the_forces_of_their_steps() {
     let job = |every: f64, adaptivity: &str| {

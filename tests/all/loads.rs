@@ -215,10 +215,9 @@ fn a_record_in_a_file_is_a_table_over_time() {
     assert!(told.contains("files that the job names"), "{told}");
 }
 
-/// A stiff block on a slope with friction, shaken by the record of `jobs/shaken_slope.toml`, slides as N. M.
-/// Newmark (Géotechnique 15,
-/// 1965) says: while it moves, its acceleration is that of the record and its weight less the friction, and
-///       else it sticks.
+/// A stiff block on a slope with friction, shaken by the record of `jobs/shaken_slope.toml`, slides as
+/// N. M. Newmark says (Géotechnique 15, 1965): while it moves, its acceleration is that of the record and its
+/// weight less the friction, and else it sticks.
 #[test]
 fn a_shaken_block_slides_as_newmark_says() {
     let (slope, friction, g) = (8_f64.to_radians(), 0.22, 9.81);

@@ -1,4 +1,4 @@
-//! `agimp plot`, `movie` and `export`: what the files hold is what is seen, and what other programs read.
+//! `agimp plot`, `movie` and `export`: pictures and exported files show the content of the output files.
 
 use std::path::Path;
 

@@ -230,7 +230,7 @@ fn soak(comm: &Comm, every: usize, steps: u64) {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// Tells what a job did, and notes it if it failed.
+/// Prints the figures of a job, and lists it if it failed.
 fn check(comm: &Comm, name: &str, course: Result<Course, String>, most_gain: f64, failed: &mut Vec<String>) {
     match course {
         Ok(course) if course.gain <= most_gain * course.scale => {

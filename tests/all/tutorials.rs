@@ -1,4 +1,4 @@
-//! The tutorials are true: each runs word by word in an empty directory, and leaves what it says.
+//! The tutorials are true: each runs word by word in an empty directory, and gives the results that it shows.
 //!
 //! * A fenced block after a line "Save as `NAME`:" is written to that file.
 //! * A block `sh` runs; a block `text` after it shows some of what it prints, line by line and in order.

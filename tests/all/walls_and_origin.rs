@@ -110,7 +110,7 @@ where
             let body = format!(
                 "shape = {{ kind = \"box\", min = {min}, max = {max} }}\nparticles_per_cell = {count:?}"
             );
-            // Walls that hold material that pulls as well as what presses.
+            // Walls that hold the material in tension as well as in compression.
             let faces = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"];
             let slip: String =
                 faces[..2 * D].iter().map(|face| format!("{face} = {{ kind = \"slip\" }}\n")).collect();

@@ -43,7 +43,7 @@ pub(crate) struct Block {
     /// Line of the paper at which it begins, from 1.
     pub(crate) line: usize,
     pub(crate) language: String,
-    /// The last line before it that is not empty and no note.
+    /// The last line before it that is neither empty nor a comment.
     pub(crate) before: String,
     /// Text of the comment before it, after `test:`.
     pub(crate) note: Option<String>,

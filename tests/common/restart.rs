@@ -6,7 +6,7 @@ use super::history::History;
 use super::launch::{Outcome, contents, job, run, succeed, text};
 
 /// Runs a job of that name on 1, 2 and 3 ranks and goes on from its second checkpoint: the results are the
-/// same. `look` sees the directory of each run, and what the run said.
+/// same. `look` gets the directory and the output of each run.
 pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnMut(&Path, &str)) {
     let mut reference: Option<Outcome> = None;
     for ranks in [1, 2, 3] {
@@ -26,7 +26,7 @@ pub(crate) fn assert_same_on_any_ranks(job: &str, name: &str, mut look: impl FnM
 }
 
 /// Runs a job of `tests/jobs/runs` on 1, 2 and 3 ranks and with 2 threads, and goes on from the checkpoint in
-/// the middle of it: the results are the same. `look` sees the history of the first run.
+/// the middle of it: the results are the same. `look` gets the history of the first run.
 pub(crate) fn assert_same_in_all_ways(name: &str, look: impl FnOnce(&History)) {
     let (mut reference, mut look): (Option<Outcome>, _) = (None, Some(look));
     for (ranks, threads) in [(1, 1), (1, 2), (2, 1), (3, 1)] {

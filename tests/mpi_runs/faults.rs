@@ -152,7 +152,7 @@ fn a_failure_while_writing_names_the_step() {
     let messages: Vec<&str> = shown.lines().filter(|line| line.starts_with("agimp:")).collect();
     assert_eq!(messages.len(), 1, "one message: {shown}");
     // Which file it was depends on the moment: a checkpoint, a table, or the directory when old files are
-    // looked for.
+    // listed.
     for part in ["step ", "time ", "out/collapse_2d"] {
         assert!(messages[0].contains(part), "'{part}' is missing: {}", messages[0]);
     }

@@ -5,8 +5,8 @@
 //!   [`Comm::agree`] (`agree.rs`) and [`Comm::sparse_exchange`] (`sparse.rs`),
 //! * [`NeighbourExchange`] sends one message to each of a fixed set of neighbours, with a begin
 //!   and a finish between which other work can be done (`neighbour.rs`),
-//! * `host.rs` asks the ranks of one machine,
-//! * `environment.rs` has what differs between MPI libraries,
+//! * `host.rs` has collective calls of the ranks of one machine,
+//! * `environment.rs` has the differences between MPI libraries,
 //! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for
 //!   environment variables that are set before MPI starts.
 //!

@@ -54,7 +54,7 @@ impl NeighbourExchange {
         &self.neighbours
     }
 
-    /// Not collective. What this rank has sent through this exchange.
+    /// Not collective. Messages and bytes that this rank has sent through this exchange.
     pub fn traffic(&self) -> Traffic {
         self.traffic
     }

@@ -128,14 +128,14 @@ impl<T: Pod> Incoming<T> {
     }
 }
 
-/// Waits politely: looks again at once for a while, then gives the core away between looks.
+/// Waits politely: polls without pause for a while, then gives the core away between polls.
 #[derive(Debug, Default)]
 pub(super) struct Patience {
     looks: u32,
 }
 
 impl Patience {
-    /// Not collective. To be called after each look that found nothing.
+    /// Not collective. To be called after each poll that found nothing.
     pub(super) fn wait(&mut self) {
         self.looks += 1;
         if self.looks > 100 {
@@ -145,7 +145,7 @@ impl Patience {
         }
     }
 
-    /// Not collective. To be called after a look that found something.
+    /// Not collective. To be called after a poll that found something.
     pub(super) fn reset(&mut self) {
         self.looks = 0;
     }

@@ -1,9 +1,9 @@
-//! Subcommands that look at output and checkpoint files.
+//! Subcommands for output and checkpoint files.
 //!
-//! | file | what it does |
+//! | file | task |
 //! |---|---|
 //! | `given.rs` | finds the files that a command line means |
-//! | `info.rs` | says what is in a file |
+//! | `info.rs` | lists the contents of a file |
 //! | `plot.rs`, `movie.rs`, `view.rs` | draws particles: as PNG, as a movie, as a page for a browser |
 //! | `export.rs` | writes particles for other programs |
 //! | `report.rs` | writes a run on one page |

@@ -4,7 +4,7 @@ use std::io::Write;
 use crate::material::driver::control::COMPONENTS;
 use crate::material::driver::{Matrix, Point, determinant, logarithmic_strain};
 
-/// A state to be noted.
+/// A state, as input of a row.
 #[derive(Debug)]
 pub(super) struct Stage<'a> {
     /// Time, s.

@@ -1,4 +1,4 @@
-//! How pictures look: options of all subcommands that draw.
+//! Style of pictures: options of all subcommands that draw.
 use std::path::{Path, PathBuf};
 
 use super::message::warn_of;

@@ -2,8 +2,8 @@
 //!
 //! Each rank is a process of its own: it may have been started with other arguments, and it may see another
 //! text of the job, when the file is edited while a batch system starts the ranks or when a network file
-//! system holds an old copy. Ranks that ran different jobs would wait for each other for ever, or compute
-//! what nobody has asked for.
+//! system holds an old copy. Ranks that ran different jobs would wait for each other for ever, or compute a
+//! job that nobody has requested.
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::Path;

@@ -12,7 +12,7 @@ use crate::io::snapshot::directory::{AtStake, at_stake, candidates};
 use crate::run::at_end::report;
 use crate::run::stop::{STOPPED, StopRequest};
 
-/// Time between two looks at a run.
+/// Time between two polls of a run.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 
 /// How a run has ended.

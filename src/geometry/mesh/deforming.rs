@@ -17,7 +17,7 @@ pub struct Deforming {
 /// Where in time a surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
-    /// At the first mesh, before it was asked to go anywhere.
+    /// At the first mesh, before any motion.
     First,
     /// After the mesh of this number.
     After(usize),

@@ -82,7 +82,7 @@ enum Filling {
 struct Inner {
     surface: Surface,
     bounds: Aabb<3>,
-    /// Made where it is first asked for.
+    /// Made at its first use.
     raster: OnceLock<Raster>,
     /// Checksum of vertices and triangles.
     checksum: u64,
@@ -197,8 +197,8 @@ impl Mesh {
         Ok(Self(Arc::new(Inner { surface, bounds, raster, checksum, volume: volume.unwrap_or(0.0).abs() })))
     }
 
-    /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a look at
-    /// whether it crosses itself.
+    /// The surface with its vertices elsewhere (m), for a while: without a raster, and without a test whether
+    /// it crosses itself.
     pub(super) fn moved(&self, vertices: Vec<[f64; 3]>) -> Self {
         let bounds = Aabb::of_points(vertices.iter().copied());
         let indices = self.0.surface.surface.indices().to_vec();

@@ -1,9 +1,9 @@
-//! In which order bins scatter and blocks are summed up, so that few arenas are held at a time.
+//! Order in which bins scatter and blocks are summed up, so that few arenas exist at a time.
 //!
 //! Bins scatter in waves. A block is summed up with the wave after which all bins that reach it have
 //! scattered, and an arena whose blocks are all summed up serves a bin of a later wave. The first wave are
-//! the bins that other ranks need, so that their exchange can start. No sum depends on any of this: what a
-//! block adds up, and in which order, the plan says.
+//! the bins that other ranks need, so that their exchange can start. No sum depends on any of this: the plan
+//! says which arenas a block adds up, and in which order.
 use crate::csr::Csr;
 use crate::grid::plan::GridPlan;
 use crate::kernel::{Row, arena_nodes};
@@ -85,7 +85,7 @@ impl ArenaSchedule {
             before += usize::from(!is_sent);
             self.wave_of_bin.push(wave as u32);
             for block in reached(bin) {
-                // Blocks that are not asked for can wait while the first sums are on their way.
+                // Blocks that no other rank asks for can wait while the first sums are on their way.
                 let least = if seam.is_asked[block] { wave } else { wave.max(1) };
                 let last = &mut self.wave_of_block[block];
                 *last = if *last == NONE { least as u32 } else { (*last).max(least as u32) };

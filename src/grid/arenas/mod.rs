@@ -1,4 +1,4 @@
-//! Arenas: what the particles of each bin scattered, before nodes sum it up.
+//! Arenas: momentum and mass that the particles of each bin scatter, before nodes sum them up.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -90,7 +90,7 @@ impl<const D: usize> ArenaMut<'_, D> {
 }
 
 impl<const D: usize> Arenas<D> {
-    /// Has every bin keep its arena until the next step, for what looks at them afterwards.
+    /// Has every bin keep its arena until the next step, for measurements after the step.
     pub fn keep(&mut self) {
         self.keep = true;
     }
@@ -105,7 +105,7 @@ impl<const D: usize> Arenas<D> {
     ) {
         self.constraints = Arc::clone(&plan.constraints);
         if self.number.len() == plan.bins.len() {
-            // Most bins were not occupied and need no second look.
+            // Most bins were not occupied and need no further test.
             for arena in &self.occupied {
                 self.number[arena.bin as usize] = NONE;
                 self.slot[arena.bin as usize] = NONE;

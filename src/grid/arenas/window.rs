@@ -107,7 +107,7 @@ impl<const D: usize> Window<D> {
 
 /// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing
 /// of what the arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums never
-/// meet part of a region.
+/// see part of a region.
 const FIRST: [u8; 5] = [0, 1, 1, 3, 4];
 const END: [u8; 5] = [3, 4, 5, 7, 7];
 

@@ -38,7 +38,7 @@ pub(super) fn separation(a: u64, b: u64) -> u32 {
     u64::BITS - (a ^ b).leading_zeros()
 }
 
-/// Sorts terms and notes their separations.
+/// Sorts terms and computes their separations.
 pub(super) fn arrange(terms: &mut [Term]) {
     terms.sort_unstable_by_key(|term| (term.key, term.tie));
     for i in 1..terms.len() {

@@ -173,7 +173,7 @@ struct Reach<'a, const D: usize> {
     leaf: Octant<D>,
     region: Extent<D>,
     any_box: bool,
-    /// Finer leaves in the region, once somebody has asked.
+    /// Finer leaves in the region; found at the first use.
     finer: OnceCell<Vec<Octant<D>>>,
 }
 

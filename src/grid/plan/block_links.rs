@@ -119,7 +119,7 @@ impl<const D: usize> GridPlan<D> {
         self.links = links;
     }
 
-    /// Finds the nodes of a block with constrained parents, and notes these parents.
+    /// Finds the nodes of a block with constrained parents, and lists these parents.
     fn find_chained(&mut self, fine: &FineBlock, passed: &mut [u64]) {
         let table = ParentTable::of::<D>();
         let Block { level, coord, needs_sum: sum, needs_velocity: value, constrained, .. } =

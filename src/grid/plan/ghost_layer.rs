@@ -120,7 +120,7 @@ impl<const D: usize> KnownTree<D> {
     }
 
     /// Cuts the known part of the curve into about twice as many equal slices as there are leaves, so that
-    /// [`KnownTree::locate`] has a few leaves to look at wherever leaves are of similar size.
+    /// [`KnownTree::locate`] searches a few leaves wherever leaves are of similar size.
     fn slice(&mut self) {
         let Some((&first, last)) = self.keys.first().zip(self.leaves.last()) else {
             self.slices.clear();

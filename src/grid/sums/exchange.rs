@@ -157,8 +157,8 @@ impl<const D: usize> ArenaExchange<D> {
         &self.sent
     }
 
-    /// Not collective. What neighbours need of the own arenas: a message for each. Most of it `fields` have
-    /// from the blocks asked for; the rest is added up here.
+    /// Not collective. The message to each neighbour: the sums of own arenas that it needs. `fields` have
+    /// most of them, those of whole blocks; the others are added up here.
     pub fn pack(&self, plan: &GridPlan<D>, arenas: &Arenas<D>, fields: &NodeFields<D>) -> Vec<Vec<u8>> {
         let own = Sources { plan, arenas, received: None };
         let tasks: Vec<&[SentPiece]> = self.sent.iter().flat_map(|pieces| pieces.chunks(TASK)).collect();

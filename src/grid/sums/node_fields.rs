@@ -41,7 +41,7 @@ pub struct NodeFields<const D: usize> {
 /// Blocks that one task adds up, at least.
 const TASK: usize = 16;
 
-/// One block of the fields with what is noted of it, mutable.
+/// One block of the fields with its flags, mutable.
 struct Slot<'a> {
     rows: &'a mut [Row],
     moments: &'a mut [Row],

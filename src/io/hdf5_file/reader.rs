@@ -24,12 +24,11 @@ use crate::memory::may_fail;
 
 /// No data set of this program has more numbers in a row.
 const MOST_COMPONENTS: u64 = 1 << 10;
-/// Bytes that are looked at together when a data set is gone through.
+/// Bytes that are read together when a data set is checked piece by piece.
 const PIECE: u64 = 1 << 20;
 
-/// An existing file, opened for reading. What it declares is not believed: only groups and data sets of the
-/// file itself are looked at, only contiguous ones without filters, and none that would be longer than the
-/// file.
+/// An existing file, opened for reading. Its declarations are not trusted: only groups and data sets of the
+/// file itself are read, only contiguous ones without filters, and none that would be longer than the file.
 pub struct Reader {
     path: PathBuf,
     comm: Option<Comm>,
@@ -58,7 +57,7 @@ pub struct Stored {
 impl Reader {
     /// Collective. Opens the file on all ranks.
     pub fn open(comm: &Comm, path: &Path) -> Result<Self, FileError> {
-        // One rank looks first: a file that is missing or foreign is opened once.
+        // One rank tries first: a file that is missing or foreign is opened once.
         let seen = if comm.rank() == 0 { look_at(path).map(drop) } else { Ok(()) };
         agreed(Some(comm), seen)?;
         agreed(Some(comm), Self::open_here(Some(comm), path))
@@ -142,8 +141,8 @@ impl Reader {
         for end in ends {
             let name = c_text(&object[..end]);
             // SAFETY: open file, terminated name. The library fills the record when it succeeds; its kind is
-            // looked at as the number that it is in C, since links of user-defined kinds have numbers without
-            // a name.
+            // read as the number that it is in C, since links of user-defined kinds have numbers without a
+            // name.
             #[allow(deprecated)]
             let is_hard = unsafe {
                 if H5Lexists(self.id(), name.as_ptr(), H5P_DEFAULT) <= 0 {
@@ -164,7 +163,7 @@ impl Reader {
         Ok(true)
     }
 
-    /// Not collective. What a data set is, if it is one that this program could have written.
+    /// Not collective. Type, size and place of a data set, if it is one that this program could have written.
     pub fn stored(&self, dataset: &str) -> Result<Stored, FileError> {
         let _turn = library();
         if !self.leads_to(dataset)? {
@@ -264,7 +263,7 @@ impl Reader {
     }
 }
 
-/// Opens a file and looks at its first bytes. Returns it with its size.
+/// Opens a file and checks its first bytes. Returns it with its size.
 fn look_at(path: &Path) -> Result<(File, u64), FileError> {
     let system = |source| FileError::System { path: path.into(), action: "open", source };
     // Without waiting: nobody may ever write to a pipe of that name.

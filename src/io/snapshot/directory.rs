@@ -61,7 +61,7 @@ pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
 /// Files that a run may go on from.
 #[derive(Debug, Default)]
 pub struct Candidates {
-    /// Those that hold a restart state and look whole, with their steps; the latest first.
+    /// Those that hold a restart state and seem complete, with their steps; the latest first.
     pub whole: Vec<(PathBuf, u64)>,
     /// Why others cannot be read.
     pub damaged: Vec<FileError>,
@@ -107,7 +107,7 @@ pub enum AtStake {
     OtherJob(PathBuf),
 }
 
-/// Not collective. What a run `name` of the job with this digest would destroy if it started anew.
+/// Not collective. Results that a run `name` of the job with this digest would destroy if it started anew.
 pub fn at_stake(directory: &Path, name: &str, job_digest: u64) -> Result<Option<AtStake>, FileError> {
     let results = results(directory, name)?;
     let of = |wanted: Kind| results.iter().filter(move |(kind, ..)| *kind == wanted).map(|(.., path)| path);

@@ -137,7 +137,7 @@ impl Outputs {
     ) -> Result<PathBuf, FileError> {
         self.settle(comm)?;
         let path = checkpoint_path(&self.directory, &self.name, view.step);
-        // Velocity and level are enough to look at; the state has the rest.
+        // Velocity and level suffice for viewers; the state has the rest.
         let options = Options {
             fields: vec![super::PointField::Velocity, super::PointField::LeafLevel],
             single: true,

@@ -23,7 +23,7 @@ pub(in crate::job) struct Checks<'t> {
 }
 
 impl Checks<'_> {
-    /// Whether there are so many faults that it is no use to look for more.
+    /// Whether there are so many faults that a search for more is of no use.
     pub(crate) fn is_full(&self) -> bool {
         self.faults.len() > MOST
     }

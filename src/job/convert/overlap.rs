@@ -2,8 +2,8 @@
 use crate::geometry::{Aabb, common_point};
 use crate::job::Problem;
 
-/// Boxes looked at for all pairs (what is not found then is thin, and found when particles are made if it
-/// matters to them), and pairs whose bounds are compared for each of them.
+/// Boxes tested for all pairs (an overlap that is not found then is thin, and found when particles are made
+/// if it matters to them), and pairs whose bounds are compared for each of them.
 const TOTAL: usize = 1_000_000;
 const BOUNDS_PER_BOX: usize = 20;
 

@@ -161,7 +161,7 @@ impl fmt::Display for FaultList {
     }
 }
 
-/// Places in the text of a file that is asked about often.
+/// Lines and columns in the text of a file, for many queries.
 pub(in crate::job) struct Lines<'t> {
     /// The text as the user has written it.
     text: &'t str,

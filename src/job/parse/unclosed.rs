@@ -1,8 +1,8 @@
 //! Where a brace, a bracket or a string opens that is never closed.
 //!
 //! A parser notices late that something is not closed: tables and arrays may go on over lines. So after its
-//! error the text is looked through once more, line by line, with what is open. A line that begins a table of
-//! the file, or a key inside an array, shows that what is open should have been closed before.
+//! error the text is scanned once more, line by line, with what is open. A line that begins a table of the
+//! file, or a key inside an array, shows that what is open should have been closed before.
 use std::ops::Range;
 
 /// Opening sign that is not closed: its first byte, and a message.

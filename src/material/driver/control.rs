@@ -13,7 +13,7 @@ const MOST: usize = 60;
 const HALVINGS: u32 = 8;
 /// Greatest strain that one iteration adds.
 const REACH: f64 = 0.2;
-/// Greatest strain in which a solution is looked for.
+/// Greatest strain in which a solution is searched.
 const FAR: f64 = 20.0;
 
 /// Prescribed value of a component.

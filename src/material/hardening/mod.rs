@@ -240,7 +240,7 @@ impl Hardening {
         if dilation > friction {
             return fail(format!("at most friction_angle, {friction}"));
         }
-        // There is one history variable for temperature or booked volume.
+        // Temperature and volume gain share one history variable.
         if self.heats() && volume_correction && dilation > 0.0 {
             return fail("0 with Johnson-Cook hardening, unless volume_correction = false".to_owned());
         }

@@ -2,13 +2,13 @@
 //! al. 2016, "Drucker-Prager elastoplasticity for sand animation"), in three dimensions; plane strain
 //! is the same with zero out-of-plane stretch.
 //!
-//! With `ε` the trial strain plus the booked volume gain: where `tr ε >= 0` the grains come apart and
-//! all strain is plastic; else `f = |dev ε| + (3λ + 2μ)/(2μ) tr(ε) α`, and where `f > 0` the deviator
-//! shrinks by `f`.
+//! With `ε` the trial strain plus the volume gain so far: where `tr ε >= 0` the grains come apart and all
+//! strain is plastic; else `f = |dev ε| + (3λ + 2μ)/(2μ) tr(ε) α`, and where `f > 0` the deviator shrinks by
+//! `f`.
 //!
-//! Volume correction (Tampubolon et al. 2017): the volume gained apart is booked as `ln J_p` and a
-//! third of it is added to each principal trial strain, so that the material carries stress again
-//! only after the gain has been given back.
+//! Volume correction (Tampubolon et al. 2017): the volume gained apart is stored as `ln J_p`, and a third of
+//! it is added to each principal trial strain, so that the material carries stress again only after the gain
+//! has been given back.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -243,7 +243,7 @@ impl Law for Dry {
         // An unstrained particle is elastic, so that it keeps its bits.
         let apart = zero.lt(trace) | (zero.le(trace) & zero.lt(norm));
         let flows = !apart & zero.lt(excess);
-        // Strain without plastic flow; differs from the trial only where a gain of volume is booked.
+        // Strain without plastic flow; differs from the trial only where volume has been gained.
         let returns = zero.lt(booked.abs()) & !apart;
         let changed = apart | flows | returns;
         let mut kept = one;
@@ -360,7 +360,7 @@ impl Cohesive {
         })
     }
 
-    /// Whether volume that has opened is booked apart from that of dilation.
+    /// Whether volume that has opened is stored apart from that of dilation.
     fn books_apart(&self) -> bool {
         self.volume_correction && self.beta > 0.0
     }
@@ -441,7 +441,7 @@ impl Cohesive {
                 let gained = opens.select((strain - end).max(zero), zero);
                 state.history[OWN] = changed.select(gained, booked);
             } else if self.volume_correction {
-                // Nothing is booked any more once the material is closed, not even by rounding.
+                // Once the material is closed no gain is left, not even by rounding.
                 let gained = opens.select(state.history[PLASTIC_VOLUME], zero);
                 state.history[PLASTIC_VOLUME] = changed.select(gained, volume);
             }

@@ -6,8 +6,8 @@
 //! Drucker-Prager's.
 //!
 //! Cohesion hardens or softens with `κ = √(2/3) |dev ε_p|`; angles may soften with it. Where the material
-//! opens (apex, cut-off), the volume that it gains is booked and given back on compression (Tampubolon et al.
-//! 2017).
+//! opens (apex, cut-off), the volume that it gains is stored, and given back on compression (Tampubolon et
+//! al. 2017).
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -221,7 +221,7 @@ impl Properties {
         self
     }
 
-    /// Whether volume that has opened is booked apart from that of dilation.
+    /// Whether volume that has opened is stored apart from that of dilation.
     fn books_apart(&self) -> bool {
         self.volume_correction && self.dilation.sine > 0.0
     }
@@ -384,7 +384,7 @@ impl Properties {
             let gained = (trace - end_trace).max(zero);
             state.history[OWN] = changed.select(opens.select(gained, zero), booked);
         } else {
-            // Nothing is booked any more once the material is closed, not even by rounding.
+            // Once the material is closed no gain is left, not even by rounding.
             let gained = opens.select(state.history[PLASTIC_VOLUME], zero);
             state.history[PLASTIC_VOLUME] = changed.select(gained, volume);
         }

@@ -226,7 +226,7 @@ mod tests {
         let lone = Lone::of(&deviator, Lanes::splat(size));
         let principal = Principal::of(&lone);
         let sorted = principal.sorted();
-        // Rotations want a positive definite matrix.
+        // Rotations require a positive definite matrix.
         let mut shifted = deviator;
         shifted[..3].iter_mut().for_each(|component| *component += Lanes::splat(2.0 * size + 1e-300));
         let eigen = decompose(&shifted, false);

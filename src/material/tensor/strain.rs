@@ -122,8 +122,8 @@ pub(crate) fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: boo
 #[cold]
 #[inline(never)]
 fn far_tensor_of(tensor: &mut Symmetric, lanes: Mask, trace: Lanes, deviator: &Symmetric, plane: bool) {
-    // Rotations want a positive definite matrix; unlike eigenvalues of b, those of a strain are needed to the
-    // same absolute accuracy.
+    // Rotations require a positive definite matrix; unlike eigenvalues of b, those of a strain are needed to
+    // the same absolute accuracy.
     let squares = each(*deviator, |component| component * component);
     let shear = squares[3] + squares[4] + squares[5];
     let shift = (squares[0] + squares[1] + squares[2] + shear + shear).sqrt() * 2.0 + Lanes::splat(1e-9);

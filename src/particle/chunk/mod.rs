@@ -3,19 +3,19 @@
 //! A tile holds one line of the cache for each component of its particles, one after the other. A batch of a
 //! kernel is a tile, so that all that it reads and writes lies together, at offsets that the compiler knows.
 //!
-//! Order inside a chunk is part of the result: sums over particles run in this order, so it is
-//! changed only by rules that depend on tree and particles (see `ARCHITECTURE.md`, "Canonical
-//! order"), never by ranks or threads.
+//! Order inside a chunk is part of the result: sums over particles run in this order, so it is changed only
+//! by rules that depend on tree and particles (see `docs/design/node-sums.md`, "Rules"), never by ranks or
+//! threads.
 //!
 //! Positions are relative to the lower corner of the domain, so that an origin far from zero costs
 //! no digits.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `mod.rs` | the chunk, and what is read and written in place |
+//! | `mod.rs` | the chunk, and access in place |
 //! | `edit.rs` | particles come and go |
 //! | `bytes.rs` | chunks as bytes for other ranks |
-//! | `carried.rs` | what some particles carry for loads |
+//! | `carried.rs` | columns that some particles carry for loads |
 //! | `place.rs` | which content a chunk has, and where in memory |
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 

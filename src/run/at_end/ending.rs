@@ -62,7 +62,7 @@ impl Ending {
         write_whole(path, text.as_bytes())
     }
 
-    /// Not collective. What a run has left, if it has ended so.
+    /// Not collective. The record that a run has left, if it has ended ahead of its time.
     pub fn read(directory: &Path, name: &str) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(path(directory, name)).ok()?).ok()
     }

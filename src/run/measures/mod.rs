@@ -25,7 +25,7 @@ fn measure(kind: &str, name: &str, what: &str) -> String {
     format!("{kind}_{what}{:016x}", fnv1a(name.bytes().map(u64::from)))
 }
 
-/// Collective. Appends what is booked of fluxes, and where tracks are.
+/// Collective. Appends the masses of fluxes, and the places of tracks.
 pub(super) fn write<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
@@ -49,7 +49,7 @@ pub(super) fn write<const D: usize>(
 /// The lower half of an identifier.
 const HALF: u64 = 0xffff_ffff;
 
-/// Collective. Begins to count at fluxes, to follow tracks, and to note maxima over maps.
+/// Collective. Begins to count at fluxes, to follow tracks, and to record maxima over maps.
 pub(super) fn begin<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>) {
     solver.crossings.fluxes = Fluxes::new(&problem.fluxes);
     solver.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
@@ -57,8 +57,8 @@ pub(super) fn begin<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>
     solver.maxima = problem.maps.iter().map(Map::nothing).collect();
 }
 
-/// Takes over what is booked of fluxes, on rank 0, where tracks are, and the maxima of maps from the file at
-/// `path`. What the file lacks begins here.
+/// Takes over the masses of fluxes (on rank 0), the places of tracks and the maxima of maps from the file at
+/// `path`. Measurements that the file lacks begin here.
 pub(super) fn restore<const D: usize>(
     rank: usize,
     problem: &Problem<D>,

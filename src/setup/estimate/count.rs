@@ -18,12 +18,12 @@ use partition::Octant;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// Parts of the tree that are looked at. A part takes about a hundred bytes.
+/// Most parts of the tree that are examined. A part takes about a hundred bytes.
 const MOST_PARTS: u64 = 500_000;
 /// Work for all parts, in comparisons of a point or a box with a plane or an edge of a shape, a few
 /// nanoseconds each.
 const MOST_WORK: u64 = 60_000_000;
-/// Octants that are looked at for one question about a split. Beyond, the answer is yes.
+/// Most octants that are examined for one question about a split. Beyond, the answer is yes.
 const MOST_LOOKS: usize = 2_000;
 
 /// Counts, and whether they are complete.
@@ -121,7 +121,7 @@ struct Counter<'a, const D: usize> {
     problem: &'a Problem<D>,
     tally: Tally,
     parts: VecDeque<Part<D>>,
-    /// Parts that have been looked at or will be.
+    /// Parts that have been examined or will be.
     pushed: u64,
     work: u64,
     body_work: Vec<u64>,
@@ -379,7 +379,7 @@ impl<const D: usize> Counter<'_, D> {
         }
     }
 
-    /// Counts the leaves that a part has at least, without a closer look.
+    /// Counts the leaves that a part has at least, without examining it.
     fn leave(&mut self, part: &Part<D>) {
         if part.settled.is_none() {
             self.add_leaves(part, part.level.max(self.problem.tree.base_level));

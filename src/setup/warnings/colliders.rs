@@ -6,10 +6,10 @@ use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;
 use crate::text::{excerpt, quantity};
 
-/// Boxes looked at for bodies inside colliders.
+/// Boxes tested for bodies inside colliders.
 const BOXES: usize = 50_000;
 
-/// Warns of colliders that material may pass through or never meets, and of bodies that begin inside one.
+/// Warns of colliders that material may pass through or never touches, and of bodies that begin inside one.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let mut boxes = BOXES;
     for (index, collider) in problem.colliders.iter().enumerate() {
@@ -90,7 +90,7 @@ fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
     }
 }
 
-/// Times of a run at which the place of a moving collider is looked at.
+/// Times of a run at which the place of a moving collider is computed.
 const TIMES: u32 = 256;
 
 /// Whether a collider is outside the domain, by more than a cell, at all times of a run. Nothing is said of

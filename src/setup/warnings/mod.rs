@@ -1,6 +1,6 @@
 //! Likely mistakes in a job: what is allowed in it and hardly meant.
 //!
-//! | file | what it looks at |
+//! | file | subject |
 //! |---|---|
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |

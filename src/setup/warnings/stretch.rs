@@ -13,7 +13,7 @@ use crate::text::{excerpt, number, quantity};
 
 /// Greatest traction over Young's modulus: beyond, the outermost particles may come off.
 const TRACTION: f64 = 0.15;
-/// Times of a run at which loads and motions are looked at.
+/// Times of a run at which loads and motions are evaluated.
 const TIMES: u32 = 32;
 
 /// Warns of elastic bodies that are drawn, thrown or pulled apart.
@@ -75,11 +75,11 @@ struct Grip<const D: usize> {
     bounds: Aabb<D>,
     /// Axes along which it holds.
     axes: [bool; D],
-    /// Its way at the times that are looked at, m.
+    /// Its displacement at each of [`times`], m.
     ways: Vec<[f64; D]>,
 }
 
-/// Times that are looked at, s.
+/// Times at which motions are evaluated, s.
 fn times<const D: usize>(problem: &Problem<D>) -> impl Iterator<Item = f64> {
     let end = problem.time.end;
     (0..=TIMES).map(move |part| end * f64::from(part) / f64::from(TIMES))

@@ -25,7 +25,7 @@ const WEIGHT: f64 = 0.2;
 const TOOL: f64 = 0.5;
 /// Greatest speed of a body over that of waves in it.
 const BODY: f64 = 2.0;
-/// Bodies that are looked at.
+/// Most bodies that are checked.
 const BODIES: usize = 1000;
 
 /// Warns of what no material is, and of loads that no material bears.

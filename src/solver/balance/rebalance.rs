@@ -1,10 +1,9 @@
 //! Partition of leaves by their cost.
 //!
-//! When to make a new one: like a debtor who settles when what is owed equals the fee, ranks take new cuts
-//! when the time that the present ones have lost since they were made reaches what a new partition takes.
-//! While imbalance grows evenly, that is the interval with the least sum of both. The partition with which a
-//! run starts is a guess; it is replaced as soon as costs are measured, if that takes away half of the
-//! imbalance.
+//! When to make a new one: ranks take new cuts when the time that the present ones have lost since they were
+//! made reaches the cost of a new partition, as in the problem of renting or buying. While imbalance grows
+//! evenly, that is the interval with the least sum of both. The partition with which a run starts is a guess;
+//! it is replaced as soon as costs are measured, if that takes away half of the imbalance.
 use std::time::Instant;
 
 use partition::{CutAt, Cuts};
@@ -17,7 +16,7 @@ use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::phases::{Phase, thread_time};
 use crate::solver::state::regrid_timers::Part;
 
-/// Steps between looks at the imbalance.
+/// Steps between checks of the imbalance.
 const LOOK_EVERY: u64 = 10;
 /// Imbalance below which nothing is done.
 const LIMIT: f64 = 1.01;
@@ -71,7 +70,7 @@ impl<const D: usize> Solver<D> {
         Imbalance(self.plan_partition().imbalance())
     }
 
-    /// Collective. [`Solver::balance`] in those steps in which several ranks look at it.
+    /// Collective. [`Solver::balance`] in those steps in which several ranks check it.
     pub fn balance_if_due(&mut self) {
         if self.comm.size() > 1 && self.clock.step.is_multiple_of(LOOK_EVERY) {
             self.balance();

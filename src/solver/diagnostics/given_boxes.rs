@@ -1,7 +1,7 @@
 //! Transfers of particles whose boxes are given one by one, through the phases of a step.
 //!
-//! In a run half widths follow from a particle's state. To look at the weights of any box, and to hold
-//! transfers against references, they are given here instead; all else is the same code on the same grid.
+//! In a run half widths follow from a particle's state. Here they are given instead, to examine the weights
+//! of any box and to compare transfers with references; all else is the same code on the same grid.
 use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 

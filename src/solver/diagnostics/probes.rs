@@ -25,7 +25,7 @@ pub(super) struct Partial<const D: usize> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective. What the probes read of the present state, in their order.
+    /// Collective. Readings of the probes in the present state, in their order.
     pub fn read_probes(&self, probes: &[Probe<D>]) -> Vec<Readings<D>> {
         if probes.is_empty() {
             return Vec::new();

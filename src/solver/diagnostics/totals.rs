@@ -100,7 +100,7 @@ impl<const D: usize> Solver<D> {
         self.is_to_weigh = true;
     }
 
-    /// Not collective. Adds up the mass of the particles, if that is asked for, before a step.
+    /// Not collective. Adds up the mass of the particles, if that is requested, before a step.
     pub(in crate::solver) fn weigh_particles(&mut self) {
         if !self.is_to_weigh {
             return;
@@ -116,7 +116,7 @@ impl<const D: usize> Solver<D> {
         self.weighed = Some(Weighed { particles, nodes: ExactSum::new() });
     }
 
-    /// Not collective. Adds up the mass on the nodes, if that is asked for, after a step that has summed it.
+    /// Not collective. Adds up the mass on the nodes, if that is requested, after a step that has summed it.
     pub(in crate::solver) fn weigh_nodes(&mut self) {
         if !std::mem::take(&mut self.is_to_weigh) {
             return;
@@ -140,7 +140,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the
-    /// latter, when a step weighed them last; `None` if none has since the last call.
+    /// latter, as a step measured it last; `None` if none has since the last call.
     pub fn weighed_mass_error(&mut self) -> Option<f64> {
         let Weighed { particles, nodes } = self.weighed.take()?;
         let mut sums = [nodes, particles];

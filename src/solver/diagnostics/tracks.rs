@@ -38,7 +38,7 @@ impl<const D: usize> Solver<D> {
         ids[0]
     }
 
-    /// Collective. What there is of each track, in their order.
+    /// Collective. Readings of the tracks, in their order.
     pub fn read_tracks(&mut self, tracks: &[Track<D>]) -> Vec<Readings<D>> {
         if tracks.is_empty() {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Particles that cross the faces of the domain: what becomes of them, and what is booked of that.
+//! Particles that cross the faces of the domain: their fate, and their counts and masses.
 use partition::comm::Comm;
 
 use super::fluxes::Fluxes;

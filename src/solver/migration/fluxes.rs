@@ -18,7 +18,7 @@ pub struct Fluxes {
 }
 
 impl Fluxes {
-    /// Those of a job, with nothing booked.
+    /// Those of a job, with zero masses.
     pub fn new(fluxes: &[Flux]) -> Self {
         let sections = fluxes.iter().map(|flux| flux.section).collect();
         Self { sections, sums: vec![ExactSum::new(); fluxes.len()] }
@@ -37,7 +37,7 @@ impl Fluxes {
         }
     }
 
-    /// Books masses (kg, with signs) that crossed openings, each with the number of the section.
+    /// Adds masses (kg, with signs) that crossed openings, each with the number of the section.
     pub(super) fn book_passed(&mut self, passed: &[(u32, f64)]) {
         passed.iter().for_each(|&(number, mass)| self.sums[number as usize].add(mass));
     }
@@ -77,7 +77,7 @@ impl Fluxes {
         now.gather(comm).iter().map(ExactSum::to_f64).collect()
     }
 
-    /// Collective. What is booked on all ranks.
+    /// Collective. Masses over all ranks, exact.
     pub fn gather(&self, comm: &Comm) -> Vec<ExactSum> {
         let mut sums = self.sums.clone();
         if !sums.is_empty() {

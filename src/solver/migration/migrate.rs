@@ -142,9 +142,9 @@ impl<const D: usize> Migration<D> {
         self.arrive(tree, chunks, departed, &mut Vec::new(), &mut Crossings::default())
     }
 
-    /// Collective over neighbours. Appends what has departed from each own leaf, here and on other ranks, to
-    /// where it goes. Appends what splits on the way did to `splits`, and books those that crossed faces of
-    /// the domain in `crossings`.
+    /// Collective over neighbours. Appends the particles that have departed, here and on other ranks, to the
+    /// own leaves that hold them now. Appends the splits on the way to `splits`, and counts particles that
+    /// crossed faces of the domain in `crossings`.
     ///
     /// # Errors
     /// [`MigrateError`] on the rank that found it; the caller makes it collective. The exchange is completed

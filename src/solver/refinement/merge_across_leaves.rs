@@ -11,8 +11,8 @@ use crate::solver::migration::migrate::Moved;
 use crate::solver::state::{Solver, StepError};
 
 impl<const D: usize> Solver<D> {
-    /// Collective. Merges families that a face between leaves cuts in two: their parts meet in one leaf, and
-    /// those that did not merge go back. Faces across one combination of axes are tried at a time, in turn
+    /// Collective. Merges families that a face between leaves cuts in two: their parts move to one leaf, and
+    /// those that did not merge move back. Faces across one combination of axes are tried at a time, in turn
     /// from call to call. All particles must be in their leaves. Returns whether any rank merged any.
     ///
     /// # Errors

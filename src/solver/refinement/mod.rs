@@ -1,4 +1,4 @@
-//! The tree follows the material.
+//! Dynamic refinement: the tree follows the material.
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -15,15 +15,15 @@ use crate::solver::state::regrid_cache::{SettledTree, Wish};
 use crate::solver::state::regrid_timers::Part;
 use crate::solver::state::{Solver, StepError};
 
-/// A region with the level that all leaves which meet it must have at least.
+/// A region with the level that all leaves which intersect it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
 
 /// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What
 /// creeps at rest shall not refine its surroundings.
 const CREEP: f64 = 0.025;
 
-/// An octant's box with a layer around, below and above, without its surface, so that it meets only leaves
-/// that overlap it.
+/// An octant's box with a layer around, below and above, without its surface, so that it intersects only
+/// leaves that overlap it.
 fn grown<const D: usize>(octant: &Octant<D>, [below, above]: [[u32; D]; 2]) -> Region<D> {
     let (lower, upper) = (octant.lower(), octant.upper());
     Region {
@@ -182,7 +182,7 @@ impl<const D: usize> Solver<D> {
         Some(self.move_to_leaves(old.leaves()))
     }
 
-    /// Collective. What each own leaf wants for the next `steps`.
+    /// Collective. Levels that the criteria ask for in and around each own leaf for the next `steps`.
     fn wishes(&mut self, steps: u64) -> Vec<Wish<D>> {
         let values = self.indicators();
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
@@ -205,7 +205,7 @@ impl<const D: usize> Solver<D> {
         each.collect()
     }
 
-    /// Not collective. What the wishes mean for the leaves around.
+    /// Not collective. Requests to the leaves around that follow from the wishes.
     fn requests(&self, adaptivity: &Adaptivity<D>, wishes: &[Wish<D>]) -> Vec<Request<D>> {
         let leaves = self.forest.leaves();
         let edge = 1 << (MAX_LEVEL - adaptivity.finest_level());
@@ -239,7 +239,7 @@ impl<const D: usize> Solver<D> {
         requests
     }
 
-    /// Not collective. What requests mean for each own leaf of a tree.
+    /// Not collective. Mark of each own leaf of a tree, from all requests.
     fn marks(
         &self,
         adaptivity: &Adaptivity<D>,
@@ -286,7 +286,7 @@ impl<const D: usize> Solver<D> {
         let mut sources = std::mem::take(&mut self.chunks);
         let mut levels = vec![0; new.len()];
         let mut chunks: Vec<Chunk<D>> = new.iter().map(|_| Chunk::new()).collect();
-        // Nothing is known of leaves that change: they get a closer look.
+        // The bounds of leaves that change are unknown; an infinite width has their particles examined.
         let mut maxima = vec![LeafMaxima { width: f64::INFINITY, ..LeafMaxima::default() }; new.len()];
         let (roots, root_edge) = (self.forest.brick().roots, self.physics.root_edge);
         for (from, to) in correspondence(old, new) {
@@ -314,7 +314,7 @@ impl<const D: usize> Solver<D> {
         levels
     }
 
-    /// Collective. What the criteria say of each own leaf, for files.
+    /// Collective. Urgency and wanted level of each own leaf by the criteria, for files.
     pub fn refinement(&mut self) -> Option<Refinement> {
         self.physics.adaptivity.as_ref()?;
         self.nodes_of_state();

@@ -221,7 +221,7 @@ impl<const D: usize> OfLeaf<'_, D> {
     }
 
     /// Begins the next sort when the particles of own leaf `leaf` have advanced and those outside it are
-    /// gone: what it looks at is still in the cache.
+    /// gone: their data are still in the cache.
     pub(crate) fn presort(
         self,
         plan: &GridPlan<D>,

@@ -30,7 +30,7 @@ pub struct ExactSums<const N: usize> {
 }
 
 impl<const N: usize> ExactSums<N> {
-    /// Nothing is booked of so many things.
+    /// Zero sums of so many things.
     pub(in crate::solver) fn new(things: usize, time: f64) -> Self {
         Self { of: vec![std::array::from_fn(|_| ExactSum::new()); things], since: time }
     }

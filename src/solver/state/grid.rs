@@ -43,7 +43,7 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) fill: Option<Box<NodeFill>>,
     /// Ties of surface nodes, in jobs that have such.
     pub(in crate::solver) ties: Option<Box<Ties<D>>>,
-    /// Nodes inside colliders that never move, as far as they have been asked for.
+    /// Nodes inside colliders that never move, found block by block at first use.
     pub(in crate::solver) inside_still: InsideStill<D>,
     /// Bytes of the last exchange of sums.
     pub(in crate::solver) sum_bytes: u64,

@@ -9,7 +9,7 @@ pub(in crate::solver) struct LastPartition {
     pub(in crate::solver) price: f64,
     /// Lost to its imbalance so far.
     pub(in crate::solver) lost: f64,
-    /// Time of the last look.
+    /// Processor time at the last check of the imbalance.
     pub(in crate::solver) looked: Duration,
     /// Whether it was made before costs were measured.
     pub(in crate::solver) is_guess: bool,

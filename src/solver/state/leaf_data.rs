@@ -17,7 +17,7 @@ pub(in crate::solver) const MEASURE_EVERY: u64 = 32;
 pub struct LeafData<const D: usize> {
     /// Greatest sum of wave speed and particle speed after the last step, m/s; 0 if that is not known.
     pub(in crate::solver) signal: Vec<f64>,
-    /// Bounds on the particles, noted in the last step; none where it is not that of these leaves.
+    /// Bounds on the particles after the last step; empty if that step had other leaves.
     pub(in crate::solver) maxima: Vec<LeafMaxima<D>>,
     /// Mass times the shift that keeps fluids in their volume, summed over particles in the last step, kg m.
     pub(in crate::solver) shifts: Vec<[f64; D]>,
@@ -38,7 +38,7 @@ impl<const D: usize> LeafData<D> {
         self.times.reset(leaves);
     }
 
-    /// Not collective. Begins the step of this number, in which all is noted anew.
+    /// Not collective. Begins the step of this number, which fills all anew.
     pub(in crate::solver) fn begin_step(&mut self, step: u64, leaves: usize) {
         if self.signal.len() != leaves || self.times.nanoseconds.len() != leaves {
             self.reset(leaves);
@@ -48,7 +48,7 @@ impl<const D: usize> LeafData<D> {
         self.times.is_step = true;
     }
 
-    /// Not collective. Makes room for what G2P notes.
+    /// Not collective. Makes room for the results of G2P.
     pub(in crate::solver) fn begin_gather(&mut self, chunks: &[Chunk<D>]) {
         self.signal.resize(chunks.len(), 0.0);
         self.maxima.resize(chunks.len(), LeafMaxima::default());

@@ -5,9 +5,9 @@
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
 //! | `inside` | nodes inside colliders |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
-//! | [`leaf_data`] | what is noted of each leaf |
+//! | [`leaf_data`] | data of each own leaf beside its particles |
 //! | `node_fill` | how full nodes are |
-//! | `regrid_cache` | what regrids remember |
+//! | `regrid_cache` | data kept from one regrid to the next |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
 //! | [`relaxation`] | the way to equilibrium |
 //! | [`phases`], [`regrid_timers`] | timers |
@@ -168,7 +168,7 @@ pub struct Solver<const D: usize> {
     pub(super) regrid_cache: RegridCache<D>,
     /// Messages and bytes that grids of earlier trees and partitions have sent.
     pub(super) sent_before: Traffic,
-    /// Least bytes that these nodes need, as of the last step that was weighed.
+    /// Least bytes that the exchanged nodes need, in the last step that measured the mass error.
     pub(super) surface_bytes: u64,
     pub(super) costs: Costs,
     pub(super) partitioned: LastPartition,

@@ -72,7 +72,7 @@ pub struct Phases {
 }
 
 impl Phases {
-    /// Runs `work` and books its wall time.
+    /// Runs `work` and adds its wall time to a phase.
     pub fn time<R>(&mut self, phase: Phase, work: impl FnOnce() -> R) -> R {
         let (start, running) = (Instant::now(), thread_time());
         let result = work();
@@ -86,7 +86,7 @@ impl Phases {
         self.seconds[phase as usize] += time.as_secs_f64();
     }
 
-    /// Seconds booked so far, in the order of [`Phase::ALL`].
+    /// Seconds so far, in the order of [`Phase::ALL`].
     pub fn seconds(&self) -> [f64; Phase::ALL.len()] {
         self.seconds
     }

@@ -8,7 +8,7 @@ pub(in crate::solver) struct Wish<const D: usize> {
     /// Levels, a bit each; each has its own width of buffer.
     pub(in crate::solver) levels: u32,
     /// Way that the material can go down and up along each axis until the tree changes next, in edges of the
-    /// finest leaves that the job can have. Fractions would not change which leaves it meets.
+    /// finest leaves that the job can have. Fractions would not change which leaves it reaches.
     pub(in crate::solver) way: [[u32; D]; 2],
 }
 
@@ -19,7 +19,7 @@ impl<const D: usize> Wish<D> {
 /// Data kept from one regrid to the next. It saves work and changes no bit.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct RegridCache<const D: usize> {
-    /// See there.
+    /// Cached surroundings of leaves; see the type.
     pub surroundings: Surroundings,
     /// With what the tree stays as it is.
     pub(in crate::solver) settled: Option<SettledTree<D>>,

@@ -4,7 +4,7 @@ use std::time::Instant;
 /// Parts of a regrid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Values of the criteria and what leaves want.
+    /// Values of the criteria, and the levels that leaves request.
     Criteria,
     /// Marks of the leaves around, and the changed and balanced tree.
     Tree,

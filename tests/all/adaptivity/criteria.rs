@@ -77,8 +77,8 @@ fn assert_levels(solver: &Solver<2>, fine: u8, is_fine: impl Fn(&Filled<2>) -> b
     }
 }
 
-/// Leaves that meet the stripe between two places along x are fine, those further from it than a leaf are
-/// coarse.
+/// Leaves that intersect the stripe between two places along x are fine, those further from it than a leaf
+/// are coarse.
 fn assert_stripe(solver: &Solver<2>, (from, to): (f64, f64)) {
     for leaf in filled(solver) {
         let distance = (leaf.lower[0] - to).max(from - leaf.upper[0]);

@@ -1,4 +1,4 @@
-//! Jobs of the tests through the library, to look at leaves and particles.
+//! Jobs of the tests through the library, with access to leaves and particles.
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::chunk::{Layout, Tag};
 use agimp::setup;

@@ -44,9 +44,10 @@ fn energy<const D: usize>(solver: &Solver<D>) -> f64 {
     totals.kinetic + totals.elastic
 }
 
-/// Sweeps so often, looking after each; the tree must change `changes` times or more, and not more than the
-/// share `loss` of the energy may be lost without an entry in the books: children that wait in coarse cells
-/// for their siblings lose by the transfers what a merge would have booked, in space more than in the plane.
+/// Sweeps so often, with checks after each. The tree must change `changes` times or more, and at most the
+/// share `loss` of the energy may be lost without an entry in the ledger: children that wait in coarse cells
+/// for their siblings lose by the transfers the energy that a merge would have counted, in 3D more than in
+/// 2D.
 fn sweeps<const D: usize>(comm: &Comm, body: &str, sweeps: usize, changes: u64, loss: f64)
 where
     Problem<D>: TryFrom<AnyProblem>,

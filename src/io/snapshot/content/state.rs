@@ -287,8 +287,8 @@ pub(in crate::io::snapshot) fn read<const D: usize>(
     Ok(Restored { header: header.clone(), leaves: octants, chunks, leaf_fields })
 }
 
-/// Collective. Cuts the curve so that each rank gets about the same number of particles (a leaf counts
-/// as one more). Every rank looks at an equal part of the list of leaves, so none sees all of it.
+/// Collective. Cuts the curve so that each rank gets about the same number of particles (a leaf counts as one
+/// more). Every rank reads an equal part of the list of leaves, and none all of it.
 fn balanced_share(
     file: &Reader,
     checked: &mut Checked,

@@ -23,7 +23,7 @@ use crate::job::schema::job_file as file;
 
 /// Most colliders of a job: what a checkpoint's header has room for.
 const MAX_COLLIDERS: usize = 16;
-/// Most boxes in which a point of a shape is looked for.
+/// Most boxes in which a point of a shape is searched.
 const MOST_BOXES: usize = 10_000;
 /// The axis of what turns in a plane.
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
@@ -116,7 +116,7 @@ fn collider<const D: usize>(
 }
 
 /// Whether nothing is left of a bounded boolean shape. One that is thinner than a millionth of its size, or
-/// takes too long to look at, passes.
+/// takes too long to test, passes.
 fn has_no_point<const D: usize>(shape: &Shape<D>, bounds: &Aabb<D>) -> bool {
     let size = (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(0.0, f64::max);
     let mut boxes = MOST_BOXES;

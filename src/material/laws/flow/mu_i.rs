@@ -3,8 +3,8 @@
 //!
 //! While it flows `|dev τ|/√2 = μ(I) p` with `μ = μ_s + (μ_2 - μ_s)/(1 + I_0/I)`, `I = γ̇ d/√(p/ρ_s)` and
 //! `γ̇ = √2 |dev d_p|`; flow keeps the volume. The implicit step is a quadratic equation for the stress.
-//! Where the grains come apart, there is no stress, and the volume that is gained is booked and given back
-//! before it carries stress again.
+//! Where the grains come apart, there is no stress, and the volume gained is stored; the material gives it
+//! back before it carries stress again.
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use schemars::JsonSchema;
@@ -114,7 +114,7 @@ impl Law for MuI {
             kept = apart.select(zero, flows.select(end / stress, one));
             let slip = apart.select(norm, flows.select((stress - end) * (FRAC_1_SQRT_2 / modulus), zero));
             state.history[PLASTIC_STRAIN] = shear + slip;
-            // Nothing is booked any more once the material is closed.
+            // Once the material is closed no gain is left.
             let opened = apart.select(gain + trial.trace, zero);
             state.history[PLASTIC_VOLUME] = changed.select(opened, gain);
             state.work = flows.select(end * slip * SQRT_2, zero).max(zero);
