@@ -1,9 +1,10 @@
 //! Cost of the fixed order of node sums: `cargo bench --bench ordered_sums`.
 //!
 //! The ordered sums of the solver list for every block the arenas that reach it and add them in that order.
-//! Here they compete with sums without any order, in which bins add their arenas to the nodes as they come: on
-//! one thread directly, on several by atomic additions or into a copy of the nodes per thread. All start from
-//! the same arenas, in one run; medians of interleaved rounds are compared with the time of a whole step.
+//! Here they compete with sums without any order, in which bins add their arenas to the nodes as they come:
+//! on one thread directly, on several by atomic additions or into a copy of the nodes per thread. All start
+//! from the same arenas, in one run; medians of interleaved rounds are compared with the time of a whole
+//! step.
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 

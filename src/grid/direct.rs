@@ -1,10 +1,10 @@
 //! The definition of the weights, cell by cell, as an oracle for the transfers of a run.
 //!
 //! The box is cut by the leaf cells. Each cell gives its corners the integral of its own multilinear hat
-//! functions over its share of the box, divided by the volume of the box. What a hanging node collects
-//! goes to the corners of the coarse cell on whose surface it lies, with the weights of multilinear
-//! interpolation there, again and again until only real nodes are left (Gao et al. 2017, section 4). Nothing
-//! here is shared with bins, arenas and constraints; it is slow and needs the whole tree.
+//! functions over its share of the box, divided by the volume of the box. The sum of a hanging node goes to
+//! the corners of the coarse cell on whose surface it lies, with the weights of multilinear interpolation
+//! there, again and again until only real nodes are left (Gao et al. 2017, section 4). Nothing here is shared
+//! with bins, arenas and constraints; it is slow and needs the whole tree.
 use std::collections::BTreeMap;
 
 use partition::{MAX_LEVEL, Octant};
@@ -27,7 +27,7 @@ pub struct DirectNode<const D: usize> {
 type Share<const D: usize> = (f64, [f64; D]);
 
 /// Weights of the box with `centre` and half widths `half` (m, relative to the domain's lower corner), by
-/// node in lexicographic order, first axis slowest. Parts outside the domain give nothing.
+/// node in lexicographic order, first axis slowest. Parts outside the domain contribute nothing.
 pub fn weights<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
@@ -37,8 +37,8 @@ pub fn weights<const D: usize>(
     collected(tree, root_edge, centre, half, hand_to_real)
 }
 
-/// As [`weights`], but hanging nodes keep what they collect, so that fields are discontinuous beside finer
-/// leaves: the control that shows what the constraints do.
+/// As [`weights`], but hanging nodes keep their sums, so that fields are discontinuous beside finer leaves:
+/// the control that shows the effect of the constraints.
 pub fn unconstrained_weights<const D: usize>(
     tree: &KnownTree<D>,
     root_edge: f64,
@@ -86,8 +86,8 @@ struct Interval {
     cell: u32,
     /// Share of the box's width that lies in the cell.
     share: f64,
-    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is found
-    /// on its own, as a small one keeps its digits only so.
+    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is
+    /// computed on its own, so that a small one keeps its digits.
     middle: [f64; 2],
 }
 
@@ -144,7 +144,7 @@ fn intervals(leaf: u32, cell: f64, centre: f64, half: f64) -> Vec<Interval> {
         .collect()
 }
 
-/// Gives the share to real nodes: to the node itself, or over the coarse cell on which it hangs.
+/// Distributes the share to real nodes: to the node itself, or over the coarse cell on which it hangs.
 fn hand_to_real<const D: usize>(
     tree: &KnownTree<D>,
     place: [u32; D],

@@ -93,7 +93,7 @@ const ALONG: [[u64; 16]; 3] = {
 /// `set`.
 #[inline(always)]
 pub fn moved_along(mask: u64, axis: usize, k: usize, set: u8) -> u64 {
-    // Nodes on the axis itself. A product with them moves what has coordinate 0 to each of them, without
+    // Nodes on the axis itself. A product with them moves nodes of coordinate 0 to each of them, without
     // carries.
     let line = LINES[axis][usize::from(set & 0b1111)];
     (mask >> (k << (2 * axis)) & ALONG[axis][1]).wrapping_mul(line)
@@ -121,8 +121,8 @@ pub fn arena_overlap<const D: usize>(offset: [i32; D]) -> u64 {
     }))
 }
 
-/// The nodes of a block that lie on its lower faces across the axes where `below[axis]` is set: what the
-/// closed octant `block - below` shares with the block's own nodes.
+/// The nodes of a block that lie on its lower faces across the axes where `below[axis]` is set: the nodes
+/// that the closed octant `block - below` shares with the block.
 pub fn lower_face<const D: usize>(below: [bool; D]) -> u64 {
     product::<D>(below.map(|b| if b { 0b0001 } else { 0b1111 }))
 }

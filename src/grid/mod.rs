@@ -10,7 +10,7 @@
 //! | [`leaf_geometry`] | boxes of leaves, and the leaf of a position |
 //! | [`order`] | in which order the arenas that reach a node are added |
 //! | [`constraints`] | which nodes are parents of which, with which weights |
-//! | [`plan`] | bins and blocks of one tree and partition; what a rank needs of others |
+//! | [`plan`] | bins and blocks of one tree and partition; requests to other ranks |
 //! | [`arenas`] | memory that bins scatter into |
 //! | [`sums`] | node fields of a step: sums of arenas, exchange, restriction, prolongation |
 //! | [`ties`] | nodes at surfaces that move with the material beside them |

@@ -6,20 +6,20 @@ use crate::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level}
 /// Distance ahead at which tiles are prefetched, in particles; in the next chunk where this one ends.
 const AHEAD: usize = 2 * TILE;
 
-/// How many tiles have their pages looked up at a time, as many tiles before they are used.
+/// Tiles whose pages are translated at a time, as many tiles before they are used.
 const GROUP: usize = 16;
 
-/// Bytes of a page; larger ones are looked up more often than needed.
+/// Bytes of a page; larger ones are translated more often than needed.
 const PAGE: usize = 4096;
 
-/// Up to [`LANES`] particles. Lanes that are no members compute something that is never stored.
+/// Up to [`LANES`] particles. Lanes that are no members compute values that are never stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Batch {
-    /// Those of lanes that are no members are of use for their material.
+    /// Of lanes that are no members, only the material is used.
     index: [u32; LANES],
     /// Bit i says whether lane i is a member.
     lanes: u32,
-    /// The tile whose lanes are those of the batch; brought together from several otherwise.
+    /// The tile whose lanes are those of the batch; `None` if the batch is gathered from several.
     tile: Option<u32>,
     /// Data of a later batch, to be prefetched.
     ahead: Place,
@@ -31,7 +31,7 @@ const ALL: u32 = (1 << LANES) - 1;
 /// The most components that particles have.
 const MOST: usize = Layout::<3>::REALS;
 
-/// Memory for particles brought together from several tiles.
+/// Memory for particles gathered from several tiles.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Tile([[f64; LANES]; MOST]);
@@ -69,9 +69,9 @@ impl<'a, const D: usize> Batches<'a, D> {
         Batch { index, lanes: ALL >> (LANES - count), tile, ahead: self.ahead(first, AHEAD) }
     }
 
-    /// To be called after each batch was taken. Tiles run through a page after every few of them. The
-    /// processor translates several pages at the same time, but waits for each page of which a single line is
-    /// requested. In line: with a call between batches, constants would not stay in registers.
+    /// Prefetches pages; to be called after each batch was taken. Tiles run through a page after every few of
+    /// them. The processor translates several pages at the same time, but waits for each page of which a
+    /// single line is requested. Inlined: with a call between batches, constants would not stay in registers.
     #[inline(always)]
     pub(super) fn look_up_pages(&self) {
         let is_due = self.taken % (GROUP * TILE) == TILE && self.len > GROUP * TILE;
@@ -83,7 +83,7 @@ impl<'a, const D: usize> Batches<'a, D> {
         }
     }
 
-    /// Where to read ahead by so many particles while those from `first` on are at work.
+    /// Place to prefetch, so many particles ahead of those from `first` on.
     #[inline(always)]
     fn ahead(&self, first: usize, by: usize) -> Place {
         let rows = self.len.next_multiple_of(TILE);
@@ -141,7 +141,7 @@ impl Batch {
     }
 
     /// The first particles of a list, and their number. Where at least a quarter of a tile is on the list, as
-    /// is usual beside level jumps, it is read as it stands; elsewhere particles are picked.
+    /// is usual beside level jumps, it is read as a whole; elsewhere particles are gathered one by one.
     #[inline(always)]
     fn of_list(list: &[u32]) -> (Self, usize) {
         match list.first_chunk() {
@@ -171,7 +171,7 @@ impl Batch {
         (Self::from_indices(list, |&p| p), list.len().min(LANES))
     }
 
-    /// The first particles of a list of anything that names a particle, which may do so several times.
+    /// The first particles of a list whose entries name a particle each, some of them perhaps several times.
     #[inline(always)]
     pub(super) fn from_indices<T>(list: &[T], particle: impl Fn(&T) -> u32) -> Self {
         let count = list.len().min(LANES);
@@ -179,8 +179,7 @@ impl Batch {
         Self { index, lanes: ALL >> (LANES - count), tile: None, ahead: Place::default() }
     }
 
-    /// The particles' tile; `columns` are those that will be read where it has to be brought together in
-    /// `spare`.
+    /// The particles' tile; `columns` are those to gather in `spare` if it has no tile of its own.
     #[inline(always)]
     pub(super) fn tile<'a, const D: usize>(
         &self,
@@ -195,7 +194,7 @@ impl Batch {
         &tiles[tile as usize * Layout::<D>::REALS..][..Layout::<D>::REALS]
     }
 
-    /// The particles' tile, all columns, to be changed. What was brought together has to be put back.
+    /// The particles' tile, all columns, to be changed. A gathered one has to be put back.
     #[inline(always)]
     pub(super) fn tile_mut<'a, const D: usize>(
         &self,
@@ -222,7 +221,7 @@ impl Batch {
         }
     }
 
-    /// Writes members back that were brought together in `spare`.
+    /// Writes members back that were gathered in `spare`.
     #[inline(always)]
     pub(super) fn put_back<const D: usize>(&self, tiles: &mut [[f64; LANES]], spare: &Tile) {
         if self.tile.is_none() {
@@ -269,7 +268,7 @@ impl Batch {
         self.index[lane] as usize
     }
 
-    /// Asks for what a later batch will read of a column.
+    /// Prefetches a column of a later batch.
     #[inline(always)]
     fn read_ahead(&self, column: usize) {
         prefetch(self.ahead.tiles.wrapping_add(column * size_of::<[f64; TILE]>()));

@@ -1,4 +1,4 @@
-//! Constrained nodes of an arena: hanging ones, and those that first and second moments belong to.
+//! Constrained nodes of an arena: hanging ones, and those with first and second moments.
 //!
 //! Moments are for nodes whose parents are constrained themselves, beside jumps over more than one level.
 //! First moments are matrices, kept as one row for each axis, node by node; a stencil visits those of its own
@@ -64,8 +64,8 @@ impl ConstrainedNodes {
         self.hanging.heap_bytes() + self.visits.heap_bytes() + 8 * self.second.capacity()
     }
 
-    /// Members of a batch whose stencils have nodes with moments, a bit each; if there are any, the weights
-    /// of all nodes are made ready in `nodes`.
+    /// Members of a batch whose stencils have nodes with moments, a bit each; if there are any, `nodes` gets
+    /// the weights of all nodes.
     #[inline(always)]
     pub(super) fn prepare<const D: usize>(
         &self,
@@ -85,8 +85,8 @@ impl ConstrainedNodes {
         touched
     }
 
-    /// Calls `f` with row, axis and weight of each row of moments in the stencil of a lane of a batch that
-    /// [`ConstrainedNodes::prepare`] has been called for.
+    /// Calls `f` with row, axis and weight of each row of moments in the stencil of a lane of a batch, after
+    /// [`ConstrainedNodes::prepare`] for it.
     #[inline(always)]
     pub(super) fn for_each<const D: usize>(
         &self,

@@ -11,7 +11,7 @@ use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
 
 /// Least half width, as a share of the cell (2^-46): keeps the weights of a box at a wall defined. So small
-/// that what a box then has outside the domain is below round-off.
+/// that the part of such a box outside the domain is below round-off.
 const LEAST_SHARE: f64 = 1.0 / 70_368_744_177_664.0;
 
 /// Half width, as a share of the cell, below which the slopes of a box that a wall cuts are reduced (see
@@ -45,7 +45,7 @@ pub fn full_half_widths<const D: usize>(
     collect(chunk, select, cell, f64::INFINITY, extent, scheme, out);
 }
 
-/// [`full_half_widths`] of up to [`LANES`] particles, at least one; lanes behind the last hold anything.
+/// [`full_half_widths`] of up to [`LANES`] particles, at least one; lanes behind the last are undefined.
 pub fn full_half_widths_of<const D: usize>(
     chunk: &Chunk<D>,
     particles: &[u32],
@@ -59,7 +59,7 @@ pub fn full_half_widths_of<const D: usize>(
     of_batch(tile, chunk.tags(), &batch, &batch.positions(tile), cell, f64::INFINITY, extent, scheme)
 }
 
-/// Asks for what [`full_half_widths_of`] will read of the batch of particles from `first` on.
+/// Prefetches the columns that [`full_half_widths_of`] reads of the batch from `first` on.
 pub fn read_ahead<const D: usize>(place: Place, first: usize) {
     let place = place.of_particle::<D>(first);
     columns::<D>().for_each(|column| prefetch(place.tiles + column * size_of::<[f64; LANES]>()));
@@ -125,7 +125,7 @@ pub(super) fn cut_at_walls<V: Vector, const D: usize>(
     half
 }
 
-/// Half widths of boxes which no wall is near enough to cut: what [`cut_at_walls`] gives there.
+/// Half widths of boxes that no wall cuts, with the bits of [`cut_at_walls`].
 #[inline(always)]
 pub(super) fn away_from_walls<V: Vector, const D: usize>(whole: &[V; D], cell: f64) -> [V; D] {
     let mut half = *whole;
@@ -152,8 +152,8 @@ impl<V: Vector, const D: usize> AtWall<'_, V, D> {
     /// Factors of the columns of B of particles that move to `moved`; `None` if all are 1.
     ///
     /// `C = B D⁻¹` takes D at the new position. At a distance d from the wall D is about `d h`: with B kept,
-    /// C grows like `1/d`, and a particle that drifts to the wall would come with ever faster nodes and pass
-    /// through. So B falls with the distance.
+    /// C grows like `1/d`, and a particle that drifts to the wall would accelerate its nodes without bound
+    /// and pass through. So B falls with the distance.
     #[inline(always)]
     pub(super) fn kept_affine_velocity(&self, moved: &[V; D]) -> Option<[V; D]> {
         if !is_cut(&self.whole, &self.half) {
@@ -178,7 +178,7 @@ impl<V: Vector, const D: usize> AtWall<'_, V, D> {
 /// stiffness in proportion to `1/d`, which no time step in use resolves when d is small: fragments near walls
 /// would gain energy without bound. With the factor `d/d₀` below `d₀ = h/16`, or below the half width of the
 /// box before it was cut, this stiffness falls with d instead. As the same factor is in the force and in the
-/// velocity gradient, energy goes neither way.
+/// velocity gradient, it neither adds nor removes energy.
 #[inline(always)]
 pub(super) fn softening<V: Vector, const D: usize>(
     whole: &[V; D],

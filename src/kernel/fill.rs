@@ -78,7 +78,7 @@ impl<const D: usize> Shifted<D> {
     }
 }
 
-/// A batch with what it gathered.
+/// A batch with the sums that it gathered.
 pub(super) struct Filled<V: Vector, const D: usize> {
     /// Whether a particle is of a fluid.
     is_fluid: V::Mask,
@@ -88,7 +88,7 @@ pub(super) struct Filled<V: Vector, const D: usize> {
     fill: V,
     /// `Σ e_j ∇w`, 1/m.
     slope: [V; D],
-    /// J̄ / J - 1, beyond what weight explains.
+    /// J̄ / J - 1, less the part that weight explains.
     to_mean: V,
     /// J at the start of the step.
     ratio: V,
@@ -129,7 +129,7 @@ impl Filling<'_> {
             slope[D - 1] = z;
         }
         let ratio = determinant(elastic).sqrt();
-        // Still water is denser below: what lies within that is no noise, and stays.
+        // Still water is denser below: deviations within that are no noise, and stay.
         let (zero, explained) = (V::splat(0.0), weight * (0.5 * cell));
         let to_mean = batch.values::<V>(self.means) / ratio - V::splat(1.0);
         let to_mean = (to_mean - explained).max(zero) + (to_mean + explained).min(zero);
@@ -137,7 +137,7 @@ impl Filling<'_> {
     }
 }
 
-/// Share of a step in which something with a rate (in speeds of sound over cells) relaxes.
+/// Relaxation in a step, as a share, at a rate in speeds of sound over cells.
 #[inline(always)]
 fn share<V: Vector>(reach: V, rate: f64) -> V {
     let y = reach * rate;
@@ -145,8 +145,8 @@ fn share<V: Vector>(reach: V, rate: f64) -> V {
 }
 
 impl<V: Vector, const D: usize> Filled<V, D> {
-    /// Shifts particles that have moved to `moved`, and sums up their masses times the ways; not through the
-    /// faces of a domain of this extent, if they are near any.
+    /// Shifts particles that have moved to `moved`, and sums up their masses times shifts. No particle passes
+    /// a face of the domain `[0, extent]`; `extent` is `None` away from the faces.
     #[inline(always)]
     pub(super) fn shift(
         &self,

@@ -88,8 +88,8 @@ impl<const D: usize> Gathered<D> {
     }
 }
 
-/// [`Gathered`] of a batch, one row per lane. Made once and filled for batch after batch; lanes that
-/// a batch does not fill keep what they had, which is valid.
+/// [`Gathered`] of a batch, one row per lane. Made once and filled for batch after batch; lanes that a batch
+/// does not fill keep earlier values, which are valid.
 #[repr(align(64))]
 pub(super) struct Sums<const D: usize> {
     pub velocity: [F64x4; LANES],
@@ -125,8 +125,8 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// The members of a batch, of blocks with cells of edge `cell`, with all that the fields offer; `nodes`
-    /// is of use where they have moments.
+    /// Sums of all fields for the members of a batch, in blocks with cells of edge `cell`; `nodes` is used
+    /// where fields have moments.
     #[inline(always)]
     pub(super) fn gather<V: Vector>(
         &mut self,
@@ -165,8 +165,7 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    /// How full the nodes are, and the gradient of what is over: a value of a node at a time, three nodes
-    /// along x together.
+    /// Fullness, and the gradient of the excess: one value for each node, three nodes along x together.
     #[inline(always)]
     fn contract_fill<V: Vector>(&mut self, weights: &Weights<D>, lane: usize, nodes: &[f64]) {
         let nodes = &nodes[..super::stencil_span(D) + FILL_MORE];

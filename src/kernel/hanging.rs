@@ -7,7 +7,7 @@
 //! ```
 //! to B, since the velocity is multilinear in the coarse cell on whose surface or in which the node lies, and
 //! nodes j ± k lie there too. So it is a sum over nodes of the stencil with other factors in place of
-//! `w d_k`, and what P2G adds is the transpose: momentum at these nodes, which restriction carries on.
+//! `w d_k`, and P2G adds the transpose: momentum at these nodes, which restriction passes on.
 //!
 //! The hanging nodes of a stencil are those of a few boxes of nodes; beside a plane face they are one. Within
 //! a box the factors are those of each axis.
@@ -23,9 +23,9 @@ type NodeBox = [u8; 3];
 struct Along {
     /// 1 for nodes of the box.
     inside: [f64; 3],
-    /// By how much `w h` of each node goes from the lower to the upper of the two nodes that it goes to: 1
-    /// for nodes with an odd coordinate that have one neighbour in the stencil, and 1/2 for the middle one,
-    /// which has two.
+    /// Share of `w h` of each node that moves from the lower to the upper of its two neighbours: 1 for nodes
+    /// with an odd coordinate that have one neighbour in the stencil, and 1/2 for the middle one, which has
+    /// two.
     odd: [f64; 3],
 }
 
@@ -159,8 +159,8 @@ impl HangingNodes {
         }
     }
 
-    /// Adds the affine momentum `C e_k m h` of a lane that goes with other factors to the nodes from the
-    /// first of its stencil on.
+    /// Adds the affine momentum `C e_k m h` of a lane with the factors of hanging nodes, to the nodes from
+    /// the first of its stencil on.
     #[inline(always)]
     pub(super) fn scatter<const D: usize>(
         &self,

@@ -13,14 +13,14 @@ pub struct Leavers<const D: usize> {
 }
 
 impl<const D: usize> Default for Leavers<D> {
-    /// With a box that holds every position.
+    /// With a box that contains every position.
     fn default() -> Self {
         Self { lower: [f64::NEG_INFINITY; D], upper: [f64::INFINITY; D], found: Vec::new() }
     }
 }
 
 impl<const D: usize> Leavers<D> {
-    /// Forgets what was found; from now on particles belong into the box `lower <= x < upper`.
+    /// Clears the list; from now on particles belong in the box `lower <= x < upper`.
     pub fn begin(&mut self, (lower, upper): &([f64; D], [f64; D])) {
         (self.lower, self.upper) = (*lower, *upper);
         self.found.clear();
@@ -37,7 +37,7 @@ impl<const D: usize> Leavers<D> {
         inside
     }
 
-    /// Notes those of some particles of a chunk that are outside, once they have been moved anew.
+    /// Lists those of some particles of a chunk that are outside, after they have been moved once more.
     pub fn look_again(&mut self, chunk: &Chunk<D>, moved: &[u32]) {
         let is_inside = |p: u32| {
             let x = chunk.position(p as usize);
@@ -51,7 +51,7 @@ impl<const D: usize> Leavers<D> {
         }
     }
 
-    /// Notes the members of a batch that moved out.
+    /// Lists the members of a batch that moved out.
     #[inline(always)]
     pub(super) fn look<V: Vector>(&mut self, batch: &Batch, moved: &[V; D]) {
         let left = batch.members_among(!self.inside(moved).bits());

@@ -1,8 +1,8 @@
 //! Particle kernels on a uniform block of cells: GIMP weights, scatter (P2G) and gather (G2P).
 //!
-//! Knows particles and materials, but no tree, no ranks and no constraints: whatever happens at level
-//! jumps is prepared in the arenas by its caller. The kernels allocate nothing, and every sum runs
-//! over particles in the order of the selection, so the bits of a result depend on nothing else.
+//! Knows particles and materials, but no tree, no ranks and no constraints: the caller prepares the arenas
+//! for level jumps. The kernels allocate nothing, and every sum runs over particles in the order of the
+//! selection, so the bits of a result depend on that order alone.
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;
@@ -94,7 +94,7 @@ pub enum Select<'a> {
     List(&'a [u32]),
 }
 
-/// How velocities travel between particles and nodes.
+/// Transfer of velocities between particles and nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Transfer {
     /// Affine particle-in-cell (Jiang et al. 2015): `C = B D⁻¹`; conserves angular momentum.
@@ -107,8 +107,8 @@ pub enum Transfer {
         /// Share of FLIP, 0 to 1.
         blend: f64,
     },
-    /// Extended particle-in-cell (Hammerquist & Nairn 2017): increments as with FLIP, while of the particles'
-    /// own velocities only what the grid cannot see is filtered out.
+    /// Extended particle-in-cell (Hammerquist & Nairn 2017): increments as with FLIP, while the part of the
+    /// particles' velocities that the grid cannot resolve is filtered out.
     Xpic {
         /// Order, at least 1: 1 is PIC, towards infinity it becomes FLIP.
         order: u32,
@@ -165,8 +165,8 @@ pub struct Scheme<'a> {
     pub softens: bool,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
-    /// Columns of what particles carry that are shares of a whole, which add up; those behind are values,
-    /// which average.
+    /// Number of carried columns that are shares of a whole, which add up in a merge; those behind are
+    /// values, which average.
     pub shares: usize,
 }
 

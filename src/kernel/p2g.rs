@@ -5,8 +5,8 @@
 //! mass      w m
 //! momentum  w m (v + C (x_j - x_p)) - Δt V₀ τ ∇w
 //! ```
-//! where the affine matrix is `C = B D⁻¹` (APIC): the particle keeps B, since that, and not C, carries its
-//! angular momentum when D changes on the way to the next step.
+//! where the affine matrix is `C = B D⁻¹` (APIC): the particle keeps B, since B, and not C, carries its
+//! angular momentum when D changes until the next step.
 //!
 //! The tensor product of the weights is factored: with rows q = m (v, 1), C_k = m C e_k,
 //! T_k = -Δt V₀ τ e_k and d = x_j - x_p,
@@ -30,7 +30,7 @@ pub struct MomentSums<'a> {
     pub sums: &'a mut [Row],
 }
 
-/// Memory that is used from bin to bin, as it takes a while to set it up.
+/// Memory that is reused from bin to bin, since its initialisation takes a while.
 pub struct Scratch<const D: usize> {
     prepared: Prepared<D>,
     nodes: NodeWeights,
@@ -107,8 +107,8 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        // Copies of the loop, so that bins away from walls and bins without constrained nodes do not ask at
-        // every particle.
+        // Copies of the loop, so that bins away from walls and bins without constrained nodes do not test
+        // every particle for them.
         match (self.bin.frame.is_at_wall(), self.bin.moments.is_some()) {
             (false, false) => self.add_all::<V, false, false>(),
             (true, false) => self.add_all::<V, true, false>(),
@@ -230,7 +230,7 @@ impl<const D: usize> Prepared<D> {
         }
     }
 
-    /// Leaves each lane the share of its part.
+    /// Reduces each lane to the share of its part.
     fn share(&mut self, parts: &[SubBox<D>]) {
         for (lane, part) in parts.iter().enumerate() {
             let share = F64x4::splat(part.fraction);
@@ -275,7 +275,7 @@ impl<const D: usize> Prepared<D> {
         add_products::<V, D>(nodes, &weight_x, |b| of(&y[b]), |c| of(&z[c]), product, &along);
     }
 
-    /// Adds what hanging nodes of the lanes in `touched` have in place of first moments.
+    /// Adds the contributions of hanging nodes of the lanes in `touched`, which have no first moments.
     #[inline(always)]
     fn add_hanging(&self, hanging: &HangingNodes, touched: u32, cell: f64, arena: &mut [Row]) {
         let span = super::stencil_span(D);

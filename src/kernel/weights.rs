@@ -13,8 +13,8 @@ pub(super) struct Factors {
     pub slope: [[f64; LANES]; 3],
 }
 
-/// Stencils of a batch. Made once and filled for batch after batch. Begins with a line of the cache, so that
-/// lanes do.
+/// Stencils of a batch. Made once and filled for batch after batch. Aligned to cache lines, so that lanes
+/// are.
 #[repr(align(64))]
 pub(super) struct Weights<const D: usize> {
     /// Index of the lowest node in the arena; an integer plus 2^52.

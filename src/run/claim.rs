@@ -1,4 +1,4 @@
-//! A run's claim on its directory: one run at a time, and no results destroyed that nobody has given up.
+//! A run's claim on its directory: one run at a time, and no results destroyed without the user's consent.
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
@@ -18,7 +18,7 @@ use crate::job::Problem;
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The lock of a run, `JOB.lock` in its directory. Rank 0 holds it; other ranks have an empty one. It ends
-/// with the process, however that ends, so that a file left by a crash is in nobody's way.
+/// with the process, however that ends, so that a file left by a crash blocks no run.
 #[derive(Debug, Default)]
 pub(super) struct Claim(Option<Held>);
 
@@ -92,15 +92,15 @@ fn expect_shared(comm: &Comm, directory: &Path, lock: &Path) -> Result<(), RunEr
 
 impl Drop for Held {
     fn drop(&mut self) {
-        // While it is locked, so that no other run has taken it. It may be gone with its directory; then
-        // nothing is left to do.
+        // Removed while it is locked, so that no other run has taken it. It may be gone with its directory;
+        // then nothing is left to do.
         if is_at(&self.file, &self.path) {
             let _ = std::fs::remove_file(&self.path);
         }
     }
 }
 
-/// Not collective. Locks the file for a run or a sweep (`what`) and writes into it who has it.
+/// Not collective. Locks the file for a run or a sweep (`what`) and writes the owner into it.
 ///
 /// # Errors
 /// Another one has it, or the file cannot be written.

@@ -26,7 +26,7 @@ impl Cores {
         let bound = ones(&allowed);
         // Processor time may be limited beside, for all ranks of the machine together.
         let is_limited = bound == 0 || available < bound;
-        // All ranks give as many words as the one with most.
+        // All ranks send as many words as the one with most.
         let mut words = [allowed.len() as u64];
         comm.max_u64(&mut words);
         let mut bits = allowed;
@@ -51,7 +51,7 @@ impl Cores {
         let here = comm.host_sum_u64(threads as u64);
         let mut excess = [here.saturating_sub(self.host as u64), threads.saturating_sub(self.own) as u64];
         comm.max_u64(&mut excess);
-        // The machine and the rank that have it worst say how many.
+        // Threads of the machine and of the rank with the greatest excess.
         let mut counts = [
             if here.saturating_sub(self.host as u64) == excess[0] { here } else { 0 },
             if threads.saturating_sub(self.own) as u64 == excess[1] { threads as u64 } else { 0 },

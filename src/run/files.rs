@@ -93,12 +93,12 @@ impl<const D: usize> Run<'_, D> {
         })
     }
 
-    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows that it
-    /// implies are on disk before.
+    /// Collective. Gives the last checkpoint its name if it is on disk, or waits for that. The rows of tables
+    /// up to its step are on disk before.
     pub(super) fn settle(&mut self, wait: bool) -> Result<(), RunError> {
         if self.outputs.is_pending() && (wait || self.outputs.is_on_disk(self.comm)) {
             let synced = self.comm.agree(self.recorder.sync());
-            // The checkpoint counts for more than rows: without them a run can still go on from it.
+            // The checkpoint matters more than rows: without them a run can still continue from it.
             self.outputs.settle(self.comm)?;
             synced?;
         }

@@ -40,9 +40,10 @@ const COLUMNS: [Column<'static>; 20] = [
     column("left_mass", "kg"),
 ];
 
-/// Names and units of the columns after the step. What a job has adds its own in this order: splits and
-/// merges of dynamic refinement; the work of the shift of fluids; the way to equilibrium; the number of the
-/// stage, from 1; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain; colliders.
+/// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
+/// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
+/// number of the stage, from 1; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain;
+/// colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -108,16 +109,16 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
 const LEDGER: [(&str, &str); 5] =
     [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
 
-/// Columns of runs on the way to equilibrium.
+/// Columns of runs towards equilibrium.
 const RELAXATION: [(&str, &str); 3] =
     [("peak_speed", "m/s"), ("unbalanced_acceleration", "m/s²"), ("stops", "")];
 
-/// The values of a row that are of the way to equilibrium.
+/// The values of a row for the progress towards equilibrium.
 pub fn relaxation_values(relaxation: &Relaxation) -> [f64; RELAXATION.len()] {
     [relaxation.speed, relaxation.acceleration, relaxation.stops as f64]
 }
 
-/// The values of a row that are of splits and merges.
+/// The values of a row for splits and merges.
 pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {
     let count = |n: u64| n as f64;
     [
@@ -136,7 +137,7 @@ fn turning_axes<const D: usize>() -> std::ops::Range<usize> {
     if D == 2 { 2..3 } else { 0..3 }
 }
 
-/// The values of a row that are not of colliders.
+/// The values of a row, but for those of colliders.
 pub fn row(
     time: f64,
     dt: f64,
@@ -171,14 +172,13 @@ pub fn row(
     ]
 }
 
-/// The values of a row that are of one load or contact between bodies: the force, if it has one, and the
-/// work.
+/// The values of a row for one load or contact between bodies: the force, if it has one, and the work.
 pub fn force_and_work<const D: usize>(totals: &ForceAndWork, has_force: bool) -> impl Iterator<Item = f64> {
     let ForceAndWork { force, work } = *totals;
     force.into_iter().take(if has_force { D } else { 0 }).chain([work])
 }
 
-/// The values of a row that are of one collider. `origin` is the lower corner of the domain, m.
+/// The values of a row for one collider. `origin` is the lower corner of the domain, m.
 pub fn collider_values<const D: usize>(
     collider: &Collider<D>,
     state: &ColliderState<D>,

@@ -1,18 +1,18 @@
 //! A whole run: from a checked job to its last file.
 //!
-//! | file or folder | what it has |
+//! | file or folder | content |
 //! |---|---|
 //! | this | the main loop |
 //! | `outcome.rs` | options of a run, its results, and why it cannot go on |
 //! | [`claim`] | the directory of a run belongs to one run at a time |
 //! | [`cores`] | cores of the machines, and how many threads fit |
 //! | [`restart`] | states from files |
-//! | `room.rs` | whether a run fits into the memory of its machines |
+//! | `room.rs` | check of the memory of the machines |
 //! | [`schedule`], [`stop`] | when files are due; requests to stop |
-//! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; what pictures show beside particles |
+//! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; colliders in pictures |
 //! | [`record`], [`history`] | history, telemetry and progress |
 //! | `measures/` | files of lines and maps |
-//! | [`at_end`] | what a run leaves when it ends |
+//! | [`at_end`] | results at the end of a run |
 pub mod at_end;
 pub mod claim;
 pub mod cores;
@@ -129,7 +129,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let Clock { step, time, .. } = solver.clock;
         claim.take(comm, problem)?;
         let expected = scalars.count(restart::ROW_STEP);
-        // The row of the end stays where the end stays.
+        // If the run ends with this state, the row of its end stays.
         let to = expected.filter(|_| time < problem.time.end).unwrap_or(step);
         let kept = (step > 0).then_some(Kept { to, expected });
         let mut run = Self::with(comm, problem, options, solver, outputs, output_step, kept, claim)?;
@@ -152,7 +152,7 @@ impl<'a, const D: usize> Run<'a, D> {
     ) -> Result<Self, RunError> {
         let mut recorder = Recorder::open(comm, problem, options, &mut solver, kept)?;
         if comm.rank() == 0 {
-            // That of an earlier end would be taken for this one's.
+            // A report of an earlier end would be taken for one of this end.
             let _ = std::fs::remove_file(report::path(&problem.output.directory, &problem.name));
             let _ = std::fs::remove_file(ending::path(&problem.output.directory, &problem.name));
             directory::remove_unfinished(&problem.output.directory, &problem.name);
@@ -217,8 +217,8 @@ impl<'a, const D: usize> Run<'a, D> {
         self.is_settled() || self.solver.clock.time - begun >= duration
     }
 
-    /// Not collective. When the stage or the run ends or an output is due, s, after the present time: bounds
-    /// steps without material, which nothing else does.
+    /// Not collective. When the stage or the run ends or an output is due, s, after the present time: the
+    /// only bound on steps without material.
     fn next_event(&self) -> f64 {
         let (time, physics) = (self.solver.clock.time, &self.solver.physics);
         let begun = physics.stage_starts.last().copied().unwrap_or(0.0);
@@ -259,7 +259,7 @@ impl<'a, const D: usize> Run<'a, D> {
         Ok(())
     }
 
-    /// Not collective. Says how the way to equilibrium has ended.
+    /// Not collective. Tells the user whether equilibrium was reached.
     fn tell_equilibrium(&mut self) {
         let Some(asked) = self.solver.physics.equilibrium else { return };
         let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
@@ -277,7 +277,7 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Not collective. Warns of stages that the run has not come to.
+    /// Not collective. Warns of stages that the run has not reached.
     fn tell_missed_stages(&mut self) {
         let missed: Vec<&str> = self
             .problem
@@ -292,8 +292,8 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Not collective. Leaves word of why a run ends ahead of its time, on rank 0. The user is told in any
-    /// case, so a failure to write it is none of the run.
+    /// Not collective. Records why a run ends ahead of its time, on rank 0. The user is told in any case, so
+    /// a failure to write the record is ignored.
     fn note_end(&self, outcome: &Result<Outcome, RunError>) {
         let Clock { step, time, .. } = self.solver.clock;
         let ending = match outcome {
@@ -336,7 +336,8 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Collective. Last output, last row, picture, evaluation.
     fn finish(&mut self) -> Result<Summary, RunError> {
         let step = self.solver.clock.step;
-        // State before row: a run with a later end has no row at this step, and can go on from here.
+        // The state comes before the row: a run with a later end has no row at this step, and can continue
+        // from here.
         if self.output_step != Some(step) {
             self.write_output(false)?;
         }

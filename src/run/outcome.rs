@@ -15,7 +15,7 @@ pub struct Options {
     pub restart: Option<From>,
     /// Whether a new run may replace the results of another job, or checkpoints.
     pub overwrite: bool,
-    /// Whether this process shows the progress of the run.
+    /// Whether this process prints the progress of the run.
     pub speaks: bool,
     /// Threads of this rank.
     pub threads: usize,
@@ -55,7 +55,7 @@ pub struct Effort {
 pub struct Summary {
     /// Its effort.
     pub effort: Effort,
-    /// The last output, to look at.
+    /// The last output, for pictures.
     pub last_output: Option<PathBuf>,
     /// Index of the output files, for ParaView.
     pub series: PathBuf,

@@ -128,7 +128,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
     }
 
-    /// Collective. After a step: what is due by step number.
+    /// Collective. After a step: the row and the record that are due by step number.
     pub fn after_step(&mut self, comm: &Comm, solver: &mut Solver<D>) -> Result<(), RunError> {
         let step = solver.clock.step;
         let (row, record) = (
@@ -180,8 +180,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Not collective. Brings what is written to disk: a state that gets its name now says which row was the
-    /// last.
+    /// Not collective. Flushes all tables to disk: a state that gets its name now refers to their last rows.
     pub fn sync(&self) -> Result<(), FileError> {
         self.history.iter().chain(&self.lines).try_for_each(History::sync)?;
         self.telemetry.as_ref().map_or(Ok(()), Telemetry::sync)
@@ -230,7 +229,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 .and_then(|()| lines::write(&mut self.lines, self.problem, clock, &samples));
         }
         self.last_values = values;
-        // Where the row of this step has been written already, there is nothing to forget.
+        // Where the row of this step has been written already, the sums must not restart.
         solver.forget_reactions();
         solver.load_sums.forget(3, clock.time);
         solver.body_sums.forget(3, clock.time);
@@ -238,7 +237,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         written
     }
 
-    /// Collective. The values of a row of the history, on rank 0, and what the points of lines have.
+    /// Collective. The values of a row of the history, on rank 0, and the samples at the points of lines.
     fn measure(
         &self,
         comm: &Comm,

@@ -1,4 +1,4 @@
-//! Going on from a file.
+//! Restart from a file.
 use std::ffi::OsStr;
 use std::os::unix::ffi::{OsStrExt as _, OsStringExt as _};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 use crate::solver::{Clock, Solver};
 use crate::text::{quantity, written};
 
-/// Where a run goes on from.
+/// The file from which a run continues.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum From {
     /// The newest complete file of the run.
@@ -125,7 +125,8 @@ pub(super) fn stage_starts<const D: usize>(problem: &Problem<D>, header: &Header
     starts.filter(|starts| starts.is_sorted() && starts.last().is_some_and(|&last| last <= header.time))
 }
 
-/// Collective. Appends the exact sums of some kind of thing: those of all ranks, counted through all things.
+/// Collective. Appends the exact sums of one kind (loads, colliders, …) over all ranks, numbered
+/// consecutively.
 fn write_exact_sums<const N: usize>(
     kind: &str,
     sums: &ExactSums<N>,
@@ -143,7 +144,7 @@ fn write_exact_sums<const N: usize>(
     );
 }
 
-/// Takes over the exact sums of some kind of thing, which are on rank 0. `None` if the file lacks one.
+/// Takes over the exact sums of one kind, on rank 0. `None` if the file lacks one.
 fn restore_exact_sums<const N: usize>(
     kind: &str,
     sums: &mut ExactSums<N>,
@@ -163,7 +164,7 @@ fn restore_exact_sums<const N: usize>(
     Some(())
 }
 
-/// Names of the numbers of the way to equilibrium.
+/// Names of the numbers of the progress towards equilibrium.
 const RELAXATION: [&str; 3] = ["relaxation_kinetic_energy", "relaxation_speed", "relaxation_acceleration"];
 /// Name of the counter of the times that velocities were set to 0.
 const STOPS: &str = "relaxation_stops";
@@ -172,7 +173,7 @@ const PHASE: &str = "relaxation_phase";
 /// Phases by number.
 const PHASES: [RelaxPhase; 3] = [RelaxPhase::Falling, RelaxPhase::Stopped, RelaxPhase::FromRest];
 
-/// Takes over the way to equilibrium. `None` if the file lacks a number.
+/// Takes over the progress towards equilibrium. `None` if the file lacks a number.
 fn restore_relaxation<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     if solver.physics.equilibrium.is_none() {
         return Some(());
@@ -244,7 +245,7 @@ fn restore_colliders<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars) 
 }
 
 /// Collective. Reads the state and spreads it over the ranks. Of the files that `--restart latest` may mean,
-/// the latest is taken that is whole; a warning names what is passed over.
+/// the latest is taken that is whole; a warning names the others.
 ///
 /// # Errors
 /// There is no file, or none that can be trusted, or the run ends before it; the same on all ranks.
@@ -286,7 +287,7 @@ pub fn solver<const D: usize>(
     Err(RunError::Refused(refusal))
 }
 
-/// A run to the end time of the job must be able to come by this state, or end with it.
+/// A run to the end time of the job must pass through this state, or end with it.
 fn check_end<const D: usize>(problem: &Problem<D>, path: &Path, clock: Clock) -> Result<(), RunError> {
     let Clock { step, time, dt, .. } = clock;
     let end = problem.time.end;
@@ -309,7 +310,7 @@ fn restored<const D: usize>(
     path: &Path,
 ) -> Result<(Solver<D>, Scalars), String> {
     let words = |error: FileError| match error {
-        // Which rank has found it does not matter.
+        // The number of the rank does not matter here.
         FileError::Agreed(disagreement) => disagreement.message,
         other => other.to_string(),
     };
@@ -433,7 +434,7 @@ fn latest<const D: usize>(comm: &Comm, problem: &Problem<D>) -> Result<Vec<PathB
     if paths.is_empty() {
         paths.extend(other.filter(|_| damaged.is_empty()));
     }
-    // The reason of a single one becomes the error.
+    // If there is one file alone, the reason against it becomes the error.
     let only = if paths.is_empty() { damaged.pop() } else { None };
     damaged.iter().for_each(|error| warn(&format!("skipped: {error}")));
     comm.agree(only.map_or(Ok(()), Err)).map_err(|disagreement| RunError::Refused(disagreement.message))?;

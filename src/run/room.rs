@@ -1,4 +1,4 @@
-//! Whether a run fits into the memory of its machines: known before anything large is made.
+//! Check that a run fits into the memory of its machines, before anything large is allocated.
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
@@ -58,7 +58,7 @@ impl Room {
         self.refusal(problem, memory, about).map_or(Ok(()), |reason| Err(RunError::Refused(reason)))
     }
 
-    /// Not collective. Refuses a tree of this size, and says now and then how large it has become.
+    /// Not collective. Refuses a tree of this size if it does not fit, and prints its size now and then.
     ///
     /// # Errors
     /// It takes more memory than there is; the same on all ranks.

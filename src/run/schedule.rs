@@ -30,7 +30,7 @@ impl Schedule {
         schedule
     }
 
-    /// Whether an output has become due since this was asked last.
+    /// Whether an output has become due since the last call.
     pub fn output_due(&mut self, time: f64) -> bool {
         let before = std::mem::replace(&mut self.looked_until, time);
         time >= self.next_output(before)

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU};
 
-/// Exit code of a run that wrote a checkpoint because it was asked to stop.
+/// Exit code of a run that wrote a checkpoint on request.
 pub const STOPPED: u8 = 3;
 
 /// Set once one of the signals has arrived.
@@ -36,13 +36,13 @@ impl StopRequest {
         Ok(listening.insert(Self(flag)).clone())
     }
 
-    /// Whether this rank was asked to stop.
+    /// Whether this rank has received a request to stop.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Whether whoever has started the process wants it to ignore the signal, as `nohup` does with SIGHUP.
+/// Whether the parent process has set the signal to be ignored, as `nohup` does with SIGHUP.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -29,11 +29,11 @@ const ROUNDING: f64 = 1e-9;
 /// Steps inwards in search of a particle, half the distance of particles each.
 const STEPS: u32 = 6;
 
-/// Collective. Gives particles that come with a stage what they carry for the loads of the job. They lie in
-/// the own leaves of the solver, which does not have them yet.
+/// Collective. Fills the columns that particles of a stage carry for the loads of the job. They lie in the
+/// own leaves of the solver, which does not have them yet.
 ///
 /// # Errors
-/// A load finds nothing to act on, and no body will come that could have it; the same on all ranks.
+/// A load finds nothing to act on, and no body comes later that could carry it; the same on all ranks.
 pub(super) fn carry<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
@@ -160,7 +160,7 @@ impl<const D: usize> Search<'_, D> {
         Aabb::new(corner(0), corner(1))
     }
 
-    /// Adds what own particles carry of the surface in a box.
+    /// Adds the shares of own particles in the surface in a box.
     fn add(&self, carried: &Carried<D>, cell: &Aabb<D>, shares: &mut Vec<Share<D>>) {
         let (problem, size) = (self.problem, self.problem.size());
         let shape = &problem.bodies[self.body].shape;
@@ -175,7 +175,7 @@ impl<const D: usize> Search<'_, D> {
                 let slack = ROUNDING * self.spacing;
                 self.load.region.as_ref().is_none_or(|region| region.distance(x) <= slack)
             },
-            // Distances to booleans are bounds, so that one step may end short of the surface.
+            // Distances to booleans are bounds, so one step may stop short of the surface.
             project: &|x| {
                 (0..8).fold(*x, |x, _| {
                     let (distance, normal) = (shape.distance(&x), shape.gradient(&x));
@@ -224,8 +224,8 @@ impl<const D: usize> Search<'_, D> {
     }
 }
 
-/// Adds shares to the columns of own particles. They are as they were made, so that `places` gives bodies and
-/// places in the lattice of those of a leaf in their order.
+/// Adds shares to the columns of own particles. The particles are in the order in which they were made, which
+/// is that of the bodies and places in `places`.
 fn hand_out<const D: usize>(
     places: impl Fn(usize) -> Vec<(u16, [u64; D])>,
     chunks: &mut [Chunk<D>],

@@ -11,9 +11,8 @@ use crate::material::initial::{NoState, Stressed, under_stress, yielded};
 use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and the volume
-/// that they have is the one under stress: the reference volume is smaller or larger by what the stress does
-/// to it.
+/// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and their
+/// volume is the one under stress: the reference volume differs from it by the deformation under the stress.
 ///
 /// # Errors
 /// A material cannot have the stress.
@@ -47,8 +46,8 @@ pub fn put_under_stress<const D: usize>(
     Ok(())
 }
 
-/// Not collective. Looks for stress that a material cannot have at some points of each body, before any
-/// particle is made.
+/// Not collective. Checks at some points of each body, before any particle is made, that its material can
+/// have the stress.
 ///
 /// # Errors
 /// The first such point.
@@ -223,7 +222,7 @@ fn standing<const D: usize>(
             let [a, b] = [from * up.sign, to * up.sign];
             pieces.push([a.min(b), a.max(b), density]);
         };
-        // As far as the distance to the surface each time, and no less than the interval.
+        // Each step is as long as the distance to the surface, and no shorter than the interval.
         let (mut height, mut inside_from) = (low, None);
         let mut was_inside = body.shape.contains(&point(low));
         if was_inside {

@@ -160,7 +160,7 @@ fn new_particles<const D: usize>(
 }
 
 /// Collective. The tree that the job asks for before its criteria are evaluated; level by level, so that
-/// `fits` may refuse it before it is there.
+/// `fits` may refuse it before it is built.
 fn first_forest<const D: usize, R>(
     comm: &Comm,
     problem: &Problem<D>,

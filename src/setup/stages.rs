@@ -69,8 +69,8 @@ pub(super) fn material_of<const D: usize>(problem: &Problem<D>, body: usize, sta
     changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
 }
 
-/// Collective. Takes a solver into the next stage of its job: bodies go, change and come. Returns how many
-/// particles come, and how many of them to places where there is material already.
+/// Collective. Takes a solver into the next stage of its job: bodies are removed, changed and added. Returns
+/// how many particles come, and how many of them to places where there is material already.
 ///
 /// # Errors
 /// A body that comes has no particle, or cannot have its stress; the same on all ranks.
@@ -106,8 +106,8 @@ pub fn enter_next<const D: usize>(
     Ok(come)
 }
 
-/// How many particles come to a leaf where its box is taken by half along each axis by one that is there and
-/// stays.
+/// Number of the added particles of a leaf whose box overlaps that of a particle that stays by half along
+/// each axis.
 fn occupied<const D: usize>(chunk: &Chunk<D>, added: &Chunk<D>, is_removed: &[bool]) -> u64 {
     let half = |of: &Chunk<D>, p: usize| of.column(Layout::<D>::HALF)[p];
     let stays = |p: &usize| !is_removed[usize::from(Tag::unpack(chunk.tags()[*p]).body)];

@@ -1,16 +1,16 @@
 //! The time integration: one explicit step of the adaptive material point method.
 //!
 //! `Solver::advance` is the method, and `docs/time-step.md` goes through it; the rooms beside it hold its
-//! phases. [`Solver::step`] adds what is no physics: clock, measured costs and the reduction.
+//! phases. [`Solver::step`] adds clock, measured costs and the reduction.
 //!
 //! | room | what it holds, from the bottom up |
 //! |---|---|
-//! | [`physics`] | what is solved |
+//! | [`physics`] | the problem |
 //! | [`sorting`] | particles into bins |
 //! | [`migration`] | particles between leaves and ranks |
 //! | [`state`] | the solver and what it owns |
 //! | [`step`] | phases of a step |
-//! | [`refinement`] | the tree follows the material |
+//! | [`refinement`] | dynamic refinement |
 //! | [`balance`] | load balance: measured costs, new partitions |
 //! | [`stage`] | the next stage of a run |
 //! | [`diagnostics`] | totals; weights of given boxes |
@@ -103,11 +103,11 @@ impl<const D: usize> Solver<D> {
         solver
     }
 
-    /// Collective. Makes ready for the first step of particles as a job gives them: what transfers keep of
-    /// their velocity gradients, and the bound on the step. In each own leaf the first particles, as many as
-    /// `done`, have had steps.
+    /// Collective. Prepares the first step of particles as a job gives them: their affine states for the
+    /// transfer, and the bound on the step. In each own leaf the first particles, as many as `done`, have had
+    /// steps.
     fn start_from(&mut self, done: &[usize]) {
-        // A box without a bin stops the first step, which says so.
+        // A box without a bin is reported by the first step, which fails.
         let _ = self.moments_from_affine(done);
         self.leaf_data.signal = self.signals_under_stress();
         self.clock.bound = self.comm.min_f64(self.local_bound());
@@ -170,7 +170,7 @@ impl<const D: usize> Solver<D> {
         // Fresh memory costs as much as the first scatter into it.
         let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.arenas), self.grid.sum_bytes);
         let inside = KnownInside::of(&self.grid.plan, std::mem::take(&mut self.grid.inside_still));
-        // The new one shall not stand beside all of the old one.
+        // Free the old grid first: both at once would double the peak of memory.
         self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
         (self.grid.arenas, self.grid.sum_bytes) = (arenas, sum_bytes);

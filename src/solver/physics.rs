@@ -107,8 +107,7 @@ impl<const D: usize> Physics<D> {
         self.colliders.iter_mut().for_each(|collider| collider.deform(time));
     }
 
-    /// Columns of what particles carry: for loads, of the stretch between neighbours, then of what has
-    /// happened to them.
+    /// Number of carried columns: for loads, of the stretch between neighbours, then of the particles' past.
     pub fn carried_columns(&self) -> usize {
         self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
     }
@@ -119,13 +118,13 @@ impl<const D: usize> Physics<D> {
         self.followed.first_columns::<D>(self.carried_columns())
     }
 
-    /// First column of what particles carry of what has happened to them.
+    /// First carried column of the particles' past (see [`Followed`]).
     fn followed_column(&self) -> usize {
         let gaps = self.adaptivity.as_ref().and_then(|adaptivity| adaptivity.split_gap);
         self.load_columns() + if gaps.is_some() { strain::columns(D) } else { 0 }
     }
 
-    /// Columns of what particles carry of their motion.
+    /// Carried columns of the particles' motion.
     pub(crate) fn motion_columns(&self) -> Range<usize> {
         self.followed_column() + self.followed.columns::<D>()[0]..self.carried_columns()
     }
@@ -174,7 +173,7 @@ impl<const D: usize> Physics<D> {
         pressure
     }
 
-    /// Columns of what particles carry for loads.
+    /// Number of carried columns for loads.
     pub fn load_columns(&self) -> usize {
         load::columns(&self.loads)
     }

@@ -34,7 +34,7 @@ impl<const D: usize> Solver<D> {
         self.comm.sum_u64(&mut added);
         self.ledger.next_root = self.next_root() + added[0];
         if self.clock.bound == f64::INFINITY {
-            // A step without material says nothing about the next one.
+            // A step without material sets no bound for the growth of the next one.
             self.clock.dt = 0.0;
         }
         let before = std::mem::replace(&mut self.physics, physics);

@@ -19,7 +19,7 @@ pub struct Seam {
     pub is_sent: Vec<bool>,
     /// Blocks whose sums other ranks ask for.
     pub is_asked: Vec<bool>,
-    /// Bins whose arenas are summed up again with what other ranks send.
+    /// Bins whose arenas are summed up again together with the sums of other ranks.
     pub is_kept: Vec<bool>,
 }
 
@@ -64,8 +64,9 @@ impl ArenaSchedule {
         BYTES_PER_THREAD / (size_of::<Row>() * arena_nodes(D)) * rayon::current_num_threads()
     }
 
-    /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` says which blocks a
-    /// bin reaches. Without a size all but those of the first wave are in one, and every bin keeps its arena.
+    /// Waves of `size` bins each for the `occupied` ones, which ascend, where `reached` lists the blocks that
+    /// a bin reaches. Without a size all but those of the first wave are in one, and every bin keeps its
+    /// arena.
     pub fn plan<I: Iterator<Item = usize>>(
         &mut self,
         size: Option<usize>,
@@ -210,7 +211,7 @@ mod tests {
         })
     }
 
-    /// The blocks of the lowest layers are asked for.
+    /// Other ranks ask for the blocks of the lowest layers.
     fn seam(layers: usize) -> Seam {
         let blocks = EDGE.pow(3);
         let is_asked: Vec<bool> = (0..blocks).map(|block| block / (EDGE * EDGE) < layers).collect();
@@ -225,7 +226,7 @@ mod tests {
         for (layers, size) in [(0, Some(1)), (0, Some(40)), (2, Some(40)), (3, Some(100_000)), (1, None)] {
             let (seam, mut waves) = (seam(layers), ArenaSchedule::default());
             let occupied: Vec<u32> = (0..EDGE.pow(3) as u32).filter(some).collect();
-            // The second plan finds what the first has left.
+            // The second plan reuses the memory of the first.
             for _ in 0..2 {
                 waves.plan(size, &seam, around, occupied.iter().copied());
             }
@@ -247,7 +248,7 @@ mod tests {
                     let block = block as usize;
                     assert_eq!(seam.is_asked[block], wave == FIRST);
                     assert!(!std::mem::replace(&mut summed[block], true), "summed twice");
-                    // Who reaches a block lies around it.
+                    // The bins that reach a block lie around it.
                     let bins = around(block as u32).map(|bin| bin as u32).filter(some);
                     assert!(
                         bins.clone().all(|bin| scattered[bin as usize] && holder[slot(bin)] == Some(bin))

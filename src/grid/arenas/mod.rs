@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`window`] | which nodes of an arena particles can touch |
-//! | [`arena_schedule`] | when which arena is in use, so that few are held |
+//! | [`arena_schedule`] | when which arena is in use, so that few exist at a time |
 //! | `disjoint_slices` | disjoint mutable parts of one slice |
 use std::sync::Arc;
 
@@ -19,7 +19,8 @@ pub mod arena_schedule;
 pub(super) mod disjoint_slices;
 pub mod window;
 
-/// Cache lines of an arena that are prefetched: all in 2D; in 3D the processor foresees the rest.
+/// Cache lines of an arena that are prefetched: all in 2D; in 3D the prefetcher of the processor loads the
+/// rest.
 const PREFETCHED: usize = 25;
 /// No arena.
 const NONE: u32 = u32::MAX;

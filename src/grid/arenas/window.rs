@@ -6,7 +6,7 @@ use crate::grid::mask::{offset, product};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 use crate::simd::prefetch;
 
-/// A box of arena nodes, `lower..upper` per axis; what lies outside holds no values.
+/// A box of arena nodes, `lower..upper` per axis; nodes outside it have no values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window<const D: usize> {
     /// First node per axis.
@@ -27,8 +27,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Asks for the rows of the nodes, of which the first lies at an address: at most four, so in three cache
-    /// lines.
+    /// Prefetches the rows of the nodes, of which the first lies at an address: at most four, so in three
+    /// cache lines.
     #[inline(always)]
     pub fn read_ahead(&self, first: usize) {
         prefetch(first);
@@ -48,7 +48,7 @@ impl<const D: usize> Window<D> {
     /// Grows to the stencil of a box. `lowest` is the box's lower face along each axis, in cells from the
     /// corner of the bin's block.
     pub fn include(&mut self, lowest: [f64; D]) {
-        // Wider than rounding can move the kernel's own choice of the lowest node.
+        // More than rounding can shift the lowest node that the kernel finds.
         const SLACK: f64 = 1e-9;
         for axis in 0..D {
             let lowest_node = |x: f64| (x.floor().clamp(-1.0, 3.0) + 1.0) as usize;
@@ -105,9 +105,9 @@ impl<const D: usize> Window<D> {
     }
 }
 
-/// Where a window begins, by the lowest node of a stencil, and where it ends: windows contain all or nothing
-/// of what the arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums never
-/// see part of a region.
+/// First node of a window, by the lowest node of a stencil, and its end. Windows contain all or none of the
+/// nodes that the arena shares with a region of a block (see [`crate::grid::order::region`]), so that sums
+/// never see part of a region.
 const FIRST: [u8; 5] = [0, 1, 1, 3, 4];
 const END: [u8; 5] = [3, 4, 5, 7, 7];
 

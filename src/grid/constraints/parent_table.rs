@@ -75,7 +75,7 @@ impl ParentTable {
         let (mut parents, mut start, mut having) = (Vec::new(), Vec::new(), Vec::new());
         for parity in 0..1u32 << D {
             let mut corners = [0; 8];
-            // Any block of this parity that is not at the lower faces shows the pattern.
+            // Any block of this parity away from the lower faces has the pattern.
             let block: [u32; D] = std::array::from_fn(|axis| 2 + (parity >> axis & 1));
             for bit in 0..block_nodes(D) as u32 {
                 start.push(parents.len() as u16);

@@ -1,13 +1,12 @@
-//! The order in which a node adds up what reaches it.
+//! The order in which a node adds up its contributions.
 //!
 //! Each contribution has a Morton key, and the sum follows the binary tree of these keys: the keys fall into
 //! those with and without the highest bit in which any of them differ, the sums of both halves come first,
-//! and so on down to single keys. As a rank owns a segment of the curve, what it contributes to a node fills
-//! few whole subtrees, mostly one, and a neighbour needs only their sums.
+//! and so on down to single keys. As a rank owns a segment of the curve, its contributions to a node fill few
+//! whole subtrees, mostly one, and a neighbour needs only their sums.
 //!
-//! A contribution that is not there counts as zero. Adding a zero changes no other number, so it makes no
-//! difference whether it is added or passed over, but for the sign of a zero sum; sums therefore end with
-//! `+ 0.0`.
+//! An absent contribution counts as zero. Adding a zero changes no other number, so it may be added or
+//! skipped, but for the sign of a zero sum; sums therefore end with `+ 0.0`.
 pub mod region;
 
 /// Where a contribution comes from.
@@ -65,8 +64,7 @@ pub(super) fn fold<T>(
     stack.pop().map(|(_, sum)| sum)
 }
 
-/// Adds what stands on top of the stack to what is below, down to the first that parts higher than
-/// `separation`.
+/// Adds the top of the stack to the entries below, down to the first that parts higher than `separation`.
 fn merge<T>(stack: &mut Vec<(u32, T)>, separation: u32, add: &impl Fn(&mut T, &T)) {
     while stack.last().is_some_and(|(last, _)| *last <= separation) {
         if let Some((_, sum)) = stack.pop()
@@ -128,7 +126,7 @@ mod tests {
         assert_eq!(shape(&[1, 1, 1, 2]), "(((11)1)2)");
     }
 
-    /// Whoever has the keys from one to another as one sum gets the same tree.
+    /// A rank that gets the keys from one to another as one sum builds the same tree.
     #[test]
     fn subtrees_of_owners() {
         let keys: [u64; 8] = [0, 1, 2, 4, 5, 6, 12, 13];

@@ -75,7 +75,7 @@ fn finer_neighbours<const D: usize>(tree: &KnownTree<D>, here: Octant<D>) -> imp
     (0..if tree.is_beside_finer(here.level, here.coord) { offset_count(D) } else { 0 })
         .filter_map(move |index| shifted(here.coord, offset::<D>(index)))
         .filter(move |&beside| beside != here.coord && tree.contains(here.level, beside))
-        // Most neighbours are leaves of this size or larger, which is quickly seen.
+        // Most neighbours are leaves of this size or larger, which is found quickly.
         .filter(move |&beside| !matches!(tree.cover(here.level, beside), Cover::Leaf(_)))
         .flat_map(move |beside| tree.leaves_within(here.level, beside))
         .map(move |other| tree.leaves()[other])
@@ -163,7 +163,7 @@ fn half_cells<const D: usize>(tree: &KnownTree<D>) -> u32 {
     (2 * tree.reach()).max(1)
 }
 
-/// Where parts of the boxes of a leaf's particles can lie outside the leaf.
+/// Region outside a leaf in which parts of its particles' boxes can lie.
 ///
 /// A box at most one own cell wide is cut into parts only if it overlaps a finer leaf; its parts then lie
 /// within half a cell of its leaf and within a cell of the finer leaf. If boxes wider than a cell occur
@@ -221,12 +221,12 @@ pub struct SourceSearch<'a, const D: usize> {
     half_cells: u32,
     /// The known ones; some may appear twice.
     pub near: Vec<usize>,
-    /// Where there may be others.
+    /// Regions in which there may be others.
     pub missing: Vec<Region<D>>,
 }
 
 impl<'a, const D: usize> SourceSearch<'a, D> {
-    /// Goes down the tree near the bin, from the coarsest octants that may be leaves with such boxes.
+    /// Descends the tree near the bin, from the coarsest octants that may be leaves with such boxes.
     pub fn of(tree: &'a KnownTree<D>, bin: Octant<D>) -> Self {
         let mut search =
             Self { tree, bin, half_cells: half_cells(tree), near: Vec::new(), missing: Vec::new() };
@@ -260,8 +260,8 @@ impl<'a, const D: usize> SourceSearch<'a, D> {
         }
     }
 
-    /// Asks for the leaves of the octant that may reach the bin, and for the leaf at its lower corner, which
-    /// shows whether the octant is a leaf. The rest of a large octant is left alone.
+    /// Adds the leaves of the octant that may reach the bin, or requests them, and for the leaf at its lower
+    /// corner, which shows whether the octant is a leaf. The rest of a large octant is not requested.
     fn ask(&mut self, octant: &Octant<D>) {
         let lo = octant.lower();
         self.missing.push(Region { lo, hi: lo.map(|x| x + 1) });

@@ -106,7 +106,7 @@ impl<const D: usize> GridPlan<D> {
     /// Finds which nodes have constrained parents: these and their parents have first moments.
     fn find_moments(&mut self) {
         let links = std::mem::take(&mut self.links);
-        // Nodes that first moments pass through on their way between levels.
+        // Nodes through which first moments pass between levels.
         let mut passed = vec![0; self.blocks.len()];
         for fine in links.iter().flat_map(|links| &links.fine) {
             self.find_chained(fine, &mut passed);

@@ -246,9 +246,8 @@ impl<const D: usize> KnownTree<D> {
     /// Coarsest level of leaves whose boxes can have parts in a bin of `level`.
     ///
     /// In a graded tree leaves of all sizes between lie between a bin and a much coarser leaf: at a distance
-    /// of
-    /// `e (1 - 2^-k)` from a leaf of edge `e` the leaves are at most `k + 1` levels finer, and bins one level
-    /// more. Parts of that leaf's boxes come as far as `e reach / 4`.
+    /// of `e (1 - 2^-k)` from a leaf of edge `e` the leaves are at most `k + 1` levels finer, and bins one
+    /// level more. Parts of that leaf's boxes come as far as `e reach / 4`.
     pub fn coarsest_reaching(&self, level: u8) -> u8 {
         match self.reach {
             _ if !self.graded => 0,
@@ -271,7 +270,7 @@ impl<const D: usize> KnownTree<D> {
     /// The known leaf that contains the finest-level position `key`.
     pub fn locate(&self, key: u64) -> Option<usize> {
         let candidate = self.leaves_below(key, true).checked_sub(1)?;
-        // Less work than `key_end`.
+        // Faster than `key_end`.
         (key - self.keys[candidate] < self.leaves[candidate].volume()).then_some(candidate)
     }
 

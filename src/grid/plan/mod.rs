@@ -6,7 +6,7 @@
 //! | [`bin_reach`] | which leaves feed a bin |
 //! | [`needed_nodes`] | which nodes this rank needs |
 //! | [`bins_by_block`] | bins by the blocks that they reach |
-//! | [`remote_sums`] | sums that other ranks are asked for |
+//! | [`remote_sums`] | sums requested from other ranks |
 //! | [`block_links`] | pairs of blocks of two levels |
 //! | [`arena_tables`] | constrained nodes in the arena of a bin |
 use std::sync::Arc;
@@ -108,7 +108,7 @@ pub struct GridPlan<const D: usize> {
     pub moments: usize,
     /// Constrained nodes of arenas, for [`Bin::touched`].
     pub constraints: Arc<Vec<ArenaConstraints<D>>>,
-    /// Rounds that the ghost layer took to close.
+    /// Rounds of requests until the ghost layer was complete.
     pub rounds: usize,
 }
 
@@ -169,7 +169,7 @@ impl<const D: usize> GridPlan<D> {
         let mut number = Vec::new();
         for bin in &mut plan.bins {
             if let Some(of_block) = bin.touched {
-                // So far blocks are numbered, in the order of the first bin that has them.
+                // Here blocks are numbered in the order of the first bin that has them.
                 if of_block as usize == number.len() {
                     number.push(tables.number(&bin.around));
                 }
@@ -295,7 +295,7 @@ impl<const D: usize> GridPlan<D> {
     }
 
     fn list_bins(&mut self, number: &FxHashMap<(u8, [u32; D]), u32>, bins: &[Vec<Octant<D>>]) {
-        // Bins of several leaves may have one block; what depends on the block is made once.
+        // Bins of several leaves may have one block; the parts that depend on the block are made once.
         let mut of_block: FxHashMap<Octant<D>, u32> = FxHashMap::default();
         let mut tables = 0;
         for (leaf, blocks) in bins.iter().enumerate() {

@@ -135,7 +135,7 @@ impl<const D: usize> Builder<'_, D> {
         }
     }
 
-    /// Value nodes: the real nodes of blocks around some blocks, as far as the halo goes.
+    /// Value nodes: the real nodes of blocks around some blocks, within the halo.
     fn add_halo(&mut self, blocks: impl Iterator<Item = Octant<D>>) {
         if self.tree.halo() == 0 || self.tree.ghost_len() == 0 && self.tree.is_whole() {
             return;
@@ -217,7 +217,7 @@ impl<const D: usize> Builder<'_, D> {
         *is_bin.or_insert_with(|| bin_container(tree, level, coord).is_some())
     }
 
-    /// Constrained nodes of a block that can receive something, which restriction hands to their parents.
+    /// Constrained nodes of a block with contributions, which restriction adds to their parents.
     fn restricted(&mut self, level: u8, coord: [u32; D]) -> u64 {
         if let Some(&mask) = self.restricted.get(&(level, coord)) {
             return mask;
@@ -230,7 +230,7 @@ impl<const D: usize> Builder<'_, D> {
         mask
     }
 
-    /// Nodes of a block that can receive something: from bins of their level or by restriction.
+    /// Nodes of a block that can receive contributions: from bins of their level or by restriction.
     fn receives(&mut self, level: u8, coord: [u32; D]) -> u64 {
         let mut mask = 0;
         for index in 0..offset_count(D) {
@@ -295,8 +295,8 @@ impl<const D: usize> Builder<'_, D> {
         unknown
     }
 
-    /// Looks for all leaves that may feed the bins around sum nodes. In graded trees with boxes up to two
-    /// cells wide they lie within two blocks of the sum node, where everything is known.
+    /// Finds the regions of all leaves that may feed the bins around sum nodes. In graded trees with boxes up
+    /// to two cells wide they lie within two blocks of the sum node, where everything is known.
     fn look_for_sources(&self, missing: &mut Vec<Region<D>>) {
         if self.tree.sources_are_near() {
             return;

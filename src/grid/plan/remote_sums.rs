@@ -1,8 +1,8 @@
-//! Which sums a rank asks of others.
+//! Sums that a rank requests from others.
 //!
 //! For every region of every block whose sums it needs, a rank knows all bins that may contribute, own and
-//! others. In the tree of their keys it looks for the largest subtrees of one owner: these are the pieces
-//! that it asks for.
+//! others. In the tree of their keys it finds the largest subtrees of one owner: these are the pieces that it
+//! requests.
 use partition::{MAX_LEVEL, Octant};
 use rustc_hash::FxHashMap;
 
@@ -39,11 +39,12 @@ pub struct Part {
     pub region: u8,
     /// Number of the piece.
     pub piece: u32,
-    /// A key of the subtree that it is in this region.
+    /// A key of its subtree in this region.
     pub key: u64,
     /// Position of one of the bins in the subtree that lie in their leaves; [`NO_HOME`] if it has none.
     pub home: u8,
-    /// Whether own bins are one subtree as well, if any reach the region, so that the sum is theirs and this.
+    /// Whether own bins, if any reach the region, are one subtree as well: then the sum is that of theirs and
+    /// this one.
     pub is_only: bool,
 }
 
@@ -83,7 +84,7 @@ impl<const D: usize> GridPlan<D> {
         })
     }
 
-    /// Lists the pieces that this rank needs of others, by rank, and where they enter.
+    /// Lists the pieces that this rank needs of others, by rank, and the sums that they enter.
     pub(super) fn list_pieces(&mut self, rank: usize) {
         let mut search = RemoteBins::default();
         // Pieces as they are found, and where they enter: block and part.
@@ -132,7 +133,7 @@ impl<const D: usize> GridPlan<D> {
         }));
     }
 
-    /// Cuts what reaches a block into pieces of other ranks.
+    /// Divides the contributions to a block into pieces of other ranks.
     fn cut_pieces(
         &self,
         rank: usize,
@@ -198,14 +199,14 @@ const POSITIONS: [[u32; 3]; 3] = [
 ];
 
 /// Key of a bin of `leaf` in the order of sums, and its place among bins with the same: where its block lies,
-/// or, if that is outside, where the leaf lies. So what a leaf contributes is together, and so is what a rank
-/// contributes.
+/// or, if that is outside, where the leaf lies. So the contributions of a leaf are adjacent, and so are those
+/// of a rank.
 fn source_key<const D: usize>(leaf: &Octant<D>, block: &Octant<D>) -> (u64, u64) {
     let place = block.key();
     (if leaf.contains(block) { place } else { leaf.key() }, place)
 }
 
-/// Search for bins of other ranks; remembers what it has found.
+/// Search for bins of other ranks; caches its results.
 #[derive(Default)]
 struct RemoteBins<const D: usize> {
     remote: FxHashMap<Octant<D>, Vec<usize>>,

@@ -1,4 +1,4 @@
-//! The sum of one block.
+//! The sum at the nodes of one block.
 use std::ops::RangeInclusive;
 
 use super::exchange::ReceivedSums;
@@ -22,7 +22,7 @@ pub(super) static ZEROS: [Row; arena_nodes(3)] = [ZERO; arena_nodes(3)];
 pub(super) struct Sources<'a, const D: usize> {
     pub plan: &'a GridPlan<D>,
     pub arenas: &'a Arenas<D>,
-    /// Sums of other ranks, where they are wanted.
+    /// Sums of other ranks, where they are to be added.
     pub received: Option<&'a ReceivedSums<D>>,
 }
 
@@ -43,13 +43,13 @@ pub(super) struct BlockSum<'a, const D: usize> {
     pub(in crate::grid) occupied: u32,
     /// Those whose particles do not touch all nodes.
     partial: u32,
-    /// Regions that something else reaches as well: bins outside their leaves, or sums of other ranks.
+    /// Regions with other contributions as well: bins outside their leaves, or sums of other ranks.
     pub(super) mixed: u32,
 }
 
 impl<'a, const D: usize> BlockSum<'a, D> {
-    /// Finds what reaches `block`: from own bins, only of sources with these `keys` if any are given; and
-    /// from other ranks.
+    /// Finds the contributions to `block`: of own bins, only of sources with these `keys` if any are given;
+    /// and of other ranks.
     pub(super) fn find(
         sources: Sources<'a, D>,
         scratch: &'a mut Irregular<D>,
@@ -148,8 +148,8 @@ impl<'a, const D: usize> BlockSum<'a, D> {
         }
     }
 
-    /// Sums the regions in `wanted` along the fixed pattern; returns those left out because what reaches them
-    /// does not fit it. `MIXED` if more than whole arenas reaches these regions.
+    /// Sums the regions in `wanted` along the fixed pattern; returns those left out because their
+    /// contributions do not fit it. `MIXED` if these regions have contributions beside whole arenas.
     #[inline(never)]
     fn all_planes<const MIXED: bool>(&mut self, wanted: u32, to: &mut [Row]) -> u32 {
         if D == 3 {
@@ -312,8 +312,8 @@ impl<'a, const D: usize> BlockSum<'a, D> {
 }
 
 impl<const D: usize> Sources<'_, D> {
-    /// Asks for the rows of arenas that the sums of a block will need: they lie too far apart for the
-    /// processor to foresee them.
+    /// Prefetches the rows of arenas that the sums of a block need: they lie too far apart for the prefetcher
+    /// of the processor.
     pub(super) fn read_ahead(&self, block: usize) {
         for (position, &bin) in self.plan.bins_by_block.inner::<D>(block).iter().enumerate() {
             if bin == NO_BIN {

@@ -1,8 +1,8 @@
 //! Exchange of partial sums between ranks: one message per neighbour and step.
 //!
-//! A rank that sums up a node which bins of others reach has asked their owners, once per plan, for the sums
-//! of the largest subtrees (see [`crate::grid::order`]) that these own alone. In each step an owner adds up
-//! its arenas over these nodes and sends the sums of those that its particles touch.
+//! A rank that sums up a node with contributions of others has requested from their owners, once per plan,
+//! the sums of the largest subtrees (see [`crate::grid::order`]) that these own alone. In each step an owner
+//! adds up its arenas over these nodes and sends the sums of those that its particles touch.
 use partition::comm::{Comm, NeighbourExchange, Pending, Traffic};
 use partition::{MAX_LEVEL, Octant};
 use rayon::prelude::*;
@@ -90,7 +90,7 @@ impl<const D: usize> ArenaExchange<D> {
         let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
         let answers = comm.sparse_exchange(requests);
         let mut ranks: Vec<usize> = answers.iter().map(|(rank, _)| *rank).chain(asked).collect();
-        // A rank that is asked without asking back must hear of it, so that both list each other.
+        // A rank that gets requests without making any must know of them, so that both list each other.
         let told = comm.sparse_exchange(ranks.iter().map(|&rank| (rank, vec![0u8])).collect());
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();

@@ -1,8 +1,8 @@
-//! Sums at nodes that more than whole arenas reach: bins outside their leaves, and sums of other ranks.
+//! Sums at nodes with contributions beside whole arenas: bins outside their leaves, and sums of other ranks.
 //!
 //! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another
-//! rank are the only ones within a subtree of the pattern, what they add enters at one of its places, the
-//! others being empty. What does not fit is listed and added up along the tree of keys.
+//! rank are the only ones within a subtree of the pattern, their contribution enters at one of its places,
+//! the others being empty. Contributions that do not fit are listed and added up along the tree of keys.
 use super::block_sum::{BlockSum, ZERO, ZEROS};
 use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::mask::{bits, offset_count, opposite};
@@ -71,7 +71,7 @@ impl<const D: usize> BlockSum<'_, D> {
         })
     }
 
-    /// Finds the places of all that reaches a region beside whole arenas; false if it does not fit the
+    /// Finds the places of all contributions to a region beside whole arenas; false if it does not fit the
     /// pattern.
     #[inline(never)]
     pub(super) fn place(&mut self, region: usize) -> bool {
@@ -117,7 +117,7 @@ impl<const D: usize> BlockSum<'_, D> {
         }
     }
 
-    /// The sums of a region, along a list of all that reaches it.
+    /// The sums of a region, along a list of all contributions.
     pub(super) fn fold_rows(&mut self, region: usize, to: &mut [Row]) {
         self.list_terms(region);
         let nodes = self.regions.nodes[region];
@@ -133,7 +133,7 @@ impl<const D: usize> BlockSum<'_, D> {
         self.scratch.rows = stack;
     }
 
-    /// The moments at nodes of a region, along a list of all that reaches it. `to` has all of the block.
+    /// The moments at nodes of a region, along a list of all contributions. `to` has all of the block.
     pub(super) fn fold_moments(&mut self, region: usize, nodes: u64, to: &mut [Row]) {
         self.list_terms(region);
         let mut stack = std::mem::take(&mut self.scratch.moments);
@@ -150,7 +150,7 @@ impl<const D: usize> BlockSum<'_, D> {
         self.scratch.moments = stack;
     }
 
-    /// Lists what reaches a region, in order.
+    /// Lists the contributions to a region, in order.
     fn list_terms(&mut self, region: usize) {
         let mut terms = std::mem::take(&mut self.scratch.terms);
         terms.clear();
@@ -200,7 +200,7 @@ impl<const D: usize> BlockSum<'_, D> {
         rows
     }
 
-    /// First moments that something adds to a node.
+    /// First moments that a contribution adds to a node.
     pub(super) fn moments(&self, origin: Origin, bit: u32) -> Option<Moments<D>> {
         match origin {
             Origin::Bin { bin, position } => {

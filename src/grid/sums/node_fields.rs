@@ -1,8 +1,8 @@
-//! Node fields of one time step: sums of arenas, and what the gather reads; `restrict_prolong.rs` has
+//! Node fields of one time step: sums of arenas, and values for the gather; `restrict_prolong.rs` has
 //! restriction and prolongation.
 //!
 //! Every sum runs in the order that the plan fixes from tree and particles, so its bits do not depend on
-//! ranks or threads. Blocks that no particle reaches are passed over: their rows are zero.
+//! ranks or threads. Blocks that no particle reaches are skipped: their rows are zero.
 use rayon::prelude::*;
 
 use super::block_sum::{BlockSum, Sources};
@@ -24,7 +24,7 @@ pub(super) const ZERO: Row = Row([0.0; 4]);
 /// Rows of all blocks of a plan: momentum and mass after the sums, velocity after the update.
 #[derive(Clone, Debug)]
 pub struct NodeFields<const D: usize> {
-    /// One row per node, block by block. Those of blocks that nothing ever reaches take no memory.
+    /// One row per node, block by block. Those of blocks without contributions take no memory.
     pub rows: Block<Row>,
     /// First moments, block by block.
     pub moments: Block<Row>,
@@ -69,8 +69,8 @@ impl<const D: usize> NodeFields<D> {
         size_of_val(&*self.rows) + size_of_val(&*self.moments)
     }
 
-    /// Not collective. Adds the mass of other material to that of these fields, which all hold velocities,
-    /// and gives it the mean velocity.
+    /// Not collective. Adds the mass of other fields to that of these, and sets the mean velocities by mass.
+    /// All rows hold velocities.
     pub fn add_material(&mut self, other: &Self) {
         let nodes = block_nodes(D);
         let blocks = other.rows.chunks(nodes).zip(self.rows.chunks_mut(nodes)).enumerate();
@@ -135,8 +135,8 @@ impl<const D: usize> NodeFields<D> {
         });
     }
 
-    /// Not collective. Adds what other ranks have sent. Where their share and the own one are one subtree
-    /// each, that is all; other regions are added up anew.
+    /// Not collective. Adds the sums of other ranks. Where their share and the own one are one subtree each,
+    /// one addition completes the region; other regions are added up anew.
     pub fn add_received(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, received: &ReceivedSums<D>) {
         if plan.pieces.is_empty() {
             return;
@@ -247,7 +247,7 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Prefetches what [`NodeFields::load`] will copy: the blocks around a bin lie too far apart for the
-    /// processor to foresee them.
+    /// prefetcher of the processor.
     fn prefetch(&self, plan: &GridPlan<D>, bin: usize, window: &Window<D>) {
         let (rows, nodes) = (self.rows.as_ptr().addr(), block_nodes(D));
         for (_, block, shared) in shared_blocks(&plan.bins[bin], window) {

@@ -19,8 +19,8 @@ struct BlockMut<'a> {
 }
 
 impl<const D: usize> NodeFields<D> {
-    /// Not collective. Hands the sums of constrained nodes to their parents, finest level first:
-    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent meets its children block by block
+    /// Not collective. Restriction. Adds the sums of constrained nodes to their parents, finest level first:
+    /// `a_i += Σ c (a_j + A_j (x_i - x_j))`, `A_i += Σ c A_j`. A parent adds its children block by block
     /// along the curve.
     pub fn restrict(&mut self, plan: &GridPlan<D>) {
         for level in (1..plan.levels()).rev() {
@@ -44,9 +44,9 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
-    /// Not collective. Gives the constrained nodes that the gather reads the values of their parents,
-    /// coarsest level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on real
-    /// nodes.
+    /// Not collective. Prolongation. Interpolates the constrained nodes that the gather reads from their
+    /// parents, coarsest level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on
+    /// real nodes.
     pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         self.mark_needed(plan, arenas);
         for level in 1..plan.levels() {

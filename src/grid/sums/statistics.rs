@@ -1,4 +1,4 @@
-//! Sizes of tree and grid on a rank, bytes that it sends, and the least that other ranks need of these.
+//! Sizes of tree and grid on a rank, bytes that it sends, and the least bytes that other ranks need.
 use rustc_hash::FxHashMap;
 
 use super::block_sum::Sources;

@@ -25,7 +25,7 @@ const SAME: u32 = u32::MAX;
 pub enum OfBlock<'a> {
     /// The same for all.
     Same(f64),
-    /// Node by node; of use at real nodes.
+    /// Node by node; defined at real nodes.
     Each(&'a [f64]),
 }
 
@@ -71,13 +71,13 @@ fn cell_volume<const D: usize>(plan: &GridPlan<D>, block: &Block<D>) -> f64 {
     plan.cell(block.level).powi(D as i32)
 }
 
-/// One bit for each of the blocks of cells that meet at the lower corner of a block.
+/// One bit for each of the blocks of cells around the lower corner of a block.
 const fn all_around(d: usize) -> u32 {
     (1 << (1 << d)) - 1
 }
 
-/// Which of the blocks of cells that meet at the lower corner of a block are leaves of its level: bit `Σ 2^k`
-/// over the axes k along which it lies below.
+/// Which of the blocks of cells around the lower corner of a block are leaves of its level: bit `Σ 2^k` over
+/// the axes k along which it lies below.
 fn leaves_around<const D: usize>(plan: &GridPlan<D>, block: &Block<D>) -> u32 {
     let tree = &plan.tree;
     let is_leaf = |below: &u32| {

@@ -9,11 +9,11 @@ use crate::run::RunError;
 /// Why a run has ended ahead of its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ending {
-    /// The message that the user has got.
+    /// The message to the user.
     pub reason: String,
     /// Advice.
     pub advice: String,
-    /// Whether it was asked to stop.
+    /// Whether it stopped on request.
     pub is_stop: bool,
     /// Steps done.
     pub step: u64,
@@ -68,7 +68,7 @@ impl Ending {
     }
 }
 
-/// Where it is, for a job of this name, in the directory of its results.
+/// Path of the record of a job of this name, in the directory of its results.
 pub fn path(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.ended.json"))
 }

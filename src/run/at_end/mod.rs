@@ -1,6 +1,6 @@
 //! Results that a run leaves when it ends.
 //!
-//! | file | what it has |
+//! | file | content |
 //! |---|---|
 //! | [`report`] | `JOB.report.json`: the results of a finished run |
 //! | [`ending`] | `JOB.ended.json`: why a run ended early, and what to do |

@@ -1,4 +1,4 @@
-//! `JOB.report.json`: what a finished run says of itself, for scripts.
+//! `JOB.report.json`: the report of a finished run, for scripts.
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ pub struct Report {
     pub program: String,
     /// Name of the job.
     pub job: String,
-    /// Checksum of what decides the state, in hexadecimal digits.
+    /// Checksum of the keys that decide the state, in hexadecimal digits.
     pub digest: String,
     /// End of the run that the job asks for, s.
     pub end: f64,
@@ -81,7 +81,7 @@ pub fn digest(digest: u64) -> String {
     format!("{digest:016x}")
 }
 
-/// Where the report of a job of this name is, in the directory of its results.
+/// Path of the report of a job of this name, in the directory of its results.
 pub fn path(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.report.json"))
 }

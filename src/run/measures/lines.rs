@@ -25,7 +25,7 @@ pub(in crate::run) fn open<const D: usize>(
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let path = path(problem, line);
         match kept {
-            // A line that a run had not before begins where the run goes on.
+            // A line that the run did not have before begins where the run continues.
             Some(kept) if path.exists() => History::resume(&path, &columns, line.points.len(), kept),
             _ => Ok((History::create(&path, &columns)?, Vec::new())),
         }

@@ -1,4 +1,4 @@
-//! Measurements beside the history: their files, and what a restart needs of them.
+//! Measurements beside the history: their files, and their state for a restart.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -20,7 +20,7 @@ use crate::probe::{Map, Maxima, Tracked};
 use crate::solver::Solver;
 use crate::solver::migration::fluxes::Fluxes;
 
-/// Name under which a file has something of a flux or a track.
+/// Name of a number of a flux or a track in the header of a file.
 fn measure(kind: &str, name: &str, what: &str) -> String {
     format!("{kind}_{what}{:016x}", fnv1a(name.bytes().map(u64::from)))
 }

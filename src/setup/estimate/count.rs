@@ -1,9 +1,9 @@
 //! Leaves and particles of a job's tree, counted without building it.
 //!
 //! A part of the tree whose leaves all have one level, and which no body or one body fills, is counted by
-//! arithmetic. What is left are surfaces: of bodies, of regions, and of the layers by which a graded tree
-//! falls off around a region. Those are followed down to the leaves, coarse parts first, until a bound on the
-//! work is reached.
+//! arithmetic. Surfaces are left: of bodies, of regions, and of the layers by which a graded tree falls off
+//! around a region. Those are followed down to the leaves, coarse parts first, until a bound on the work is
+//! reached.
 //!
 //! A graded tree needs no list of its leaves. A split of level `m` makes the parents of its neighbours split,
 //! these make the parents of theirs, and so on; so an octant of level `l` is split just when a region splits
@@ -46,7 +46,7 @@ struct Part<const D: usize> {
     hi: [u32; D],
     /// Level of all leaves in it, once that is known and they are counted.
     settled: Option<u8>,
-    /// Regions and bodies that may matter in it.
+    /// Regions and bodies that may reach it.
     regions: Rc<[u32]>,
     bodies: Rc<[u32]>,
 }
@@ -108,7 +108,7 @@ fn work<const D: usize>(shape: &Shape<D>) -> u64 {
     }
 }
 
-/// Whether `Outside` is said of every box that lies outside.
+/// Whether classification finds `Outside` for every box that lies outside.
 fn is_exact<const D: usize>(shape: &Shape<D>) -> bool {
     match shape {
         Shape::Box(_) | Shape::Sphere { .. } | Shape::HalfSpace { .. } => true,
@@ -129,7 +129,7 @@ struct Counter<'a, const D: usize> {
 }
 
 impl<const D: usize> Counter<'_, D> {
-    /// Counts a part, or hands on smaller ones.
+    /// Counts a part, or queues smaller ones.
     fn look(&mut self, mut part: Part<D>) -> Result<(), SeedError> {
         self.work += 10;
         let cell = self.cell(part.level, part.lo, part.hi);
@@ -356,7 +356,7 @@ impl<const D: usize> Counter<'_, D> {
         Ok(())
     }
 
-    /// Hands on the parts of a part.
+    /// Queues the parts of a part.
     fn divide(&mut self, part: &Part<D>, octant: Option<Octant<D>>) {
         let mut push = |level, lo, hi| {
             self.pushed += 1;

@@ -1,4 +1,4 @@
-//! The tree of a job leaf by leaf, split by split: what counting by arithmetic is compared with.
+//! The tree of a job leaf by leaf, split by split: the reference for counting by arithmetic.
 use crate::grid::mask::{offset, offset_count};
 use crate::job::Problem;
 use partition::Octant;

@@ -150,7 +150,7 @@ pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, Estima
     let counted = steps(problem);
     let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
     let probed = super::initial_stress::probe(problem, &materials);
-    // First, for it makes nonsense of the others.
+    // First, since such numbers invalidate the other checks.
     check_finite(problem)?;
     let (time_step, steps) = counted?;
     probed?;

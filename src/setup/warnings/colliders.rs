@@ -1,4 +1,4 @@
-//! Colliders that do not do what they are for.
+//! Colliders that are unlikely to act as intended.
 use super::NAME;
 use crate::boundary::motion::{Pose, length};
 use crate::boundary::{ActsOn, Collider, Contact};
@@ -93,8 +93,8 @@ fn thickness<const D: usize>(shape: &Shape<D>) -> f64 {
 /// Times of a run at which the place of a moving collider is computed.
 const TIMES: u32 = 256;
 
-/// Whether a collider is outside the domain, by more than a cell, at all times of a run. Nothing is said of
-/// free bodies.
+/// Whether a collider is outside the domain, by more than a cell, at all times of a run. False for free
+/// bodies.
 fn stays_outside<const D: usize>(problem: &Problem<D>, collider: &Collider<D>) -> bool {
     let edge = problem.cell_edge(problem.tree.base_level);
     let size = problem.size();

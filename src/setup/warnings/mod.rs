@@ -1,11 +1,11 @@
-//! Likely mistakes in a job: what is allowed in it and hardly meant.
+//! Likely mistakes in a job: settings that are allowed and hardly intended.
 //!
 //! | file | subject |
 //! |---|---|
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
-//! | `units.rs` | numbers that no matter has |
+//! | `units.rs` | properties that no matter has |
 use crate::job::Problem;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;

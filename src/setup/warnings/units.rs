@@ -1,4 +1,4 @@
-//! Numbers that no matter has, or under which it collapses at once: mostly units that were mistaken.
+//! Properties that no matter has, or under which it collapses at once: mostly mistaken units.
 use serde_json::Value;
 
 use super::NAME;
@@ -17,7 +17,7 @@ const STRENGTH: f64 = 0.2;
 const DENSITIES: [f64; 2] = [1.0, 23_000.0];
 /// Speeds of waves from the softest gels to beyond diamond, m/s.
 const WAVES: [f64; 2] = [0.2, 20_000.0];
-/// Least number of steps of a run that shows anything.
+/// Least number of steps of a meaningful run.
 const STEPS: f64 = 100.0;
 /// Greatest pressure of a body's weight at its foot over the stiffness of its material.
 const WEIGHT: f64 = 0.2;
@@ -28,7 +28,7 @@ const BODY: f64 = 2.0;
 /// Most bodies that are checked.
 const BODIES: usize = 1000;
 
-/// Warns of what no material is, and of loads that no material bears.
+/// Warns of properties that no material has, and of loads that no material bears.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut Vec<String>) {
     let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
     for (index, (setup, material)) in problem.materials.iter().zip(&materials).enumerate() {
@@ -111,8 +111,8 @@ fn of_body<const D: usize>(
     }
 }
 
-/// Greatest acceleration of gravity times the height of a body along it, m²/s²; roughly, and only as exact as
-/// it takes to compare it with `limit`.
+/// Greatest acceleration of gravity times the height of a body along it, m²/s²; approximate, and only as
+/// exact as the comparison with `limit` requires.
 fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f64) -> f64 {
     if body.given.is_some() {
         return 0.0;

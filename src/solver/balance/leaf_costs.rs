@@ -1,4 +1,4 @@
-//! Costs of own leaves, and what ranks agree on.
+//! Costs of own leaves from measured times, on which all ranks agree.
 use std::sync::atomic::Ordering;
 
 use crate::solver::state::Solver;
@@ -6,7 +6,7 @@ use crate::solver::state::cost::{KINDS, Kind, UNIT, arena_cost, loads};
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// How the boxes of an own leaf were transferred last, or will be next where that is known.
+    /// Kind of transfer of the boxes of an own leaf: of the last step, or of the next where that is known.
     fn kind(&self, leaf: usize) -> Kind {
         let grid = &self.grid;
         if grid.plan.revision != self.forest.revision() {

@@ -3,7 +3,7 @@
 //! When to make a new one: ranks take new cuts when the time that the present ones have lost since they were
 //! made reaches the cost of a new partition, as in the problem of renting or buying. While imbalance grows
 //! evenly, that is the interval with the least sum of both. The partition with which a run starts is a guess;
-//! it is replaced as soon as costs are measured, if that takes away half of the imbalance.
+//! it is replaced as soon as costs are measured, if that halves the imbalance.
 use std::time::Instant;
 
 use partition::{CutAt, Cuts};
@@ -20,7 +20,7 @@ use crate::solver::state::regrid_timers::Part;
 const LOOK_EVERY: u64 = 10;
 /// Imbalance below which nothing is done.
 const LIMIT: f64 = 1.01;
-/// Imbalance from which on the price does not matter, if new cuts take away half of it.
+/// Imbalance from which on the cost of a new partition does not matter, if new cuts halve the imbalance.
 const CEILING: f64 = 1.04;
 
 /// Greatest cost of a rank over the mean.
@@ -77,8 +77,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Collective. Measures costs and partitions anew if that pays. Changes no bit of the state. Returns
-    /// whether leaves have moved.
+    /// Collective. Measures costs, and partitions anew if that saves more time than it takes. Changes no bit
+    /// of the state. Returns whether leaves have moved.
     pub fn balance(&mut self) -> bool {
         self.agree_on_costs();
         let now = self.imbalance().0;

@@ -62,7 +62,7 @@ impl<const D: usize> Solver<D> {
         self.note_surface();
 
         let plan = &self.grid.plan;
-        // Exact sums do not depend on how they are put together.
+        // Exact sums do not depend on the order of their parts.
         let together = |mut sums: Vec<ExactSum>, others: Vec<ExactSum>| {
             sums.iter_mut().zip(&others).for_each(|(sum, other)| sum.merge(other));
             sums
@@ -155,19 +155,19 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Exact sums do not depend on how they are put together.
+/// Exact sums do not depend on the order of their parts.
 fn together(mut sum: ExactSum, other: ExactSum) -> ExactSum {
     sum.merge(&other);
     sum
 }
 
-/// How much the mass on the nodes differs from that of the particles, as a share of it; 0 where there is no
-/// mass.
+/// Difference between the mass on the nodes and that of the particles, relative to the latter; 0 where there
+/// is no mass.
 pub fn mass_error(nodes: f64, particles: f64) -> f64 {
     if nodes == particles { 0.0 } else { (nodes - particles) / particles }
 }
 
-/// Mass, momentum and angular momentum of nothing.
+/// Zero sums of mass, momentum and angular momentum.
 fn empty_sums() -> Vec<ExactSum> {
     vec![ExactSum::new(); 7]
 }

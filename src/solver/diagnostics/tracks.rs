@@ -1,9 +1,9 @@
 //! Particles that are followed.
 //!
 //! A track has an identifier. It follows the particles of its family: the one with this identifier, one that
-//! holds it since a merge has undone a split, or all into which it has split. Once a merge of strangers has
-//! taken the identifier away, the track goes on with the particle nearest to the place where the history
-//! showed it last.
+//! holds it since a merge has undone a split, or all into which it has split. Once a merge of particles of
+//! several families has removed the identifier, the track continues with the particle nearest to its place in
+//! the last row of the history.
 use rayon::prelude::*;
 
 use super::probes::{Partial, of_leaf, reduced};

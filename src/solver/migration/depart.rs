@@ -1,7 +1,7 @@
-//! Particles are taken out of leaves that they have left.
+//! Removal of particles from leaves that they have left.
 //!
-//! The last particles of a leaf fill the gaps of those that left. Only those that enter a finer leaf are
-//! split, beside the others: to make room for their children among these would copy the leaf.
+//! The last particles of a leaf fill the gaps of those that left. Particles that enter a finer leaf are split
+//! apart from the others: room for their children in the chunk would require a copy of the leaf.
 use super::crossings::{Crossed, Crossing, FaceRules, Gone, face_name, farthest_beyond};
 use super::migrate::MigrateError;
 use super::records::{push_record, record_words};
@@ -30,7 +30,7 @@ pub(in crate::solver) enum Destination {
     Split,
 }
 
-/// The boxes of the own leaves, and what happens to particles outside them.
+/// The boxes of the own leaves, and the rules for particles outside them.
 pub struct Borders<const D: usize> {
     boxes: Vec<([f64; D], [f64; D])>,
     rules: FaceRules<D>,
@@ -93,7 +93,8 @@ impl<const D: usize> Borders<D> {
         departed
     }
 
-    /// Notes a particle that goes somewhere.
+    /// Enters a particle that leaves: in the records of its new leaf, or in the counts of those that cross a
+    /// face.
     fn note(&self, departed: &mut Departed, chunk: &Chunk<D>, p: usize, destination: Destination) {
         match destination {
             Destination::Leaf(to) => {
@@ -127,7 +128,7 @@ impl<const D: usize> Borders<D> {
 
     /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to
     /// another or to none. With `resampling`, particles that enter a leaf finer than they were made for
-    /// become their children, which go each their own way; those that stay come last in the leaf.
+    /// become their children, each with a destination of its own; children that stay come last in the leaf.
     pub(in crate::solver) fn depart(
         &self,
         tree: &KnownTree<D>,
@@ -247,7 +248,8 @@ impl<const D: usize> Borders<D> {
         MigrateError::TooFar { id: record[1 + Layout::<D>::REALS], position }
     }
 
-    /// The first particle of a leaf whose state material cannot have, where G2P found that there is one.
+    /// The first particle of a leaf in a state that material cannot have, where G2P has found that one
+    /// exists.
     pub(in crate::solver) fn unsound(&self, chunk: &Chunk<D>) -> Option<MigrateError> {
         (0..chunk.len()).find_map(|p| {
             let (quantity, value) = unsound_quantity(chunk, p)?;

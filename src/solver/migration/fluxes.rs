@@ -24,7 +24,7 @@ impl Fluxes {
         Self { sections, sums: vec![ExactSum::new(); fluxes.len()] }
     }
 
-    /// Books a particle that leaves the domain.
+    /// Counts a particle that leaves the domain.
     pub(super) fn book(&mut self, gone: &Gone) {
         for (section, sum) in self.sections.iter().zip(&mut self.sums) {
             let is_beyond = match section {
@@ -48,9 +48,9 @@ impl Fluxes {
         numbered.filter(|(_, section)| matches!(section, Section::Opening { .. })).collect()
     }
 
-    /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 the material that is
-    /// there is none that has passed: at the start, and behind the start of a stage; with +1 before it, what
-    /// a stage changes passes nothing.
+    /// Not collective. Adds the mass beyond each section, kg, times a sign. With -1 material that is already
+    /// beyond does not count as passed: at the start, and after the changes of a stage. With +1 before these
+    /// changes, they do not count either.
     pub fn add_beyond<const D: usize>(&mut self, chunks: &[Chunk<D>], sign: f64) {
         for (section, sum) in self.sections.iter().zip(&mut self.sums) {
             let leaves = chunks.par_iter().with_min_len(16).map(|chunk| {

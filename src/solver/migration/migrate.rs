@@ -1,4 +1,4 @@
-//! Particles change leaves, and with them ranks.
+//! Migration of particles between leaves, and with them between ranks.
 //!
 //! Arrivals are appended to a leaf in the order of their source leaves along the curve, then in the order in
 //! which `depart.rs` took them out. Ranks hold contiguous segments of the curve, so appending the messages of
@@ -123,7 +123,7 @@ impl<const D: usize> Migration<D> {
     }
 
     /// Collective over neighbours. Moves particles (per own leaf, ascending) into the leaves that contain the
-    /// places given with them, which must be in or next to their leaf; they stay where they are in space.
+    /// places given with them, which must be in or next to their leaf; their positions do not change.
     pub(in crate::solver) fn gather(
         &mut self,
         tree: &KnownTree<D>,

@@ -8,7 +8,7 @@ use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
     /// Collective. The value of each criterion (inner) in each own leaf (outer); all zero for leaves without
-    /// particles. [`Solver::survey_now`], or a step after which this is due, comes before.
+    /// particles. To be called after [`Solver::survey_now`], or after a step at whose end a regrid is due.
     pub(super) fn indicators(&mut self) -> Vec<Value> {
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
         let criteria = &adaptivity.criteria;
@@ -18,7 +18,7 @@ impl<const D: usize> Solver<D> {
         let surroundings = &mut self.regrid_cache.surroundings;
         if adaptivity.needs().exposure {
             surroundings.update(&self.forest, &self.grid.plan);
-            // A leaf cannot see it from its nodes where the empty one is coarser.
+            // The nodes of a leaf do not show it where the empty one is coarser.
             beside_empty = surroundings.beside_empty(&self.forest, &self.comm, &self.chunks);
             masses = MassRange::of_blocks(&self.grid.plan, fields);
         }

@@ -1,4 +1,4 @@
-//! Families that a face between leaves cuts in two find together.
+//! Merges of families that a face between leaves cuts in two.
 use partition::comm::Disagreement;
 use rayon::prelude::*;
 
@@ -43,7 +43,7 @@ impl<const D: usize> Solver<D> {
         }
         let before: Vec<usize> = self.chunks.iter().map(Chunk::len).collect();
         let gathered = self.gather_in_leaves(&apart);
-        // Where particles came. Counts alone do not show it where as many went.
+        // Leaves into which particles came. Counts alone do not show it where as many have gone.
         let came: Vec<bool> = (self.chunks.iter().zip(&before).zip(&apart))
             .map(|((chunk, &before), apart)| chunk.len() != before || !apart.is_empty())
             .collect();

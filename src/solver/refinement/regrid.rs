@@ -1,4 +1,4 @@
-//! The tree follows the material: criteria, refinement and coarsening, splitting and merging.
+//! One regrid: criteria, refinement and coarsening, splitting and merging.
 use std::time::Instant;
 
 use partition::comm::Disagreement;
@@ -18,8 +18,8 @@ use crate::solver::state::{Solver, StepError};
 /// A region with the level that all leaves which intersect it must have at least.
 type Request<const D: usize> = (Region<D>, u32);
 
-/// Part of the edge of a finest leaf that material may go on without being expected: a tenth of a cell. What
-/// creeps at rest shall not refine its surroundings.
+/// Displacement that does not count as motion, as a share of the edge of a finest leaf: a tenth of a cell.
+/// Material that creeps at rest shall not refine its surroundings.
 const CREEP: f64 = 0.025;
 
 /// An octant's box with a layer around, below and above, without its surface, so that it intersects only
@@ -35,14 +35,14 @@ fn grown<const D: usize>(octant: &Octant<D>, [below, above]: [[u32; D]; 2]) -> R
 /// Refinement of each own leaf, for files.
 #[derive(Clone, Debug, Default)]
 pub struct Refinement {
-    /// How urgent refinement is by the most urgent criterion: 1 where it begins.
+    /// Urgency of refinement by the most urgent criterion: 1 where refinement begins.
     pub urgency: Vec<f64>,
     /// Level that the criteria want for the leaf itself; 0 if none does.
     pub wanted: Vec<f64>,
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Notes the state as it is now; rates stay.
+    /// Not collective. Records the bounds of each leaf's state as it is now; rates stay.
     pub(in crate::solver) fn survey_now(&mut self) {
         let Some(adaptivity) = &self.physics.adaptivity else { return };
         let watch = adaptivity.watch(0);
@@ -94,8 +94,7 @@ impl<const D: usize> Solver<D> {
         let mut merged = is_due && self.comm.any(reports.iter().any(|report| report.merged > 0));
         self.regrid_timers.end(Part::Merge);
         if is_other || merged {
-            // Boxes of children may reach over the faces of their leaf, and with them their centres. Those of
-            // merged ones do not, but for rounding.
+            // Children may lie beyond the faces of their leaf. Merged particles do not, but for rounding.
             let is_merged = |leaf: usize| reports.get(leaf).is_some_and(|report| report.merged > 0);
             let may_stray = |leaf: usize| split_in.get(leaf) == Some(&true) || is_merged(leaf);
             let moved: Result<Moved, StepError> = match is_other {
@@ -111,20 +110,20 @@ impl<const D: usize> Solver<D> {
             self.regrid_timers.end(Part::Merge);
         }
         if is_other {
-            // Merged particles are no faster than the fastest of those that they stand for.
+            // Merged particles are no faster than the fastest of their members.
             self.leaf_data.signal = self.signals_at_rest();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
             self.regrids += u64::from(is_new);
         }
         if is_other || merged {
-            // Who has moved may have a box that is wide in the leaf where it is now.
+            // A particle that has moved may have a box that is wide for its new leaf.
             let mut reach = [u64::from(self.reach_now())];
             self.comm.max_u64(&mut reach);
             self.provide_reach(reach[0] as u32);
         }
         self.regrid_timers.end(Part::Migrate);
-        // One phase for all of it.
+        // All of it counts as one phase.
         self.phases = phases;
         self.phases.book(Phase::Regrid, start.elapsed());
         Ok(is_other || merged)
@@ -144,7 +143,7 @@ impl<const D: usize> Solver<D> {
     /// Collective. Velocities and masses of the nodes as the particles have them between two steps.
     fn nodes_of_state(&mut self) {
         let phases = self.phases;
-        // A box without a bin stops the next step, which says so.
+        // A box without a bin is reported by the next step, which fails.
         let _ = self.sort_into_bins();
         self.nodes_from_particles(0.0);
         let rates = self.collider_rates(0.0);
@@ -170,7 +169,7 @@ impl<const D: usize> Solver<D> {
         let marks = self.marks(adaptivity, &self.forest, &requests, true);
         let is_new = self.comm.any(settled.is_none_or(|settled| settled.marks != marks));
         let followed = is_new.then(|| self.followed(adaptivity, &requests, &marks));
-        // 2:1 balance may take back what was coarsened.
+        // 2:1 balance may undo the coarsening.
         let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
         let Some(followed) = followed else {
             self.regrid_cache.settled = Some(SettledTree { revision, wishes, marks });
@@ -187,7 +186,7 @@ impl<const D: usize> Solver<D> {
         let values = self.indicators();
         let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
         let count = adaptivity.criteria.len();
-        // One step more than the interval, as particles may have come from next door in this one.
+        // One step more than the interval, as particles may have come from a neighbouring leaf in this one.
         let interval = (steps + 1) as f64 * self.clock.dt;
         let per_edge = adaptivity.finest_edges_per_metre(self.physics.root_edge);
         let way =
@@ -212,7 +211,7 @@ impl<const D: usize> Solver<D> {
         let mut requests = Vec::new();
         let mut leaf = 0;
         while leaf < leaves.len() {
-            // A family that wants the same asks as one; most do.
+            // A family whose members have the same wish makes one request; most do.
             let family = leaf..leaf + Octant::<D>::CHILDREN;
             let alike = leaves.get(family.clone()).and_then(|members| {
                 let parent = members[0].parent()?;

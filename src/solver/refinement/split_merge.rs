@@ -14,7 +14,7 @@ use crate::solver::state::Solver;
 use crate::solver::step::exchange::reach_of_width;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. How the particles of each own leaf fit it.
+    /// Not collective. Whether each own leaf has particles that are too large or too small for it.
     pub(super) fn look_at_levels(&self) -> Vec<BackoffState> {
         if self.physics.adaptivity.is_none() {
             return Vec::new();
@@ -23,15 +23,15 @@ impl<const D: usize> Solver<D> {
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&turns).enumerate();
         let maxima = Some(&self.leaf_data.maxima).filter(|maxima| maxima.len() == self.chunks.len());
         let each = leaves.with_min_len(64).map(|(number, ((chunk, leaf), &turn))| {
-            // Who came in this very step can wait for the next time.
+            // Particles that came in this very step can wait for the next regrid.
             let known = maxima.and_then(|maxima| maxima[number].levels?.look(leaf.level, turn));
             known.unwrap_or_else(|| merge_backoff::look(chunk, leaf.level, turn))
         });
         each.collect()
     }
 
-    /// Not collective. Who is to be tried in each own leaf. While the grid is not that of the tree, leaves
-    /// count as not beside finer ones.
+    /// Not collective. Which particles of each own leaf are to be tried. While the grid is not that of the
+    /// tree, leaves count as not beside finer ones.
     pub(super) fn turns(&self) -> Vec<RetrySlot> {
         let every = self.physics.adaptivity.as_ref().map_or(1, |adaptivity| adaptivity.every);
         let regrid = self.clock.step / every;
@@ -69,15 +69,15 @@ impl<const D: usize> Solver<D> {
         });
         let done: Vec<Option<Splits>> = done.collect();
         let ledger = &mut self.ledger;
-        // A refusal is told again at each regrid, so the count is that of now.
+        // Each regrid reports all refusals anew, so the count is that of the present state.
         ledger.refused = 0;
         done.iter().flatten().for_each(|done| ledger.enter_splits(done));
         done.iter().map(|done| done.as_ref().is_some_and(Splits::is_any)).collect()
     }
 
     /// Not collective. Merges particles made for finer leaves than theirs, further than a cell from the next
-    /// finer leaf, in the wanted leaves; strangers only on demand. Returns per leaf those that are to be
-    /// named.
+    /// finer leaf, in the wanted leaves; particles of several families only on demand. Returns per leaf the
+    /// merged particles that need an identifier.
     pub(super) fn merge_in_leaves(
         &mut self,
         among_strangers: bool,
@@ -137,7 +137,7 @@ impl<const D: usize> Solver<D> {
         reports
     }
 
-    /// Not collective. After all merges of a regrid: counts those that were tried in vain.
+    /// Not collective. After all merges of a regrid: counts the attempts that failed.
     pub(super) fn count_tries(&mut self, looks: &[BackoffState], reports: &[Merged]) {
         let turns = self.turns();
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(looks).enumerate();
@@ -149,8 +149,8 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]):
-    /// with that the grid needs not be made anew for them.
+    /// Not collective. Reach that merges of this rank's particles may need (see [`Solver::agreed_reach`]): a
+    /// grid of that reach serves them too.
     pub(in crate::solver) fn reach_of_merges(&self) -> u32 {
         let Some(adaptivity) = self.physics.adaptivity.as_ref().filter(|a| a.merge.is_some()) else {
             return 0;
@@ -176,7 +176,7 @@ impl<const D: usize> Solver<D> {
         next[0]
     }
 
-    /// Enters splits on the way to other leaves.
+    /// Enters splits on the way to other leaves in the ledger.
     pub(in crate::solver) fn book_entries(&mut self, splits: &[Splits]) {
         splits.iter().for_each(|done| self.ledger.enter_splits(done));
     }

@@ -13,8 +13,8 @@ use crate::simd::Lanes;
 /// Particle lists of the bins of one rank.
 #[derive(Clone, Debug, Default)]
 pub struct BinLists<const D: usize> {
-    /// Of leaves beside finer ones, and of others that have needed lists. For the rest nothing is read or
-    /// kept.
+    /// Of leaves beside finer ones, and of others that have needed lists. `None` for the others, which are
+    /// neither read nor stored.
     leaves: Vec<Option<Box<LeafBins<D>>>>,
     sorted: Vec<bool>,
     bounds: Vec<NearLeaf<D>>,
@@ -33,17 +33,17 @@ pub struct BinMissing {
 /// Half widths of the boxes of a chunk, and their bound.
 pub trait BoxWidths<const D: usize>: Sync {
     /// Half widths of the boxes of up to `LANES` particles in a leaf with cells of edge `cell`, m; lanes
-    /// behind the last are of no use.
+    /// behind the last are undefined.
     fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D];
     /// Bounds on the half widths of `LANES` particles from `first` on, m; lanes behind the last particle are
-    /// of no use.
+    /// undefined.
     fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes;
-    /// Asks for what [`BoxWidths::of_batch`] will read of the `LANES` particles from `first` on.
+    /// Prefetches the data that [`BoxWidths::of_batch`] reads of the `LANES` particles from `first` on.
     fn read_ahead(&self, _chunk: &Chunk<D>, _first: usize) {}
     /// A bound on all half widths in a chunk, m.
     fn bound(&self, chunk: &Chunk<D>) -> f64;
-    /// Whether the kernels find the same half widths from the particles' state. If not, every box is
-    /// handed to them, a narrow one as its only part.
+    /// Whether the kernels find the same half widths from the particles' state. If not, they get every box as
+    /// parts, a narrow one as its only part.
     fn are_known_to_kernels(&self) -> bool {
         true
     }
@@ -76,7 +76,7 @@ impl<const D: usize> BinLists<D> {
         }
         self.has_members.clear();
         let leaves = self.leaves.par_iter_mut().zip(&mut self.sorted).zip(&self.bounds).enumerate();
-        // All leaves, also after a failure: the others must not keep the lists of the step before.
+        // All leaves, also after a failure: no leaf may keep the lists of the step before.
         let sorted =
             leaves.with_min_len(8).map_init(Scratch::default, |scratch, (leaf, ((bins, sorted), own))| {
                 let chunk = &chunks[leaf];
@@ -120,12 +120,12 @@ impl<const D: usize> BinLists<D> {
         sorted.reduce(|| Ok(()), Result::and)
     }
 
-    /// Whether an own leaf with particles has any that these lists are of.
+    /// Whether any particle of an own leaf is in these lists.
     pub fn has_members(&self, leaf: usize) -> bool {
         is_in(&self.has_members, leaf)
     }
 
-    /// The lists of each own leaf, for what advances its particles.
+    /// The lists of each own leaf, for the advance of its particles.
     pub(in crate::solver) fn by_leaf(&mut self) -> impl IndexedParallelIterator<Item = OfLeaf<'_, D>> {
         let leaves = self.leaves.par_iter_mut().zip(&self.sorted).zip(&self.bounds).enumerate();
         let has_members = &self.has_members;

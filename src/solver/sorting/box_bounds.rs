@@ -1,4 +1,4 @@
-//! Widths of boxes, as sorting needs them.
+//! Bounds on the widths of boxes, for sorting.
 use super::bins::BoxWidths;
 use crate::grid::GridPlan;
 use crate::kernel::{BoxPolicy, Scheme, domain};

@@ -3,9 +3,8 @@
 //! A box at most one cell wide scatters on the finest level that it overlaps, into the arena of the block of
 //! that level that contains its centre. In most leaves that is the leaf's own block for all particles; only
 //! beside finer leaves, or where boxes are wider than a cell, boxes near these and wide ones are compared
-//! with the finer leaves around.
-//! A box wider than a cell of the finest level that it overlaps is cut into equal parts, each treated in the
-//! same way; its weights are the mean of theirs.
+//! with the finer leaves around. A box wider than a cell of the finest level that it overlaps is cut into
+//! equal parts, each treated in the same way; its weights are the mean of theirs.
 
 use super::bin_members::BinMembers;
 use super::bins::{BinMissing, BoxWidths};
@@ -162,7 +161,7 @@ impl<const D: usize> LeafBins<D> {
 
     /// Classifies the particles now, while they are in the cache, so that the next [`LeafBins::sort`] only
     /// classifies those that are appended until then. Any other change of the chunk ends its revision, and
-    /// `sort` begins anew.
+    /// `sort` starts over.
     pub(in crate::solver) fn presort(
         &mut self,
         chunk: &mut Chunk<D>,
@@ -173,7 +172,7 @@ impl<const D: usize> LeafBins<D> {
             return;
         }
         self.begin();
-        // An error is found again, and told, when it matters.
+        // The next sort finds an error again, and reports it.
         let looked = self.look(chunk, 0, sorting, scratch, |_| true);
         self.presorted = looked.ok().and_then(|()| Some((chunk.revision()?, chunk.len())));
     }
@@ -192,7 +191,7 @@ impl<const D: usize> LeafBins<D> {
         self.members.iter_mut().for_each(BinMembers::clear);
     }
 
-    /// Finds the bins of the particles from the one numbered `from` on, as far as they are members.
+    /// Finds the bins of the particles from number `from` on, as far as they are members.
     fn look(
         &mut self,
         chunk: &Chunk<D>,
@@ -211,7 +210,7 @@ impl<const D: usize> LeafBins<D> {
         let own_cell = plan.cell(own.level);
         let given = !widths.are_known_to_kernels();
         let faces = if given { None } else { self.faces.take() };
-        // Of most boxes it is known without their half widths that they are whole and stay inside.
+        // Most boxes are known to be whole and inside without their half widths.
         let limit = Lanes::splat(narrow_limit(own_cell));
         scratch.undecided.clear();
         list_lanes(from..chunk.len(), &mut scratch.undecided, |first| {
@@ -341,9 +340,9 @@ impl<const D: usize> LeafBins<D> {
         Ok(())
     }
 
-    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: where the kernel
-    /// sees an overlap that is none here, it would reach for nodes that do not exist within finer leaves.
-    /// `faces` are those of the leaf, for boxes at most a cell wide.
+    /// Finest level among the leaves that the open box overlaps, or touches up to round-off: if the kernel
+    /// saw an overlap that is none here, it would access nodes that do not exist within finer leaves. `faces`
+    /// are those of the leaf, for boxes at most a cell wide.
     fn finest_level(
         &self,
         own: &NearLeaf<D>,

@@ -54,7 +54,7 @@ pub(super) enum Side {
 pub(super) struct LeafFaces<const D: usize> {
     /// By the faces that a box crosses, see [`LeafFaces::faces`].
     sides: [Side; 64],
-    /// Faces, a bit each, that some box must cross for its side to be what it is.
+    /// Faces, a bit each, on which the side of a box depends.
     decisive: u32,
     lower: [f64; D],
     upper: [f64; D],
@@ -103,7 +103,7 @@ impl<const D: usize> LeafFaces<D> {
             let faces = (0..D).fold(0, |faces, axis| faces | along[axis] << (2 * axis));
             sides[faces] = side;
         }
-        // Whoever crosses several faces reaches what lies across any of them.
+        // A box that crosses several faces reaches the leaves across any of them.
         for face in 0..2 * D {
             for faces in (0..1 << (2 * D)).filter(|faces| faces >> face & 1 == 1) {
                 sides[faces] = sides[faces].max(sides[faces & !(1 << face)]);

@@ -102,7 +102,7 @@ pub(in crate::solver) struct ParticlePush<const D: usize> {
     pub load: u32,
     /// The force, N.
     pub force: [f64; D],
-    /// Where the particle was; after G2P the way it went, m.
+    /// Place of the particle, m; after G2P its displacement in the step, m.
     pub way: [f64; D],
 }
 
@@ -138,14 +138,14 @@ impl ExactSums<LOAD_SUMS> {
     }
 }
 
-/// A particle that may come to the surface of a collider in a step.
+/// A particle that may touch the surface of a collider in a step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Near<const D: usize> {
     /// Its index in its chunk.
     pub particle: u32,
     /// Number of the collider.
     pub collider: u32,
-    /// Where it was; where it was held back, if it was, m.
+    /// Its place, m: before the step, then where the collider stopped it, if it did.
     pub place: [f64; D],
     /// Impulse that it gave to the collider there, kg m/s.
     pub impulse: [f64; D],

@@ -1,14 +1,14 @@
 //! Cost of leaves: integers from measured time, the same on all ranks.
 //!
-//! In one step of many the time of scatter and gather of a leaf is taken. It is shared out to classes: the
+//! The time of scatter and gather of a leaf is measured in one step of many, and divided among classes: the
 //! material of the particles, and the kind of their leaf. Sums over all ranks give the cost of a particle of
-//! each class; the leaf's arena counts as some particles more. Steps in which nodes are summed and updated
-//! give the cost of a leaf beside them. Costs steer the partition, which changes no bit of the state.
+//! each class; the arena of the leaf counts as additional particles. Steps in which nodes are summed and
+//! updated give the cost of a leaf beside them. Costs steer the partition, which changes no bit of the state.
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
 use crate::solver::state::leaf_data::MEASURE_EVERY;
 
-/// A leaf without particles costs one such part of what a leaf with particles costs beside them.
+/// Cost of a leaf with particles, without these, over that of a leaf without particles.
 const EMPTY: u64 = 8;
 /// Unit of measured costs, s.
 pub(in crate::solver) const UNIT: f64 = 1e-11;
@@ -120,14 +120,14 @@ fn per_particle(units: u64, particles: u64) -> Option<u64> {
 }
 
 impl Costs {
-    /// Takes in sums over all ranks, as [`Solver::agree_on_costs`] lays them out.
+    /// Updates costs from sums over all ranks, in the layout of [`Solver::agree_on_costs`].
     pub(in crate::solver) fn take_in(&mut self, sums: &[u64], materials: usize) {
         let (times, rest) = sums.split_at(KINDS * materials);
         let (particles, nodes) = rest.split_at(KINDS * materials);
         let Some(mean) = per_particle(times.iter().sum(), particles.iter().sum()) else { return };
         self.particle.resize(materials, [0; KINDS]);
         for (class, cost) in self.particle.as_flattened_mut().iter_mut().enumerate() {
-            // A class of few particles costs little in any case; what is measured of it may be noise.
+            // A class of few particles costs little in any case; its measured time may be noise.
             let new = per_particle(times[class], particles[class]).unwrap_or(mean);
             *cost = smoothed(*cost, new);
         }

@@ -93,7 +93,7 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// Gives back the memory of what the next step fills anew.
+    /// Frees the memory that the next step fills anew.
     pub(in crate::solver) fn clear(&mut self) {
         self.arenas = Arenas::default();
         self.increments = Increments::default();
@@ -234,7 +234,7 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// A velocity field beside the first: what its particles scatter into, and gather from.
+/// A velocity field beside the first: arenas and node fields of its particles.
 pub(in crate::solver) struct VelocityField<const D: usize> {
     pub(in crate::solver) arenas: Arenas<D>,
     pub(in crate::solver) fields: NodeFields<D>,

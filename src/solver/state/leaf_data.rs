@@ -7,8 +7,8 @@ use crate::particle::Chunk;
 use crate::particle::chunk::Place;
 use crate::solver::state::phases::thread_time;
 
-/// Of each leaf time is taken in one of so many steps, of neighbours along the curve in different ones: to
-/// ask for the processor time takes as long as several particles.
+/// Steps between measurements of time in a leaf; neighbours along the curve have theirs in different steps.
+/// Reading the processor time takes as long as several particles.
 pub(in crate::solver) const MEASURE_EVERY: u64 = 32;
 
 /// Data of each own leaf beside its particles: arrays that run parallel to the leaves, and are reset together
@@ -23,12 +23,12 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) shifts: Vec<[f64; D]>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,
-    /// Time that the particles took.
+    /// Processor time of the particles' work.
     pub(in crate::solver) times: LeafTimes,
 }
 
 impl<const D: usize> LeafData<D> {
-    /// Not collective. Nothing is known of so many own leaves.
+    /// Not collective. Clears the data, for so many own leaves.
     pub(in crate::solver) fn reset(&mut self, leaves: usize) {
         self.signal.clear();
         self.signal.resize(leaves, 0.0);
@@ -92,14 +92,14 @@ impl LeafTimes {
         result
     }
 
-    /// In how many of the steps time was taken of a leaf.
+    /// Number of the steps in which the time of a leaf was measured.
     pub(crate) fn measurements(&self, leaf: usize) -> u64 {
         let before = |end: u64| (leaf as u64 + end) / MEASURE_EVERY;
         before(self.steps.end) - before(self.steps.start)
     }
 }
 
-/// Whether time is taken of a leaf in the step before `end`.
+/// Whether the time of a leaf is measured in the step before `end`.
 fn is_measured(leaf: usize, end: u64) -> bool {
     (leaf as u64 + end).is_multiple_of(MEASURE_EVERY)
 }

@@ -115,7 +115,7 @@ pub(in crate::solver) struct Weighed {
     pub(in crate::solver) nodes: ExactSum,
 }
 
-/// Particles, tree and clock of one rank, and what advances them.
+/// Particles, tree and clock of one rank, and the data to advance them.
 pub struct Solver<const D: usize> {
     pub(super) comm: Comm,
     /// The problem.
@@ -126,12 +126,12 @@ pub struct Solver<const D: usize> {
     pub chunks: Vec<Chunk<D>>,
     /// Step and time.
     pub clock: Clock,
-    /// Where the colliders are, and their reactions.
+    /// States of the colliders, and their reactions.
     pub contacts: Contacts<D>,
     /// Impulse of each load since the last row of the history, and its work since the start.
     pub load_sums: ExactSums<LOAD_SUMS>,
-    /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; none
-    /// where nobody asks.
+    /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; empty
+    /// if the job does not ask for them.
     pub face_sums: ExactSums<FACE_SUMS>,
     /// Impulse of each contact between bodies since the last row of the history, and its work since the
     /// start.
@@ -142,7 +142,7 @@ pub struct Solver<const D: usize> {
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// Particles near colliders that act on particles, by own leaf; empty without such colliders.
     pub(super) near: Vec<Vec<Near<D>>>,
-    /// The way to equilibrium.
+    /// Progress of kinetic damping towards equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for
     /// equilibrium.
@@ -162,7 +162,7 @@ pub struct Solver<const D: usize> {
     pub ledger: Ledger,
     /// Changes of the tree since the start of this process.
     pub regrids: u64,
-    /// Where the time of regrids went since the start of this process.
+    /// Wall time of the parts of regrids since the start of this process.
     pub regrid_timers: RegridTimers,
     /// Data kept from one regrid to the next; no bit of the state depends on it.
     pub(super) regrid_cache: RegridCache<D>,

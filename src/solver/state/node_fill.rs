@@ -17,7 +17,8 @@ pub(in crate::solver) struct NodeFill {
     pub(in crate::solver) volumes: NodeVolumes,
     /// Per block, whether its values may differ from 0.
     pub(in crate::solver) dirty: Vec<bool>,
-    /// Per block, the shares of nodal volumes that colliders which never move leave open; `None` until its first use.
+    /// Per block, the shares of nodal volumes that colliders which never move leave open; `None` until its
+    /// first use.
     pub(in crate::solver) open: Vec<Option<OpenShares>>,
     /// Where bodies of unlike density share a velocity field, by field: sums of reference volumes, m³, by
     /// node; empty elsewhere.

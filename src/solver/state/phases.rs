@@ -1,7 +1,7 @@
 //! Wall time by phase of the step.
 use std::time::{Duration, Instant};
 
-/// Processor time of this thread: what other programs take of the machine does not count.
+/// Processor time of this thread, to which other programs on the machine do not add.
 pub(in crate::solver) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
@@ -16,7 +16,7 @@ pub enum Phase {
     Scatter,
     /// Sending and awaiting arenas.
     Exchange,
-    /// Node sums.
+    /// Sums of arenas at nodes.
     Sum,
     /// Restriction, velocity update, boundary conditions and prolongation.
     Nodes,
@@ -81,7 +81,7 @@ impl Phases {
         result
     }
 
-    /// Books wall time measured elsewhere.
+    /// Adds wall time measured elsewhere to a phase.
     pub fn book(&mut self, phase: Phase, time: Duration) {
         self.seconds[phase as usize] += time.as_secs_f64();
     }

@@ -19,9 +19,9 @@ impl<const D: usize> Wish<D> {
 /// Data kept from one regrid to the next. It saves work and changes no bit.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct RegridCache<const D: usize> {
-    /// Cached surroundings of leaves; see the type.
+    /// Surroundings of leaves, as criteria use them.
     pub surroundings: Surroundings,
-    /// With what the tree stays as it is.
+    /// The last requests, if the tree has stayed as it was.
     pub(in crate::solver) settled: Option<SettledTree<D>>,
 }
 

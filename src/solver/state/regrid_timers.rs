@@ -1,4 +1,4 @@
-//! Where the time of regrids goes.
+//! Wall time of the parts of regrids.
 use std::time::Instant;
 
 /// Parts of a regrid.
@@ -53,12 +53,12 @@ impl Default for RegridTimers {
 }
 
 impl RegridTimers {
-    /// A part begins now.
+    /// Starts the time of a part.
     pub(in crate::solver) fn begin(&mut self) {
         self.since = Instant::now();
     }
 
-    /// A part ends now, and the next begins.
+    /// Ends the time of a part, and starts that of the next.
     pub(in crate::solver) fn end(&mut self, part: Part) {
         let now = Instant::now();
         self.seconds[part as usize] += (now - self.since).as_secs_f64();

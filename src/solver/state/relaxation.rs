@@ -1,8 +1,8 @@
-//! Where a run is on its way to equilibrium.
+//! Progress of kinetic damping towards equilibrium.
 use crate::solver::physics::Equilibrium;
 use crate::text::quantity;
 
-/// Where a run is on its way to equilibrium; the same on all ranks.
+/// Progress of kinetic damping towards equilibrium; the same on all ranks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
     /// Kinetic energy of the nodes in the last step, J; 0 once the velocities were set to 0.
@@ -21,9 +21,9 @@ pub struct Relaxation {
 /// of others.
 ///
 /// A mode of frequency ω and amplitude a at rest is at `a (1 - ω² Δt² / 2)` after a step of Δt/√2, as
-/// leapfrog would have it with its first velocity, `ω² Δt a / 2`, half a step later. That is 1/√2 of what the
-/// step gives. With it positions are `a cos nθ`, so at no stop is a mode further from its equilibrium than at
-/// the one before, for all steps that are stable at all.
+/// leapfrog would have it with its first velocity, `ω² Δt a / 2`, half a step later. That is 1/√2 of the
+/// velocity after the step. With it positions are `a cos nθ`, so at no stop is a mode further from its
+/// equilibrium than at the one before, for all steps that are stable at all.
 pub(in crate::solver) const FROM_REST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Kind of a step on the way to equilibrium.
