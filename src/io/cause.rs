@@ -1,10 +1,10 @@
-//! Why the system has refused a file, in words that say what to do.
+//! Reasons for which the system refuses a file, in words that say what to do.
 use std::io::Error;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// The reason of an error on a path. Looks at the file system where the error alone does not say enough.
+/// The reason of an error on a path. Checks the file system where the error alone does not say enough.
 pub fn explain(path: &Path, error: &Error) -> String {
     let Some(code) = error.raw_os_error() else { return error.to_string() };
     let words = match code {
@@ -24,7 +24,7 @@ pub fn explain(path: &Path, error: &Error) -> String {
 }
 
 /// From now on a write beyond the limit of this process for files (`ulimit -f`) is an error, and does not end
-/// the process without a word.
+/// the process silently.
 pub fn tell_size_limits() -> std::io::Result<()> {
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false))).map(drop)
 }

@@ -43,7 +43,7 @@ pub(crate) struct Chart {
     pub from_zero: bool,
     /// Whether the vertical axis is logarithmic; values that are not positive are left out then.
     pub is_logarithmic: bool,
-    /// Points of the curves. Gaps are where a value is not a number.
+    /// Points of the curves. A NaN makes a gap.
     pub curves: Vec<Vec<(f64, f64)>>,
 }
 
@@ -174,8 +174,8 @@ fn span(values: impl Iterator<Item = f64>, from_zero: bool, margin: f64) -> Rang
     least - margin..most + margin
 }
 
-/// A curve of at most four points for each column of the picture: its ends there, its least and greatest
-/// value.
+/// The curve with at most four points for each column of the picture: the first, the last, the least and the
+/// greatest.
 fn thinned(points: &[(f64, f64)], across: &Range<f64>) -> Vec<(f64, f64)> {
     if points.len() <= 4 * COLUMNS {
         return points.to_vec();
@@ -202,7 +202,7 @@ fn rgb(text: &str) -> RGBColor {
     RGBColor(part(1), part(3), part(5))
 }
 
-/// A number at an axis, with as many digits as tell the numbers of the axis apart.
+/// A number at an axis, with enough digits to distinguish the numbers of the axis.
 fn within(value: f64, axis: &Range<f64>) -> String {
     let (greatest, span) = (axis.start.abs().max(axis.end.abs()), axis.end - axis.start);
     if value.abs() < 1e-9 * span {

@@ -16,7 +16,7 @@ pub struct Frame {
     pub positions: Vec<[f64; 3]>,
     /// Half widths of the undeformed boxes, m.
     pub half_widths: Vec<f64>,
-    /// The fields asked for that the file shows.
+    /// The requested fields that the file has.
     pub(crate) fields: Vec<(PointField, Values)>,
 }
 
@@ -33,7 +33,7 @@ pub struct Leaves {
 pub(crate) struct LeafField {
     pub name: &'static str,
     pub values: Vec<f64>,
-    /// Whether leaves together have the sum of their values, or the mean.
+    /// Whether the value of several leaves is their sum; else their mean.
     pub is_sum: bool,
 }
 
@@ -137,7 +137,7 @@ impl Leaves {
         Self::read(&file, &header)
     }
 
-    /// The leaves that belong to an output, the header of their file, and what it says of each leaf.
+    /// The leaves that belong to an output, the header of their file, and its fields of leaves.
     pub(crate) fn with_fields(path: &Path) -> Result<(Header, Self, Vec<LeafField>), FileError> {
         let (file, header) = with_tree(path)?;
         let leaves = Self::read(&file, &header)?;

@@ -1,18 +1,18 @@
 //! Files: HDF5 output of all ranks that ParaView opens and a run restarts from, tables, logs, charts and
 //! pictures.
 //!
-//! | file or folder | what it has |
+//! | file or folder | content |
 //! |---|---|
 //! | [`hdf5_file`] | HDF5 files of all ranks; the only folder that calls the library |
 //! | `whole_file.rs` | other files, written whole |
 //! | [`snapshot`] | outputs and checkpoints |
 //! | [`series`] | the index of the outputs of a run |
-//! | [`frame`] | what outputs show, for viewers and exports |
+//! | [`frame`] | particles and leaves of an output, for viewers and exports |
 //! | [`picture`], [`movie`], `chart.rs` | pictures of particles and plots of numbers |
 //! | [`export`] | outputs for other programs |
 //! | [`log`] | history, telemetry, progress |
 //! | [`particles`], [`raster`] | tables of particles and rasters |
-//! | [`cause`] | reasons for what the operating system refuses |
+//! | [`cause`] | reasons of the operating system for refusals |
 pub mod cause;
 pub(crate) mod chart;
 pub mod export;

@@ -48,7 +48,7 @@ const MOST_BYTES: u64 = 1 << 34;
 /// Characters of a cell that a message shows.
 const SHOWN: usize = 40;
 
-/// Reads a table; what follows a name in its header in brackets is its unit.
+/// Reads a table; a text in brackets behind a name in its header is the unit.
 ///
 /// # Errors
 /// The file cannot be read, is of another kind, or damaged.
@@ -83,7 +83,7 @@ fn parse(bytes: &[u8]) -> Result<Table, TableError> {
         if table.columns.is_empty() {
             let names = cells.map(|cell| cell.split('[').next().unwrap_or_default().trim().to_owned());
             table.columns = names.map(|name| (name, Vec::new())).collect();
-            // ParaView writes all that it knows of its points.
+            // ParaView writes all arrays of its points.
             table.may_have_others = rename_from_paraview(&mut table.columns);
             continue;
         }

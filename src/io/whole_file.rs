@@ -10,7 +10,7 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     write_in_pieces(path, |out| out.write_all(bytes))
 }
 
-/// [`write_whole`] of what `fill` writes, piece by piece.
+/// [`write_whole`] with the bytes that `fill` writes, piece by piece.
 pub(crate) fn write_in_pieces(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,

@@ -229,7 +229,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 .and_then(|()| lines::write(&mut self.lines, self.problem, clock, &samples));
         }
         self.last_values = values;
-        // Where the row of this step has been written already, the sums must not restart.
+        // The sums restart; if the row of this step was written before, they are zero already.
         solver.forget_reactions();
         solver.load_sums.forget(3, clock.time);
         solver.body_sums.forget(3, clock.time);

@@ -1,6 +1,6 @@
 //! Outputs for other programs.
 //!
-//! | file | what it writes |
+//! | file | output |
 //! |---|---|
 //! | [`points`] | particles: PLY, CSV, VTP |
 //! | [`surface`] | the surface of the material as a mesh: PLY, OBJ |

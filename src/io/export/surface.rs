@@ -1,8 +1,8 @@
 //! The surface of the material as a mesh of triangles, for renderers and for CAD.
 //!
-//! It is a level of the density that the particles make, each with a smooth kernel, cut out by marching cubes
-//! (`splashsurf_lib`; Löschner, Böttcher, Jeske, Bender 2023). All particles of the cut have one size: larger
-//! ones are taken as cubes of small ones.
+//! It is a level set of the density of the particles, each with a smooth kernel, found by marching cubes
+//! (`splashsurf_lib`; Löschner, Böttcher, Jeske, Bender 2023). All particles must have one size for that:
+//! larger ones are divided into cubes of small ones.
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -21,7 +21,7 @@ const CUBE: f64 = 1.0;
 /// Density at the surface, as a part of that inside: a ball of 4,000 particles keeps its volume to 2 %, one
 /// of 270,000 to 0.3 %.
 const LEVEL: f64 = 0.6;
-/// Particles, counted as small ones, that a surface is made from.
+/// Most particles of a surface, counted as small ones.
 const MOST: f64 = 3e7;
 
 /// How a mesh is written.

@@ -109,7 +109,7 @@ impl Tree {
                     }
                 }
                 if next.is_empty() {
-                    // Nothing below: the deepest level needs no bits.
+                    // No cells below: the deepest level needs no bits.
                     cells.refined.truncate(start);
                 }
                 (level, row) = (level + 1, next);
@@ -124,7 +124,7 @@ impl Tree {
         (0..z).flat_map(move |k| (0..y).flat_map(move |j| (0..x).map(move |i| [i, j, k])))
     }
 
-    /// Values of a field on all cells: of a leaf its own, of other cells the sum or mean of their children.
+    /// Values of a field on all cells: its own for a leaf, the sum or mean of the children for another cell.
     fn on_cells(&self, cells: &Cells, field: &LeafField) -> Vec<f64> {
         let children = 1_usize << self.header.dimension;
         let mut values = vec![0.0; cells.all.len()];

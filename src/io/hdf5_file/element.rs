@@ -69,7 +69,7 @@ impl std::fmt::Display for Kind {
 
 /// A number type that a data set or an attribute can hold.
 pub trait Element: bytemuck::Pod {
-    /// Which one it is.
+    /// The type.
     const KIND: Kind;
 }
 

@@ -1,10 +1,10 @@
 //! Files of the HDF5 format: one file, laid out by one rank and filled by all.
 //!
 //! The only folder that calls HDF5's C functions, and it calls them for names, shapes and attributes alone.
-//! Data sets are contiguous, unfiltered and little-endian: rows stand in the file as they stand in memory,
-//! and every rank writes and reads its own with plain system calls, at the place that the library has given
-//! the data set. So no rank waits inside a library for one that has failed; the system's own reason for a
-//! failure is known; and whatever a file declares is compared with its size before memory is taken for it.
+//! Data sets are contiguous, unfiltered and little-endian: rows in the file have the layout of memory, and
+//! every rank writes and reads its own with plain system calls, at the place that the library has assigned to
+//! the data set. So no rank waits inside a library for one that has failed, the system's own reason for a
+//! failure is known, and sizes that a file declares are compared with its own before memory is allocated.
 //! Handles live no longer than the call or the file that they belong to. The library knows no threads:
 //! whoever calls it holds its lock (`library`).
 //!
@@ -40,7 +40,7 @@ pub use writer::Writer;
 #[cfg(test)]
 mod tests;
 
-// Rows stand in the file as in memory.
+// Rows in the file have the layout of memory.
 const _: () = assert!(cfg!(target_endian = "little"), "files are little-endian, and so must be the machine");
 
 /// An HDF5 identifier that is closed when dropped.
@@ -50,7 +50,7 @@ struct Handle {
 }
 
 impl Handle {
-    /// Takes over a fresh identifier, or says what failed.
+    /// Takes over a fresh identifier; an error if the call failed.
     fn new(id: hid_t, close: unsafe extern "C" fn(hid_t) -> herr_t) -> Result<Self, Complaint> {
         if id < 0 { Err(Complaint::fetch()) } else { Ok(Self { id, close }) }
     }
@@ -64,9 +64,9 @@ impl Drop for Handle {
     }
 }
 
-/// Starts the library. To be called before MPI starts where a program must survive a file that cannot be
-/// closed: a library for parallel files that starts later ends itself with MPI, and tries to write such a
-/// file again.
+/// Starts the library. To be called before MPI starts if the program must survive a file that cannot be
+/// closed: a parallel HDF5 library that starts later finalizes with MPI, and tries to write such a file
+/// again.
 pub fn prepare() {
     drop(library());
 }
@@ -77,9 +77,9 @@ fn library() -> impl Drop {
     static START: Once = Once::new();
     let turn = hdf5_sys::LOCK.lock();
     START.call_once(|| {
-        // SAFETY: plain calls, the first before all others. What stays open when the program ends could not
-        // be written, and trying again then would crash; error messages are fetched by us, so the library
-        // must not print them.
+        // SAFETY: plain calls, the first before all others. Files that stay open at the end of the program
+        // could not be written, and another attempt then would crash; error messages are fetched by us, so
+        // the library must not print them.
         unsafe {
             H5dont_atexit();
             H5open();

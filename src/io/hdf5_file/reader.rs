@@ -33,7 +33,7 @@ pub struct Reader {
     path: PathBuf,
     comm: Option<Comm>,
     layout: Handle,
-    /// The way to the rows.
+    /// The file for plain reads of rows.
     rows: File,
     /// Bytes of the file.
     size: u64,
@@ -116,7 +116,7 @@ impl Reader {
     }
 
     /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it;
-    /// returns its bytes. To be asked before memory is taken whose size the file declares.
+    /// returns its bytes. To be called before memory is allocated whose size the file declares.
     pub(super) fn held_bytes(&self, object: &str, count: u64, element: usize) -> Result<u64, FileError> {
         match count.checked_mul(element as u64) {
             Some(bytes) if bytes <= self.size && usize::try_from(bytes).is_ok() => Ok(bytes),
@@ -245,7 +245,7 @@ impl Reader {
         Ok(values)
     }
 
-    /// Not collective. Hands all bytes of a data set on, piece by piece.
+    /// Not collective. Passes all bytes of a data set to `each`, piece by piece.
     pub fn for_bytes(&self, dataset: &str, mut each: impl FnMut(&[u8])) -> Result<(), FileError> {
         let stored = self.stored(dataset)?;
         let mut piece = vec![0; stored.bytes.min(PIECE) as usize];
@@ -266,7 +266,7 @@ impl Reader {
 /// Opens a file and checks its first bytes. Returns it with its size.
 fn look_at(path: &Path) -> Result<(File, u64), FileError> {
     let system = |source| FileError::System { path: path.into(), action: "open", source };
-    // Without waiting: nobody may ever write to a pipe of that name.
+    // Without waiting: the file may be a pipe to which nobody ever writes.
     let mut file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path).map_err(system)?;
     let data = file.metadata().map_err(system)?;
     if !data.is_file() {

@@ -30,19 +30,19 @@ const MOST_COMPACT: std::ffi::c_uint = 255;
 /// A new file of all ranks. Rank 0 alone keeps names, shapes and attributes; every rank writes its own rows.
 ///
 /// Every method is collective and gives an error on all ranks if any rank fails, so that callers may use `?`.
-/// A file that is not wanted after all must be [abandoned](Writer::abandon).
+/// A file that is given up must be [abandoned](Writer::abandon).
 pub struct Writer {
     path: PathBuf,
     comm: Comm,
     /// The library's file, on rank 0.
     layout: Option<Layout>,
-    /// This rank's own way into the file.
+    /// The file for plain writes of this rank's rows.
     rows: File,
 }
 
-/// The library's file. What is dropped before it is closed stays open to the end of the program: closing
-/// would write what the library still holds, and where space has run out the library takes the file apart,
-/// but keeps it, and crashes over it when it ends.
+/// The library's file. If it is dropped before it is closed, it stays open to the end of the program: closing
+/// writes the library's buffers, and where space has run out the library destroys its record of the file
+/// without releasing it, and crashes at the end.
 struct Layout(hid_t);
 
 impl Layout {
@@ -54,8 +54,8 @@ impl Layout {
 }
 
 impl Writer {
-    /// Collective. Creates the file. One of that name goes; if it is a symbolic link, the link goes and what
-    /// it leads to stays.
+    /// Collective. Creates the file. An old one of that name is removed; if it is a symbolic link, its target
+    /// stays.
     pub fn create(comm: &Comm, path: &Path) -> Result<Self, FileError> {
         let layout = if comm.rank() == 0 { lay_out(path).map(Some) } else { Ok(None) };
         let layout = agreed(Some(comm), layout)?;
@@ -65,7 +65,7 @@ impl Writer {
         Ok(Self { path: path.into(), comm: comm.clone(), layout, rows })
     }
 
-    /// An error of what is to be written.
+    /// An error in the data to be written.
     pub fn refuse(&self, reason: impl Into<String>) -> FileError {
         FileError::Refused { path: self.path.clone(), reason: reason.into() }
     }
@@ -75,7 +75,7 @@ impl Writer {
         agreed(Some(&self.comm), result)
     }
 
-    /// Collective. Lets rank 0 do something with the library's file.
+    /// Collective. Runs `act` with the library's file, on rank 0.
     pub(super) fn on_rank_0<T>(
         &self,
         act: impl FnOnce(hid_t, &Path) -> Result<T, FileError>,
@@ -142,8 +142,8 @@ impl Writer {
         self.agree(written.map_err(failed))
     }
 
-    /// Collective. Hands everything to the operating system and closes the library's file. Returns this
-    /// rank's own way into the file, through which it can wait for the disk.
+    /// Collective. Passes all data to the operating system and closes the library's file. Returns this rank's
+    /// own file, through which it can wait for the disk.
     pub fn close(self) -> Result<File, FileError> {
         let flushed = self.on_rank_0(|file, path| {
             // SAFETY: open file.
@@ -158,11 +158,11 @@ impl Writer {
         agreed(Some(&comm), closed.map(|()| rows))
     }
 
-    /// Not collective; after an error on any rank. Gives up an unwanted file; the caller removes it.
+    /// Not collective; after an error on any rank. Gives up the file; the caller removes it.
     pub fn abandon(self) {
         if self.layout.is_some() {
-            // The library keeps it open, so that its space would not come free by the removal. If giving that
-            // back fails too, the first error matters.
+            // The library keeps it open, so that removal alone would not free its space. If this fails too,
+            // the first error matters.
             let _ = self.rows.set_len(0);
         }
     }
@@ -190,7 +190,7 @@ fn lay_out(path: &Path) -> Result<Layout, FileError> {
         let root = H5Pcreate(*H5P_CLS_FILE_CREATE);
         H5Pset_obj_track_times(root, 0);
         let file = H5Fcreate(name.as_ptr(), H5F_ACC_EXCL, root, access);
-        // At once: the next call forgets the complaint.
+        // At once: the next call clears the complaint.
         let file = if file < 0 { Err(Complaint::fetch()) } else { Ok(Layout(file)) };
         H5Pclose(root);
         H5Pclose(access);
@@ -216,8 +216,8 @@ fn add_dataset(
         let space = H5Screate_simple(rank, shape.as_ptr(), std::ptr::null());
         let space = Handle::new(space, H5Sclose).map_err(failed)?;
         let list = Handle::new(H5Pcreate(*H5P_CLS_DATASET_CREATE), H5Pclose).map_err(failed)?;
-        // A place at once. Contents are always written in full, so no fill values; no timestamps, so that
-        // equal contents give equal files.
+        // Allocated at once, for its place. Contents are always written in full, so no fill values; no
+        // timestamps, so that equal contents give equal files.
         H5Pset_alloc_time(list.id, H5D_ALLOC_TIME_EARLY);
         H5Pset_fill_time(list.id, H5D_FILL_TIME_NEVER);
         H5Pset_obj_track_times(list.id, 0);

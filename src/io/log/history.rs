@@ -16,8 +16,8 @@ pub struct Column<'a> {
 
 /// The open history file. Belongs to rank 0.
 ///
-/// The first column is the step, the second the time. Numbers are written with the digits that bring back the
-/// same bits.
+/// The first column is the step, the second the time. Numbers are written with enough digits to restore their
+/// bits.
 #[derive(Debug)]
 pub struct History {
     lines: Lines,
@@ -26,7 +26,7 @@ pub struct History {
     last: Option<(u64, Vec<f64>)>,
 }
 
-/// Rows of a file that a run goes on with.
+/// Rows of the file of a run that continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// Rows up to this step stay.
@@ -52,10 +52,10 @@ impl History {
         Ok(Self { lines, columns: columns.len(), last: None })
     }
 
-    /// Not collective. Opens the file of a run that goes on. Rows that are not `kept` are cut off, so that
-    /// the finished file equals that of an uninterrupted run. What is damaged is cut out, and a warning names
-    /// what is missing for that reason. Starts a new file if there is none, or nothing of it is whole. Each
-    /// step has so many `rows`.
+    /// Not collective. Opens the file of a run that continues. Rows that are not `kept` are cut off, so that
+    /// the finished file equals that of an uninterrupted run. Damaged lines are cut out, and a warning names
+    /// the rows that are missing for that reason. Starts a new file if there is none, or none of it is whole.
+    /// Each step has so many `rows`.
     ///
     /// # Errors
     /// The file cannot be opened, or has other columns.
@@ -96,7 +96,7 @@ impl History {
         self.last.as_ref().map(|(step, values)| (*step, values.as_slice()))
     }
 
-    /// Not collective. Appends the row of a step and hands it to the operating system.
+    /// Not collective. Appends the row of a step and passes it to the operating system.
     ///
     /// # Panics
     /// If the number of values is not the number of columns.
@@ -122,7 +122,7 @@ impl History {
 struct Seen {
     has_header: bool,
     has_other_columns: bool,
-    /// Something damaged stands behind the last good line.
+    /// Whether there are damaged lines behind the last good one.
     is_damaged: bool,
     /// Rows that each step has.
     rows: usize,
@@ -142,7 +142,7 @@ impl Seen {
         }
         if !self.has_header {
             self.has_header = line == header.trim_end().as_bytes();
-            // A whole line of text is no damage. Nothing of such a file is changed.
+            // A whole line of text is no damage. Such a file is not changed.
             self.has_other_columns =
                 !self.has_header && line.starts_with(b"step,") && std::str::from_utf8(line).is_ok();
             return if self.has_header || self.has_other_columns { Verdict::Keep } else { Verdict::Stop };
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 4);
     }
 
-    /// Whatever a crash leaves: what is whole stays, and a warning names what is missing.
+    /// After any crash whole rows stay, and a warning names the missing ones.
     #[test]
     fn damage_is_cut_out_and_told() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! Text files that grow by a line at a time and are mended after a crash.
 //!
 //! A machine that loses power may leave a file without its last lines, with half a line, with zero bytes in
-//! the place of lines, or empty. What is whole of it is kept.
+//! the place of lines, or empty. Whole lines are kept.
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -35,8 +35,8 @@ impl Lines {
         Ok(Self { file, path: path.into() })
     }
 
-    /// Not collective. Opens a file to go on with. `judge` sees its whole lines, without the newline, from
-    /// the first on; one without a newline at the end goes.
+    /// Not collective. Opens a file to continue. `judge` gets its whole lines, without the newline, from the
+    /// first on; a last one without a newline is removed.
     pub(super) fn resume(path: &Path, mut judge: impl FnMut(&[u8]) -> Verdict) -> Result<Self, FileError> {
         let failed = |source| system(path, "resume", source);
         let mut options = OpenOptions::new();
@@ -47,7 +47,7 @@ impl Lines {
             return Err(FileError::Refused { path: path.into(), reason });
         }
         let mut reader = BufReader::new(&file);
-        // Bytes up to the first damage, and what is whole behind it.
+        // Bytes up to the first damage, and the whole lines behind it.
         let (mut kept, mut behind, mut damaged) = (0, Vec::new(), false);
         let mut line = Vec::new();
         loop {
@@ -72,7 +72,7 @@ impl Lines {
         &self.path
     }
 
-    /// Not collective. Appends a line, which ends in a newline, and hands it to the operating system.
+    /// Not collective. Appends a line, which ends in a newline, and passes it to the operating system.
     pub(super) fn append(&mut self, line: &str) -> Result<(), FileError> {
         self.file.write_all(line.as_bytes()).map_err(|source| system(&self.path, "write", source))
     }

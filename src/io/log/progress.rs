@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::telemetry::Record;
 use crate::text::{bytes, count, number, quantity, quantity_to};
 
-/// Time between lines where there is no terminal; in long runs a sixtieth of what has passed.
+/// Time between lines where there is no terminal; in long runs a sixtieth of the time so far.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 /// Time between changes on a terminal.
 const BETWEEN_DRAWS: Duration = Duration::from_millis(200);
@@ -36,7 +36,7 @@ struct Known {
     words: String,
 }
 
-/// The progress of a run, on standard error. Speaks on rank 0 only; the other ranks create it silent.
+/// The progress of a run, on standard error. Prints on rank 0 only; the other ranks create it silent.
 pub struct Progress {
     display: Display,
     start_time: f64,
@@ -53,7 +53,7 @@ pub struct Progress {
 
 impl Progress {
     /// A run from `start_time` to `end_time` (s), of which the user has been warned `warnings` times.
-    /// `speaks` on rank 0 and unless the user wants it quiet.
+    /// `speaks` is true on rank 0, unless the user wants a quiet run.
     pub fn new(speaks: bool, start_time: f64, end_time: f64, warnings: usize) -> Self {
         let display = if !speaks {
             Display::Nothing
@@ -80,7 +80,7 @@ impl Progress {
         }
     }
 
-    /// Takes over what changes slowly: particles, leaves per level, imbalance and memory.
+    /// Updates the figures that change slowly: particles, leaves per level, imbalance and memory.
     pub fn record(&mut self, record: &Record) {
         let levels: Vec<String> =
             record.levels.iter().map(|level| format!("{}:{}", level.level, level.leaves)).collect();
@@ -179,7 +179,7 @@ impl Progress {
         }
     }
 
-    /// A message that is shown even if the user wants it quiet. On rank 0 only.
+    /// A message that is shown even in a quiet run. On rank 0 only.
     pub fn warning(&mut self, text: &str) {
         self.warnings += 1;
         match &mut self.display {
@@ -199,7 +199,7 @@ impl Progress {
 
 /// Warns the user while no progress is shown. To be called on one rank.
 pub fn warn(text: &str) {
-    // In one piece, or `mpirun` may put its own words between pieces; a closed pipe is no error.
+    // In one piece, or `mpirun` may put its own text between pieces; a closed pipe is no error.
     let _ = std::io::stderr().write_all(format!("agimp: warning: {text}\n").as_bytes());
 }
 
@@ -208,13 +208,13 @@ pub fn tell(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
-/// Columns of the terminal, as far as it says so.
+/// Columns of the terminal, or [`COLUMNS`] if it does not tell.
 fn console_columns() -> usize {
     let asked = rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| usize::from(size.ws_col));
     if asked == 0 { COLUMNS } else { asked }
 }
 
-/// Name, width, figure, and how much it matters: the greater the number, the earlier it goes.
+/// Name, width, figure, and rank: the greater the number, the earlier it is left out.
 type Figure = (&'static str, usize, String, i32);
 
 /// Row of figures of the present state, on a terminal.
@@ -318,8 +318,8 @@ mod tests {
         assert_eq!(remaining(Duration::from_secs(1), 0.0, 0.0), None);
     }
 
-    /// A run that goes on at half of its time says how far the whole run is, and estimates the rest by its
-    /// own speed.
+    /// A run that continues at half of its time shows the progress of the whole run, and estimates the rest
+    /// from its own speed.
     #[test]
     fn a_part_of_a_run_counts_from_its_start() {
         let progress = Progress::new(false, 1.0, 2.0, 0);
@@ -373,7 +373,7 @@ mod tests {
             for name in ["done", "step", "time", "ETA", "p/s", "particles", "levels", "memory", "warn"] {
                 assert!(row.fit(79).contains(name), "{name} is shown");
             }
-            // Narrow ones keep how far the run is and how long it takes.
+            // Narrow ones keep the progress and the remaining time.
             for columns in [1, 10, 30, 50] {
                 let text = row.fit(columns);
                 assert!(

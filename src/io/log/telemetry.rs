@@ -29,7 +29,7 @@ impl Spread {
         let (mut min, mut max) = (values.to_vec(), values.to_vec());
         comm.min_f64s(&mut min);
         comm.max_f64s(&mut max);
-        // Reductions add integers only; 32 binary digits of the largest value are plenty for a report.
+        // Reductions add integers only; 32 binary digits of the largest value suffice for a report.
         let scale = |max: f64| if max > 0.0 { f64::from(u32::MAX) / max } else { 0.0 };
         let mut sums: Vec<u64> = values.iter().zip(&max).map(|(v, &max)| (v * scale(max)) as u64).collect();
         comm.sum_u64(&mut sums);
@@ -99,9 +99,9 @@ pub struct Resampled {
     pub refused: u64,
     /// Particles made by merges.
     pub merges: u64,
-    /// Particles that went away in merges.
+    /// Particles that merges removed.
     pub merged_away: u64,
-    /// Kinetic energy that splits took out of affine velocities, J.
+    /// Kinetic energy that splits removed from affine velocities, J.
     pub split_energy: f64,
     /// Kinetic energy that merges removed, J.
     pub merge_energy: f64,
@@ -295,8 +295,8 @@ impl Telemetry {
         Ok(Self(Lines::create(path)?))
     }
 
-    /// Not collective. Goes on with the file of a run that goes on from `step`: its records stay; those of
-    /// later steps and what is damaged go. Starts a new file if there is none.
+    /// Not collective. Opens the file of a run that continues from `step`: its records stay; later ones and
+    /// damaged ones are removed. Starts a new file if there is none.
     pub fn resume(path: &Path, step: u64) -> Result<Self, FileError> {
         /// The part of a record that decides whether it stays.
         #[derive(Deserialize)]
@@ -313,7 +313,7 @@ impl Telemetry {
         Ok(Self(Lines::resume(path, judge)?))
     }
 
-    /// Not collective. Appends a record and hands it to the operating system.
+    /// Not collective. Appends a record and passes it to the operating system.
     pub fn write(&mut self, record: &Record) -> Result<(), FileError> {
         let line =
             serde_json::to_string(record).map_err(|error| system(self.0.path(), "write", error.into()))?;

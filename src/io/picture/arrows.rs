@@ -1,4 +1,4 @@
-//! Vectors as arrows on a lattice of the picture, with an arrow beside them that says how long they are.
+//! Vectors as arrows on a lattice of the picture, with an arrow beside them for their scale.
 use super::camera::Camera;
 use super::canvas::Canvas;
 use super::colour::Rgb;
@@ -11,9 +11,9 @@ use super::source::derived::{Source, magnitude};
 
 /// Pixels between arrows.
 const SPACING: f64 = 26.0;
-/// Pixels of the longest arrow: it may reach into the next place, not beyond it.
+/// Length of the longest arrow, pixels: it may reach into the next place, not beyond it.
 const LONGEST: f64 = 44.0;
-/// Pixels below which an arrow is none.
+/// Length below which no arrow is drawn, pixels.
 const SHORTEST: f64 = 2.5;
 
 /// The vectors that a picture shows.
@@ -72,7 +72,7 @@ struct Mean {
 }
 
 impl Drawing {
-    /// Draws the arrows of the particles that are seen.
+    /// Draws the arrows of the visible particles.
     pub(super) fn arrows(
         &self,
         canvas: &mut Canvas,
@@ -106,7 +106,7 @@ impl Drawing {
         for mean in lattice.iter().filter(|mean| mean.count > 0.0) {
             let place = mean.place.map(|x| x / mean.count);
             let from = camera.project(place);
-            // The way of a metre per unit of the vector, in pixels, brought to the length of the scale.
+            // Projected length of the vector in pixels, at the length of the scale.
             let end =
                 camera.project(std::array::from_fn(|axis| place[axis] + mean.vector[axis] / mean.count));
             let way = [0, 1].map(|i| (end[i] - from[i]) / camera.scale * scale);
@@ -114,7 +114,7 @@ impl Drawing {
         }
     }
 
-    /// The arrow that says how long the others are.
+    /// The arrow of the scale.
     pub(super) fn arrow_of_scale(&self, canvas: &mut Canvas, settings: &Settings) {
         let longest = settings.longest.unwrap_or_else(|| self.vectors.longest());
         if self.vectors.each.is_empty() || longest <= 0.0 {

@@ -1,4 +1,4 @@
-//! How wide particles are drawn: as the solver has their boxes.
+//! Widths of particles in pictures: those of their boxes in the solver.
 use super::source::numbers;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::Header;
@@ -21,7 +21,7 @@ pub struct Boxes {
     pub is_plastic: Vec<bool>,
 }
 
-/// A particle, as far as its box follows from it.
+/// The data of a particle from which its box follows.
 struct Particle {
     /// Half of the edge of the undeformed box, m.
     half: f64,

@@ -1,4 +1,4 @@
-//! From space to pixels.
+//! Projection from space to pixels.
 use std::ops::Range;
 
 use crate::geometry::vector::{cross, dot};
@@ -39,7 +39,7 @@ impl Bounds {
     }
 }
 
-/// From where a picture in space looks at the material.
+/// Direction from which a picture in space shows the material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum View {
     /// Obliquely down.
@@ -124,8 +124,8 @@ pub(super) fn unit(a: [f64; 3]) -> [f64; 3] {
 }
 
 impl Camera {
-    /// Looks at `bounds`, which fill the given part of the image times `zoom`, with `focus` or their middle
-    /// in its centre.
+    /// A camera on `bounds`, which fill the given part of the image times `zoom`, with `focus` or their
+    /// middle in its centre.
     pub(super) fn new(
         (flat, view): (bool, View),
         bounds: &Bounds,
@@ -174,7 +174,8 @@ impl Camera {
         std::array::from_fn(|i| a * self.right[i] + b * self.up[i] + depth * self.toward[i])
     }
 
-    /// Where the ray of a pixel meets the plane of height `z`, and the depth there; not for a flat view.
+    /// Intersection of the ray of a pixel with the plane of height `z`, and the depth there; not for a flat
+    /// view.
     pub(super) fn on_plane(&self, column: f64, row: f64, z: f64) -> ([f64; 3], f64) {
         let foot = self.point(column, row, 0.0);
         let depth = (z - foot[2]) / self.toward[2];

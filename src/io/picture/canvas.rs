@@ -12,7 +12,7 @@ use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::write_whole;
 use crate::text::{html, printable};
 
-/// A colour as SVG has it.
+/// A colour in SVG.
 fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
@@ -44,12 +44,12 @@ impl Canvas {
         self.pixels
     }
 
-    /// From here on rectangles, texts and polygons are kept as elements of SVG; what is there stays pixels.
+    /// From here on rectangles, texts and polygons are kept as elements of SVG; earlier ones stay pixels.
     pub(super) fn collect(&mut self) {
         self.marks = Some(String::new());
     }
 
-    /// Colours a pixel; outside nothing happens.
+    /// Colours a pixel; places outside are ignored.
     pub(super) fn set(&mut self, x: i64, y: i64, colour: Rgb) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
@@ -99,7 +99,7 @@ impl Canvas {
         font::draw(size * self.unit, text, |_, _, _| ())
     }
 
-    /// A text of at most `width` pixels: an ellipsis stands for what does not fit.
+    /// A text of at most `width` pixels: an ellipsis replaces the part that does not fit.
     pub(super) fn shortened(&self, size: f64, text: &str, width: i64) -> String {
         let text = printable(text);
         match font::fitting(size * self.unit, &text, width) {
@@ -112,9 +112,9 @@ impl Canvas {
     }
 
     /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that
-    /// are wider than a line. An ellipsis stands for what does not fit.
+    /// are wider than a line. An ellipsis replaces the part that does not fit.
     pub(super) fn lines(&self, size: f64, text: &str, width: i64, most: usize) -> Vec<String> {
-        // Wide gaps between words stay, as they part what belongs together.
+        // Wide gaps between words stay, as they separate groups.
         let text = text.trim().replace(['\n', '\r', '\t'], " ");
         let text = printable(&text);
         let (mut rest, mut lines) = (&*text, Vec::new());
@@ -168,7 +168,7 @@ impl Canvas {
         }
     }
 
-    /// Mixes a share of a colour into a pixel; outside nothing happens.
+    /// Mixes a share of a colour into a pixel; places outside are ignored.
     pub(super) fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
@@ -191,7 +191,7 @@ impl Canvas {
         Ok(bytes)
     }
 
-    /// The image as SVG: its pixels, and over them what has been collected.
+    /// The image as SVG: its pixels, and over them the collected elements.
     fn svg(&self) -> std::io::Result<String> {
         let (width, height, png) = (self.width, self.height, BASE64.encode(self.png()?));
         Ok(format!(

@@ -11,7 +11,7 @@ pub enum Map {
     Viridis,
     /// Black over red to light yellow; the same holds.
     Magma,
-    /// Blue over grey to red, for what has two sides (Moreland 2009).
+    /// Blue over grey to red, for values of both signs (Moreland 2009).
     Coolwarm,
     /// Dark to light grey.
     Grey,

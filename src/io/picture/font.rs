@@ -30,7 +30,7 @@ pub(super) fn fitting(size: f64, text: &str, width: i64) -> (&str, bool) {
     (text, true)
 }
 
-/// Where letters of a text stand.
+/// Positions of the letters of a text.
 struct Pen {
     font: Option<PxScaleFont<&'static FontRef<'static>>>,
     /// Where the next letter begins, pixels.
@@ -48,7 +48,7 @@ impl Pen {
         Self { font, at: 0.0, before: None }
     }
 
-    /// Adds a letter; where it begins, and which it is.
+    /// Adds a letter; returns its position and glyph.
     fn add(&mut self, character: char) -> Option<(f32, GlyphId)> {
         let font = self.font?;
         let id = font.glyph_id(character);

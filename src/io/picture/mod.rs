@@ -56,7 +56,7 @@ use tree::leaves;
 pub struct Scene {
     /// Rigid bodies.
     pub solids: Vec<Solid>,
-    /// How wide particles are; `None` where that is not known: they are then drawn as they were at the start.
+    /// Widths of particles; `None` where these are not known: they are then drawn as at the start.
     pub boxes: Option<Boxes>,
 }
 
@@ -70,7 +70,7 @@ struct Tint {
     name: String,
     /// Its unit, empty for pure numbers.
     unit: String,
-    /// Whether its values are numbers of something rather than amounts.
+    /// Whether its values number classes, such as bodies, rather than measure amounts.
     classes: bool,
     /// Names of these numbers, from 0 on, if they have names.
     names: Vec<String>,
@@ -151,7 +151,7 @@ pub fn draw<const D: usize>(
 }
 
 /// Not collective. Draws the particles of an output file, coloured by the quantity of this name: a field that
-/// the file shows, or what follows from its fields or its state.
+/// the file shows, or one that follows from its fields or its state.
 ///
 /// # Errors
 /// The file cannot be read or does not offer the quantity, or the picture cannot be written.
@@ -189,7 +189,7 @@ pub fn png_of_file(
 pub struct Prepared(Drawing);
 
 impl Prepared {
-    /// Not collective. Reads what a file shows of a quantity.
+    /// Not collective. Reads the particles of a file, coloured by a quantity.
     ///
     /// # Errors
     /// The file cannot be read or does not offer the quantity.
@@ -396,7 +396,7 @@ impl Drawing {
         let unit = canvas.unit;
         let [left, right, top, bottom] = MARGINS.map(|margin| margin * unit);
         let top = top + heading.extra as f64;
-        // Numbers and unit of the axes of a plane picture stand there.
+        // Room for the numbers and the unit of the axes of a plane picture.
         let [left, right] = if self.flat {
             let numbers = scales::Metric::of(&frame).widest(&canvas, [frame.low[1], frame.high[1]]);
             [(left + 60.0 * unit).max(numbers as f64 + 34.0 * unit), right + 45.0 * unit]
@@ -485,7 +485,7 @@ impl Drawing {
         canvas
     }
 
-    /// Why a clip leaves nothing to be seen of particles that are there, if so.
+    /// The reason if a clip removes all particles of the file.
     fn emptied(&self, settings: &Settings) -> Option<String> {
         let clip = settings.clip?;
         let axis = clip.axis;
@@ -507,7 +507,7 @@ impl Drawing {
         ))
     }
 
-    /// Adds what lies behind planes of symmetry. Returns the frame of all.
+    /// Adds the mirror images behind planes of symmetry. Returns the frame of all.
     fn mirror(&mut self, settings: &Settings, mut frame: Bounds) -> Bounds {
         for axis in (0..3).filter(|&axis| settings.mirror[axis]) {
             let plane = self.domain.low[axis];

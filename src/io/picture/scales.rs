@@ -13,7 +13,7 @@ pub(super) const WIDTH: f64 = 185.0;
 /// No axis has more ticks.
 const MOST_TICKS: f64 = 100.0;
 
-/// Where the drawing has its place, pixels.
+/// Place of the drawing, pixels.
 pub(super) struct Plot {
     pub columns: [f64; 2],
     pub rows: [f64; 2],
@@ -29,7 +29,7 @@ impl Plot {
         if (0..2).all(|axis| seen.low[axis] < seen.high[axis]) { seen } else { window }
     }
 
-    /// Clears what is outside: beyond the frame of a plane picture, else below title and legend.
+    /// Clears the pixels outside: beyond the frame of a plane picture, else below title and legend.
     pub(super) fn clear_around(
         &self,
         canvas: &mut Canvas,
@@ -75,7 +75,7 @@ impl Metric {
     /// Ticks of an axis from `low` to `high`, m, with their numbers: no two ticks of a spacing have the same.
     fn ticks(self, [low, high]: [f64; 2], spacing: f64) -> Vec<(f64, String)> {
         let (first, last) = ((low / spacing - 1e-9).ceil(), (high / spacing + 1e-9).floor());
-        // More than there is room for where the frame is no length at all.
+        // Too many if the frame has almost no length.
         let count = if last - first < MOST_TICKS { (last - first) as i64 + 1 } else { 0 };
         let decimals = (-(spacing / self.by).log10() - 1e-9).ceil().clamp(0.0, 15.0) as usize;
         let tick = |n: i64| {
@@ -87,8 +87,8 @@ impl Metric {
         (0..count).map(tick).collect()
     }
 
-    /// Ticks as close as their numbers have room: `needed` says how many pixels a number takes, `scale` how
-    /// many a metre has.
+    /// Ticks as close as their numbers have room: `needed` gives the width of a number, `scale` that of a
+    /// metre, pixels.
     fn fitting(self, span: [f64; 2], scale: f64, needed: impl Fn(&str) -> i64) -> Vec<(f64, String)> {
         let mut spacing = nice((span[1] - span[0]) / 8.0);
         loop {
@@ -149,7 +149,7 @@ fn heading(canvas: &mut Canvas, tint: &Tint, paper: &Paper, top: i64) -> (i64, i
     (x, row + canvas.px(30.0))
 }
 
-/// The bar of the colours below the row `top`; `room` is what is kept free below it, in units of the layout.
+/// The bar of the colours below the row `top`; `room` stays free below it, in units of the layout.
 pub(super) fn colour_bar(
     canvas: &mut Canvas,
     tint: &Tint,
@@ -191,7 +191,7 @@ pub(super) fn legend(
     let (line, text) = (canvas.px(30.0), x + canvas.px(34.0));
     let all = numbers.clone().count();
     let fitting = ((canvas.height as i64 - top) / line.max(1)).clamp(1, 64) as usize;
-    // The last line says how many have none.
+    // The last line counts those without one.
     let shown = if all <= fitting { all } else { fitting - 1 };
     for (row, number) in (0..).map(|n| top + line * n).zip(numbers.take(shown)) {
         canvas.fill(x, row, canvas.px(24.0), canvas.px(20.0), class(number));
@@ -219,7 +219,7 @@ pub(super) fn short(value: f64) -> String {
     number(if value.abs() < 1e-12 { 0.0 } else { value }, 3)
 }
 
-/// A number of a scale from `low` to `high`, with as many digits as tell its numbers apart.
+/// A number of a scale from `low` to `high`, with enough digits to distinguish its numbers.
 pub(super) fn within(value: f64, [low, high]: [f64; 2]) -> String {
     let (greatest, span) = (low.abs().max(high.abs()), high - low);
     let digits = if span > 0.0 { (greatest / span).log10().ceil().clamp(0.0, 12.0) as usize + 3 } else { 3 };

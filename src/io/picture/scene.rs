@@ -42,7 +42,7 @@ pub(super) struct Raster {
     pub grain: f64,
 }
 
-/// How a raster becomes a picture.
+/// Style of a picture from a raster.
 pub(super) struct Looks<'a> {
     pub paper: &'a Paper,
     /// Whether surfaces are shaded by their slope and darkened behind nearer ones.
@@ -139,8 +139,8 @@ impl Raster {
         }
     }
 
-    /// Paints the image; `colour` turns values between 0 and 1 into colours. Solids are seen where nothing is
-    /// before them, and hide particles behind them by half.
+    /// Paints the image; `colour` turns values between 0 and 1 into colours. Solids are visible where nothing
+    /// is in front of them, and hide particles behind them by half.
     pub(super) fn paint(
         &self,
         camera: &Camera,
@@ -152,7 +152,7 @@ impl Raster {
             camera.scale * (camera.depths.end - camera.depths.start) / f64::from(u32::MAX - 1);
         let solids = looks.solids;
         let solid = |at: usize| (solids.depth[at] - camera.depths.start) * camera.scale;
-        // Depth in pixels, and what is seen there.
+        // Depth in pixels, and the foremost object.
         let mut depth: Vec<f64> = self.pixels.iter().map(|&p| (p >> 32) as f64 * pixels_per_unit).collect();
         let mut seen: Vec<Seen> = (0..depth.len()).map(|at| self.seen(at)).collect();
         for at in 0..depth.len() {
@@ -192,7 +192,7 @@ impl Raster {
         }
     }
 
-    /// Whether a place at this depth (m) is not behind what a pixel shows.
+    /// Whether a place at this depth (m) is not behind the foremost object of a pixel.
     pub(super) fn is_free(&self, camera: &Camera, solids: &Layer, at: usize, depth: f64) -> bool {
         let unit = (camera.depths.end - camera.depths.start) / f64::from(u32::MAX - 1);
         let known = camera.depths.start + (self.pixels[at] >> 32) as f64 * unit;
@@ -221,7 +221,8 @@ impl Surface {
         matches!(self.seen[at], Seen::Particle(_))
     }
 
-    /// Depth averaged over the surface around, so that slopes show the pile rather than its grains.
+    /// Depth averaged over the surface around, so that slopes are those of the pile rather than of its
+    /// grains.
     fn smoothed(&self) -> Vec<f64> {
         const REACH: usize = 4;
         const STEP: f64 = 14.0;
@@ -259,7 +260,7 @@ impl Surface {
         ((0.45 * x + 0.62 * y + 0.643) / (x * x + y * y + 1.0).sqrt()).max(0.0)
     }
 
-    /// Brightness from the slope and from what stands in front.
+    /// Brightness from the slope and from occlusion.
     fn shade(&self, smooth: &[f64], balls: f64, column: usize, row: usize) -> f64 {
         let at = row * self.width + column;
         let mut factor = 1.0;

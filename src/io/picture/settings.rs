@@ -3,7 +3,7 @@ use super::Direction;
 use super::camera::numbers;
 use super::colour::{DARK, LIGHT, Map, Paper};
 
-/// How a picture looks.
+/// Options of a picture.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Pixels across.
@@ -14,11 +14,11 @@ pub struct Settings {
     pub title: String,
     /// Values of the first and the last colour; `None`: as found, without the outermost half percents.
     pub range: Option<[f64; 2]>,
-    /// Lower and upper corner of what it shows, m; `None`: the particles with some room.
+    /// Lower and upper corner of the frame, m; `None`: the particles with some room.
     pub frame: Option<[[f64; 3]; 2]>,
-    /// From where it looks; plane pictures look along z.
+    /// Direction of view; along z in plane pictures.
     pub view: Direction,
-    /// How much larger than what fits.
+    /// Magnification over the picture that just fits.
     pub zoom: f64,
     /// Place in the middle, m.
     pub focus: Option<[f64; 3]>,
@@ -49,14 +49,14 @@ pub struct Clip {
     pub axis: usize,
     /// Where it is, m.
     pub at: f64,
-    /// Whether what lies above it goes; else what lies below.
+    /// Whether the part above it is removed; else the part below.
     pub above: bool,
 }
 
 impl std::str::FromStr for Clip {
     type Err = String;
 
-    /// `x<0.5` keeps what lies below 0.5 m, `z>1` what lies above 1 m.
+    /// `x<0.5` keeps the part below 0.5 m, `z>1` the part above 1 m.
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || "expected the half space to keep, such as x<0.5 or z>1".to_owned();
         let place = text.find(['<', '>']).ok_or_else(expected)?;
@@ -94,7 +94,7 @@ pub fn place(text: &str) -> Result<[f64; 3], String> {
 pub struct Look {
     /// Values of the first and the last colour.
     pub range: [f64; 2],
-    /// Lower and upper corner of what they show, m.
+    /// Lower and upper corner of the frame, m.
     pub frame: [[f64; 3]; 2],
     /// Length of the longest vector, in its unit; 0 if there are none.
     pub longest: f64,
@@ -124,15 +124,15 @@ impl Settings {
         }
     }
 
-    /// Takes what a series of pictures shares, where nothing else was chosen.
+    /// Takes the options that a series shares, where no other was chosen.
     pub fn share(&mut self, look: &Look) {
         self.frame = Some(look.frame);
         self.longest = Some(look.longest);
         self.range = self.range.or(Some(look.range));
     }
 
-    /// Pixels of a unit of the layout: letters and margins keep their size in pictures of usual sizes, and go
-    /// with the size of smaller and larger ones.
+    /// Pixels of a unit of the layout: letters and margins keep their size in pictures of usual sizes, and
+    /// scale with smaller and larger ones.
     pub(super) fn unit(&self) -> f64 {
         let share = (self.width as f64 / 1280.0).min(self.height as f64 / 800.0);
         match share {

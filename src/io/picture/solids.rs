@@ -9,7 +9,7 @@ pub type Distance = dyn Fn(&[f64; 3]) -> f64 + Send + Sync;
 
 /// A rigid body that a picture shows.
 pub struct Solid {
-    /// Signed distance of a place (m) to its surface, m, or what is smaller in magnitude.
+    /// Signed distance of a place (m) to its surface, m, or a bound smaller in magnitude.
     pub distance: Box<Distance>,
     /// Its triangles, if it is made of them; else empty.
     pub triangles: Vec<[[f64; 3]; 3]>,
@@ -158,13 +158,13 @@ fn inside(solid: &Solid, camera: &Camera, within: &Bounds, [column, row]: [f64; 
         return None;
     }
     let distance = (solid.distance)(&[x, y, 0.0]) * camera.scale;
-    // A line along the surface; sheets are nothing but that.
+    // A line along the surface; sheets consist of it alone.
     let light = if distance.abs() < 1.0 { 0.55 } else { 1.0 };
     (distance < 1.0).then_some((0.0, light))
 }
 
-/// Depth and brightness of a solid where the ray of a pixel meets it first within a box, by steps as long as
-/// the distance.
+/// Depth and brightness of a solid at the first intersection with the ray of a pixel within a box, by sphere
+/// tracing.
 fn trace(solid: &Solid, camera: &Camera, within: &Bounds, [column, row]: [f64; 2]) -> Option<(f64, f64)> {
     let foot = camera.point(column, row, 0.0);
     // Depths between which the ray lies in the box, and the axis of the face through which it enters.
@@ -192,7 +192,7 @@ fn trace(solid: &Solid, camera: &Camera, within: &Bounds, [column, row]: [f64; 2
         let point = camera.point(column, row, depth);
         let distance = (solid.distance)(&point);
         if distance <= close {
-            // Where the box cuts the solid, the cut is seen.
+            // Where the box cuts the solid, the cut is visible.
             let normal = if step == 0 && distance < -close {
                 std::array::from_fn(|axis| if axis == face { camera.toward[axis].signum() } else { 0.0 })
             } else {

@@ -185,7 +185,7 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// Not collective. Where the states of two files differ, fields in the order of the particle layout,
+/// Not collective. Differences between the states of two files, fields in the order of the particle layout,
 /// particles by identifier. Empty if they are the same bit for bit.
 pub fn diff(a: &Path, b: &Path) -> Result<Vec<Difference>, FileError> {
     let files = [Reader::open_alone(a)?, Reader::open_alone(b)?];

@@ -58,14 +58,14 @@ pub fn checkpoint_path(directory: &Path, name: &str, step: u64) -> PathBuf {
     directory.join(format!("{name}{CHECKPOINT}{step:09}{ENDING}"))
 }
 
-/// Files that a run may go on from.
+/// Files from which a run may continue.
 #[derive(Debug, Default)]
 pub struct Candidates {
     /// Those that hold a restart state and seem complete, with their steps; the latest first.
     pub whole: Vec<(PathBuf, u64)>,
     /// Why others cannot be read.
     pub damaged: Vec<FileError>,
-    /// A file that is passed over since it is of another job.
+    /// A file that is skipped since it is of another job.
     pub other: Option<PathBuf>,
 }
 
@@ -121,9 +121,9 @@ pub fn at_stake(directory: &Path, name: &str, job_digest: u64) -> Result<Option<
 }
 
 /// Not collective. Of the checkpoints of the run `name` and the job with this digest, keeps the `keep` latest
-/// up to step `step`, which was just written. Those of later steps were left by an earlier run, and go too,
-/// as do temporary files of checkpoints that were never finished. Those of other jobs stay, as do those that
-/// cannot be read.
+/// up to step `step`, which was just written. Those of later steps were left by an earlier run, and are
+/// removed too, as are temporary files of checkpoints that were never finished. Those of other jobs stay, as
+/// do those that cannot be read.
 pub fn remove_old_checkpoints(
     directory: &Path,
     name: &str,
@@ -149,7 +149,7 @@ pub fn remove_old_checkpoints(
 }
 
 /// Not collective. Removes what earlier parts of the run `name` were writing when something killed them:
-/// files under temporary names. They are in nobody's way, so that one that cannot be removed stays.
+/// files under temporary names. They are harmless, so that one that cannot be removed stays.
 pub fn remove_unfinished(directory: &Path, name: &str) {
     let unfinished = files(directory).unwrap_or_default().into_iter();
     for path in unfinished.filter(|path| is_unfinished(file_name(path), name)) {
@@ -237,7 +237,7 @@ fn results(directory: &Path, name: &str) -> Result<Vec<(Kind, u64, PathBuf)>, Fi
             None => (Kind::Output, number.strip_prefix('_')?),
         };
         let is_number = digits.bytes().all(|byte| byte.is_ascii_digit());
-        // A pipe of that name would never open.
+        // To open a pipe of that name would block.
         (is_number && path.is_file()).then_some((kind, digits.parse().ok()?, path))
     };
     let mut found: Vec<_> = files(directory)?.into_iter().filter_map(result).collect();

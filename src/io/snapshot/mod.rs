@@ -4,11 +4,11 @@
 //! and, where asked for, all that a restart needs, bit by bit. A file is written under a temporary
 //! name and gets its own when it is whole and on disk. Nothing in it depends on the number of ranks.
 //!
-//! | file or folder | what it has |
+//! | file or folder | content |
 //! |---|---|
 //! | this | files written and read |
-//! | [`header`], `place.rs` | what a file says of itself, and where its job file lies |
-//! | `content/` | what is in a file: particle fields, groups for viewers and restarts |
+//! | [`header`], `place.rs` | the header of a file, and the place of its job file |
+//! | `content/` | particle fields, groups for viewers and restarts |
 //! | `intact/` | checksums, limits, and the way to disk |
 //! | [`outputs`], [`directory`] | the numbered files of a run; finding and keeping them |
 //! | [`compare`] | digests and differences |
@@ -110,9 +110,9 @@ pub struct Restored<const D: usize> {
     pub leaf_fields: Vec<(String, Vec<f64>)>,
 }
 
-/// Collective. Writes particles, and the state if `options` ask for it, to `path`. After an error on any rank
-/// all ranks have it, and no file of that name has been made or changed; a state with numbers that are not
-/// finite is such an error.
+/// Collective. Writes particles, and the state if `options` ask for it, to `path`. An error on any rank is
+/// one on all ranks, and no file of that name is made or changed; a state with numbers that are not finite is
+/// such an error.
 pub fn write<const D: usize>(
     comm: &Comm,
     path: &Path,
@@ -139,7 +139,7 @@ pub fn start_write<const D: usize>(
         let mut recorded = Recorded::new(comm, file);
         state::write_job(&mut recorded, comm, view)?;
         state::write_maps(file, &mut recorded, comm, view)?;
-        // The state first: what ParaView can read of it gets a second name there.
+        // The state first: data sets of it that ParaView can read get a second name there.
         if options.restart {
             state::write(file, &mut recorded, comm, view, leaves, particles)?;
         }

@@ -165,7 +165,7 @@ impl Outputs {
         self.pending.is_some()
     }
 
-    /// Collective. Whether nobody would have to wait in [`Outputs::settle`].
+    /// Collective. Whether no rank would have to wait in [`Outputs::settle`].
     pub fn is_on_disk(&self, comm: &Comm) -> bool {
         let mut ready = [u64::from(self.pending.as_ref().is_none_or(|pending| pending.file.is_on_disk()))];
         comm.min_u64(&mut ready);

@@ -1,4 +1,4 @@
-//! Where the job file of a run lies, as its files say it: meshes and terrains that the job names lie beside
+//! Place of the job file of a run, as its files record it: meshes and terrains that the job names lie beside
 //! it.
 use std::path::{Component, Path, PathBuf};
 
@@ -10,7 +10,7 @@ const ABSOLUTE: &str = "job_file";
 /// Attribute with the path from the directory of the output, which holds as long as both are moved together.
 const RELATIVE: &str = "job_file_relative";
 
-/// Collective. Says in a file of a run where its job file is; nothing if that is not known on rank 0.
+/// Collective. Records in a file of a run where its job file is; no record if that is not known on rank 0.
 pub(super) fn write(file: &Writer, output: &Path, job: &Path) -> Result<(), FileError> {
     let texts = match (job.is_absolute(), job.to_str()) {
         (true, Some(absolute)) => {
@@ -27,7 +27,7 @@ pub(super) fn write(file: &Writer, output: &Path, job: &Path) -> Result<(), File
     file.set_texts(GROUP, &texts)
 }
 
-/// Not collective. Where the job file of the run that wrote a file may be: relative to the file, then
+/// Not collective. Candidates for the job file of the run that wrote a file: relative to the file, then
 /// absolute. Empty where the file does not say it.
 pub fn job_files(output: &Path) -> Vec<PathBuf> {
     let Ok(file) = Reader::open_alone(output) else { return Vec::new() };

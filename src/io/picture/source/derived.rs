@@ -24,7 +24,7 @@ impl Table {
     }
 }
 
-/// How a quantity follows from others. Names with a slash are data sets of the file.
+/// Definition of a quantity by others. Names with a slash are data sets of the file.
 struct Rule {
     name: &'static str,
     unit: &'static str,
@@ -177,7 +177,7 @@ impl<'f> Source<'f> {
         self.rule(name).map(|rule| rule.components)
     }
 
-    /// The data set that holds the quantity as it is.
+    /// The data set of the quantity itself.
     fn data_set(&self, name: &str) -> Option<String> {
         let path = if name.contains('/') { name.to_owned() } else { format!("VTKHDF/PointData/{name}") };
         self.file.exists(&path).then_some(path)

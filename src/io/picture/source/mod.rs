@@ -1,6 +1,6 @@
 //! Reading of output files for pictures. All of it has the right checksum.
 //!
-//! | file | what it reads |
+//! | file | content |
 //! |---|---|
 //! | this | places, sizes and numbers of the particles |
 //! | `derived.rs` | quantities that give colours |

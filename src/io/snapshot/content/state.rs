@@ -64,7 +64,7 @@ pub(in crate::io::snapshot) fn columns<const D: usize>() -> [Columns; 9] {
     columns
 }
 
-/// Name of the data set of what particles carry for loads, which a state has where any does.
+/// Name of the data set of carried columns, which a state has where any particle carries a value.
 pub(in crate::io::snapshot) const CARRIED: &str = "carried";
 
 /// The data set with the text of the job file.
@@ -165,7 +165,7 @@ pub(in crate::io::snapshot) fn write<const D: usize>(
     file.set_texts(&path("particles", "tag"), &[("units", ""), ("description", meaning)])
 }
 
-/// Collective. Writes what particles carry, if any does.
+/// Collective. Writes the carried columns, if any particle carries a value.
 fn write_carried<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
@@ -190,12 +190,12 @@ fn write_carried<const D: usize>(
     file.set_texts(&path("particles", CARRIED), &[("units", ""), ("description", meaning)])
 }
 
-/// Components of the data set of what particles carry as [`Writer::write_slab`] counts them.
+/// Components of the data set of carried columns as [`Writer::write_slab`] counts them.
 pub(in crate::io::snapshot) fn carried_components(columns: usize) -> usize {
     if columns == 1 { 0 } else { columns }
 }
 
-/// Columns of what particles carry in a file; 0 if no particle carries anything.
+/// Carried columns in a file; 0 if no particle carries a value.
 pub(in crate::io::snapshot) fn carried_columns(file: &Reader, header: &Header) -> Result<usize, FileError> {
     let name = path("particles", CARRIED);
     if header.checksum(&name).is_none() {
@@ -208,7 +208,7 @@ pub(in crate::io::snapshot) fn carried_columns(file: &Reader, header: &Header) -
     }
 }
 
-/// Most columns of what particles carry: three of each of as many loads as a job can have.
+/// Most carried columns: three of each of as many loads as a job can have.
 const MOST_CARRIED: usize = 3 * 27;
 
 /// Collective. Reads tree and particles; each rank gets a contiguous share of the curve with about

@@ -180,7 +180,7 @@ pub(in crate::io::snapshot) fn write_leaves<const D: usize>(
     write_averages(file, recorded, view, leaves)
 }
 
-/// Collective. Writes what fills the leaves, and its mean stress.
+/// Collective. Writes the volume fraction of leaves, and the mean stress.
 fn write_averages<const D: usize>(
     file: &Writer,
     recorded: &mut Recorded,
@@ -239,7 +239,7 @@ fn write_averages<const D: usize>(
     Ok(())
 }
 
-/// Corners of a leaf, first axis fastest, as VTK's pixels and voxels want them.
+/// Corners of a leaf, first axis fastest, in the order of VTK's pixels and voxels.
 fn leaf_corners<const D: usize>(view: &View<D>, leaf: &Octant<D>) -> Vec<[f64; 3]> {
     let edge = view.root_edge / f64::from(1_u32 << leaf.level);
     let corner = |number: usize| {

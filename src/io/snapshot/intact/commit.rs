@@ -1,8 +1,8 @@
 //! From a written file to one that is on disk under its own name.
 //!
-//! A file grows under a temporary name. It gets its own only when every rank has brought what it wrote to
-//! disk, so that whatever has a name is whole. The disk may take many times as long as handing the bytes to
-//! the operating system; this wait can go on in the background.
+//! A file grows under a temporary name. It gets its own only when the data of every rank are on disk, so that
+//! a file with its own name is whole. The disk may take many times as long as passing the bytes to the
+//! operating system; this wait can go on in the background.
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
@@ -21,7 +21,7 @@ pub struct Unnamed {
 }
 
 impl Unnamed {
-    /// Collective. Lets `fill` write a new file, and starts to bring it to disk. After an error the temporary
+    /// Collective. Lets `fill` write a new file, and starts to flush it to disk. After an error the temporary
     /// file is removed.
     pub fn write(
         comm: &Comm,
@@ -73,8 +73,8 @@ impl Unnamed {
     }
 }
 
-/// Not collective. Removes a file that did not come to be; it may not even exist, and the error that matters
-/// is the one before.
+/// Not collective. Removes an unfinished file; it may not even exist, and the error that matters is the one
+/// before.
 fn remove(comm: &Comm, part: &Path) {
     if comm.rank() == 0 {
         let _ = std::fs::remove_file(part);

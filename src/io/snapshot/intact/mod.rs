@@ -1,10 +1,10 @@
-//! How a file comes to be whole, and is known to be.
+//! Integrity of files: when one is complete, and how that is checked.
 //!
-//! | file | what it has |
+//! | file | content |
 //! |---|---|
 //! | `checked.rs` | data sets with checksums |
 //! | [`commit`] | from a written file to one on disk under its own name |
-//! | `sane.rs` | limits on what a state may hold |
+//! | `sane.rs` | limits on the values of a state |
 pub(in crate::io) mod checked;
 pub mod commit;
 pub(in crate::io::snapshot) mod sane;
