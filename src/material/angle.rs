@@ -18,7 +18,7 @@ impl Angle {
         Self { sine: libm::sin(angle), cosine: libm::cos(angle), softens: (first - last).to_radians() }
     }
 
-    /// Sine and cosine once a part, from 0 to 1, of what may soften has gone.
+    /// Sine and cosine once a share `lost`, from 0 to 1, of the possible decrease has occurred.
     #[inline(always)]
     pub(super) fn softened<V: Vector>(self, lost: V) -> [V; 2] {
         let (sine, cosine) = (V::splat(self.sine), V::splat(self.cosine));

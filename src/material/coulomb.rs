@@ -105,7 +105,7 @@ impl<V: Vector> Pyramid<V> {
     }
 
     /// Whether a stress with this mean and this norm of the deviator lies inside whatever its Lode angle, or
-    /// outside whatever its Lode angle. Where it is neither, [`Pyramid::may_hold`] has to tell.
+    /// outside whatever its Lode angle. Where it is neither, [`Pyramid::holds`] decides.
     #[inline(always)]
     pub(super) fn surely(&self, mean: V, norm: V, slopes: &Slopes<V>) -> [V::Mask; 2] {
         // √(3/2) |dev| <= s₁ - s₃ <= √2 |dev|; no principal stress is further from the mean than √(2/3)
@@ -134,7 +134,7 @@ impl<V: Vector> Pyramid<V> {
         (high - low) + (high + low).mul_add(self.friction, -self.strength)
     }
 
-    /// The stress to which a trial stress, greatest first, returns.
+    /// The returned stress of a trial stress, greatest first.
     #[inline(always)]
     pub(super) fn returned(&self, trial: &[V; 3], slopes: &Slopes<V>, elastic: &Lame) -> Returned<V> {
         let [s1, s2, s3] = *trial;
@@ -171,7 +171,7 @@ impl<V: Vector> Pyramid<V> {
         Returned { stress, flows, opens }
     }
 
-    /// Where the cut-off takes part; `flow` is the stress per flow on the face between 1 and 3.
+    /// Return where the cut-off is active; `flow` is the stress per flow on the face between 1 and 3.
     #[inline(always)]
     fn cut_off(&self, trial: &[V; 3], flow: [V; 3], elastic: &Lame) -> [V; 3] {
         let zero = V::splat(0.0);
@@ -327,7 +327,7 @@ mod tests {
         for round in 0..1500 {
             let elastic = Lame::new(1.0, 0.45 * random(&mut seed).abs());
             let friction = (0.1 + 0.7 * random(&mut seed).abs()).sin();
-            // Without dilation nothing returns from beyond the apex but in the limit.
+            // Without dilation a stress beyond the apex returns in the limit only.
             let dilation = friction * (0.05 + 0.95 * random(&mut seed).abs());
             let strength = if round % 4 == 0 { 0.0 } else { random(&mut seed).abs() };
             let apex = 0.5 * strength / friction;

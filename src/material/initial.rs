@@ -57,7 +57,7 @@ pub enum NoState {
 /// Largest part of a stress that may be lost to rounding on the way to the strain and back.
 const TOLERANCE: f64 = 1e-9;
 
-/// Long enough that all flow by a rate has come to its end, s.
+/// Long enough for all rate-dependent flow to end, s.
 const LONG: f64 = 1e9;
 
 /// The state of a material under a Cauchy stress (Pa, `xx, yy, zz, xy, xz, yz`). `plane`: xz and yz are zero.
@@ -91,8 +91,8 @@ pub fn under_stress_after(
     let first = |value: Lanes| value.to_array()[0];
     let found = state.stress.map(first);
     let asked = stress.map(|component| component * volume_ratio);
-    // Strains are small beside 1, so that rounding of the elastic tensor shows in the stress as a part of the
-    // modulus.
+    // Strains are small compared with 1, so the rounding of the elastic tensor appears in the stress as a
+    // share of the modulus.
     let modulus = material.density() * material.wave_speed() * material.wave_speed();
     let difference: [f64; 6] = std::array::from_fn(|c| found[c] - asked[c]);
     let (lost, allowed) = (norm(&difference), TOLERANCE * norm(&asked) + 1e-13 * modulus);
@@ -202,8 +202,8 @@ fn compose(value: &[f64; 3], vector: &[[f64; 3]; 3]) -> [f64; 6] {
 }
 
 /// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last
-/// two points, halves of the bracket where that leads outside or hardly on. `None` where the function does
-/// not change its sign.
+/// two points, bisection where that leads outside or converges slowly. `None` where the function does not
+/// change its sign.
 pub(super) fn increasing_root(function: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> Option<f64> {
     let (mut at_low, mut at_high) = (function(low), function(high));
     if !(at_low <= 0.0 && at_high >= 0.0) {
@@ -310,7 +310,7 @@ mod tests {
                 yielded(&*sand, &[-1e4 * ratio, -1e4, -1e4 * ratio, 0.0, 0.0, 0.0], None, true).unwrap();
             let [horizontal, vertical] = [state.stress[0], state.stress[1]];
             assert!((horizontal / vertical - limit).abs() < 1e-9 * limit, "{ratio}: {horizontal} {vertical}");
-            // It stays there.
+            // A second update changes nothing.
             let again = under_strain(&*sand, &state.elastic, state.history, true);
             for c in 0..6 {
                 assert!((again.stress[c] - state.stress[c]).abs() < 1e-6, "{c}");

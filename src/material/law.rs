@@ -49,7 +49,7 @@ impl State {
         state
     }
 
-    /// Takes over what is in the registers of a kernel.
+    /// Takes over the registers of a kernel.
     #[inline(always)]
     fn write<V: Vector>(&mut self, state: &State<V>, histories: usize) {
         for c in 0..6 {
@@ -73,10 +73,10 @@ pub struct Step {
     pub dt: f64,
     /// Whether the components xz and yz of all tensors are zero.
     pub plane: bool,
-    /// Edge of the cells on which the particles move, m: what bounds the step of viscous flow.
+    /// Edge of the cells on which the particles move, m: bounds the step of viscous flow.
     pub cell: f64,
-    /// Edge of the cells that each particle was made for, m: what softening is regularised with. 0: no cells.
-    /// Set only for models that ask for it ([`Material::softens`]).
+    /// Edge of the cells that each particle was made for, m: regularises softening. 0: no cells. Set only for
+    /// models that ask for it ([`Material::softens`]).
     pub size: [f64; LANES],
 }
 
@@ -174,7 +174,7 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Greatest wave speed of the undeformed material, m/s.
     fn wave_speed(&self) -> f64;
 
-    /// How much faster waves of the undeformed material count on cells of edge `cell` (m), so that explicit
+    /// Addition to the wave speed of the undeformed material on cells of edge `cell` (m) with which explicit
     /// viscous stress is stable, m/s.
     fn viscous_speed(&self, cell: f64) -> f64;
 
@@ -189,14 +189,14 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Whether it asks for the size of cells ([`Step::size`]).
     fn softens(&self) -> bool;
 
-    /// Whether it is a fluid: its particles go where they will among each other, and its elastic state is its
-    /// volume alone.
+    /// Whether it is a fluid: its particles move freely among each other, and its elastic state is its volume
+    /// alone.
     fn is_fluid(&self) -> bool;
 
     /// Whether a fluid bears tension.
     fn bears_tension(&self) -> bool;
 
-    /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), yield aside; `None`
+    /// Principal logarithmic strains, elastic, under principal Cauchy stresses (Pa), without yield; `None`
     /// where there are none. The volume is that of these strains and of the plastic volume in `history`,
     /// which holds the initial values; a law that is consolidated changes them to the requested values.
     fn strain_under(

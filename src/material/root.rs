@@ -8,9 +8,9 @@ const MOST: usize = 80;
 /// Relative change below which a lane has converged.
 const TOLERANCE: f64 = 4.0 * f64::EPSILON;
 
-/// A function of lanes. What captures more than a few numbers is a type of its own, with its method marked
-/// `inline(always)`, and not a closure: the compiler may make closures functions of their own, which lack the
-/// instructions of the kernel that calls them.
+/// A function of lanes. Functions that capture more than a few numbers are types with a method marked
+/// `inline(always)`, not closures: the compiler may compile a closure as a separate function, which lacks the
+/// instructions of the kernel that calls it.
 pub(super) trait Function<V, R> {
     /// Its value.
     fn at(&self, x: V) -> R;
@@ -102,7 +102,7 @@ pub(super) fn bracketed<V: Vector>(
         }
         let value = function.at(next);
         let left = zero.lt(value);
-        // An end that stays twice gets a smaller value, so that the next secant comes nearer to it.
+        // An end that stays twice gets a smaller value, so that the next secant is nearer to it.
         let shrink = |old: V| {
             let factor = V::splat(1.0) - value / old;
             zero.lt(factor).select(factor, half)

@@ -6,7 +6,7 @@ use super::strain;
 pub struct Followed {
     /// Mean pressure of contact with other bodies.
     pub contact_pressure: bool,
-    /// Motion since they came.
+    /// Motion since the particles came.
     pub motion: Motion,
 }
 
@@ -34,7 +34,7 @@ impl Followed {
         [usize::from(self.contact_pressure), strain, displacement]
     }
 
-    /// First columns of the same among `carried` columns, of which they are the last; `None` for what
+    /// First columns of the same among `carried` columns, of which they are the last; `None` for those that
     /// particles do not carry.
     pub fn first_columns<const D: usize>(self, carried: usize) -> [Option<usize>; 3] {
         let columns = self.columns::<D>();

@@ -6,7 +6,7 @@ use crate::geometry::Aabb;
 /// Particles in the order of their file, found by place.
 pub struct Given<const D: usize> {
     chunk: Chunk<D>,
-    /// Whether the file says how they move; otherwise the body does.
+    /// Whether the file gives their velocities; otherwise the body does.
     pub has_velocity: bool,
     bounds: Aabb<D>,
     /// Cells of a raster over the bounds along each axis, about one for each particle.

@@ -10,7 +10,7 @@ pub struct Group<'a> {
     pub field_of_body: &'a [u8],
 }
 
-/// How many particles of a chunk a group has.
+/// Share of a chunk's particles that are in a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Share {
     /// None.
@@ -27,7 +27,7 @@ impl Group<'_> {
         self.field_of_body[usize::from(Tag::unpack(tag).body)] == self.field
     }
 
-    /// How many particles of a chunk are in the group.
+    /// Share of a chunk's particles that are in the group.
     pub fn share<const D: usize>(&self, chunk: &Chunk<D>) -> Share {
         match chunk.tags().iter().filter(|&&tag| self.has(tag)).count() {
             0 => Share::None,

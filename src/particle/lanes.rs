@@ -4,8 +4,8 @@ use std::ops::Range;
 use super::chunk::{Chunk, Layout};
 use crate::simd::{LANES, Lanes, Vector};
 
-/// Appends to a list those of some particles whose bits are set in what `lanes` gives for the batch from some
-/// particle on; bits behind the last particle are of no use.
+/// Appends to a list those of some particles whose bits are set by `lanes`, which is called with the first
+/// particle of each batch; bits behind the last particle are ignored.
 #[inline(always)]
 pub fn list_lanes(particles: Range<usize>, list: &mut Vec<u32>, lanes: impl Fn(usize) -> u32) {
     for first in particles.clone().step_by(LANES) {
@@ -18,8 +18,7 @@ pub fn list_lanes(particles: Range<usize>, list: &mut Vec<u32>, lanes: impl Fn(u
     }
 }
 
-/// Values in a column of [`LANES`] particles from `first` on; what lies behind the last particle is of no
-/// use.
+/// Values in a column of [`LANES`] particles from `first` on; values behind the last particle are undefined.
 #[inline(always)]
 pub fn values<const D: usize>(chunk: &Chunk<D>, column: usize, first: usize) -> Lanes {
     Lanes::new(chunk.values(column, first))

@@ -1,12 +1,12 @@
-//! Total strain of a particle, elastic and plastic, since it came.
+//! Total strain of a particle, elastic and plastic, since it was made.
 //!
 //! Particles carry `e = b - 1` with the total left Cauchy-Green tensor `b = F Fᵀ`, so that small strains keep
-//! their digits. A step with the velocity gradient ∇v makes of it `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In
-//! plane strain no component out of the plane changes.
+//! their digits. A step with the velocity gradient ∇v gives `f (1 + e) fᵀ - 1`, `f = 1 + Δt ∇v`. In plane
+//! strain no component out of the plane changes.
 //!
-//! Material that is stirred without end is strained without end. Components of e stop at `GREATEST`, and
-//! the least stretch is not taken below what rounding leaves of it beside the greatest: strains stay finite
-//! for any motion.
+//! Material that is stirred without end is strained without end. Components of e stop at `GREATEST`, and the
+//! least stretch is bounded below by its rounding error beside the greatest: strains stay finite for any
+//! motion.
 use super::chunk::Chunk;
 use crate::material::tensor::eigen::decompose;
 use crate::simd::{Lanes, Vector};
@@ -72,8 +72,8 @@ pub fn tensor(dimension: usize, e: &Components) -> [f64; 6] {
 }
 
 /// Logarithmic (Hencky) strain `½ ln(1 + e)`, components xx, yy, zz, xy, yz, xz as VTK orders them. Where the
-/// greatest principal stretch is more than 1e8 times the least, rounding has left nothing of the latter, and
-/// it is at most approximate.
+/// greatest principal stretch is more than 1e8 times the least, the latter is lost to rounding, and
+/// approximate at most.
 pub fn logarithmic(dimension: usize, e: &Components) -> [f64; 6] {
     let [xx, yy, zz, xy, xz, yz] = match dimension {
         2 => [e[0], e[1], 0.0, e[2], 0.0, 0.0],

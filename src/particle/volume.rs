@@ -24,7 +24,7 @@ fn ratio_in_tile<const D: usize>(tile: &[[f64; TILE]], lane: usize) -> f64 {
     det_f(elastic, tile[Layout::<D>::PLASTIC_VOLUME][lane])
 }
 
-/// [`volume_ratio`] of the particles of a tile; what lies behind the last particle is of no use.
+/// [`volume_ratio`] of the particles of a tile; values behind the last particle are undefined.
 pub fn volume_ratios<const D: usize>(tile: &[[f64; TILE]]) -> [f64; TILE] {
     std::array::from_fn(|lane| ratio_in_tile::<D>(tile, lane))
 }
@@ -34,9 +34,9 @@ pub fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     reference_volume(chunk, p) * volume_ratio(chunk, p)
 }
 
-/// Greatest det F with which volume counts where it is measured: that of a box that is stretched as far as
-/// the solver stretches boxes by default, twice along each axis. What flies alone, with nothing around that
-/// its det F could fill, may have one of thousands.
+/// Greatest det F that measurements of volume count: that of a box at the default limit of the solver, a
+/// stretch of two along each axis. A particle that flies alone may have a det F of thousands, with no
+/// material in that volume.
 fn greatest_ratio<const D: usize>() -> f64 {
     (0..D).fold(1.0, |product, _| 2.0 * product)
 }

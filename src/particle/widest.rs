@@ -13,7 +13,7 @@ impl Widest {
     /// To be found anew.
     pub(super) const UNKNOWN: Self = Self { half: f64::NAN, count: 0 };
 
-    /// Looks at all half widths.
+    /// Finds it among all half widths.
     pub(super) fn of(halves: Column) -> Self {
         let half = halves.greatest();
         Self { half, count: halves.iter().filter(|&&h| h == half).count() as u32 }
@@ -24,7 +24,7 @@ impl Widest {
         (!self.half.is_nan()).then_some(self.half)
     }
 
-    /// A particle has come.
+    /// Updates it for a particle that is added.
     pub(super) fn add(&mut self, half: f64) {
         if half > self.half {
             *self = Self { half, count: 1 };
@@ -33,7 +33,7 @@ impl Widest {
         }
     }
 
-    /// A particle has gone.
+    /// Updates it for a particle that is removed.
     pub(super) fn remove(&mut self, half: f64) {
         if half == self.half {
             self.count -= 1;

@@ -1,8 +1,8 @@
 //! Fluxes: the mass that has passed a plane, or left through a face of the domain.
 //!
-//! The mass beyond a plane, with what has left the domain beyond it, less the mass beyond it at the start:
-//! each is an exact sum, so inside and outside make up the whole. At an opening, a part of a plane, masses
-//! are summed up as particles cross.
+//! The mass beyond a plane, plus the mass that has left the domain beyond it, less the mass beyond it at the
+//! start: each is an exact sum, so inside and outside make up the whole. At an opening, a part of a plane,
+//! masses are summed up as particles cross.
 
 /// Where mass is counted.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,15 +16,16 @@ pub struct Flux {
 /// A plane, an opening in it, or a face of the domain. Components along z are 0 in plane strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Section {
-    /// A plane through a point (m from the lower corner of the domain); what lies where the normal points is
-    /// beyond.
+    /// A plane through a point (m from the lower corner of the domain); the side to which the normal points
+    /// is beyond.
     Plane {
         /// The point, m.
         point: [f64; 3],
         /// The normal; its length does not matter.
         normal: [f64; 3],
     },
-    /// A part of a plane: what crosses it there from a step's start to its end, along a straight line.
+    /// A part of a plane: mass that crosses it between the start and the end of a step, along a straight
+    /// line.
     Opening {
         /// A point of the plane, m.
         point: [f64; 3],
@@ -33,7 +34,7 @@ pub enum Section {
         /// Lower and upper corner of a box that holds the part, m.
         bounds: [[f64; 3]; 2],
     },
-    /// The lower (0) or upper (1) face of the domain along an axis: what has left beyond it.
+    /// The lower (0) or upper (1) face of the domain along an axis: mass that has left through it.
     Face {
         /// The axis.
         axis: usize,

@@ -1,8 +1,8 @@
 //! The widest registers of the processor, chosen when the program runs.
 //!
-//! The whole program is compiled for AVX2 and FMA. What is most of a step is compiled once more for AVX-512:
-//! a [`Vector`] is then one register instead of two, and there are 32 of them, which batches need. Each
-//! operation is rounded as before, so results do not depend on the choice.
+//! The whole program is compiled for AVX2 and FMA. The kernels that take most of a step are compiled once
+//! more for AVX-512: a [`Vector`] is then one register instead of two, and there are 32 of them, which
+//! batches need. Each operation is rounded as before, so results do not depend on the choice.
 use super::Vector;
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 use super::avx512::Wide;
@@ -13,9 +13,9 @@ pub trait Kernel {
     /// The result.
     type Output;
 
-    /// Does the work. To be marked `inline(always)`, and so is all that it calls with vectors: functions of
-    /// their own, as those that map arrays and closures that are called twice can become, are compiled
-    /// without AVX-512, and then call one for each operation.
+    /// Does the work. To be marked `inline(always)`, and so is all that it calls with vectors: separate
+    /// functions, such as mappings of arrays and closures that are called twice may become, are compiled
+    /// without AVX-512, and then make a call for each operation.
     fn run<V: Vector>(self) -> Self::Output;
 }
 
@@ -43,8 +43,8 @@ pub fn widest<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512cd")]
 fn wide<K: Kernel>(kernel: K) -> K::Output {
-    // Something with this alignment on the stack has the compiler align what it puts there itself. Registers
-    // of 512 bits would otherwise lie across two lines of the cache (a fourteenth of the time of G2P in 2D).
+    // A variable of this alignment makes the compiler align its own data on the stack. Registers of 512 bits
+    // would otherwise lie across two lines of the cache (a fourteenth of the time of G2P in 2D).
     let mut line = CacheLine(0);
     std::hint::black_box(&mut line);
     kernel.run::<Wide>()

@@ -13,13 +13,13 @@ pub struct Lanes([F64x4; 2]);
 pub struct Mask([Mask4; 2]);
 
 impl Lanes {
-    /// The lanes where they lie.
+    /// The lanes in place.
     #[inline(always)]
     pub fn as_array(&self) -> &[f64; LANES] {
         // SAFETY: both are eight doubles without gaps.
         unsafe { &*std::ptr::from_ref(self).cast() }
     }
-    /// The lanes where they lie.
+    /// The lanes in place, mutable.
     #[inline(always)]
     pub fn as_array_mut(&mut self) -> &mut [f64; LANES] {
         // SAFETY: both are eight doubles without gaps, of which any bits are a value.

@@ -1,9 +1,9 @@
 //! Explicit vectors of `f64`: the only module of this crate with CPU intrinsics.
 //!
-//! [`F64x4`] is one AVX register where the build has AVX2 and FMA and an array of four numbers
-//! elsewhere. It holds a row of a node. [`LANES`] particles at a time make a [`Vector`]: two of them
-//! ([`Lanes`]), or one register of 512 bits where the processor has AVX-512 (see [`widest`]). All do the same
-//! IEEE 754 operations, each correctly rounded, so a result never depends on which of them was at work.
+//! [`F64x4`] is one AVX register where the build has AVX2 and FMA and an array of four numbers elsewhere. It
+//! holds a row of a node. [`LANES`] particles at a time make a [`Vector`]: two of them ([`Lanes`]), or one
+//! register of 512 bits where the processor has AVX-512 (see [`widest`]). All do the same IEEE 754
+//! operations, each correctly rounded, so a result never depends on the choice.
 
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -34,12 +34,11 @@ mod avx512;
 mod dispatch;
 mod lanes;
 #[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
-// Public where it takes the place of AVX2, which is not so in tests on most machines.
+// Public where it replaces AVX2, which it does not in tests on most machines.
 #[cfg_attr(test, allow(unreachable_pub))]
 mod portable;
 
-/// Asks the processor to fetch the cache line at an address, which need not be valid; a hint without effect
-/// on results.
+/// Prefetches the cache line at an address, which need not be valid; a hint without effect on results.
 #[inline(always)]
 pub fn prefetch(address: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -52,8 +51,8 @@ pub fn prefetch(address: usize) {
     let _ = address;
 }
 
-/// As [`prefetch`], but past the first level of the cache, where lines at the same place of their pages push
-/// each other out.
+/// As [`prefetch`], but past the first level of the cache, where lines at the same place of their pages evict
+/// each other.
 #[inline(always)]
 pub fn prefetch_to_second_level(address: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -123,7 +122,7 @@ pub trait Vector:
     fn columns(rows: &[F64x4; LANES]) -> [Self; 4];
 
     /// Four numbers for each particle become one row of four per particle. Writes row by row, as they are
-    /// read: what is stored and loaded in different pieces waits in the store queue.
+    /// read: data that are stored and loaded in different pieces wait in the store queue.
     #[inline(always)]
     fn write_rows(columns: [Self; 4], rows: &mut [F64x4; LANES]) {
         let [x, y, z, w] = columns;

@@ -96,7 +96,7 @@ fn rows_and_columns_are_inverse() {
     assert_eq!(Mask::from_bits(0b1010_0110).bits(), 0b1010_0110);
 }
 
-/// Every operation of vectors on three of them, one of which is positive where that is asked for.
+/// Every operation of vectors on three of them, one of which is positive where an operation requires it.
 struct Everything([[f64; LANES]; 3]);
 
 impl Kernel for Everything {

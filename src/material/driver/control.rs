@@ -46,7 +46,7 @@ impl Target {
     }
 }
 
-/// No strain has the stress that is asked for.
+/// No strain has the prescribed stress.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error(
     "found no deformation with {wanted}; the nearest has {found}. Either the material cannot carry it, as after failure, or the row is too far from the previous one: add rows in between or increase --substeps"
@@ -90,10 +90,10 @@ impl<'a> Controlled<'a> {
         self.point.stress.map(|stress| stress / volume)
     }
 
-    /// Goes to a target in equal steps of what is prescribed, each of `dt` (s).
+    /// Moves to a target in equal steps of the prescribed components, each of `dt` (s).
     ///
     /// # Errors
-    /// A stress cannot be had.
+    /// No strain has the prescribed stress.
     pub fn go(&mut self, target: &Target, steps: u32, dt: f64) -> Result<(), NoSolution> {
         let (shear, strain, stress) = (self.shear, self.strain, self.stress());
         for step in 1..=steps {
@@ -128,7 +128,7 @@ impl<'a> Controlled<'a> {
         });
         let middle = Target { shear: 0.5 * (self.shear + target.shear), components };
         let mut next = self.clone();
-        // Whichever half fails, the user asked for the whole.
+        // Whichever half fails, the error names the whole target.
         let halves = next.step(&middle, 0.5 * dt, halvings - 1);
         halves.and_then(|()| next.step(target, 0.5 * dt, halvings - 1)).map_err(|_| error)?;
         *self = next;
@@ -143,9 +143,9 @@ impl<'a> Controlled<'a> {
         next.point.stress.iter().all(|stress| stress.is_finite()).then_some(next)
     }
 
-    /// The point where the free components have the stresses that are asked for: by Newton's method with
-    /// differences for derivatives, and where that fails, as at kinks of a yield surface, by Broyden's from
-    /// the elastic stiffness.
+    /// The point where the free components have the prescribed stresses: by Newton's method with differences
+    /// for derivatives, and where that fails, as at kinks of a yield surface, by Broyden's from the elastic
+    /// stiffness.
     fn solve(&self, target: &Target, dt: f64) -> Result<Self, NoSolution> {
         let mut search = Search { start: self, target, dt, free: Vec::new() };
         let mut strain = self.strain;
@@ -201,7 +201,7 @@ impl<'a> Search<'a, '_> {
         self.free.iter().map(column).collect()
     }
 
-    /// Stiffness from differences in the direction in which the stress shall go.
+    /// Stiffness from differences, in the directions of the errors of the stress.
     fn differences(&self, strain: &[f64; 6], errors: &[f64]) -> Option<Vec<Vec<f64>>> {
         let mut columns = Vec::new();
         for (k, &(c, _)) in self.free.iter().enumerate() {

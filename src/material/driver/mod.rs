@@ -25,9 +25,9 @@ pub struct Point<'a> {
     pub wave_speed: f64,
     /// Length of the steps to come, s; 0: nothing flows by its rate.
     pub dt: f64,
-    /// Edge of the cells that softening is regularised with, m; 0: none.
+    /// Edge of the cells that regularise softening, m; 0: none.
     pub size: f64,
-    /// Edge of the cells on which it moves, m: what bounds the step of viscous flow. Infinite: none.
+    /// Edge of the cells on which it moves, m: bounds the step of viscous flow. Infinite: none.
     pub cell: f64,
 }
 

@@ -135,7 +135,7 @@ impl Curve {
         self.initial * self.factor
     }
 
-    /// The modulus where strength is linear for good.
+    /// The modulus, if strength is linear for all strains.
     pub(crate) fn linear(&self) -> Option<f64> {
         match self.kind {
             Kind::Linear { modulus } => Some(modulus * self.factor),
@@ -240,8 +240,8 @@ impl Curve {
         }
     }
 
-    /// Part of the way from the strength of the undeformed material to the residual one that is still to go,
-    /// 1 to 0: what other parameters that soften with this strength follow. 1 for laws that do not soften.
+    /// Strength above the residual one, as a share of that of the undeformed material above it: 1 to 0. Other
+    /// parameters soften in proportion. 1 for laws that do not soften.
     #[inline(always)]
     pub(crate) fn progress<V: Vector>(&self, strain: V, step: &Step) -> V {
         let one = V::splat(1.0);
@@ -256,7 +256,7 @@ impl Curve {
         }
     }
 
-    /// Edge of cells over that for which strains of softening hold.
+    /// Edge of cells over the one for which strains of softening hold.
     #[inline(always)]
     fn scale<V: Vector>(&self, step: &Step) -> V {
         let one = V::splat(1.0);

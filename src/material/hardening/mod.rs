@@ -179,7 +179,7 @@ fn most() -> f64 {
 }
 
 impl Hardening {
-    /// Checks what the ranges of single keys cannot say. `initial` is the strength of the undeformed
+    /// Checks conditions beyond the ranges of single keys. `initial` is the strength of the undeformed
     /// material, Pa.
     pub(super) fn check(&self, initial: f64) -> Result<(), OutOfRange> {
         let fail = |key: &str, value: f64, range: String| {

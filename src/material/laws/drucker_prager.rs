@@ -305,8 +305,8 @@ impl<V: Vector> Cone<'_, V> {
         [value * self.law.strength, slope * (self.law.strength * root)]
     }
 
-    /// Increment at which a load, less by `stiffness` for each, meets the strength of the cone; `first` is
-    /// that at the start.
+    /// Increment at which a load, reduced by `stiffness` per increment, equals the strength of the cone;
+    /// `first` is that at the start.
     #[inline(always)]
     fn slip(&self, [load, first]: [V; 2], stiffness: f64, active: V::Mask) -> V {
         let least = V::splat(f64::MIN_POSITIVE);
@@ -396,7 +396,7 @@ impl Cohesive {
         let [first, _] = cone.strength(zero);
         let excess = trace.mul_add(V::splat(self.alpha), norm) - first;
         let shears = zero.lt(excess);
-        // Nothing flows by its rate without a step, but the material opens at once.
+        // Without a step there is no rate-dependent flow, but the material opens at once.
         let torn = self.tip(first).lt(trace);
         let returns = zero.lt(booked.abs());
         let none = V::Mask::from_bits(0);
@@ -415,7 +415,8 @@ impl Cohesive {
             let cut =
                 (flows & self.tip(end_strength).lt(end_trace)) | (torn & !yields) | (yields & whole.lt(slip));
             if cut.any() {
-                // At the apex all shear goes; at the cut-off there is a corner with the cone, or none goes.
+                // At the apex all shear vanishes; at the cut-off the return is to the corner with the cone,
+                // or shear stays.
                 let mean = V::splat(3.0 * self.tension);
                 let is_apex = first.le(mean * self.alpha);
                 let load = is_apex.select(zero, mean).mul_add(V::splat(self.alpha), norm);

@@ -49,14 +49,13 @@ pub trait Model: Law {
         Box::new(Self::new(parameters, density))
     }
 
-    /// Checks what the ranges of single keys cannot say.
+    /// Checks conditions beyond the ranges of single keys.
     fn check(_parameters: &Self::Parameters) -> Result<(), OutOfRange> {
         Ok(())
     }
 
-    /// Sets of parameters, in the form of a job file, that between them take every way through the law: for
-    /// tests and benches. Strengths are such that some percent of strain makes it flow; densities are 1000
-    /// kg/m³.
+    /// Sets of parameters, in the form of a job file, that together cover every branch of the law: for tests
+    /// and benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
     fn examples() -> &'static [&'static str];
 }
 
@@ -70,8 +69,7 @@ macro_rules! materials {
             $($(#[$description])* $name(<$law as Model>::Parameters),)*
         }
 
-        /// History variables that each particle has room for: as many as the model with most of them asks
-        /// for.
+        /// History variables that each particle has room for: as many as the model with most of them needs.
         pub const HISTORIES: usize = {
             let mut most = super::PLASTIC_VOLUME + 1;
             $(if <$law as Law>::HISTORIES > most {

@@ -86,8 +86,8 @@ fn yes() -> bool {
 #[derive(Clone, Debug)]
 pub struct MohrCoulomb(pub(super) Properties);
 
-/// The same where the pyramid depends on the state, or does not: kernels of their own, which are smaller and
-/// faster.
+/// The law with a pyramid that depends on the state, or with a fixed one: separate kernels, which are smaller
+/// and faster.
 #[derive(Clone, Debug)]
 struct Only<const HARDENS: bool>(MohrCoulomb);
 
@@ -206,7 +206,7 @@ impl Properties {
         }
     }
 
-    /// Works out what does not depend on the state, once for all.
+    /// Computes the parts that do not depend on the state, once for all.
     fn with_fixed_pyramid(mut self) -> Self {
         if !self.hardens() {
             let pyramid = Pyramid {
@@ -259,7 +259,7 @@ impl Properties {
     }
 }
 
-/// Where principal stresses end, and what is lost on the way.
+/// Returned principal stresses, and the plastic strain of the return.
 #[derive(Clone, Copy)]
 struct Outcome<V: Vector> {
     returned: Returned<V>,
@@ -308,7 +308,7 @@ impl<V: Vector> Return<'_, V> {
     }
 }
 
-/// Plastic strain that comes of the return to the pyramid after an increment, beyond that increment.
+/// Plastic strain of the return to the pyramid after an increment, less that increment.
 impl<V: Vector> Function<V, V> for &Return<'_, V> {
     #[inline(always)]
     fn at(&self, increment: V) -> V {
@@ -379,7 +379,7 @@ impl Properties {
         state.history[PLASTIC_STRAIN] = flows.select(shear + slip, shear);
         state.history[PLASTIC_VOLUME] = changed.select(volume + (trial.trace - end_trace), volume);
         if !self.volume_correction {
-            // Not given back, but part of the volume all the same.
+            // Not given back, but part of the plastic volume.
         } else if self.books_apart() {
             let gained = (trace - end_trace).max(zero);
             state.history[OWN] = changed.select(opens.select(gained, zero), booked);

@@ -75,7 +75,7 @@ impl Law for NeoHookean {
         let Lame { lambda, mu } = self.lame;
         let squares = |log: f64| stress.map(|s| 1.0 + (libm::exp(log) * s - lambda * log) / mu);
         let excess = |log: f64| {
-            // Where a stretch is not positive, J is too great.
+            // If a stretch is not positive, J is too large.
             let logs = squares(log).map(|b| if b > 0.0 { libm::log(b) } else { f64::NEG_INFINITY });
             log - 0.5 * logs.iter().sum::<f64>()
         };

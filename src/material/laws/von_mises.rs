@@ -244,7 +244,7 @@ impl VonMises {
         let (strain, temperature) = (state.history[PLASTIC_STRAIN], state.history[TEMPERATURE]);
         let still = Flow { increment: zero, temperature: [temperature, zero] };
         let [strength, _] = self.curve.strength(strain, &still, step);
-        // Without a step nothing flows by its rate.
+        // Without a step there is no rate-dependent flow.
         let mut flows = strength.lt(stress);
         if self.overstress.is_some() && step.dt <= 0.0 {
             flows = V::Mask::from_bits(0);

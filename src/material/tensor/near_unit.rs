@@ -7,7 +7,7 @@ use super::eigen::{Symmetric, determinant};
 use crate::simd::{Vector, each};
 
 /// Greatest norm (Frobenius) of Y for which the series are exact but for rounding: eigenvalues are at most
-/// 0.82 times as large, and what the series leave out is below 2e-18.
+/// 0.82 times as large, and the remainder of the series is below 2e-18.
 const LIMIT: f64 = 0.2;
 
 /// `ln(1 + x) = x - x²/2 + x³/3 - …`
@@ -70,7 +70,7 @@ impl<V: Vector> TraceFree<V> {
         Self { tensor, square, q: (square[0] + square[1] + square[2]) * 0.5, d: determinant(&tensor) }
     }
 
-    /// Where the series hold.
+    /// Lanes for which the series hold.
     #[inline(always)]
     pub(super) fn is_small(&self) -> V::Mask {
         self.q.le(V::splat(0.5 * LIMIT * LIMIT))

@@ -1,7 +1,7 @@
 //! Principal values of a deviator, and tensors with the same principal directions, without eigenvectors.
 //!
 //! The eigenvalue of the greatest magnitude stands alone: the other two are no nearer to it than `√(3/2)` of
-//! the norm, so its projector `n ⊗ n` is a well-conditioned polynomial in the tensor. What is left lies in
+//! the norm, so its projector `n ⊗ n` is a well-conditioned polynomial in the tensor. The remainder lies in
 //! the plane across `n` and has eigenvalues of equal size and opposite sign, exact for equal and nearly equal
 //! ones.
 use super::eigen::{Symmetric, determinant};
@@ -58,10 +58,10 @@ pub(crate) struct Lone<V> {
     angle: V,
 }
 
-/// A deviator taken apart. It is `norm` times a tensor U of unit norm.
+/// Decomposition of a deviator. It is `norm` times a tensor U of unit norm.
 ///
 /// `P = (U² + lone U + (lone² - 1/2) I) inverse` is the projector on the direction of `lone`, and
-/// `R = U + lone/2 I - 3/2 lone P` what U has in the plane across, with eigenvalues `half` and `-half`.
+/// `R = U + lone/2 I - 3/2 lone P` the part of U in the plane across it, with eigenvalues `half` and `-half`.
 pub(crate) struct Principal<V> {
     /// Frobenius norm of the deviator.
     norm: V,
@@ -122,7 +122,7 @@ fn sorted<V: Vector>(norm: V, lone: V, half: V) -> [V; 3] {
 }
 
 impl<V: Vector> Principal<V> {
-    /// Takes a deviator apart.
+    /// Decomposes a deviator.
     #[inline(always)]
     pub(crate) fn of(from: &Lone<V>) -> Self {
         let one = V::splat(1.0);
@@ -138,7 +138,7 @@ impl<V: Vector> Principal<V> {
         ];
         // (U - a)(U - b) with the other two eigenvalues a and b, over its value for `lone`.
         let lone_square = lone * lone;
-        // A polynomial and a step of Newton's method take less time than a division.
+        // A polynomial and a step of Newton's method are faster than a division.
         let x = angle * angle;
         let (mut even, mut odd) = (V::splat(INVERSE[8]), V::splat(INVERSE[9]));
         for n in (0..4).rev() {

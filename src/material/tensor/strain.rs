@@ -1,7 +1,7 @@
-//! Logarithmic strains of elastic tensors and the way back: what all models in Hencky strains share.
+//! Logarithmic strains of elastic tensors, and their inverse: code that all models in Hencky strains share.
 //!
 //! Elastic strains of metals and soils are small, so most tensors are near a multiple of the unit tensor and
-//! need no eigenvectors (`near_unit.rs`). The others are decomposed; which way a particle goes follows from
+//! need no eigenvectors (`near_unit.rs`). The others are decomposed; the choice for a particle follows from
 //! its own state.
 use super::eigen::{Eigen, Symmetric, decompose};
 use super::near_unit::TraceFree;
@@ -22,8 +22,8 @@ pub(crate) struct Strain<V = Lanes> {
     far: Option<Far>,
 }
 
-/// Lanes that were decomposed. They are rare, and a function of their own has not the registers that a kernel
-/// may have.
+/// Lanes that were decomposed. They are rare, and handled by a separate function, which has narrower
+/// registers than a kernel may have.
 struct Far {
     lanes: Mask,
     eigen: Eigen,

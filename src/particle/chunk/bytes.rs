@@ -5,8 +5,8 @@ use super::{Chunk, Layout};
 use crate::particle::widest::Widest;
 
 impl<const D: usize> Chunk<D> {
-    /// Appends the particles as bytes: the number of columns of what they carry, then all columns. Nothing
-    /// without particles.
+    /// Appends the particles as bytes: the number of carried columns, then all columns. Nothing without
+    /// particles.
     pub fn append_to(&self, bytes: &mut Vec<u8>) {
         if self.is_empty() {
             return;

@@ -8,7 +8,7 @@ use bytemuck::{cast_slice, cast_slice_mut};
 use super::{Chunk, TILE};
 
 impl<const D: usize> Chunk<D> {
-    /// Columns of what particles carry; 0 in most leaves.
+    /// Number of carried columns; 0 in most leaves.
     pub fn carried_columns(&self) -> usize {
         self.carried
     }

@@ -1,4 +1,4 @@
-//! Particles come and go.
+//! Adding and removing particles.
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::{Chunk, Layout, TILE, Tag};
@@ -15,7 +15,7 @@ impl<const D: usize> Chunk<D> {
     }
 
     /// Appends a particle given by the words of its columns, with its identifier, its packed tag and the
-    /// words of what it carries.
+    /// words of its carried columns.
     pub fn push_words(&mut self, columns: &[u64], id: u64, tag: u64, carried: &[u64]) {
         // A leaf whose particles carry zeros alone needs no columns for them.
         if carried.iter().any(|&word| word != 0) {
@@ -124,8 +124,8 @@ impl<const D: usize> Chunk<D> {
         self.give_back();
     }
 
-    /// Gives back room once more than a quarter of what is needed stands empty, as in leaves that the
-    /// material has left.
+    /// Frees room once more than a quarter of the needed room is unused, as in leaves that the material has
+    /// left.
     fn give_back(&mut self) {
         if self.len == 0 {
             *self = Self::new();
@@ -145,8 +145,8 @@ impl<const D: usize> Chunk<D> {
     }
 
     /// Makes this chunk the particles `source[q]` of another, of which it has the identifiers, tags and these
-    /// columns. Other columns keep what they hold, which is zero in a chunk that only ever is filled in this
-    /// way. Keeps its memory from one time to the next. Whole tiles are copied fastest.
+    /// columns. Other columns keep their values, which are zero in a chunk that is filled in this way alone.
+    /// Keeps its memory from one time to the next. Whole tiles are copied fastest.
     pub fn gather_columns(&mut self, other: &Self, source: &[u32], columns: &[usize]) {
         if source.len() > self.capacity {
             let capacity = (source.len() + source.len() / 8).next_multiple_of(TILE);
@@ -182,7 +182,7 @@ impl<const D: usize> Chunk<D> {
         }
     }
 
-    /// Changes the number of tiles; what lies behind them moves along.
+    /// Changes the number of tiles; the words behind them move along.
     fn set_capacity(&mut self, capacity: usize) {
         let (before, len) = (self.capacity, self.len);
         let lines = capacity / TILE * self.columns();
@@ -192,7 +192,7 @@ impl<const D: usize> Chunk<D> {
         let words: &mut [u64] = cast_slice_mut(&mut self.block);
         let mut shift =
             |column: usize| words.copy_within(column * before..column * before + len, column * capacity);
-        // Those that would be overwritten go first.
+        // Columns that would be overwritten move first.
         let columns = Self::IDS..Self::CARRIED + self.carried;
         if capacity > before {
             columns.rev().for_each(shift)

@@ -1,7 +1,7 @@
 //! The particles of one leaf, in tiles of eight: an array of structures of arrays.
 //!
 //! A tile holds one line of the cache for each component of its particles, one after the other. A batch of a
-//! kernel is a tile, so that all that it reads and writes lies together, at offsets that the compiler knows.
+//! kernel is a tile, so that its data are contiguous, at offsets that the compiler knows.
 //!
 //! Order inside a chunk is part of the result: sums over particles run in this order, so it is changed only
 //! by rules that depend on tree and particles (see `docs/design/node-sums.md`, "Rules"), never by ranks or
@@ -13,10 +13,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `mod.rs` | the chunk, and access in place |
-//! | `edit.rs` | particles come and go |
+//! | `edit.rs` | adding and removing particles |
 //! | `bytes.rs` | chunks as bytes for other ranks |
 //! | `carried.rs` | columns that some particles carry for loads |
-//! | `place.rs` | which content a chunk has, and where in memory |
+//! | `place.rs` | revision of a chunk's content, and its place in memory |
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
 pub use self::place::{Place, Revision};
@@ -40,11 +40,11 @@ pub const TILE: usize = 8;
 #[repr(C, align(64))]
 struct Line([f64; TILE]);
 
-/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags, then what
-/// particles carry for loads, in leaves with such particles (see [`Chunk::carried`]).
+/// Particles of one leaf: tiles of `Layout::<D>::REALS` lines of `f64`, then ids, then tags, then carried
+/// columns, in leaves that have any (see [`Chunk::carried`]).
 ///
-/// All lie in one block, with room for whole tiles; lanes of the last tile behind the last particle hold
-/// anything. Leaves at the surface of a moving body become fuller or emptier all the time; in the heap each
+/// All lie in one block, with room for whole tiles; lanes of the last tile behind the last particle are
+/// undefined. Leaves at the surface of a moving body become fuller or emptier all the time; in the heap each
 /// size that they pass through would leave a hole that is too small for the next.
 #[derive(Clone, Debug, Default)]
 pub struct Chunk<const D: usize> {
@@ -52,7 +52,7 @@ pub struct Chunk<const D: usize> {
     capacity: usize,
     block: Block<Line>,
     widest: Widest,
-    /// Columns of what particles carry.
+    /// Number of carried columns.
     carried: usize,
     revision: Option<Revision>,
 }
@@ -128,7 +128,7 @@ impl<const D: usize> Chunk<D> {
         Self::CARRIED + self.carried
     }
 
-    /// Identifiers, tags, or a column of what particles carry.
+    /// Identifiers, tags, or a carried column.
     fn words(&self, column: usize) -> &[u64] {
         &cast_slice(&self.block)[column * self.capacity..][..self.len]
     }
@@ -183,8 +183,8 @@ impl<const D: usize> Chunk<D> {
         }
     }
 
-    /// Values in a column of [`TILE`] particles from `first` on; what lies behind the last particle is of no
-    /// use.
+    /// Values in a column of [`TILE`] particles from `first` on; values behind the last particle are
+    /// undefined.
     #[inline(always)]
     pub fn values(&self, column: usize, first: usize) -> [f64; TILE] {
         let line = first / TILE * Layout::<D>::REALS + column;
@@ -235,8 +235,8 @@ impl<const D: usize> Chunk<D> {
         self.widest.known().unwrap_or_else(|| self.column(Layout::<D>::HALF).greatest())
     }
 
-    /// Finds the greatest half width if something may have changed it, for [`Chunk::greatest_half`] to have
-    /// it at hand.
+    /// Updates the greatest half width if it may have changed, so that [`Chunk::greatest_half`] need not
+    /// search for it.
     pub fn note_greatest_half(&mut self) {
         if self.widest.known().is_none() {
             self.widest = Widest::of(self.column(Layout::<D>::HALF));

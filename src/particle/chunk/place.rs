@@ -1,12 +1,12 @@
-//! Which content a chunk has, and where it lies.
+//! Revision of a chunk's content, and its place in memory.
 use std::num::NonZeroU64;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{Layout, TILE};
 
-/// Names what the first particles of a chunk hold: as long as a chunk has the revision that it once had,
-/// these particles are what they were, where they were. Appending keeps it, every other change ends it, and
-/// no two contents have the same.
+/// Number of the content of a chunk: as long as a chunk has the same revision, the particles that it had then
+/// are unchanged, at the same indices. Appending keeps it, every other change ends it, and no two contents
+/// share one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Revision(NonZeroU64);
 
@@ -17,9 +17,8 @@ impl Revision {
     }
 }
 
-/// Where a chunk lies in memory: from the chunk that comes next, kernels fetch the first lines while they
-/// are still at work on this one. Holds no borrow; an address that is no longer right costs time and nothing
-/// else.
+/// Place of a chunk in memory: kernels prefetch the first lines of the next chunk while they work on this
+/// one. Holds no borrow; an outdated address costs time and nothing else.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     /// Address of the first tile; 0 if there are no particles.
@@ -29,7 +28,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Where the tile of particle `p` lies, and its tag.
+    /// Places of the tile and the tag of particle `p`.
     #[inline(always)]
     pub fn of_particle<const D: usize>(self, p: usize) -> Self {
         let tile = p / TILE * Layout::<D>::REALS * size_of::<[f64; TILE]>();

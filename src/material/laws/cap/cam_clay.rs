@@ -6,8 +6,8 @@
 //!
 //! The implicit step has one unknown, the stress ratio `η = q/p` at its end: the ellipse gives
 //! `p_c/p = 1 + η²/M²`, whose logarithm is linear in the plastic volume, so volume and stress follow from η,
-//! and what is left is the direction of flow, `2η Δe_p = (M² - η²) Δe_q`. The root is bracketed by the
-//! critical state and the ratio without plastic volume.
+//! and the direction of flow remains, `2η Δe_p = (M² - η²) Δe_q`. The root is bracketed by the critical state
+//! and the ratio without plastic volume.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -141,7 +141,7 @@ impl Law for CamClay {
         let log = trial.trace.neg_mul_add(V::splat(1.0 / self.swelling), V::splat(self.pressure_log));
         let preconsolidation =
             gain.neg_mul_add(V::splat(1.0 / self.plastic), V::splat(self.preconsolidation_log));
-        // Bounded, so that the root of its exponential is a number.
+        // Bounded, so that the root of its exponential is finite.
         let distance = (preconsolidation - log).min(V::splat(690.0));
         let strain = trial.norm * (2.0_f64 / 3.0).sqrt();
         let ellipse = exp(distance) - one;
@@ -192,7 +192,7 @@ impl Law for CamClay {
         state.wave_speed = (modulus * (1.0 / self.density)).sqrt();
     }
 
-    /// `W = κ p + G |dev ε|²`, 0 where pressure and shear are gone.
+    /// `W = κ p + G |dev ε|²`, 0 without pressure and shear.
     #[inline(always)]
     fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V {
         let Strain { trace, norm, .. } = Strain::of(&state.elastic, plane);

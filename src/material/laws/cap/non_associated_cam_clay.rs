@@ -4,7 +4,7 @@
 //! `y = (1 + 2β) q² + M² (p + β p₀)(p - p₀)` with `p₀ = κ (10⁻⁵ + sinh(ξ max(ε_c, 0)))`, ε_c the strain to
 //! which it is consolidated. Beyond the tips of the ellipse the stress returns to them; else its deviator
 //! shrinks to the ellipse at constant pressure. ε_c changes by the volume that is lost, as if the stress had
-//! gone straight to the centre. p₀ is that of the start of the step.
+//! moved straight to the centre. p₀ is that of the start of the step.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +70,7 @@ impl Model for NonAssociatedCamClay {
     }
 }
 
-/// The elastic tensor taken apart.
+/// Invariants of the elastic tensor.
 #[derive(Clone, Copy)]
 struct RegridTimers<V> {
     /// J².
@@ -137,7 +137,7 @@ impl Law for NonAssociatedCamClay {
         let norm = xx.mul_add(xx, yy.mul_add(yy, zz.mul_add(zz, shear + shear))).sqrt();
         let size = norm * trial.scale * self.mu;
         let pressure = (one - trial.square) * (0.5 * kappa);
-        // No strain is so great that its strength is no number.
+        // The strength is finite for any strain.
         let power = exp((consolidation.max(zero) * p.compaction_exponent).min(V::splat(300.0)));
         let strength = (power - one / power).mul_add(V::splat(0.5 * kappa), V::splat(1e-5 * kappa));
         let tension = strength * -beta;
