@@ -74,7 +74,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         measure_all(comm, &jobs, extent, &directory, arguments.json)
     });
     if comm.rank() == 0 {
-        // Only telemetry of these runs; if it cannot be removed, the system will some day.
+        // Only telemetry of these runs; if it cannot be removed, the system does so in time.
         let _ = std::fs::remove_dir_all(&directory);
     }
     together(comm, done)

@@ -28,7 +28,7 @@ pub struct Arguments {
     changes: Changes,
 }
 
-/// Reads the job and prints what it will take.
+/// Reads the job and prints its size and cost.
 ///
 /// # Errors
 /// The job is wrong.
@@ -86,8 +86,8 @@ fn report<const D: usize>(
 /// the particles themselves.
 const MOST_MEMORY: f64 = 90e6;
 
-/// The estimate for the tree at the start, which criteria have refined, and what particles carry of each
-/// load; if that tree is of moderate size.
+/// The estimate for the tree at the start, which criteria have refined, and the totals that particles carry
+/// of each load; if that tree is of moderate size.
 fn start<const D: usize>(
     problem: &Problem<D>,
     estimate: &Estimate,
@@ -100,7 +100,7 @@ fn start<const D: usize>(
     let comm = world.comm();
     let fits = |size| if tree_memory::<D>(size) < MOST_MEMORY { Ok(()) } else { Err(()) };
     let solver = setup::solver_within(comm, problem, fits);
-    // Whatever is wrong at the start is wrong with the job.
+    // A fault of the first state is one of the job.
     let Ok(solver) = solver.map_err(|error| Failure::Usage(error.to_string()))? else { return Ok(None) };
     let mut bodies = vec![0; problem.bodies.len()];
     for &tag in solver.chunks.iter().flat_map(|chunk| chunk.tags()) {

@@ -1,5 +1,5 @@
-//! Command line: one file per subcommand, and `shared/` for what several need. The only part of the library
-//! that prints.
+//! Command line: one file per subcommand, and `shared/` for code that several need. The only part of the
+//! library that prints.
 use crate::job::JobError;
 use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};
@@ -80,16 +80,16 @@ pub enum Failure {
     /// The command cannot be carried out as given.
     #[error("{0}")]
     Usage(String),
-    /// Something failed while the command ran.
+    /// A failure while the command ran.
     #[error("{0}")]
     Run(String),
-    /// The run was asked to stop and has written a checkpoint.
+    /// The run has stopped on request and written a checkpoint.
     #[error("stopped on request; continue with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
-    /// The sweep was asked to stop, as was its run.
+    /// The sweep and its run have stopped on request.
     #[error("stopped on request; the same command continues")]
     SweepStopped,
-    /// The user knows all; what is left is to end with this exit code.
+    /// The user has all messages; the program ends with this exit code.
     #[error("a failure that has been reported")]
     Reported(u8),
 }
@@ -98,7 +98,7 @@ pub enum Failure {
 const BAD_INPUT: u8 = 2;
 
 impl Failure {
-    /// 2 for wrong input, 1 for what goes wrong later, 3 after a stop on request.
+    /// 2 for wrong input, 1 for later failures, 3 after a stop on request.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Job(_) | Self::Seed(_) | Self::Usage(_) => BAD_INPUT,
@@ -114,7 +114,7 @@ impl Failure {
 impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
         match error.kind() {
-            // Whoever listened has heard enough, as in `agimp schema | head`.
+            // The reader has closed the pipe, as in `agimp schema | head`.
             std::io::ErrorKind::BrokenPipe => Self::Reported(0),
             _ => Self::Run(format!("cannot write: {error}")),
         }
@@ -124,7 +124,7 @@ impl From<std::io::Error> for Failure {
 /// Carries out a command.
 ///
 /// # Errors
-/// Wrong input, or a failure on the way; [`Failure::exit_code`] says which.
+/// Wrong input, or a failure on the way; [`Failure::exit_code`] distinguishes them.
 pub fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Run(arguments) => run::execute(&arguments),

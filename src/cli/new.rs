@@ -61,7 +61,7 @@ const TEMPLATES: &[Template] = templates![
     "snow_bunny" with "meshes/bunny.obj";
 ];
 
-/// File that editors complete and check job files by.
+/// File by which editors complete and check job files.
 const SCHEMA: &str = "agimp.schema.json";
 
 /// Arguments of `agimp new`.
@@ -130,7 +130,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Template {
-    /// The job, with the settings that make it quick unless it is to be as the project has it.
+    /// The job, with the settings that make it quick unless `full`.
     fn text(&self, full: bool) -> Result<String, Failure> {
         if full || self.quick.is_empty() {
             return Ok(self.text.to_owned());

@@ -43,7 +43,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// The words that decide what a run does. Threads and messages are each rank's own affair.
+    /// The words that decide the results of a run. Threads and messages may differ between ranks.
     fn words<'a>(&'a self, settings: &'a Settings) -> Vec<&'a OsStr> {
         let mut words = vec![OsStr::new("run"), self.job.as_os_str()];
         words.extend(settings.words());
@@ -105,8 +105,7 @@ fn page(results: &Results, job: &Path) -> Result<PathBuf, String> {
     Ok(path)
 }
 
-/// Collective. Warns of what is likely not meant in the job, once, when a run starts anew. Returns the
-/// warnings.
+/// Collective. Warns of likely mistakes in the job, once, when a run starts anew. Returns the warnings.
 fn warned<const D: usize>(comm: &Comm, problem: &Problem<D>, is_new: bool) -> Result<Vec<String>, Failure> {
     let (_, steps) = steps(problem).map_err(|error| Failure::Usage(error.to_string()))?;
     let found = if comm.rank() == 0 && is_new { warnings(problem, steps) } else { Vec::new() };
@@ -129,7 +128,7 @@ fn conclude(
     match outcome {
         Ok(Outcome::Finished(summary)) => {
             if let Some(results) = speaks_of {
-                // The run is complete and its results are on disk, whether somebody listens or not.
+                // The run is complete and its results are on disk, whether or not its output is read.
                 let _ = print(&mut std::io::stdout().lock(), &summary, page.as_ref(), results);
             }
             Ok(())
@@ -195,7 +194,7 @@ fn print(
     Ok(())
 }
 
-/// A path as a shell takes it for one word, and no program for an option.
+/// A path quoted such that a shell takes it for one word, and no program for an option.
 fn shell_word(path: &Path) -> String {
     let text = path.to_string_lossy();
     let text = if text.starts_with('-') { format!("./{text}").into() } else { text };

@@ -79,7 +79,7 @@ pub struct NodeWeights {
 /// Carries out `agimp weights`.
 ///
 /// # Errors
-/// The file cannot be read, or asks for something that makes no sense.
+/// The file cannot be read, or asks for something impossible.
 pub fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let world = World::init().map_err(|error| Failure::Run(error.to_string()))?;
     let comm = world.comm();

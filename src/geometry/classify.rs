@@ -1,4 +1,4 @@
-//! Where an axis-aligned box lies with respect to a shape.
+//! Position of an axis-aligned box with respect to a shape.
 use super::{Aabb, Frustum, Shape};
 
 /// The side of a shape's surface on which a box lies.
@@ -23,9 +23,9 @@ impl Side {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Classifies a box. `Inside` and `Outside` are certain; `Crosses` may be said of a box near the
-    /// surface that does not cross it. Exact for boxes, balls, half-spaces, upright cylinders and for
-    /// unions of what is outside or intersections of what is inside.
+    /// Classifies a box. `Inside` and `Outside` are certain; a box near the surface may get `Crosses`
+    /// although it does not cross it. Exact for boxes, balls, half-spaces, upright cylinders, for the outside
+    /// of their unions and for the inside of their intersections.
     pub fn classify(&self, cell: &Aabb<D>) -> Side {
         match self {
             Self::Box(aabb) => Side::of(
@@ -57,9 +57,9 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// The distance changes by no more than the way gone, so the centre speaks for its ball.
+    /// The distance is 1-Lipschitz, so the centre decides for the ball around it.
     fn classify_by_distance(&self, cell: &Aabb<D>) -> Side {
-        // A polygon has no extent along a third axis; it stands only in 2D.
+        // A polygon has no extent along a third axis; it exists only in 2D.
         let (distance, radius) = (self.distance(&cell.centre()), cell.half_diagonal());
         Side::of(distance <= -radius, distance >= radius)
     }
@@ -179,8 +179,8 @@ mod tests {
             }
         }
 
-        /// Distances have the sign of membership, change no faster than the point moves, and the
-        /// bounds hold every point of the shape.
+        /// Distances have the sign of membership, are 1-Lipschitz, and the bounds contain every point of the
+        /// shape.
         #[test]
         fn distances_and_bounds(
             x in prop::array::uniform3(-0.2_f64..1.2),

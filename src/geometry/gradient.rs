@@ -84,11 +84,11 @@ fn of_frustum<const D: usize>(frustum: &Frustum<D>, x: &[f64; D]) -> [f64; D] {
     let across: [f64; D] = std::array::from_fn(|a| (-t).mul_add(axis[a], from_base[a]));
     let r = across.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt();
     let (foot, head) = ([lower_radius, 0.0], [upper_radius, height]);
-    // Round the profile counter-clockwise; the axis is no surface.
+    // Counter-clockwise around the profile; the axis is no surface.
     let profile = [([0.0, 0.0], foot), (foot, head), (head, [0.0, height])];
     let inside = Shape::Frustum(*frustum).distance(x) < 0.0;
     let [outward, along] = nearest_normal(profile.into_iter(), [r, t], inside);
-    // On the axis every direction across it is as near as any other.
+    // On the axis all directions across it are equally near.
     let radial = unit(across).or_else(|| {
         let other = (0..D).fold(0, |best, a| if axis[a].abs() < axis[best].abs() { a } else { best });
         unit(std::array::from_fn(|a| f64::from(u8::from(a == other)) - axis[other] * axis[a]))
@@ -108,9 +108,9 @@ fn of_polygon(points: &[[f64; 2]], q: [f64; 2], inside: bool) -> [f64; 2] {
     }
 }
 
-/// Gradient of the distance to the nearest of the edges, which run counter-clockwise round the inside. Beside
-/// an edge it is the edge's normal, which has no rounding that grows near the surface; round a corner the way
-/// from it.
+/// Gradient of the distance to the nearest of the edges, which run counter-clockwise around the inside.
+/// Beside an edge it is the edge's normal, whose rounding does not grow near the surface; around a corner the
+/// direction away from it.
 fn nearest_normal(edges: impl Iterator<Item = ([f64; 2], [f64; 2])>, q: [f64; 2], inside: bool) -> [f64; 2] {
     let mut best = (f64::INFINITY, [0.0, 1.0]);
     for (a, b) in edges {
@@ -165,14 +165,14 @@ mod tests {
         ]
     }
 
-    /// A unit vector along which the distance grows as fast as the point moves.
+    /// A unit vector along which the distance grows at the rate 1.
     fn check<const D: usize>(shape: &Shape<D>, x: [f64; D]) -> Result<(), TestCaseError> {
         const STEP: f64 = 1e-7;
         let gradient = shape.gradient(&x);
         let length = gradient.iter().map(|c| c * c).sum::<f64>();
         prop_assert!((length - 1.0).abs() < 1e-12, "{shape:?} {x:?} {gradient:?}");
         let at = |t: f64| shape.distance(&std::array::from_fn(|a| t.mul_add(gradient[a], x[a])));
-        // Next to an edge of the gradient one of the two sides is another one's.
+        // Near a discontinuity of the gradient one of the two sides has another nearest face.
         let (ahead, behind) = ((at(STEP) - at(0.0)) / STEP, (at(0.0) - at(-STEP)) / STEP);
         prop_assert!(ahead.max(behind) > 1.0 - 1e-6, "{shape:?} {x:?} {gradient:?} {ahead} {behind}");
         Ok(())

@@ -81,7 +81,7 @@ impl<const D: usize> Aabb<D> {
         }
     }
 
-    /// True when the box holds no open set.
+    /// True when the box contains no open set.
     pub fn is_empty(&self) -> bool {
         // `!(<)` rather than `>=`, so that a NaN corner counts as empty.
         (0..D).any(|a| self.lower[a].partial_cmp(&self.upper[a]) != Some(std::cmp::Ordering::Less))

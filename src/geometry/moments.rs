@@ -163,8 +163,8 @@ fn of_mesh<const D: usize>(mesh: &Mesh) -> Option<Moments<D>> {
     (mesh.volume() > 0.0).then_some(Moments { volume, centre: std::array::from_fn(|a| centre[a]), second })
 }
 
-/// Cells of an octree over the shape: those that the surface may cross are divided, and of the last ones
-/// counts what a plane at the distance of their centre cuts off.
+/// Cells of an octree over the shape: those that the surface may cross are divided, and of the last ones the
+/// part counts that a plane at the distance of their centre cuts off.
 fn of_cells<const D: usize>(shape: &Shape<D>) -> Option<Moments<D>> {
     let bounds = shape.bounds();
     if bounds.lower.iter().chain(&bounds.upper).any(|c| !c.is_finite()) || bounds.is_empty() {

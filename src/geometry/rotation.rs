@@ -5,7 +5,7 @@
 pub fn rotation<const D: usize>(axis: [f64; 3], angle: f64) -> [[f64; D]; D] {
     let [x, y, z] = axis;
     let k = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    // Own elementary functions: what comes of it must not depend on the machine's library.
+    // `libm`, since results must not depend on the library of the machine.
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
     std::array::from_fn(|i| {
         std::array::from_fn(|j| {

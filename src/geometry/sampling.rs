@@ -1,18 +1,18 @@
-//! Where the particles of a body lie in the cells of their lattice.
+//! Places of the particles of a body in the cells of their lattice.
 //!
-//! Each point of the lattice has one particle. Places depend on nothing but the place in the lattice, so that
-//! they are the same on any ranks: jitter comes from a hash of it (splitmix64, Steele, Lea and Flood 2014),
-//! blue noise from a tile that fills space.
+//! Each point of the lattice has one particle. Its place depends on the indices in the lattice alone, so that
+//! it is the same on any ranks: jitter comes from a hash of it (splitmix64, Steele, Lea and Flood 2014), blue
+//! noise from a tile that fills space.
 //!
 //! The tile is made once: points of a jittered lattice that repel each other over the distance of particles,
-//! as soft balls do, across the faces of the tile as well. What is left is dense, and without order beyond
+//! as soft balls do, across the faces of the tile as well. The result is dense, and without order beyond
 //! neighbours. No point leaves its leaf, so that each leaf has as many as on the lattice.
 use std::sync::Arc;
 
 /// Greatest jitter along each axis, as a share of the distance of particles.
 const JITTER: f64 = 0.35;
 
-/// The same of the points from which a tile begins: of the order of the lattice nothing is left.
+/// The same of the points from which a tile starts: they keep no order of the lattice.
 const LOOSE: f64 = 1.0;
 
 /// Rounds in which the points of a tile move apart.
@@ -22,7 +22,7 @@ const ROUNDS: usize = 30;
 /// have.
 const REPULSION: f64 = 1.2;
 
-/// Share of an overlap that a round takes away.
+/// Share of an overlap that a round removes.
 const STIFFNESS: f64 = 0.2;
 
 /// Most points of a tile along an edge, unless a leaf has more.
@@ -30,7 +30,7 @@ const fn longest(d: usize) -> usize {
     if d == 2 { 32 } else { 16 }
 }
 
-/// How the particles of a body lie.
+/// Arrangement of the particles of a body.
 #[derive(Clone, Debug, Default)]
 pub enum Sampling<const D: usize> {
     /// On the lattice.
@@ -42,7 +42,8 @@ pub enum Sampling<const D: usize> {
     Poisson(Arc<Tile<D>>),
 }
 
-/// Ways of points from their places in the lattice, in distances of particles, over a box that repeats.
+/// Displacements of points from their places in the lattice, in distances of particles, over a box that
+/// repeats.
 #[derive(Debug)]
 pub struct Tile<const D: usize> {
     edge: usize,
@@ -55,8 +56,8 @@ impl<const D: usize> Sampling<D> {
         Self::Poisson(Arc::new(Tile::new(along_leaf)))
     }
 
-    /// Way from a point of the lattice to its particle, in distances of particles; leaves of different levels
-    /// have lattices of their own.
+    /// Displacement from a point of the lattice to its particle, in distances of particles; leaves of
+    /// different levels have lattices of their own.
     pub fn way(&self, index: &[u64; D], level: u8) -> [f64; D] {
         match self {
             Self::Lattice => [0.0; D],

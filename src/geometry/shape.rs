@@ -107,8 +107,8 @@ impl<const D: usize> Shape<D> {
 
     /// True when the point belongs to the shape.
     ///
-    /// Boxes own their lower faces, other primitives no surface point; what a difference removes and
-    /// what it leaves never share a point nor leave one out.
+    /// Boxes own their lower faces, other primitives no surface point; the removed and the remaining part of
+    /// a difference never share a point nor leave one out.
     pub fn contains(&self, x: &[f64; D]) -> bool {
         match self {
             Self::Box(aabb) => aabb.contains(x),

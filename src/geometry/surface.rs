@@ -1,11 +1,11 @@
 //! Pieces of the surface of a region in a box: their area vectors, which point out of the region.
 //!
-//! Where the surface lies on faces of the box, each such face gives a piece. What lies inside the box is one
-//! piece more: the part of the region in the box has a closed surface, the sum of whose area vectors is 0, so
-//! that the piece is minus the sum over the faces of the box of their parts in the region. Both need no more
-//! than membership along lines. Plane surfaces on faces of boxes have their exact area; a plane anywhere else
-//! has it as well, but for boxes that its edges cross, and a curved surface to the second order of the edge
-//! of the box.
+//! Where the surface lies on faces of the box, each such face gives a piece. The surface inside the box is
+//! one more piece: the part of the region in the box has a closed surface, the sum of whose area vectors is
+//! 0, so that the piece is minus the sum over the faces of the box of their parts in the region. Both need no
+//! more than membership along lines. Plane surfaces on faces of boxes have their exact area; a plane anywhere
+//! else has it as well, but for boxes that its edges cross, and a curved surface to the second order of the
+//! edge of the box.
 use super::Aabb;
 
 /// A piece of surface.
@@ -68,7 +68,7 @@ pub fn patches<const D: usize>(region: &Region<'_, D>, cell: &Aabb<D>) -> Vec<Pa
     if size > LEAST * face_area {
         let mut centre = (region.project)(&cell.centre());
         (0..D).for_each(|a| centre[a] = centre[a].clamp(cell.lower[a], cell.upper[a]));
-        // Rounding of the projection must not hide it.
+        // Far enough out that rounding of the projection does not matter.
         let out = std::array::from_fn(|a| 1e-3f64.mul_add(edge * closing[a] / size, centre[a]));
         if (region.free)(&out) && (region.counts)(&centre) {
             found.push(Patch { area: closing, centre, is_on_face: false });
@@ -140,7 +140,7 @@ fn share_of_line<const D: usize>(
         line.moment += 0.5 * (to - from) * (to + from);
     };
     let mut crossings = 0;
-    // The ends speak for what lies just inside of them, whatever side of the surface rounding takes them to.
+    // The ends count as the points just inside of them, whatever side of the surface rounding moves them to.
     let place = |part: usize| part as f64 / PARTS as f64;
     let looked_at = |part: usize| place(part).clamp(BESIDE, 1.0 - BESIDE);
     let mut before = has(looked_at(0));

@@ -1,8 +1,7 @@
 //! Job files: the input of a run.
 //!
-//! A file is parsed to a tree that knows where everything stands ([`load`]), checked against the
-//! schema (keys, types, ranges), then against itself (names, shapes, overlaps), and becomes a
-//! [`Problem`] of its dimension.
+//! A file is parsed to a tree of values with their places ([`load`]), checked against the schema (keys,
+//! types, ranges), then against itself (names, shapes, overlaps), and becomes a [`Problem`] of its dimension.
 mod convert;
 mod difference;
 mod parse;
@@ -85,7 +84,7 @@ pub fn from_bytes(bytes: Vec<u8>, path: &Path, settings: &Settings) -> Result<An
         .map_err(|faults| FaultList { path: path.to_path_buf(), text, faults }.into())
 }
 
-/// The text of a job with some values set, comments and all. `name` stands for it in messages.
+/// The text of a job with some values set, comments and all. `name` is its name in messages.
 ///
 /// # Errors
 /// A setting leads nowhere.
@@ -139,7 +138,7 @@ fn parse_edited(
     if !faults.is_empty() {
         return Err(faults);
     }
-    // The types accept all that the schema accepts; should they ever differ, the parser's words count.
+    // The types accept all that the schema accepts; should they ever differ, the parser's error is reported.
     let file: schema::job_file::JobFile = toml::from_str(text)
         .map_err(|error| alone(error.span().unwrap_or(0..0), error.message().to_owned()))?;
     let lines = Lines::of(original);

@@ -164,11 +164,11 @@ pub struct Problem<const D: usize> {
     pub face_forces: bool,
     /// Measurements of the material.
     pub probes: Vec<Probe<D>>,
-    /// Particles that it follows.
+    /// Particles that the history follows.
     pub tracks: Vec<Track<D>>,
-    /// Where it counts mass that passes.
+    /// Sections through which passing mass is counted.
     pub fluxes: Vec<Flux>,
-    /// Lines with tables of their own, a row of the history apart.
+    /// Lines with tables of their own, with rows at those of the history.
     pub lines: Vec<Line<D>>,
     /// Rasters with the largest depths and speeds.
     pub maps: Vec<Map>,
@@ -200,7 +200,7 @@ impl<const D: usize> Problem<D> {
         Aabb::new(octant.coord.map(|c| f64::from(c) * edge), octant.coord.map(|c| f64::from(c + 1) * edge))
     }
 
-    /// A point in the coordinates of the job, m, with z = 0 in plane strain: where quantities are taken.
+    /// A point in the coordinates of the job, m, with z = 0 in plane strain: the argument of quantities.
     pub fn place(&self, x: &[f64; D]) -> [f64; 3] {
         in_job(&self.origin, x)
     }
@@ -215,14 +215,14 @@ impl<const D: usize> Problem<D> {
         (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
     }
 
-    /// Whether two bodies with shapes of their own come with the same stage. Where what came earlier lies by
-    /// then, no shape says.
+    /// Whether two bodies with shapes of their own come with the same stage. The place of earlier bodies by
+    /// then is not that of their shapes.
     pub fn come_together(&self, first: usize, second: usize) -> bool {
         let [first, second] = [first, second].map(|body| &self.bodies[body]);
         first.given.is_none() && second.given.is_none() && first.stage == second.stage
     }
 
-    /// Gravity at the start of a stage, its time counted from there or from where it began to hold.
+    /// Gravity of a stage, its time counted from the start of the stage that has set it.
     pub fn gravity_of_stage(&self, stage: usize) -> &Gravity<D> {
         let mut changes = self.stages[..=stage].iter().rev().filter_map(|stage| stage.gravity.as_ref());
         changes.next().unwrap_or(&self.gravity)
@@ -233,8 +233,7 @@ impl<const D: usize> Problem<D> {
         self.tree.regions.iter().map(|region| region.level).fold(self.tree.base_level, u8::max)
     }
 
-    /// True when the job wants the leaf finer: a region that it crosses or lies in asks for a deeper
-    /// level.
+    /// True when the job asks for a finer leaf: a region that it crosses or lies in asks for a deeper level.
     pub fn wants_refinement(&self, octant: &Octant<D>) -> bool {
         let regions = self.tree.regions.iter().map(|region| (&region.shape, region.level));
         octant.level < least_level(self.tree.base_level, regions, &self.octant_box(octant))
@@ -293,15 +292,15 @@ pub struct Body<const D: usize> {
     pub stage: usize,
     /// Particles per cell along each axis; not necessarily a whole number.
     pub particles_per_cell: f64,
-    /// How its particles lie about the points of the lattice.
+    /// Arrangement of its particles about the points of the lattice.
     pub sampling: Sampling<D>,
-    /// Stress at the start, if it does not begin without.
+    /// Stress at the start, if there is any.
     pub stress: Option<InitialStress>,
     /// Its particles, where the job gives them one by one; the shape then is a box about them.
     pub given: Option<Arc<Given<D>>>,
 }
 
-/// A stage of the run: what it changes at its start, and when it ends.
+/// A stage of the run: its changes at the start, and its end.
 #[derive(Clone, Debug)]
 pub struct Stage<const D: usize> {
     /// Name; empty in a job without stages.
@@ -310,7 +309,7 @@ pub struct Stage<const D: usize> {
     pub duration: f64,
     /// Equilibrium to which kinetic damping leads, and at which the stage ends.
     pub equilibrium: Option<Equilibrium>,
-    /// Bodies that are taken away.
+    /// Bodies that are removed.
     pub removed: Vec<usize>,
     /// Bodies with their new materials.
     pub materials: Vec<(usize, usize)>,
@@ -443,7 +442,7 @@ pub struct OutputSetup {
     pub restart: bool,
     /// Whether a picture of the last state is drawn.
     pub picture: bool,
-    /// Field that colours it; `None`: what suits the materials.
+    /// Field that colours it; `None`: by the materials.
     pub picture_field: Option<Field>,
     /// Whether the run ends with a page for a browser.
     pub report: bool,

@@ -27,7 +27,7 @@ fn digest_is_of_what_changes_the_state() {
         assert!(JOB.contains(from));
         assert_ne!(digest(JOB), digest(&JOB.replace(from, to)), "{to}");
     }
-    // Comments and the way numbers are written are not the state.
+    // Comments and the notation of numbers do not belong to the state.
     assert_eq!(digest(JOB), digest(&JOB.replace("young = 3e5", "young = 300000 # Pa")));
 }
 
@@ -44,7 +44,7 @@ fn coordinates_are_relative_to_the_lower_corner() {
     assert_eq!((base, up), ([0.288, 0.288, 0.0], 2));
 }
 
-/// The schema names limits that the tree has.
+/// The schema has the limits of the tree.
 #[test]
 fn deepest_level_in_the_schema_is_the_trees() {
     let schema = schema();
@@ -60,8 +60,7 @@ fn text_that_is_not_toml_is_a_fault_with_a_place() {
     assert!(faults[0].span.start >= 12, "{faults:?}");
 }
 
-/// Included tables are those of the job; what is wrong with them is said of their file, and what is wrong
-/// with the job of the job.
+/// Included tables are those of the job; faults in them name their file, and faults in the job name the job.
 #[test]
 fn faults_of_included_files_name_these() {
     let directory = tempfile::tempdir().unwrap();
@@ -98,7 +97,7 @@ fn faults_of_included_files_name_these() {
     let AnyProblem::Three(problem) = load(&path).unwrap() else { panic!("3D") };
     let place = &problem.bodies[0].place;
     assert!(place.file.ends_with("bodies.toml") && place.line > 2 && place.line < 12, "{place}");
-    // Settings hold for what is included too.
+    // Settings also change included tables.
     let mut settings = Settings::default();
     settings.set("materials.0.density=-1").unwrap();
     text(&job, &materials).unwrap();

@@ -1,4 +1,4 @@
-//! `agimp diff`: where the states in two files differ.
+//! `agimp diff`: differences between the states in two files.
 use crate::cli::Failure;
 use crate::io::snapshot::compare::diff;
 use std::io::Write;

@@ -16,8 +16,8 @@ pub(super) struct Given {
 }
 
 impl Given {
-    /// Files with particles. What a pattern such as `out/a/*.hdf` finds of the tree is passed over, as the
-    /// outputs are there as well.
+    /// Files with particles. Files of the tree that match a pattern such as `out/a/*.hdf` are skipped, as the
+    /// outputs match as well.
     ///
     /// # Errors
     /// A word means no files, or only files of the tree.
@@ -52,7 +52,7 @@ impl Given {
     }
 }
 
-/// The files that a word means, and the index that stands for them, if it is not a file itself.
+/// The files that a word means, and the index that names them, if the word is not a file itself.
 fn meant(word: &Path) -> Result<(Option<PathBuf>, Vec<PathBuf>), Failure> {
     let ending = word.extension().unwrap_or_default();
     if word.is_dir() {
@@ -159,7 +159,7 @@ mod tests {
         let pattern = ["a_000000.hdf", "a_000001.hdf", "a_000001.tree.hdf"].map(|name| here.join(name));
         assert_eq!(names(&given(&pattern).unwrap().files), both);
         assert_eq!(given(&pattern).unwrap().first, pattern[0]);
-        // A tree alone is refused with a word of what was meant.
+        // A tree alone is refused, with a hint to its output.
         let told = given(&pattern[2..]).err().unwrap();
         assert!(
             told.contains("a_000001.tree.hdf: found the tree") && told.ends_with("a_000001.hdf"),

@@ -1,4 +1,4 @@
-//! `agimp info`: what is in an output or checkpoint file.
+//! `agimp info`: contents of output and checkpoint files.
 use super::given::Given;
 use crate::cli::Failure;
 use crate::io::hdf5_file::{FileError, Reader};
@@ -29,7 +29,7 @@ struct Contents {
     levels: BTreeMap<u8, (u64, u64)>,
 }
 
-/// Prints what is in each file.
+/// Prints the contents of each file.
 ///
 /// # Errors
 /// The file is damaged or not of this program.

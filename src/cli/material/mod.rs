@@ -1,11 +1,11 @@
 //! `agimp material`: drives one particle of a model along a path of strains and stresses.
 //!
-//! | file | what it holds |
+//! | file | content |
 //! |---|---|
 //! | `mod.rs` | arguments, errors, and the drive itself |
 //! | `path.rs` | paths from files |
 //! | `trial.rs` | tests of the laboratory as paths |
-//! | `table.rs` | what is printed of each state |
+//! | `table.rs` | columns of each state |
 //! | `chart.rs` | the states as a picture |
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -88,7 +88,7 @@ enum MaterialError {
         /// The system's reason.
         error: std::io::Error,
     },
-    /// The text of the model is none.
+    /// The text is no model.
     #[error(transparent)]
     Model(#[from] NotAModel),
     /// The density is not above zero.
@@ -112,7 +112,7 @@ enum MaterialError {
         /// The fault in it.
         reason: String,
     },
-    /// A stress of a row cannot be had.
+    /// No strain has the stress of a row.
     #[error("{place}, row {row}: {reason}")]
     Stress {
         /// The file or the test.
@@ -165,7 +165,7 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     let (place, drive) = match (&args.path, args.test) {
         (_, Some(test)) => ("--test".to_owned(), Drive::Control(trial::rows(test, args)?)),
         (Some(path), None) => (path.display().to_string(), path::read_path(path)?),
-        // clap wants one of them.
+        // clap requires one of them.
         (None, None) => (String::new(), Drive::Deformation(Vec::new())),
     };
     let material = build(&parameters, args.density);

@@ -148,7 +148,7 @@ pub(super) fn read_path(path: &Path) -> Result<Drive, MaterialError> {
     Ok(Drive::Deformation(path))
 }
 
-/// Whether a header names what is prescribed: strains, stresses, the shear or the time.
+/// Whether a header names prescribed components: strains, stresses, the shear or the time.
 fn is_control(header: &str) -> bool {
     let begins = |name: &str| name.starts_with("strain_") || name.starts_with("stress_");
     header.split(',').map(str::trim).any(|name| begins(name) || matches!(name, "shear" | "time"))

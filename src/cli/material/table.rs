@@ -47,7 +47,7 @@ impl Table {
         Self { names, histories: histories.len(), rows: Vec::new(), invariants: Vec::new() }
     }
 
-    /// Notes a state.
+    /// Appends a state.
     pub(super) fn push(&mut self, stage: &Stage) {
         let Stage { time, gradient, point } = stage;
         let volume = determinant(gradient);
@@ -70,7 +70,7 @@ impl Table {
     /// Writes CSV.
     ///
     /// # Errors
-    /// `out` takes no more.
+    /// `out` cannot be written.
     pub(super) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         writeln!(out, "row,{}", self.names.join(","))?;
         for (i, row) in self.rows.iter().enumerate() {

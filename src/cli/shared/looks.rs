@@ -82,7 +82,7 @@ fn zoom(text: &str) -> Result<f64, String> {
     zoom.ok_or_else(|| "expected a number from 0.01 to 1000".into())
 }
 
-/// Title of what shows an output: the given one, else that of the job that wrote the output, else `name`.
+/// Title of a picture of an output: the given one, else that of the job that wrote the output, else `name`.
 pub(in crate::cli) fn title(given: Option<&str>, output: Option<&Path>, name: &str) -> String {
     let of_job = || output.filter(|output| output.is_file()).and_then(scene::title_of);
     given.map(str::to_owned).or_else(of_job).unwrap_or_else(|| name.to_owned())
@@ -114,8 +114,7 @@ impl Looks {
         }
     }
 
-    /// The job of outputs, for what is drawn beside the fields of particles; a warning where colliders cannot
-    /// be.
+    /// The job of outputs, for colliders and boxes in pictures; a warning where colliders cannot be drawn.
     fn job(&self, output: &Path) -> Option<AnyProblem> {
         if !output.is_file() {
             return None;

@@ -1,4 +1,4 @@
-//! How failures and warnings are reported: once, whatever the number of ranks.
+//! Reports of failures and warnings: once, whatever the number of ranks.
 use std::io::{IsTerminal as _, Write as _};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, Report};
@@ -11,21 +11,21 @@ use crate::job::{FaultList, JobError};
 use crate::text::{excerpt, printable};
 
 impl Failure {
-    /// Reports the failure on standard error, unless that is done.
+    /// Reports the failure on standard error, unless it was reported already.
     pub fn report(&self) {
         match self {
             Self::Job(JobError::Invalid(list)) => explain_faults(list),
             Self::Reported(_) => {}
-            // If nobody listens, there is nobody to report to.
+            // A closed pipe is ignored.
             Self::Arguments(error) => drop(error.print()),
             other => print(&format!("agimp: {}", visible(&other.to_string()))),
         }
     }
 }
 
-/// Collective. A failure of one rank or of all ends all: the lowest of those that failed says why, and every
-/// rank gets its exit code. None goes on before that is said: as soon as one rank has ended without success,
-/// `mpirun` ends the others, whatever these still have to say.
+/// Collective. A failure of one rank or of all ends all: the lowest of those that failed reports the reason,
+/// and every rank gets its exit code. None continues before the report: as soon as one rank has ended without
+/// success, `mpirun` ends the others, with their output.
 pub(in crate::cli) fn together<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
     let ranks = comm.size() as u64;
     let mut lowest = [if result.is_err() { comm.rank() as u64 } else { ranks }];
@@ -59,13 +59,12 @@ pub fn unusable(error: clap::Error) -> Failure {
     }
 }
 
-/// A message whose own line breaks stay, while what it quotes controls no terminal.
+/// A message with its own line breaks, but without other characters that control a terminal.
 fn visible(message: &str) -> String {
     message.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
-/// Writes a message in one piece: `mpirun` may put its own words between pieces. That nobody listens is no
-/// failure.
+/// Writes a message in one piece: `mpirun` may put its own text between pieces. A closed pipe is no failure.
 fn print(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
@@ -107,7 +106,7 @@ fn explain_faults(list: &FaultList) {
         let report = Report::new(diagnostic).with_source_code(source);
         let mut text = String::new();
         match handler.render_report(&mut text, report.as_ref()) {
-            // Without colours the line begins with the file, as editors and scripts like it.
+            // Without colours the line begins with the file, as editors and scripts expect.
             Ok(()) => print(text.strip_prefix("  x ").unwrap_or(&text)),
             Err(_) => print(&list.headline(fault)),
         }

@@ -9,8 +9,8 @@ use crate::text::controls;
 /// Most characters of a line that are shown.
 const WIDTH: usize = 200;
 
-/// The line of a fault with its neighbours. Characters that control a terminal stand as one visible character
-/// each.
+/// The line of a fault with its neighbours. Characters that control a terminal are replaced by one visible
+/// character each.
 #[derive(Debug)]
 pub(super) struct Quote {
     name: String,

@@ -15,9 +15,9 @@ use crate::cli::Failure;
 use crate::job::{self, AnyProblem, Settings};
 
 /// Collective. Refuses ranks whose command differs from that of rank 0. `words` are the words of the command
-/// that decide what it does.
+/// that decide its results.
 pub(in crate::cli) fn same_command(comm: &Comm, words: &[&OsStr]) -> Result<(), Failure> {
-    // Ranks whose command line cannot be used at all say so here.
+    // Ranks whose command line cannot be used at all report it here.
     together(comm, Ok(()))?;
     let own = words.join(OsStr::new(" "));
     let mut first = own.as_bytes().to_vec();

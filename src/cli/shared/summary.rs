@@ -23,7 +23,7 @@ pub(in crate::cli) struct Start<'a> {
     pub carried: &'a [CarriedTotals],
 }
 
-/// Writes what a job will take on some ranks.
+/// Writes the size and the cost of a job on some ranks.
 pub(in crate::cli) fn write<const D: usize>(
     out: &mut impl Write,
     ranks: u32,
@@ -147,7 +147,7 @@ pub(in crate::cli) fn write<const D: usize>(
     Ok(())
 }
 
-/// Criteria in words, and what they mean for the numbers above and below.
+/// Criteria in words, and their meaning for the numbers above and below.
 fn write_refinement<const D: usize>(
     out: &mut impl Write,
     adaptivity: &Adaptivity<D>,

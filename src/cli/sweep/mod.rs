@@ -2,13 +2,12 @@
 //!
 //! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as
 //! `mpirun -n 4`) with a directory of its own. A run that has its report is finished and not done again, so
-//! that the same command goes on after an interruption. Results of another job are replaced only where the
-//! user says so.
+//! that the same command goes on after an interruption. Results of another job are replaced only on request.
 //!
-//! | file | what it has |
+//! | file | content |
 //! |---|---|
 //! | this | combinations of values, one run after the other |
-//! | `process` | what a directory holds, and the process of a run |
+//! | `process` | directory and process of a run |
 //! | `table` | `sweep.csv` |
 mod process;
 mod table;
@@ -69,11 +68,11 @@ struct Run {
     end: f64,
 }
 
-/// Runs what is not finished yet, and writes the table.
+/// Runs the combinations that are not finished yet, and writes the table.
 ///
 /// # Errors
 /// A combination is no valid job, another sweep writes here, or results of another job would be lost (then
-/// nothing is run); some run failed; or the sweep was asked to stop.
+/// nothing is run); some run failed; or the sweep was stopped.
 pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let over: Vec<(String, Vec<String>)> =

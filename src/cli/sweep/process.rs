@@ -28,9 +28,9 @@ pub(super) enum Ended {
 /// Contents of the directory of an unfinished run.
 #[derive(Debug, PartialEq, Eq)]
 enum Held {
-    /// Nothing that could be lost, or something of which `agimp run` says what it is.
+    /// Nothing that could be lost, or files that `agimp run` names.
     Nothing,
-    /// A state of this job, to go on from.
+    /// A state of this job, from which a run continues.
     State,
     /// A result of another job.
     OtherJob(PathBuf),
@@ -68,7 +68,7 @@ pub(super) fn spare_results(runs: &[Run], name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Runs a run to its end, from its latest state if it was interrupted. A request to stop is handed on to it.
+/// Runs a run to its end, from its latest state if it was interrupted. A request to stop is passed on to it.
 pub(super) fn start(
     arguments: &Arguments,
     run: &Run,
@@ -83,7 +83,7 @@ pub(super) fn start(
     let anew: &[&str] = if arguments.overwrite { &["--overwrite"] } else { &[] };
     let code = match held(run, name).map_err(|error| Failure::Run(error.to_string()))? {
         Held::State => match go(&["--restart", "latest"])? {
-            // It cannot go on from there, as with an earlier end.
+            // It cannot continue from there, as with an earlier end.
             Some(2) if arguments.overwrite && !stop.is_set() => go(anew)?,
             code => code,
         },
@@ -122,8 +122,8 @@ fn command(arguments: &Arguments, run: &Run, how: &[&str]) -> Result<Command, st
     Ok(command)
 }
 
-/// Waits for a process. Once the sweep is asked to stop, so is the process, by the one signal that launchers
-/// hand on to their ranks. Returns its exit code, if it has one.
+/// Waits for a process. A request to stop is passed on to the process, by the one signal that launchers pass
+/// on to their ranks. Returns its exit code, if it has one.
 fn wait(mut command: Command, stop: &StopRequest) -> std::io::Result<Option<i32>> {
     let mut child = command.spawn()?;
     let mut is_told = false;
@@ -132,7 +132,7 @@ fn wait(mut command: Command, stop: &StopRequest) -> std::io::Result<Option<i32>
             return Ok(status.code());
         }
         if stop.is_set() && !std::mem::replace(&mut is_told, true) {
-            // It may end just now.
+            // It may have ended just now.
             let _ = kill_process(Pid::from_child(&child), Signal::USR1);
         }
         std::thread::sleep(BETWEEN_LOOKS);

@@ -1,4 +1,4 @@
-//! Triangles of a surface that go through each other.
+//! Triangles of a surface that intersect.
 use parry3d_f64::partitioning::Bvh;
 
 use super::solid::NotSolid;
@@ -7,8 +7,7 @@ use super::solid::NotSolid;
 /// they touch.
 const TOUCHES: f64 = 1e-12;
 
-/// Looks for pairs of triangles of which an edge of one goes through the other. Pairs with a common edge are
-/// left out.
+/// Finds pairs of triangles of which an edge of one pierces the other. Pairs with a common edge are left out.
 pub(super) fn check(
     vertices: &[[f64; 3]],
     indices: &[[u32; 3]],
@@ -34,7 +33,7 @@ pub(super) fn check(
     }
 }
 
-/// A point in which an edge of one triangle goes through the other.
+/// A point in which an edge of one triangle pierces the other.
 fn crossing(vertices: &[[f64; 3]], a: [u32; 3], b: [u32; 3]) -> Option<[f64; 3]> {
     let common = a.iter().filter(|corner| b.contains(corner)).count();
     if common > 1 {
@@ -50,7 +49,7 @@ fn crossing(vertices: &[[f64; 3]], a: [u32; 3], b: [u32; 3]) -> Option<[f64; 3]>
     through(a, b).or_else(|| through(b, a))
 }
 
-/// Where an edge goes from one side of a triangle through it to the other.
+/// The point in which an edge pierces a triangle from one side to the other.
 fn piercing([p, q]: [[f64; 3]; 2], [u, v, w]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
     let reach = |axis: usize| {
         let all = [p, q, u, v, w].map(|x| x[axis]);

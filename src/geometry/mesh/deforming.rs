@@ -14,7 +14,7 @@ pub struct Deforming {
     place: Place,
 }
 
-/// Where in time a surface is.
+/// Position of a surface in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     /// At the first mesh, before any motion.
@@ -77,7 +77,7 @@ impl Deforming {
         self.every * self.meshes.len().saturating_sub(1) as f64
     }
 
-    /// Goes to a time (s). Returns the surface there, unless it is the one that it was.
+    /// Moves to a time (s). Returns the surface there, unless it is the same as before.
     pub fn advance(&mut self, time: f64) -> Option<Mesh> {
         let last = self.meshes.len().checked_sub(1)?;
         let number = (time / self.every).max(0.0);
@@ -117,7 +117,7 @@ impl Deforming {
     }
 }
 
-/// The longest way of a vertex between two meshes, m.
+/// The longest displacement of a vertex between two meshes, m.
 fn farthest(from: &Mesh, to: &Mesh) -> f64 {
     let ways = from.vertices().zip(to.vertices());
     let squares = ways.map(|(a, b)| (0..3).map(|i| (b[i] - a[i]).powi(2)).sum::<f64>());
@@ -136,7 +136,7 @@ mod tests {
         Mesh::new(Triangles { vertices, indices }).expect("closed")
     }
 
-    /// A ball that grows from 1 to 2 m in half a second: its radius is linear in time, and its surface goes
+    /// A ball that grows from 1 to 2 m in half a second: its radius is linear in time, and its surface moves
     /// outwards at 2 m/s.
     #[test]
     fn a_growing_ball_has_the_radius_and_velocity_of_its_time() {

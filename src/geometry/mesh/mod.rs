@@ -1,6 +1,6 @@
 //! Closed triangle meshes as shapes.
 //!
-//! | file | what it does |
+//! | file | task |
 //! |---|---|
 //! | `read` | OBJ, PLY and STL to triangles |
 //! | `stl` | STL |
@@ -13,9 +13,9 @@
 //! | this | signed distance and normal |
 //!
 //! The nearest point of the surface comes from the tree of `parry3d`, and the side from its angle-weighted
-//! normals (Baerentzen and Aanaes 2005), which is exact at edges and corners, or, for what is not quite
-//! closed, from the winding number. A raster of distances stands before it: away from the surface a point
-//! takes the bound that its cell of the raster gives, so that what asks from afar does not search the tree.
+//! normals (Baerentzen and Aanaes 2005), which is exact at edges and corners, or, for surfaces with gaps,
+//! from the winding number. A raster of distances accelerates both: away from the surface a point takes the
+//! bound of its cell in the raster, so that queries from afar do not search the tree.
 use std::sync::{Arc, OnceLock};
 
 use parry3d_f64::math::Vector;
@@ -89,7 +89,7 @@ struct Inner {
     volume: f64,
 }
 
-/// Signed distances at the centres of the cells of a regular grid over the bounding box with a margin of a
+/// Signed distances at the centres of the cells of a regular grid over the bounding box with a margin of one
 /// cell.
 struct Raster {
     lower: [f64; 3],
@@ -111,25 +111,25 @@ impl Mesh {
     /// heights cannot have.
     ///
     /// # Errors
-    /// A height is at no place.
+    /// A height is not finite.
     pub fn terrain(triangles: Triangles) -> Result<Self, NotSolid> {
         Self::of(triangles, Filling::Terrain)
     }
 
-    /// The solid that triangles bound, or, where they are not closed, the sheet that they are: all its
-    /// distances are positive.
+    /// The solid that triangles bound, or, where they are not closed, a sheet, all of whose distances are
+    /// positive.
     ///
     /// # Errors
-    /// There is no triangle with an area, or a vertex is at no place.
+    /// There is no triangle with an area, or a vertex is not finite.
     pub fn solid_or_sheet(triangles: Triangles) -> Result<Self, NotSolid> {
         Self::of(triangles, Filling::ClosedOrSheet)
     }
 
     /// The solid that triangles wind around: they may leave holes, cross each other and face both ways. Holes
-    /// are closed by cones over their rims, and what the surface winds around is inside.
+    /// are closed by cones over their rims, and the inside follows from the winding number.
     ///
     /// # Errors
-    /// There is no triangle with an area, a vertex is at no place, or nothing is inside.
+    /// There is no triangle with an area, a vertex is not finite, or nothing is inside.
     pub fn wound(triangles: Triangles) -> Result<Self, NotSolid> {
         Self::of(triangles, Filling::Winding)
     }
@@ -150,7 +150,7 @@ impl Mesh {
             (filling, &checked),
             (Filling::Closed | Filling::ClosedOrSheet, Err(NotSolid::Open { .. }))
         ) {
-            // Vertices that are hardly apart may be all that keeps it from being closed.
+            // Gaps between nearly equal vertices may be the only reason that it is not closed.
             let welded = merged.welded();
             let closed = welded.check();
             if closed.is_ok() {
@@ -208,7 +208,7 @@ impl Mesh {
             Inside::Nothing => (Inside::Nothing, TriMeshFlags::empty()),
         };
         let places = vertices.iter().map(|x| Vector::new(x[0], x[1], x[2])).collect();
-        // The same triangles were accepted where they came from.
+        // The same triangles were accepted at the first mesh.
         let Ok(surface) = TriMesh::with_flags(places, indices, flags) else { return self.clone() };
         let (surface, raster) = (Surface { surface, inside }, OnceLock::from(Raster::none(&bounds)));
         Self(Arc::new(Inner { surface, bounds, raster, checksum: self.0.checksum, volume: self.0.volume }))
@@ -283,7 +283,7 @@ impl Mesh {
         let (distance, point) = nearest(&self.0.surface, x);
         let way: [f64; 3] = std::array::from_fn(|a| (x[a] - point[a]) * distance.signum());
         let length = way.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // On the surface the way has no direction.
+        // On the surface the difference has no direction.
         if length > 1e-12 * self.raster().edge {
             return way.map(|c| c / length);
         }
@@ -324,7 +324,7 @@ impl Raster {
         raster
     }
 
-    /// A raster that bounds nothing.
+    /// A raster without cells.
     fn none(bounds: &Aabb<3>) -> Self {
         Self { lower: bounds.lower, edge: Self::edge(bounds), cells: [0; 3], distances: Vec::new() }
     }
@@ -349,7 +349,7 @@ impl Raster {
         let cell = i + self.cells[0] * (j + self.cells[1] * k);
         let (distance, centre) = (self.distances[cell], self.centre(cell));
         let way = (0..3).map(|a| (x[a] - centre[a]).powi(2)).sum::<f64>().sqrt();
-        // Rounding of the distances that are compared is far below this margin.
+        // The rounding error of the compared distances is far below this margin.
         let left = distance.abs() - way;
         (left > 2.0 * self.edge).then_some(left * distance.signum())
     }

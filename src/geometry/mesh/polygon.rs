@@ -1,14 +1,13 @@
 //! Polygons of a mesh to triangles.
 //!
-//! A polygon is cut into a fan from its first corner where that is right, as it is for all convex ones; else
-//! ears are cut off one by one (Meisters 1975), in the plane that it faces most.
+//! A polygon is cut into a fan from its first corner where the fan is valid, as for all convex ones; else
+//! ears are clipped one by one (Meisters 1975), in the coordinate plane that it faces most.
 use crate::geometry::vector::{cross, dot};
 
-/// Most corners of a polygon whose ears are cut: the time goes with their square.
+/// Most corners of a polygon whose ears are cut: the time grows with their square.
 const MOST: usize = 2_000;
 
-/// The triangles of a polygon with these corners, with their orientation. Corners without a vertex are left
-/// as they are.
+/// The triangles of a polygon with these corners, with their orientation. Corners without a vertex are kept.
 pub(super) fn triangles(vertices: &[[f64; 3]], corners: &[u32]) -> Vec<[u32; 3]> {
     let [first, rest @ ..] = corners else { return Vec::new() };
     let fan = || rest.windows(2).map(|pair| [*first, pair[0], pair[1]]).collect();
@@ -64,7 +63,7 @@ fn ears(flat: &[[f64; 2]]) -> Vec<[usize; 3]> {
                 })
         };
         // One after another around the polygon, so that no fan of thin triangles arises; where there is none,
-        // whatever comes.
+        // any corner.
         let k = (from..from + n).find(is_ear).unwrap_or(from) % n;
         found.push(corners(k));
         left.remove(k);
@@ -78,7 +77,7 @@ fn ears(flat: &[[f64; 2]]) -> Vec<[usize; 3]> {
 mod tests {
     use super::*;
 
-    /// Where a point of a plane lies in space.
+    /// Place in space of a point of a plane.
     type Plane = fn(&[f64; 2]) -> [f64; 3];
 
     /// Polygons in a plane that is turned every way: triangles with the sum of their areas, none of them
@@ -145,7 +144,7 @@ mod tests {
         is_cut_rightly(&star, 10.0 * 0.5 * 0.4 * (std::f64::consts::PI / 5.0).sin());
     }
 
-    /// Convex polygons are fans; what crosses itself or is nowhere gives triangles all the same.
+    /// Convex polygons are fans; polygons that cross themselves or are not finite give triangles as well.
     #[test]
     fn other_polygons() {
         let square = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];

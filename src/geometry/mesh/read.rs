@@ -48,7 +48,7 @@ pub enum ReadError {
 /// Most bytes of a file.
 pub(super) const MOST_BYTES: u64 = 1 << 31;
 
-/// Reads the triangles of a file, whose ending says what it is. Polygons are cut into triangles.
+/// Reads the triangles of a file, whose ending gives its format. Polygons are cut into triangles.
 ///
 /// # Errors
 /// The file cannot be read, is of no known kind, or damaged.
@@ -74,7 +74,7 @@ pub fn read(path: &Path) -> Result<Triangles, ReadError> {
 fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
     let damaged = |reason: String| ReadError::Damaged { kind: "OBJ", reason };
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
-    // Colours are of no interest here.
+    // Colours are ignored.
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut BufReader::new(bytes), &options, no_materials)
         .map_err(|error| damaged(error.to_string()))?;
@@ -83,7 +83,7 @@ fn obj(bytes: &[u8]) -> Result<Triangles, ReadError> {
         let first = triangles.vertices.len() as u64;
         let places = model.mesh.positions.as_chunks::<3>().0;
         triangles.vertices.extend(places);
-        // Without numbers of corners all faces are triangles.
+        // Without counts of corners all faces are triangles.
         let mut left = &model.mesh.indices[..];
         let mut counts = model.mesh.face_arities.iter().map(|count| *count as usize);
         while !left.is_empty() {
@@ -108,7 +108,7 @@ fn ply_elements(bytes: &[u8]) -> Result<Payload<DefaultElement>, ReadError> {
     let parser = Parser::<DefaultElement>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
     let header = parser.read_header(&mut reader).map_err(|error| damaged(error.to_string()))?;
-    // Elements without properties take no bytes: as many as one likes would fit.
+    // Elements without properties take no bytes: any number of them would fit.
     let all: u128 = header.elements.values().map(|element| element.count as u128).sum();
     if all > bytes.len() as u128 {
         return Err(damaged(format!(
@@ -177,7 +177,7 @@ fn number(property: &Property) -> Option<f64> {
     }
 }
 
-/// Corners of a face; a negative one is that of no vertex.
+/// Corners of a face; a negative one refers to no vertex.
 fn list(property: &Property) -> Option<Vec<u32>> {
     let all = |values: &mut dyn Iterator<Item = i64>| {
         values.map(|value| u32::try_from(value).unwrap_or(u32::MAX)).collect()

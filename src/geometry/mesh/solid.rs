@@ -1,4 +1,4 @@
-//! Whether triangles bound a solid.
+//! Checks that triangles bound a solid.
 use std::collections::BTreeMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -13,7 +13,7 @@ pub enum NotSolid {
     /// There is none with an area.
     #[error("found no triangle with an area; expected a closed surface")]
     Empty,
-    /// A vertex is not at a place.
+    /// A coordinate of a vertex is not a number below the limit.
     #[error(
         "found the vertex {0} with a coordinate that is not a number below 1e12 m; expected finite coordinates"
     )]
@@ -88,12 +88,12 @@ fn point(x: &[f64; 3]) -> String {
 /// Greatest coordinate, m: squares and cubes of distances stay finite.
 const FARTHEST: f64 = 1e12;
 
-/// Vertices that are nearer to each other than this share of the longest edge of their bounding box are one,
-/// where a surface has gaps: roundings of programs that mesh each face by itself.
+/// Vertices that are nearer to each other than this share of the longest edge of their bounding box are
+/// welded, where a surface has gaps: rounding by programs that mesh each face by itself.
 const WELDED: f64 = 1e-6;
 
-/// Share of the volume that triangles enclose with their middle below which the solid that is left when holes
-/// are closed counts as none.
+/// Least volume of a solid whose holes were closed, as a share of the cones over its triangles with their tip
+/// in its middle; a smaller one counts as none.
 const HOLLOW: f64 = 0.1;
 
 /// Triangles with vertices of their own.
@@ -106,7 +106,7 @@ pub(super) struct Merged {
     pub numbers: Vec<u32>,
 }
 
-/// The triangles with vertices at the same place made one, without those that have two corners at one place.
+/// The triangles with vertices at the same place merged, without those that have two corners at one place.
 pub(super) fn merged(triangles: Triangles) -> Result<Merged, NotSolid> {
     let mut numbers = FxHashMap::default();
     let mut vertices = Vec::new();
@@ -115,7 +115,7 @@ pub(super) fn merged(triangles: Triangles) -> Result<Merged, NotSolid> {
         if x.iter().any(|c| !c.is_finite() || c.abs() >= FARTHEST) {
             return Err(NotSolid::Vertex(index));
         }
-        // Zero has two signs, and one place.
+        // Zeros of both signs are the same place.
         let x = x.map(|c| c + 0.0);
         let number = *numbers.entry(x.map(f64::to_bits)).or_insert_with(|| {
             vertices.push(x);
@@ -148,13 +148,13 @@ impl Merged {
         reach(0).max(reach(1)).max(reach(2))
     }
 
-    /// The distance below which [`Merged::welded`] makes vertices one, m.
+    /// The distance below which [`Merged::welded`] merges vertices, m.
     fn gap(&self) -> f64 {
         WELDED * self.size()
     }
 
-    /// The same with vertices that are hardly apart made one: the first of them. Triangles that have two
-    /// corners at one place then are gone.
+    /// The same with nearly equal vertices merged to the first of them. Triangles with two corners at one
+    /// place are removed.
     pub(super) fn welded(&self) -> Self {
         let gap = self.gap();
         let cell = |x: &[f64; 3]| x.map(|c| (c / gap).floor());
@@ -183,7 +183,7 @@ impl Merged {
         Self { vertices, indices, numbers }
     }
 
-    /// Leaves out triangles that are there already, with the same orientation.
+    /// Removes repeated triangles of the same orientation.
     pub(super) fn leave_out_doubled(&mut self) {
         let mut seen = FxHashSet::default();
         let is_new: Vec<bool> = self.indices.iter().map(|corners| seen.insert(turned(corners))).collect();
@@ -193,7 +193,7 @@ impl Merged {
         self.numbers.retain(|_| *keep.next().unwrap_or(&true));
     }
 
-    /// Whether each triangle is there once in an orientation.
+    /// Checks that no triangle occurs twice in the same orientation.
     pub(super) fn check_doubled(&self) -> Result<(), NotSolid> {
         let (mut seen, mut count, mut first) = (FxHashMap::default(), 0, None);
         for (corners, number) in self.indices.iter().zip(&self.numbers) {
@@ -208,9 +208,9 @@ impl Merged {
     /// Closes the holes. Returns the volume inside, m³, with the sign of its orientation.
     ///
     /// # Errors
-    /// Nothing is inside: faces whose edges do not meet lose what they enclose, since the rim of each is
-    /// closed over itself. Then little is left beside the cones over the triangles with their tip in the
-    /// middle of the bounding box.
+    /// Nothing is inside: faces with gaps between their edges enclose no volume once the rim of each is
+    /// closed over itself. Then the volume is small compared with the cones over the triangles with their tip
+    /// in the middle of the bounding box.
     pub(super) fn capped(&mut self) -> Result<f64, NotSolid> {
         if self.indices.is_empty() {
             return Err(NotSolid::Empty);
@@ -248,9 +248,8 @@ fn enclosed(vertices: &[[f64; 3]], indices: &[[u32; 3]], tip: &[f64; 3]) -> f64 
     cones.sum()
 }
 
-/// Closes what is open by cones. The rims of all holes are what the edges of the triangles add up to with
-/// their directions; they have no end, and so each loop of them and the cone over it, from the mean of its
-/// vertices, close the surface.
+/// Closes holes by cones. The rims of all holes are the sum of the directed edges of the triangles, a cycle.
+/// So each loop of it, with the cone over it from the mean of its vertices, closes the surface.
 fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     let mut sums: BTreeMap<(u32, u32), i64> = BTreeMap::new();
     for [a, b, c] in indices.iter() {
@@ -267,7 +266,7 @@ fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     }
     let starts: Vec<u32> = onwards.keys().copied().collect();
     for start in starts {
-        // A walk along the rims; where it comes to a vertex again, it has gone round a loop.
+        // A walk along the rims; where it returns to a vertex, it has completed a loop.
         let mut walk = vec![start];
         let mut places = BTreeMap::from([(start, 0)]);
         while let Some(next) = next_on_rim(vertices, &walk, &mut onwards) {
@@ -293,8 +292,8 @@ fn cap_holes(vertices: &mut Vec<[f64; 3]>, indices: &mut Vec<[u32; 3]>) {
     }
 }
 
-/// Where a rim goes on. Where several meet it is the edge that goes back the most: so slits between edges
-/// that are divided in different ways are closed by themselves, and not with whole faces.
+/// Next edge of a rim. Where several meet, it is the one that turns back the most: so slits between edges
+/// with different divisions are closed by themselves, and not with whole faces.
 fn next_on_rim(vertices: &[[f64; 3]], walk: &[u32], onwards: &mut BTreeMap<u32, Vec<u32>>) -> Option<u32> {
     let (last, before) = walk.split_last()?;
     let ways = onwards.get_mut(last)?;
@@ -310,10 +309,10 @@ fn next_on_rim(vertices: &[[f64; 3]], walk: &[u32], onwards: &mut BTreeMap<u32, 
     Some(ways.remove(most))
 }
 
-/// Whether triangles are closed and face one way. Returns the volume inside, m³, negative where they face
+/// Checks that triangles are closed and face one way. Returns the volume inside, m³, negative where they face
 /// inwards.
 fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, NotSolid> {
-    // Each edge is gone along as often in one direction as in the other.
+    // Each edge occurs as often in one direction as in the other.
     let mut edges: FxHashMap<(u32, u32), [u32; 2]> = FxHashMap::default();
     let directed = |triangle: &[u32; 3]| {
         let [a, b, c] = *triangle;
@@ -345,7 +344,7 @@ fn check(vertices: &[[f64; 3]], indices: &[[u32; 3]]) -> Result<f64, NotSolid> {
     if let Some(edge) = turned {
         return Err(NotSolid::Turned(middle(edge)));
     }
-    // Tetrahedra with a point of the surface, so that far from the origin nothing is lost.
+    // Tetrahedra with a point of the surface, so that no digits are lost far from the origin.
     let origin = vertices[indices[0][0] as usize];
     let volume = enclosed(vertices, indices, &origin);
     if volume == 0.0 || !volume.is_finite() { Err(NotSolid::Flat(volume)) } else { Ok(volume) }
@@ -410,8 +409,8 @@ mod tests {
         apart
     }
 
-    /// Faces that are a rounding apart are one surface, closed or by winding number; wider gaps leave no
-    /// solid, which is an error.
+    /// Faces with gaps of the size of rounding are one surface, closed or by winding number; wider gaps leave
+    /// no solid, which is an error.
     #[test]
     fn faces_that_are_hardly_apart_are_welded() {
         for make in [Mesh::new, Mesh::wound] {

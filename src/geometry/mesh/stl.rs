@@ -1,8 +1,8 @@
 //! STL, text and binary.
 //!
-//! A file is binary if it is as long as the number of triangles in its header says, whatever the header
-//! begins with; else, if its first word is `solid`, it is text: words in letters of either case, one after
-//! another as many solids as there are.
+//! A file is binary if its length matches the number of triangles in its header, whatever the header begins
+//! with; else, if its first word is `solid`, it is text: words in letters of either case, one after another
+//! as many solids as there are.
 use super::read::{ReadError, Triangles};
 use crate::text::excerpt;
 

@@ -89,7 +89,7 @@ fn a_fine_ball_is_nearly_a_ball() {
     }
 }
 
-/// Turned inside out it is the same solid.
+/// With all triangles turned it is the same solid.
 #[test]
 fn facing_inwards_is_turned() {
     let mut inwards = cube();

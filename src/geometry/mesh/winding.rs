@@ -1,15 +1,14 @@
-//! How often a surface winds around a point: the generalised winding number of Jacobson, Kavan and
-//! Sorkine-Hornung (2013).
+//! The generalised winding number of a surface around a point (Jacobson, Kavan and Sorkine-Hornung 2013).
 //!
-//! Solid angles of near triangles are exact (Van Oosterom and Strackee 1983); a group of triangles that is
-//! far off counts by the first term of its expansion (Barill, Dickson, Schmidt, Levin and Jacobson 2018).
+//! Solid angles of near triangles are exact (Van Oosterom and Strackee 1983); a distant group of triangles
+//! counts by the first term of its expansion (Barill, Dickson, Schmidt, Levin and Jacobson 2018).
 
 use crate::geometry::vector::{cross, dot};
 
 /// Triangles of a group that is not divided.
 const LEAST: usize = 8;
 
-/// A group counts as far off at this many of its radii.
+/// Distance from which a group counts as distant, in its radii.
 const FAR: f64 = 3.0;
 
 /// Triangles in a tree of groups.
@@ -27,7 +26,7 @@ struct Group {
     second: usize,
     /// Mean of its triangles, weighted with their areas, m.
     centre: [f64; 3],
-    /// Of the ball about the centre that holds it, m.
+    /// Radius of the ball about the centre that contains it, m.
     radius: f64,
     /// Sum of the areas with their normals, m².
     area: [f64; 3],

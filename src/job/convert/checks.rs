@@ -12,7 +12,7 @@ pub(in crate::job) struct Checks<'t> {
     pub text: &'t str,
     /// Place of a byte of the text in the files of the job.
     pub position: &'t dyn Fn(usize) -> Position,
-    /// Directory of the job file, from which names of files in it go.
+    /// Directory of the job file, to which names of files in it are relative.
     pub directory: &'t std::path::Path,
     /// Checksum of the files that the job names, as far as they have been read; 0 without.
     pub files: u64,
@@ -28,7 +28,7 @@ impl Checks<'_> {
         self.faults.len() > MOST
     }
 
-    /// Notes a fault of the value at `path`.
+    /// Adds a fault of the value at `path`.
     pub(crate) fn fault(&mut self, path: &Path, message: String) {
         if self.is_full() {
             return;
@@ -49,8 +49,7 @@ impl Checks<'_> {
         (self.position)(self.tree.locate(path).start)
     }
 
-    /// Notes a fault unless `name` can be part of the names of columns and none of the names `before` it is
-    /// the same.
+    /// Adds a fault unless `name` can be part of the names of columns and differs from the names `before` it.
     pub(crate) fn column_name<'a>(
         &mut self,
         name: &str,
@@ -82,7 +81,7 @@ impl Checks<'_> {
         index
     }
 
-    /// Notes that a name is not among those of things of one kind.
+    /// Adds a fault for a name that is not among those of things of one kind.
     pub(crate) fn unknown<'a, I: Iterator<Item = &'a str>>(
         &mut self,
         name: &str,
@@ -141,7 +140,7 @@ impl Checks<'_> {
             .ok()
     }
 
-    /// Notes the checksum of a file that the job names: with other contents it is another job.
+    /// Adds the checksum of a file that the job names: with other contents it is another job.
     pub(crate) fn note_file(&mut self, checksum: u64) {
         self.files = self.files.rotate_left(1) ^ checksum;
     }

@@ -1,4 +1,4 @@
-//! Contact between bodies: which bodies share a velocity field, and what holds between these.
+//! Contact between bodies: which bodies share a velocity field, and the law between these.
 use std::collections::BTreeMap;
 
 use super::checks::Checks;
@@ -51,7 +51,7 @@ pub(super) fn body_contacts(checks: &mut Checks, file: &JobFile, path: &Path) ->
     contacts.filter(|_| sound)
 }
 
-/// Bodies that meet all others in the same way share a field.
+/// Bodies with the same laws towards all others share a field.
 fn fields(laws: &BTreeMap<[u16; 2], Law>, bodies: usize, names: Vec<(String, bool)>) -> Option<BodyContacts> {
     let mut meets: Vec<Vec<(u16, Law)>> = vec![Vec::new(); bodies];
     for (&[a, b], &law) in laws {
@@ -71,7 +71,7 @@ fn fields(laws: &BTreeMap<[u16; 2], Law>, bodies: usize, names: Vec<(String, boo
     if first_of_field.len() > MAX_FIELDS {
         return None;
     }
-    // All bodies of two fields meet alike.
+    // All bodies of two fields have the same law.
     let mut pairs = BTreeMap::new();
     for (&[a, b], &(law, contact, turned)) in laws {
         let (f, g) = (field_of_body[usize::from(a)], field_of_body[usize::from(b)]);
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn bodies_that_meet_all_others_alike_share_a_field() {
-        // Body 3 against 0 and 1; body 2 meets nobody.
+        // Body 3 against 0 and 1; body 2 has no contact.
         let laws = [([0, 3], (LAW, 0, false)), ([1, 3], (LAW, 0, false))].into();
         let contacts = fields(&laws, 4, Vec::new()).unwrap();
         assert_eq!(contacts.field_of_body, [0, 0, 1, 2]);

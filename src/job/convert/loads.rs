@@ -13,7 +13,7 @@ use crate::quantity::{Expression, Quantity, Table};
 use crate::text::{excerpt, written as number};
 
 /// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and
-/// loads (four each) that a checkpoint's header has room for.
+/// loads (four each): the header of a checkpoint has limited room.
 const MAX_SUMS: usize = 108;
 
 /// All loads, or faults.
@@ -166,7 +166,7 @@ pub(super) fn vector<const D: usize>(
     all?.try_into().ok()
 }
 
-/// A quantity that nodes have, and so none of places of the undeformed body, or a fault.
+/// A quantity at nodes, which cannot depend on places of the undeformed body, or a fault.
 pub(super) fn at_nodes<const D: usize>(
     checks: &mut Checks,
     written: &WrittenQuantity,

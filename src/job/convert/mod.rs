@@ -1,9 +1,9 @@
-//! From the file's types to a checked problem: what the schema cannot say about domain, tree, materials
-//! and bodies.
+//! From the file's types to a checked problem: conditions beyond the schema on domain, tree, materials and
+//! bodies.
 //!
-//! | file | what it checks |
+//! | file | subject |
 //! |---|---|
-//! | `checks` | what all need: faults with their places, the domain |
+//! | `checks` | state that all share: faults with their places, the domain |
 //! | `settings` | faces, numerics, output, report |
 //! | `shapes` | shapes, among them terrain, and particles from a file |
 //! | `adaptivity` | dynamic refinement |
@@ -225,7 +225,7 @@ fn domain<const D: usize>(
         let edge = domain.root_edge;
         if whole < 1.0 || (count - whole).abs() > 1e-9 * whole {
             let (below, above) = (count.floor().max(1.0) * edge, (count.floor() + 1.0).max(1.0) * edge);
-            // Twelve digits: within what counts as whole.
+            // Twelve digits: within the tolerance for whole numbers.
             let [below, above] = [below, above].map(|size| number(size, 12));
             let near = if below == above { above } else { format!("{below} or {above}") };
             let (found, edge) = (written(size[a]), written(edge));
@@ -336,7 +336,7 @@ fn bodies<const D: usize>(
     path: &Path,
 ) -> Option<Vec<Body<D>>> {
     names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
-    // Of equal names the first counts, as everywhere.
+    // Of equal names the first counts, as elsewhere.
     let mut numbers = FxHashMap::default();
     for (number, material) in file.materials.iter().enumerate() {
         numbers.entry(material.name.as_str()).or_insert(number);
@@ -406,7 +406,7 @@ fn body<const D: usize>(
         // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
         let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
         let (low, high) = (bounds.lower[a], bounds.upper[a]);
-        // A plane of symmetry cuts what goes on beyond it; of particles from a file none may lie there.
+        // A plane of symmetry cuts bodies that continue beyond it; particles from a file may not lie there.
         let is_cut = |side: usize| given.is_none() && is_symmetric(&file_of.boundaries, a, side);
         let below = low.is_finite() && low < -slack && !is_cut(0);
         let above = high.is_finite() && high > space.size[a] + slack && !is_cut(1);
@@ -457,7 +457,7 @@ fn is_symmetric(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool
     matches!(face, Some(file::Face::Symmetric {}))
 }
 
-/// How the particles of a body lie.
+/// Arrangement of the particles of a body.
 fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
     match body.sampling {
         None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),

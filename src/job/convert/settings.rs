@@ -229,7 +229,7 @@ pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     state
 }
 
-/// Checksum (64-bit FNV-1a) of what changes the state, from the file with all defaults filled in.
+/// Checksum (64-bit FNV-1a) of the keys that decide the state, from the file with all defaults filled in.
 pub(in crate::job) fn digest(file: &JobFile) -> u64 {
     let state = deciding(file);
     // Field order and shortest round-trip numbers make the text canonical.

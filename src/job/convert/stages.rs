@@ -128,7 +128,7 @@ fn stage_named(checks: &mut Checks, file: &JobFile, name: &str, path: &Path) -> 
     checks.named(name, "stage", || file.stages.iter().map(|stage| stage.name.as_str()), path)
 }
 
-/// The stage at whose start a body comes; a fault where there is none of that name.
+/// The stage at whose start a body is added; a fault where there is none of that name.
 pub(super) fn of_body(checks: &mut Checks, body: &Body, file: &JobFile, path: &Path) -> usize {
     let Some(name) = &body.stage else { return 0 };
     stage_named(checks, file, name, &path.key("stage")).unwrap_or(0)

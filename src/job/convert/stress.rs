@@ -38,7 +38,7 @@ pub(super) fn fields<const D: usize>(
     sound.then_some(all)
 }
 
-/// A fault for what changes in time.
+/// A fault for a quantity that changes in time.
 fn is_field(checks: &mut Checks, quantity: &Quantity, path: &Path) -> bool {
     if quantity.depends_on_time() {
         let message = "found a quantity that changes in time; expected a number or an expression of position, for the start";

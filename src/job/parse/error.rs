@@ -74,9 +74,9 @@ pub enum JobError {
 
 /// Faults of a file that are shown; the rest are counted.
 const SHOWN: usize = 20;
-/// Faults after which no more are looked for.
+/// Faults after which the search for more ends.
 pub(in crate::job) const MOST: usize = 1000;
-/// Longest message, in characters. What it quotes of the file is shorter; only lists of what is possible come
+/// Longest message, in characters. Quotations from the file are shorter; only lists of possible values come
 /// near.
 const LONGEST: usize = 500;
 /// Longest key of a message, in characters.
@@ -191,7 +191,7 @@ fn position(text: &str, byte: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// [`alternatives`] of names that stand in the file: the first ones of many, each cut to what can be read.
+/// [`alternatives`] of names that stand in the file: the first ones of many, each cut to a readable length.
 pub(in crate::job) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let mut names = names.into_iter();
     let first: Vec<_> = names.by_ref().take(NAMES).map(|name| excerpt(name, QUOTED)).collect();

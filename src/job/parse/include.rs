@@ -1,9 +1,9 @@
 //! `include`: other files whose tables become part of a job.
 //!
-//! The text of the job and those of the files are taken apart at the headers of tables and put together anew:
-//! what stands ahead of the first header comes first; sections with the same header become one; all others
-//! follow, those of the job first. So what comes out is a job file like any other, and each byte of it still
-//! knows its file. A key that stands twice is a fault, as in one file.
+//! The texts of the job and of the files are divided at the headers of tables and joined anew: the text ahead
+//! of the first header comes first; sections with the same header become one; all others follow, those of the
+//! job first. So the result is a job file like any other, and each byte of it is mapped to its file. A key
+//! that occurs twice is a fault, as in one file.
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -123,8 +123,8 @@ impl Whole {
 /// The name of a file, and where it stands.
 type Named = (String, Range<usize>);
 
-/// Where the job says what it includes, and the names, if it does so in the right form. Another form is a
-/// fault of the schema.
+/// Place of the key `include`, and the names, if it has the right form. Another form is a fault of the
+/// schema.
 fn names(tree: &Node) -> Option<(Range<usize>, Vec<Named>)> {
     let node = tree.get(KEY)?;
     let Value::Array(elements) = &node.value else { return None };

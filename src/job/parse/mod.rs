@@ -1,5 +1,4 @@
-//! From text to a tree that knows where everything stands, checked against the schema; faults with their
-//! places.
+//! From text to a tree of values with their places, checked against the schema; faults with their places.
 pub(super) mod error;
 pub(super) mod include;
 pub(super) mod settings;

@@ -1,7 +1,7 @@
 //! Values of a job that are set from outside: `--set key=value` and the like.
 //!
-//! A setting changes the text of the job, all else stays as it is; what comes out is a job file like any
-//! other. Places in it are mapped back to the file that the user has written.
+//! A setting changes the text of the job, all else stays as it is; the result is a job file like any other.
+//! Places in it are mapped back to the file that the user has written.
 use super::error::{Fault, QUOTED, names as listed};
 use super::source::Path;
 use crate::text::excerpt;
@@ -13,7 +13,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Key, Table, Table
 #[derive(Clone, Debug, Default)]
 pub struct Settings(Vec<Setting>);
 
-/// One value that takes the place of that of the job, or of its default.
+/// One value that replaces that of the job, or its default.
 #[derive(Clone, Debug)]
 struct Setting {
     /// As the user has typed it; the place of its faults.
@@ -27,7 +27,7 @@ impl Settings {
     /// or the name of an element. The value is one of TOML; words need no quotes.
     ///
     /// # Errors
-    /// It is not of that form; says what is.
+    /// It is not of that form; the message names the form.
     pub fn set(&mut self, text: &str) -> Result<(), String> {
         let typed = format!("--set {text}");
         let refuse = |reason: &str| format!("{}: {reason}", excerpt(&typed, QUOTED));
@@ -260,7 +260,7 @@ pub(in crate::job) struct Edited {
     made: Vec<(String, String)>,
 }
 
-/// A piece of text that another has taken the place of.
+/// A piece of text that was replaced by another.
 #[derive(Clone, Debug)]
 struct Edit {
     start: usize,
@@ -269,7 +269,7 @@ struct Edit {
 }
 
 impl Edited {
-    /// Goes on with another text.
+    /// Records the change to another text.
     fn replace(&mut self, text: &str) {
         let (old, new) = (self.text.as_bytes(), text.as_bytes());
         let start = old.iter().zip(new).take_while(|(a, b)| a == b).count();
@@ -282,7 +282,7 @@ impl Edited {
         }
     }
 
-    /// Where a byte stands in the text as the user has written it; for what is new, where that is put.
+    /// Place of a byte in the text as the user has written it; of a new text, the place where it is inserted.
     pub(crate) fn original(&self, byte: usize) -> usize {
         self.edits.iter().rev().fold(byte, |byte, edit| {
             if byte < edit.start {

@@ -1,4 +1,4 @@
-//! The text of a job file as a tree of values that know where they stand.
+//! The text of a job file as a tree of values with their places.
 use super::error::QUOTED;
 use super::unclosed;
 use crate::text::{excerpt, written};
@@ -90,7 +90,7 @@ impl Node {
         }
     }
 
-    /// Where the value at `path` stands, or the innermost value around it that is there.
+    /// Place of the value at `path`, or of the innermost value around it that exists.
     pub(crate) fn locate(&self, path: &Path) -> Range<usize> {
         let mut node = self;
         for step in &path.0 {

@@ -1,7 +1,7 @@
 //! Checks a file against the schema: keys, types, choices and ranges.
 //!
-//! Working from the schema rather than from the parser's errors finds all faults at once, knows where
-//! each stands, and can say what a key means.
+//! Working from the schema rather than from the parser's errors finds all faults at once, has the place of
+//! each, and can explain a key.
 use super::error::{Fault, MOST, QUOTED, alternatives};
 use super::source::{Node, Path, Value as Toml};
 use crate::job::schema::GONE;
@@ -39,7 +39,7 @@ struct Layers<'s> {
 }
 
 impl<'s> Layers<'s> {
-    /// Follows references and joins what holds at the same time.
+    /// Follows references and joins schemas that hold at the same time.
     fn add(&mut self, root: &'s Value, schema: &'s Value) {
         self.schemas.push(schema);
         let target = schema.get("$ref").and_then(Value::as_str).and_then(|name| name.strip_prefix('#'));
@@ -112,7 +112,7 @@ impl<'s> Checker<'s> {
             (Some("object"), Toml::Table(entries)) => self.table(node, entries, &layers, path),
             (Some("array"), Toml::Array(elements)) => self.array(node, elements, &layers, path),
             (Some("number"), Toml::Float(number)) => self.number(node, *number, &layers, path),
-            // Exact for what the limits are about; larger integers are beyond them anyway.
+            // Exact within the limits; larger integers are beyond them anyway.
             (Some("number" | "integer"), Toml::Integer(number)) => {
                 self.number(node, *number as f64, &layers, path);
             }
@@ -171,7 +171,7 @@ impl<'s> Checker<'s> {
             }
             return found.copied();
         }
-        // Different types; what has a definition of its own is a table.
+        // Different types; one with a definition of its own is a table.
         let found = options.iter().find(|option| {
             let is_table = option.get("$ref").is_some() && matches!(node.value, Toml::Table(_));
             is_table
@@ -227,7 +227,7 @@ impl<'s> Checker<'s> {
                 });
                 continue;
             }
-            // A key that is missing is what a misspelt one was most likely meant to be.
+            // A misspelt key was most likely meant to be one that is missing.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
             let free = keys.clone().filter(|known| node.get(known).is_none());
             let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, free));
@@ -275,7 +275,7 @@ impl<'s> Checker<'s> {
         let count = elements.len() as f64;
         if count < least || count > most {
             self.mismatch(node, &type_words("array", layers), layers, path);
-            // One fault says it all if there are far too many, or many.
+            // One fault suffices if there are far too many elements.
             if count > most && (count > 10.0 * most || most > 1000.0) {
                 return;
             }

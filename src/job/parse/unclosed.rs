@@ -1,8 +1,8 @@
-//! Where a brace, a bracket or a string opens that is never closed.
+//! Search for a brace, a bracket or a string that is never closed.
 //!
-//! A parser notices late that something is not closed: tables and arrays may go on over lines. So after its
-//! error the text is scanned once more, line by line, with what is open. A line that begins a table of the
-//! file, or a key inside an array, shows that what is open should have been closed before.
+//! A parser detects late that a sign is not closed: tables and arrays may span lines. So after its error the
+//! text is scanned once more, line by line, with a stack of open signs. A line that begins a table of the
+//! file, or a key inside an array, shows that the open sign should have been closed before.
 use std::ops::Range;
 
 /// Opening sign that is not closed: its first byte, and a message.
@@ -49,7 +49,7 @@ impl Scan<'_> {
         self.text[at..].find('\n').map_or(self.text.len(), |length| at + length)
     }
 
-    /// Whether a line cannot stand within what is open.
+    /// Whether a line cannot stand within the open signs.
     fn is_too_late(&self, start: usize, end: usize) -> bool {
         let Some(&opener) = self.open.last() else { return false };
         let line = self.text[start..end].split('#').next().unwrap_or_default().trim();
@@ -62,7 +62,7 @@ impl Scan<'_> {
         names_key && !(goes_on && self.text[opener..].starts_with('{'))
     }
 
-    /// Goes through a line. Returns where to go on.
+    /// Scans a line. Returns the place to continue.
     fn line(&mut self, start: usize, end: usize) -> Result<usize, Option<Unclosed>> {
         let bytes = self.text.as_bytes();
         let mut at = start;
@@ -158,7 +158,7 @@ mod tests {
 
     const JOB: &str = "version = 1 # [one\n\n[domain]\nsize = [8, 6]\n[tree]\nregions = [{ level = 2, shape = { kind = \"box\", min = [0, 2] } }]\n[[bodies]]\nname = \"ground\"\nshape = {\n  kind = \"box\", # {\n  max = [8, 4],\n}\ntext = '''\n[a\n'''\n[[colliders]]\nname = \"footing\"\n";
 
-    /// Each of them left out, one after the other: the message names its partner.
+    /// Each closing sign left out, one after the other: the message names its partner.
     #[test]
     fn what_is_not_closed_is_reported_where_it_opened() {
         assert!(Node::parse(JOB).is_ok());

@@ -1,4 +1,4 @@
-//! GeoTIFF: an image of one band whose tags say where it lies (OGC 19-008).
+//! GeoTIFF: an image of one band whose tags give its place (OGC 19-008).
 use std::io::Cursor;
 
 use tiff::ColorType;
@@ -37,14 +37,14 @@ pub(super) fn parse(bytes: &[u8], placing: &Placing) -> Result<Raster, String> {
     Raster::from_north(&values, size, none, placing, of_file)
 }
 
-/// Distance of neighbours and place of the south-western height, if the tags say them.
+/// Distance of neighbours and place of the south-western height, if the tags have them.
 fn place(
     image: &mut Decoder<Cursor<&[u8]>>,
     rows: usize,
     cell_is_given: bool,
 ) -> Result<Option<(f64, [f64; 2])>, String> {
     let keys = image.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap_or_default();
-    // Four words for each key, after four of a header; the value of these stands in the fourth.
+    // Four words for each key, after four of a header; the value is the fourth.
     let has = |[key, value]: [u16; 2]| keys.chunks_exact(4).skip(1).any(|k| k[0] == key && k[3] == value);
     if has(MODEL) && !cell_is_given {
         return Err(

@@ -1,6 +1,6 @@
 //! Terrain from a raster of heights: the solid between its surface and a level below.
 //!
-//! | file | what it does |
+//! | file | content |
 //! |---|---|
 //! | `raster` | values on a regular grid, from a file of any kind |
 //! | `esri` `geotiff` `npy` | the kinds |
@@ -84,7 +84,7 @@ impl Terrain {
         }
         let (mut above, layer) =
             if is_smooth { (self.smooth()?, layer.smooth()?) } else { (self.clone(), layer) };
-        // Where a smooth layer ends it swings below 0.
+        // At its end a smooth layer overshoots below 0.
         above.heights.iter_mut().zip(&layer.heights).for_each(|(height, t)| *height += t.max(0.0));
         Ok(above)
     }
@@ -167,7 +167,7 @@ impl Terrain {
     }
 }
 
-/// Values and those between them. Beyond the ends the curve goes on straight.
+/// Values and those between them. Beyond the ends the curve is straight.
 fn refined(values: &[f64]) -> impl Iterator<Item = f64> {
     let last = values.len() - 1;
     let before = move |i: usize| if i > 0 { values[i - 1] } else { 2.0 * values[0] - values[1] };

@@ -83,7 +83,7 @@ pub(super) fn parse_archive(bytes: &[u8], placing: &Placing) -> Result<Raster, S
     parse(&array, placing)
 }
 
-/// A header is short and flat: what reads it goes as deep as its brackets.
+/// A header must be short and flat: its parser recurses as deep as its brackets.
 fn check_header(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(b"\x93NUMPY") || bytes.len() < 12 {
         return Err("it does not start with the header of an array".into());

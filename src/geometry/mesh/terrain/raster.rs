@@ -1,4 +1,4 @@
-//! Values on a regular grid, from a file whose ending says what it is.
+//! Values on a regular grid, from a file whose ending gives its format.
 use std::path::Path;
 
 use super::super::read::{MOST_BYTES, ReadError};
@@ -8,7 +8,7 @@ use crate::input_file;
 /// Values on a regular grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
-    /// Row by row from south to north, from west to east in each; not a number where there is none.
+    /// Row by row from south to north, from west to east in each; NaN where there is none.
     pub(super) values: Vec<f64>,
     pub(super) columns: usize,
     pub(super) rows: usize,
@@ -21,18 +21,18 @@ pub struct Raster {
 /// Keys of a job that complement the file of a raster.
 #[derive(Clone, Debug, Default)]
 pub struct Placing {
-    /// Distance of neighbours in place of that of the file, m: the south-western value then stands at the
+    /// Distance of neighbours in place of that of the file, m: the south-western value then lies at the
     /// origin.
     pub cell: Option<f64>,
     /// Array of a file with several.
     pub array: Option<String>,
 }
 
-/// Greatest magnitude of a value; what is larger stands for none.
+/// Greatest magnitude of a value; a larger one counts as none.
 const GREATEST: f64 = 1e9;
 
-/// The least whole number of 16 bits stands for none whatever a file says of others: no ground lies so deep,
-/// and many programs write it.
+/// The least integer of 16 bits counts as no value in any file: no ground lies so deep, and many programs
+/// write it.
 const HOLE: f64 = -32768.0;
 
 /// Value without data, for files that declare none.
@@ -56,7 +56,7 @@ impl Raster {
         raster.map_err(|reason| ReadError::Damaged { kind, reason })
     }
 
-    /// A raster of values whose first row is the northernmost; `none` stands for no value.
+    /// A raster of values whose first row is the northernmost; `none` marks places without a value.
     pub(super) fn from_north(
         values: &[f64],
         [columns, rows]: [usize; 2],

@@ -17,7 +17,7 @@ pub(super) type Body<const D: usize> = (Free<D>, [f64; 3], Option<[f64; D]>);
 /// Coefficient of friction between rigid bodies unless a job gives one.
 const FRICTION: f64 = 0.5;
 
-/// How a body turns.
+/// Rotation of a body.
 enum Turns {
     Never,
     About([f64; 3]),
@@ -78,7 +78,7 @@ pub(super) fn free_body<const D: usize>(
     } else {
         Table::default()
     };
-    // To add up the cells of a boolean takes long, so only where they are asked for.
+    // The sum over the cells of a boolean takes long, so it is made at its first use.
     let found = OnceCell::new();
     let mut of_shape = |key: &'static str| {
         let moments = *found.get_or_init(|| shape.moments());
@@ -208,7 +208,7 @@ fn meeting(
 }
 
 /// The table of a body that is free along some axes only: each of its motions is along another one, or a
-/// rotation of what does not turn by itself.
+/// rotation of a body that does not turn by itself.
 fn driven<const D: usize>(
     checks: &mut Checks,
     table: Table<D>,

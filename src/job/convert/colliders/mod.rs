@@ -1,6 +1,6 @@
 //! Colliders of the job file to those of the solver.
 //!
-//! | file | what it converts |
+//! | file | subject |
 //! |---|---|
 //! | `free_bodies` | colliders that move by themselves |
 //! | `deforming` | meshes in time |
@@ -21,11 +21,11 @@ use crate::job::schema::colliders::{ActsOn as WrittenActsOn, Contact as WrittenC
 use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file as file;
 
-/// Most colliders of a job: what a checkpoint's header has room for.
+/// Most colliders of a job: the header of a checkpoint has limited room.
 const MAX_COLLIDERS: usize = 16;
 /// Most boxes in which a point of a shape is searched.
 const MOST_BOXES: usize = 10_000;
-/// The axis of what turns in a plane.
+/// The axis of rotations in a plane.
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// All colliders, or faults.
@@ -115,8 +115,8 @@ fn collider<const D: usize>(
     })
 }
 
-/// Whether nothing is left of a bounded boolean shape. One that is thinner than a millionth of its size, or
-/// takes too long to test, passes.
+/// Whether a bounded boolean shape is empty. One that is thinner than a millionth of its size, or takes too
+/// long to test, passes.
 fn has_no_point<const D: usize>(shape: &Shape<D>, bounds: &Aabb<D>) -> bool {
     let size = (0..D).map(|a| bounds.upper[a] - bounds.lower[a]).fold(0.0, f64::max);
     let mut boxes = MOST_BOXES;

@@ -1,6 +1,6 @@
 //! Shapes of the job file to geometry, with checks that they have a volume.
 //!
-//! | file | what it checks |
+//! | file | subject |
 //! |---|---|
 //! | `terrain` | terrain |
 //! | `particles` | particles from a file |
@@ -113,8 +113,8 @@ impl Checks<'_> {
         }
     }
 
-    /// The mesh of a file, placed as a shape of kind `mesh` says, whose path and that of the file's name are
-    /// given.
+    /// The mesh of a file, placed by the keys of a shape of kind `mesh`. `path` is that of the shape, `here`
+    /// that of the file's name.
     pub(super) fn mesh<const D: usize>(
         &mut self,
         shape: &Written,
@@ -133,7 +133,7 @@ impl Checks<'_> {
         self.solid(triangles, *scale, &origin, make, file, here)
     }
 
-    /// Where the origin of a file lies, m from the lower corner of the domain.
+    /// Place of the origin of a file, m from the lower corner of the domain.
     pub(super) fn origin_of_file<const D: usize>(
         &mut self,
         origin: Option<&Vector>,
@@ -285,7 +285,7 @@ impl Checks<'_> {
     }
 }
 
-/// The first edge that meets an edge other than its neighbours, or has no length or folds back.
+/// The first edge that intersects an edge other than its neighbours, or has no length or folds back.
 fn first_crossing(corners: &[[f64; 2]]) -> Option<usize> {
     let n = corners.len();
     let turn =
@@ -306,7 +306,7 @@ fn first_crossing(corners: &[[f64; 2]]) -> Option<usize> {
         let ((a, b), next) = (edge(i), corners[(i + 2) % n]);
         turn(a, b, next) == 0.0 && (next[0] - b[0]) * (b[0] - a[0]) + (next[1] - b[1]) * (b[1] - a[1]) <= 0.0
     };
-    // Along x: an edge can meet those only that begin before it ends.
+    // Sorted along x: an edge can only intersect those that begin before it ends.
     let reach = |i: usize| {
         let (a, b) = edge(i);
         (a[0].min(b[0]), a[0].max(b[0]))

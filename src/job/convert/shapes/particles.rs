@@ -94,7 +94,7 @@ fn from_table<const D: usize>(
     Ok((chunk, columns.velocity.is_some()))
 }
 
-/// Where the numbers of a particle stand in a table.
+/// Columns of the numbers of a particle in a table.
 struct Columns {
     position: Vec<usize>,
     velocity: Option<Vec<usize>>,
