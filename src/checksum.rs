@@ -1,4 +1,4 @@
-//! A checksum that tells texts and lists of numbers apart.
+//! A checksum that distinguishes texts and lists of numbers.
 
 /// FNV-1a with 64 bits over bytes, or over whole words.
 pub fn fnv1a(words: impl IntoIterator<Item = u64>) -> u64 {

@@ -22,7 +22,7 @@ impl<T: Copy> Csr<T> {
         csr
     }
 
-    /// As [`Csr::new`], in the memory that is there.
+    /// As [`Csr::new`], in the memory of this one.
     pub fn fill(&mut self, groups: usize, given: impl Iterator<Item = (u32, T)> + Clone) {
         let Self { start, items } = self;
         starts(start, groups, given.clone().map(|(group, _)| group as usize));

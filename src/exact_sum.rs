@@ -13,7 +13,7 @@ const LIMB: u32 = 32;
 const LIMBS: usize = 68;
 /// Words behind the limbs: number of NaN, +∞ and -∞ added.
 const SPECIALS: usize = 3;
-/// Additions after which the carries must be handed on. One addition changes a limb by less than 2^32.
+/// Additions after which the carries must be propagated. One addition changes a limb by less than 2^32.
 const CARRY_EVERY: u32 = 1 << 30;
 
 /// An exact sum of `f64` values.
@@ -74,8 +74,8 @@ impl ExactSum {
         self.pending = 1;
     }
 
-    /// The words of the sum in their unique form: equal sums have equal words. Words of several sums
-    /// (up to 2^30 of them) may be added entry by entry and handed to [`ExactSum::from_words`].
+    /// The words of the sum in their unique form: equal sums have equal words. Words of several sums (up to
+    /// 2^30 of them) may be added entry by entry and passed to [`ExactSum::from_words`].
     pub fn words(&mut self) -> &[i64] {
         self.carry();
         &self.words

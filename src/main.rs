@@ -1,4 +1,4 @@
-//! The `agimp` program: maps what a command returns to an exit code.
+//! The `agimp` program: maps the result of a command to an exit code.
 use agimp::cli::{Arguments, execute, unusable};
 use agimp::run::stop::StopRequest;
 use clap::Parser as _;
@@ -15,9 +15,8 @@ fn main() -> ExitCode {
         let _ = StopRequest::listen();
     }
     agimp::memory::return_large_blocks();
-    // Without it such a write ends the program, which says nothing. `agimp run` does so on ranks once MPI has
-    // started: until then the limit may be what keeps `mpirun` from starting it, and they would wait for
-    // ever.
+    // Without it such a write ends the program silently. `agimp run` does so on ranks once MPI has started:
+    // until then the limit may keep `mpirun` from starting it, and the ranks would wait for ever.
     if !is_launched() {
         let _ = agimp::io::cause::tell_size_limits();
     }

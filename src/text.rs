@@ -3,7 +3,7 @@
 //! Files for machines (history, telemetry, CSV) keep every digit and do not go through here.
 use std::borrow::Cow;
 
-/// Significant digits of a measured or computed quantity where nothing asks for more.
+/// Significant digits of a measured or computed quantity by default.
 const DIGITS: usize = 4;
 
 /// Significant digits of a coordinate.
@@ -50,8 +50,8 @@ fn prefix(value: f64, unit: &str, digits: usize) -> (i32, &'static str) {
     PREFIXES.into_iter().rfind(|entry| usable(entry)).unwrap_or((0, ""))
 }
 
-/// Text in which HTML and SVG see nothing of their own. Characters that XML does not have, or that change the
-/// order of others, become visible; ends of lines and tabs stay.
+/// Text without markup of HTML and SVG. Characters that XML does not have, or that change the order of
+/// others, become visible; ends of lines and tabs stay.
 pub fn html(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 8);
     for c in text.chars() {
@@ -112,7 +112,7 @@ pub fn place(coordinates: &[f64]) -> String {
     format!("({}) m", numbers.join(", "))
 }
 
-/// A count with its thousands set apart: `1 234 567`.
+/// A count with separated thousands: `1 234 567`.
 pub fn count(count: u64) -> String {
     let digits = count.to_string();
     let mut out = String::new();

@@ -73,7 +73,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
         Ripple { forest, rank, added: HashSet::new(), work, sent: HashSet::new(), outgoing: BTreeMap::new() }
     }
 
-    /// Applies the rule until it holds on this rank. Returns what other ranks must know.
+    /// Applies the rule until it holds on this rank. Returns the requests to other ranks.
     fn settle(&mut self) -> Vec<(usize, Vec<u64>)> {
         for level in (1..self.work.len()).rev() {
             while let Some(octant) = self.work[level].pop() {
@@ -83,7 +83,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
         std::mem::take(&mut self.outgoing).into_iter().collect()
     }
 
-    /// Takes in what other ranks have found.
+    /// Adds the requests of other ranks.
     fn hear(&mut self, received: Vec<(usize, Vec<u64>)>) {
         for code in received.into_iter().flat_map(|(_, codes)| codes) {
             self.require(Octant::from_code(code).expect("ranks send codes of octants"));
@@ -107,7 +107,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
         }
     }
 
-    /// Takes care that `octant` becomes subdivided.
+    /// Requires that `octant` is subdivided.
     fn require(&mut self, octant: Octant<D>) {
         let markers = &self.forest.markers;
         let (first, end) = (octant.key(), octant.key_end());
@@ -118,7 +118,7 @@ impl<'a, const D: usize> Ripple<'a, D> {
             }
             return;
         }
-        // An octant with leaves of several ranks is subdivided already, and they all know.
+        // An octant with leaves of several ranks is subdivided already, and they all know it.
         let owner = self.forest.owner(first);
         if end <= markers[owner + 1] && self.sent.insert(octant.code()) {
             self.outgoing.entry(owner).or_default().push(octant.code());

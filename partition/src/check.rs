@@ -138,8 +138,8 @@ impl<const D: usize> Forest<D> {
     /// Collective. A number that depends on the brick and the leaves, but not on the partition:
     /// equal trees have equal checksums on any number of ranks.
     pub fn checksum(&self, comm: &Comm) -> u64 {
-        // A sum, so that the order in which ranks are combined does not matter. It cannot wash out
-        // a difference as plain keys could, since each code is mixed first and occurs once.
+        // A sum, so that the order in which ranks are combined does not matter. Unlike a sum of plain keys it
+        // does not hide differences, since each code is mixed first and occurs once.
         let own = self.leaves.iter().fold(0u64, |sum, leaf| sum.wrapping_add(mix(leaf.code())));
         let sum = comm.wrapping_sum_u64(own);
         self.brick.roots.iter().fold(mix(sum ^ D as u64), |hash, &n| mix(hash ^ u64::from(n)))

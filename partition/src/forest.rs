@@ -16,7 +16,7 @@ pub struct Forest<const D: usize> {
     pub(crate) brick: Brick<D>,
     /// Leaves of this rank in curve order.
     pub(crate) leaves: Vec<Octant<D>>,
-    /// Key of each leaf: what binary searches read.
+    /// Key of each leaf, for binary searches.
     pub(crate) keys: Vec<u64>,
     /// Rank `r` owns the keys `markers[r]..markers[r + 1]`; an empty rank owns an empty range.
     pub(crate) markers: Vec<u64>,
@@ -94,8 +94,8 @@ impl<const D: usize> Forest<D> {
         &self.brick
     }
 
-    /// Not collective. Number of changes of tree or partition so far; the same on all ranks.
-    /// Whatever is derived from the forest remembers the revision it was built for.
+    /// Not collective. Number of changes of tree or partition so far; the same on all ranks. Data derived
+    /// from the forest store the revision that they were built for.
     pub fn revision(&self) -> u64 {
         self.revision
     }

@@ -31,8 +31,8 @@ impl<const D: usize> Forest<D> {
         self.partition_at(comm, cuts)
     }
 
-    /// Collective. Where [`Forest::partition`] would cut the curve. Changes nothing, so that a caller can see
-    /// what a new partition would bring.
+    /// Collective. Where [`Forest::partition`] would cut the curve. Changes nothing, so that a caller can
+    /// evaluate a new partition.
     ///
     /// # Panics
     /// As [`Forest::partition`].

@@ -1,4 +1,4 @@
-//! Where to cut the curve so that every rank gets its share of the weight.
+//! Cuts of the curve that give every rank its share of the weight.
 
 use crate::{Brick, Comm, Forest, Octant};
 
@@ -23,7 +23,7 @@ struct Boundary {
 /// Number of integers that every rank reports of its leaves.
 const SUMMARY: usize = 5;
 
-/// Where the curve is to be cut, and what each rank then gets. The same on all ranks.
+/// New cuts of the curve, with the weights of ranks. The same on all ranks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cuts {
     /// Rank `r` gets the keys `markers[r]..markers[r + 1]`.

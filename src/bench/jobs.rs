@@ -1,7 +1,7 @@
 //! The built-in jobs, as job files.
 //!
 //! All have bodies of eight particles per cell (in 2D also four, as is usual there), in motion and deforming
-//! from the first step, in a domain that is little larger. Sizes follow from the number of particles.
+//! from the first step, in a domain that is slightly larger. Sizes follow from the number of particles.
 
 /// A built-in job.
 #[derive(Clone, Copy, Debug)]
@@ -10,7 +10,7 @@ pub struct BenchJob {
     pub name: &'static str,
     /// Description, for the table of results.
     pub title: &'static str,
-    /// Steps before the measurement, for the state to be a usual one.
+    /// Steps before the measurement, until the state is a typical one.
     pub warm_up: u64,
     kind: Kind,
 }
@@ -23,7 +23,7 @@ enum Kind {
 }
 
 const NEO_HOOKEAN: &str = r#"model = "neo_hookean""#;
-// Next to nothing keeps it from flowing, so that all of it does, all the time.
+// A negligible yield stress, so that all of the material flows all the time.
 const VON_MISES: &str = "model = \"von_mises\"\nyield_stress = 1e-2\nhardening = 1.0";
 const SAND: &str = "model = \"drucker_prager\"\nfriction_angle = 29.5\nmatch = \"plane_strain\"";
 

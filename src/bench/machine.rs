@@ -7,8 +7,8 @@ use crate::simd::{LANES, Lanes, Vector};
 /// Limits of one core.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
-    /// Bytes per second of `a = b + s c` over arrays far larger than the caches, 24 bytes per element (what
-    /// the processor reads before it overwrites `a` is not counted).
+    /// Bytes per second of `a = b + s c` over arrays far larger than the caches, 24 bytes per element (reads
+    /// of `a` before it is overwritten are not counted).
     pub triad: f64,
     /// Operations per second of fused multiply-adds (two each) in registers, with the vectors that this build
     /// uses.

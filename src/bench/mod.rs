@@ -17,7 +17,7 @@ use crate::setup;
 use crate::solver::Requests;
 use crate::solver::state::phases::Phase;
 
-/// How much to measure.
+/// Extent of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
     /// Particles, about.
@@ -54,7 +54,7 @@ pub struct Figures {
     pub fused: f64,
     /// Resident bytes per particle of the rank that has most.
     pub memory: f64,
-    /// Processor time over wall time of this rank; well below 1, others have used the core.
+    /// Processor time over wall time of this rank; well below 1 if other processes have used the core.
     pub core_share: f64,
 }
 

@@ -1,8 +1,8 @@
-//! Long arrays whose pages are their own.
+//! Long arrays with pages of their own.
 //!
 //! Pages come from the system zeroed when they are first touched and go back to it at once; an array that
-//! grows takes its pages along without a copy. `unsafe` is needed for the latter: other references could
-//! still point to the old place. Nothing here hands out any that outlive a change.
+//! grows moves its pages without a copy. `unsafe` is needed for the latter: other references could still
+//! point to the old place. Nothing here hands out any that outlive a change.
 #![allow(unsafe_code)]
 
 use std::ops::{Deref, DerefMut};
@@ -30,7 +30,7 @@ impl<T: Pod> Block<T> {
     pub fn zeroed(len: usize) -> Self {
         let bytes = len * size_of::<T>();
         if bytes >= PAGES_FROM {
-            // A system has only so many mappings for a process; without one more the heap has to do.
+            // The number of mappings of a process is limited; without one more the heap is used.
             if let Ok(pages) = MmapOptions::new().len(bytes).map_anon() {
                 return Self(Memory::Pages(pages));
             }
@@ -39,7 +39,7 @@ impl<T: Pod> Block<T> {
     }
 
     /// Makes it `len` long. The first elements, as many as there are before and after, stay as they are;
-    /// others hold anything.
+    /// others are undefined.
     pub fn resize(&mut self, len: usize) {
         let bytes = len * size_of::<T>();
         match &mut self.0 {

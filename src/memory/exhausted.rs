@@ -1,4 +1,4 @@
-//! The system's allocator, with a word where it has nothing left.
+//! The system's allocator, with a message when memory is exhausted.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -6,16 +6,16 @@ use std::cell::Cell;
 use std::io::Write as _;
 
 thread_local! {
-    /// Whether the caller can do without.
+    /// Whether the caller can handle a failure.
     static MAY_FAIL: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The system's allocator. Where it has no memory left the program says so and ends with exit code 1: an
-/// abort, as by default, would have MPI print a backtrace.
+/// The system's allocator. When memory is exhausted the program prints a message and ends with exit code 1:
+/// an abort, as by default, would have MPI print a backtrace.
 #[derive(Debug)]
 pub struct Allocator;
 
-/// Calls a function that can do without the memory that it asks for (`try_reserve`).
+/// Calls a function that handles a failure to allocate (`try_reserve`).
 pub fn may_fail<T>(function: impl FnOnce() -> T) -> T {
     MAY_FAIL.set(true);
     let result = function();
@@ -23,7 +23,7 @@ pub fn may_fail<T>(function: impl FnOnce() -> T) -> T {
     result
 }
 
-// SAFETY: all is left to the system's allocator, and what it returns is returned; or the process ends.
+// SAFETY: all calls go to the system's allocator, whose result is returned; or the process ends.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as the caller's.
@@ -55,7 +55,7 @@ fn checked(pointer: *mut u8, size: usize) -> *mut u8 {
 
 #[cold]
 fn end(size: usize) -> ! {
-    // Without memory, so in a buffer of fixed length, and without what runs at an orderly end.
+    // Without memory, so in a buffer of fixed length, and without the handlers of an orderly end.
     let mut buffer = [0_u8; 200];
     let mut rest = &mut buffer[..];
     let _ = writeln!(

@@ -1,10 +1,10 @@
-//! How much memory there is.
+//! Limits on memory.
 use std::path::Path;
 
 /// Bytes that a run may use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// All processes on this machine together: its memory, or what a container or batch job may have of it.
+    /// All processes on this machine together: its memory, or the share of a container or batch job.
     pub host: f64,
     /// One process (`ulimit -v`).
     pub process: f64,

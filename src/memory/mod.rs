@@ -1,4 +1,4 @@
-//! Settings of the system's allocator, arrays that do without it, and how much memory there is.
+//! Settings of the system's allocator, arrays that do without it, and limits on memory.
 #![allow(unsafe_code)]
 
 pub mod block;
@@ -15,9 +15,9 @@ pub use limits::Limits;
 const RETURNED: libc::c_int = 4 << 20;
 
 /// Has large blocks returned to the system when they are freed. Left to itself, the allocator of GNU systems
-/// raises its bound for such blocks up to 32 MiB as they come and go, and then keeps their pages between the
-/// particles' columns: 25 bytes per particle in a run of two million. To be called before anything large is
-/// allocated.
+/// raises its bound for such blocks up to 32 MiB as they are allocated and freed, and then keeps their pages
+/// between the particles' columns: 25 bytes per particle in a run of two million. To be called before
+/// anything large is allocated.
 pub fn return_large_blocks() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {

@@ -29,9 +29,9 @@ pub fn smooth_step(s: f64) -> f64 {
 /// A place of material, m, in the coordinates of the job; z is 0 in plane strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Where it is.
+    /// The present place.
     pub now: [f64; 3],
-    /// Where it was in the undeformed body: `now` less its displacement.
+    /// The place in the undeformed body: `now` less the displacement.
     pub undeformed: [f64; 3],
 }
 
@@ -43,7 +43,7 @@ impl From<[f64; 3]> for Place {
 }
 
 /// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job,
-/// where quantities are taken; z is 0 in plane strain.
+/// the argument of quantities; z is 0 in plane strain.
 pub fn in_job<const D: usize>(origin: &[f64; D], x: &[f64; D]) -> [f64; 3] {
     std::array::from_fn(|a| if a < D { origin[a] + x[a] } else { 0.0 })
 }

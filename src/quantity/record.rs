@@ -40,12 +40,12 @@ pub enum RecordError {
     /// A record without columns.
     #[error("it is a record of PEER: values at a constant step, without columns; remove `time` and `value`")]
     Peer,
-    /// It has not as many values as its header says.
+    /// The number of values is not that of the header.
     #[error("it has {found} values; its header says NPTS = {expected}")]
     Count {
         /// Values that it has.
         found: usize,
-        /// Values of which its header speaks.
+        /// Values according to its header.
         expected: usize,
     },
 }
@@ -59,7 +59,7 @@ const QUOTED: usize = 40;
 /// The table of two columns of a file, times in s; values are multiplied by `scale`.
 ///
 /// # Errors
-/// The file cannot be read, lacks a column, or holds what is no table.
+/// The file cannot be read, lacks a column, or is no table.
 pub fn read(path: &Path, time: &Column, value: &Column, scale: f64) -> Result<Table, RecordError> {
     parse(&input_file::read(path, MOST_BYTES)?, time, value, scale)
 }
@@ -67,7 +67,7 @@ pub fn read(path: &Path, time: &Column, value: &Column, scale: f64) -> Result<Ta
 /// Numbers of some columns of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
-    /// Those of each row, in the order of the columns that were asked for.
+    /// Those of each row, in the order of the requested columns.
     pub numbers: Vec<Vec<f64>>,
     /// The line of each row, from 1.
     pub lines: Vec<u64>,
@@ -140,7 +140,7 @@ fn rows(bytes: &[u8], columns: &[Column]) -> Result<Rows, RecordError> {
     Ok(rows)
 }
 
-/// How lines are cut into cells.
+/// Separation of cells in a line.
 enum Cells {
     /// At each of this byte.
     At(u8),
@@ -149,8 +149,8 @@ enum Cells {
 }
 
 impl Cells {
-    /// As the first line with something to read says: at semicolons, tabs or commas if it has some, else at
-    /// spaces.
+    /// By the first line that is neither blank nor a remark: at semicolons, tabs or commas if it has some,
+    /// else at spaces.
     fn of(bytes: &[u8]) -> Self {
         let first = bytes.split(|&byte| byte == b'\n').find(|text| holds_cells(text)).unwrap_or_default();
         b";\t,".iter().find(|separator| first.contains(separator)).map_or(Self::Spaces, |at| Self::At(*at))

@@ -7,10 +7,10 @@ use crate::text::quantity;
 
 /// Times that a chart shows, from the first to the last.
 const TIMES: usize = 5;
-/// Columns that say where a row stands.
+/// Columns with the place of a row.
 const PLACE: [&str; 6] = ["time", "point", "x", "y", "z", "level"];
 
-/// The charts of all lines, by name and file: one for each quantity, over the way from the first point.
+/// The charts of all lines, by name and file: one for each quantity, over the distance from the first point.
 pub(super) fn panels(lines: &[(String, PathBuf)]) -> Vec<Panel> {
     lines.iter().flat_map(|(name, path)| of_line(name, &History::read(path))).collect()
 }

@@ -1,4 +1,4 @@
-//! Where the time of a run went, and how work and memory lie on its ranks: from telemetry.
+//! Time of a run by phase, and the distribution of work and memory over its ranks, from telemetry.
 use std::path::Path;
 
 use super::panels::Panel;
@@ -19,7 +19,7 @@ pub(super) struct PhaseCost {
 #[derive(Debug, Default)]
 pub(super) struct Cost {
     pub records: Vec<Record>,
-    /// Phases, the dearest first; what is left comes last.
+    /// Phases, the longest first; the rest comes last.
     pub phases: Vec<PhaseCost>,
     /// Wall seconds of all parts of the run.
     pub wall: f64,

@@ -2,14 +2,14 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | this | what goes into the page |
+//! | this | options and assembly of the page |
 //! | `sections.rs` | its words, numbers and tables |
 //! | `figures.rs` | its pictures and charts |
 //! | `results.rs` | the files of a run: which are there, and how far it has come |
 //! | `history.rs` | the table of the history |
 //! | `along.rs` | curves along lines of points |
 //! | `panels.rs` | columns of the history that belong into one chart |
-//! | `cost.rs` | where the time went, balance and memory, from telemetry |
+//! | `cost.rs` | time by phase, balance and memory, from telemetry |
 //! | `page.html`, `page.css` | frame and style of the page |
 //!
 //! Runs that go on, and runs that have ended by a fault, are shown as far as they have come.
@@ -81,7 +81,7 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
     match pictures(&mut drawn, &run, options) {
         Ok(()) => body.push_str(&drawn),
         Err(error) if options.colour.is_some() => return Err(error),
-        // A page of what can be read is worth more than none.
+        // A page of the readable files is better than none.
         Err(error) => {
             let _ = writeln!(body, "<p class=\"warning\">no pictures: {}</p>", html(&error.to_string()));
         }

@@ -30,7 +30,7 @@ impl Panel {
     }
 }
 
-/// Columns that have no chart: they say where a row stands.
+/// Columns that have no chart: they give the place of a row.
 const LEFT_OUT: [&str; 3] = ["time", "stage", "grid_mass"];
 /// Columns that share a chart: its title and their names there.
 const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
@@ -59,8 +59,8 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
 ];
 /// Charts with a logarithmic axis.
 const LOGARITHMIC: [&str; 2] = ["peak_speed", "unbalanced_acceleration"];
-/// Starts of names: what stands before the name of a load, probe, collider; the longest first where one is
-/// the start of another.
+/// Prefixes of the names of loads, probes and colliders in columns; the longest first where one is the start
+/// of another.
 const STEMS: [(&str, &str); 26] = [
     ("angular_momentum", "Angular momentum"),
     ("contact_work", "Work of contact"),
@@ -119,7 +119,7 @@ pub(super) fn panels(history: &History) -> Vec<Panel> {
         panel.curves.push(("sum".into(), sums));
     }
     panels.retain(Panel::changes);
-    // A component that is 0 all the time only takes the room of others.
+    // A component that is 0 all the time is left out.
     panels.iter_mut().for_each(|panel| panel.curves.retain(|(_, points)| points.iter().any(|p| p.1 != 0.0)));
     panels.extend(over_ways(history));
     panels
@@ -160,7 +160,7 @@ fn place(column: &str) -> (String, String) {
     (words, name)
 }
 
-/// Forces on colliders that move, over the way along which they move most.
+/// Forces on colliders that move, over their displacement along the axis of the largest.
 fn over_ways(history: &History) -> Vec<Panel> {
     let named = |what: &str, name: &str, axis: &str| history.column(&format!("{what}_{name}{axis}"));
     let axes = ["_x", "_y", "_z"];

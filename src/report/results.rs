@@ -18,10 +18,10 @@ pub struct Results {
     pub name: String,
 }
 
-/// Why a directory does not say which run is meant.
+/// Why a directory does not determine a run.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unclear {
-    /// No run has left anything there.
+    /// No run has written there.
     #[error("{}: found no history of a run (NAME.history.csv); expected the directory of the results of a run", .0.display())]
     Nothing(PathBuf),
     /// Several runs have.
@@ -29,14 +29,14 @@ pub enum Unclear {
     Several(PathBuf, Vec<String>),
 }
 
-/// How far a run has come.
+/// State of a run.
 #[derive(Debug, PartialEq)]
 pub(super) enum State {
     /// It has written its report.
     Finished,
-    /// It has its lock; who it is.
+    /// It holds its lock; the process.
     Running(String),
-    /// It has left word of why it has ended.
+    /// It has recorded why it has ended.
     Told(Ending),
     /// None of these: it was killed.
     Ended,
@@ -92,7 +92,7 @@ impl Results {
         lines
     }
 
-    /// The latest state that a run can go on from, by its header: file, step, time (s).
+    /// The latest state from which a run can continue, by its header: file, step, time (s).
     pub(super) fn last_state(&self) -> Option<(PathBuf, u64, f64)> {
         let candidates = directory::candidates(&self.directory, &self.name, None).ok()?;
         let (path, step) = candidates.whole.into_iter().next()?;
@@ -105,7 +105,7 @@ impl Results {
         serde_json::from_slice(&std::fs::read(report::path(&self.directory, &self.name)).ok()?).ok()
     }
 
-    /// How far the run has come, which says of itself whether it has finished.
+    /// State of the run; `is_finished` if it has its report.
     pub(super) fn state(&self, is_finished: bool) -> State {
         match claim::holder(&self.path("lock")) {
             _ if is_finished => State::Finished,

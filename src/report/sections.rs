@@ -62,7 +62,7 @@ pub(super) fn facts(body: &mut String, run: &Run) {
     body.push_str("</dl>\n");
 }
 
-/// Why a run has ended ahead of its time, what to do, and from where it can go on.
+/// Why a run has ended ahead of its time, what to do, and from which file it can continue.
 pub(super) fn ending(body: &mut String, run: &Run, results: &Results) {
     let (reason, advice) = match &run.state {
         State::Finished | State::Running(_) => return,

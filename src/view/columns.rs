@@ -1,4 +1,4 @@
-//! Which numbers of the particles go into a view, and their ranges over all times.
+//! Numbers of the particles in a view, and their ranges over all times.
 use std::path::Path;
 
 use crate::io::frame::{Frame, is_integer};
@@ -131,11 +131,11 @@ pub(super) fn sources(columns: &[Column]) -> Vec<PointField> {
     fields
 }
 
-/// How the values of a column become whole numbers `0 ..= levels - 1`.
+/// Scale from the values of a column to whole numbers `0 ..= levels - 1`.
 ///
-/// Level `q` stands for `unit · sinh(low + q (high - low) / (levels - 1))`: near zero levels are equally far
-/// apart, far from it they are by equal factors. So one outlier does not make all other values the same
-/// level. Whole numbers are kept as they are, from `low` on.
+/// Level `q` stands for `unit · sinh(low + q (high - low) / (levels - 1))`: near zero levels have equal
+/// distances, far from it equal ratios. So one outlier does not make all other values the same level. Whole
+/// numbers are kept as they are, from `low` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     pub unit: f64,
@@ -146,7 +146,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// The level of a value; what is not a number gets the lowest.
+    /// The level of a value; NaN gets the lowest.
     pub(super) fn level(&self, value: f64) -> u16 {
         let most = f64::from(self.levels - 1);
         let place = if self.integer {
@@ -204,7 +204,7 @@ impl LeafMaxima {
         }
     }
 
-    /// Takes a frame into account. Refuses one of another domain than the first.
+    /// Extends the bounds to a frame. Refuses one of another domain than the first.
     pub(super) fn look(&mut self, path: &Path, frame: &Frame, columns: &[Column]) -> Result<(), FileError> {
         let domain = frame.domain();
         let first = self.first.get_or_insert_with(|| First { header: frame.header.clone(), domain });

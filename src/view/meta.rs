@@ -9,7 +9,7 @@ use super::pack::STEPS_PER_DOUBLING;
 use crate::io::snapshot::{Header, PointField};
 use crate::text::printable;
 
-/// The page's knowledge of all frames.
+/// Metadata of all frames.
 #[derive(Serialize)]
 pub(super) struct Meta {
     title: String,
@@ -113,7 +113,7 @@ impl Meta {
         }
     }
 
-    /// JSON in which HTML sees no markup.
+    /// JSON without markup of HTML.
     pub(super) fn json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
     }

@@ -2,10 +2,10 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `columns.rs` | which numbers of the particles go into the file, and their ranges over all times |
+//! | `columns.rs` | numbers of the particles in the file, and their ranges over all times |
 //! | `pack.rs` | numbers as few bytes: sorted along a curve, as differences, compressed |
-//! | `meta.rs` | what the page knows beside the numbers, as JSON |
-//! | `page/` | the page itself: HTML, style and scripts, which stand in the file as they are |
+//! | `meta.rs` | metadata of the page, as JSON |
+//! | `page/` | the page itself: HTML, style and scripts |
 //!
 //! Positions keep a 32nd of the smallest particle's half width; fields keep a given number of bits on a scale
 //! that is fine near zero (`columns::Scale`). Both are far below what a picture shows; `agimp export` has
@@ -57,7 +57,7 @@ const SCRIPTS: [&str; 7] = [
 ///
 /// # Errors
 /// A file cannot be read or does not show a field that was asked for, or the HTML file cannot be written; it
-/// is then not there, or as it was.
+/// is then absent or unchanged.
 pub fn write(files: &[PathBuf], options: &Options, out: &Path) -> Result<u64, FileError> {
     let part = out.with_added_extension("part");
     let failed = |source| FileError::System { path: out.into(), action: "write", source };

@@ -2,7 +2,7 @@
 //!
 //! Particles are sorted along a space-filling curve, so that neighbours in the file are neighbours in space
 //! and differ little. Each column is a list of differences from number to number, modulo its range, with the
-//! sign in the lowest bit, as planes of bytes: all lowest bytes, then all next ones. This is what compresses
+//! sign in the lowest bit, as planes of bytes: all lowest bytes, then all next ones. This form compresses
 //! best.
 use std::io::Write as _;
 
@@ -55,7 +55,7 @@ pub(super) fn leaves(leaves: &Leaves) -> Vec<u8> {
     out
 }
 
-/// Deflate with the frame of zlib, which browsers undo.
+/// Deflate in the format of zlib, which browsers decode.
 pub(super) fn compress(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(7));
     // Writing to memory does not fail.

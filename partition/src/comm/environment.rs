@@ -38,8 +38,8 @@ fn has_one_thread() -> bool {
 /// Settings for the library that calls itself `version`.
 fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
     if version.starts_with("Open MPI v") {
-        // A rank that waits for a message gives its core to whoever has work: another rank, a thread that
-        // writes files, another program. Where nobody has, it comes back at once.
+        // A rank that waits for a message gives its core to another rank, a thread that writes files, or
+        // another program with work. If none has any, it continues at once.
         &[("OMPI_MCA_mpi_yield_when_idle", "1")]
     } else {
         &[]
@@ -50,7 +50,7 @@ fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
 mod tests {
     use super::{has_one_thread, settings};
 
-    /// A process with threads does not get its environment changed. A test is a thread beside that of its
+    /// The environment of a process with threads is not changed. A test is a thread beside that of its
     /// harness.
     #[test]
     fn threads_are_noticed() {

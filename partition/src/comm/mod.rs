@@ -29,7 +29,7 @@ pub use world::{Comm, CommError, RawComm, World};
 
 /// Message tags. Exchanges with different tags cannot receive each other's messages.
 mod tag {
-    /// [`super::Comm::sparse_exchange`] alternates between two tags, see there.
+    /// [`super::Comm::sparse_exchange`] alternates between these two tags.
     pub(super) const SPARSE: [i32; 2] = [1, 2];
     /// Tags of [`super::NeighbourExchange`] start here.
     pub(super) const NEIGHBOUR: i32 = 16;

@@ -93,8 +93,7 @@ impl NeighbourExchange {
     }
 }
 
-/// An exchange under way; ended by [`Pending::finish`]. If dropped it is finished, and what arrived
-/// is lost.
+/// An exchange under way; ended by [`Pending::finish`]. If dropped it is finished, and its messages are lost.
 #[must_use = "finish the exchange to get what arrived"]
 pub struct Pending {
     comm: Comm,
@@ -114,8 +113,8 @@ enum Slot {
 }
 
 impl Pending {
-    /// Not collective, does not wait. Receives what has arrived so far and returns whether
-    /// everything has. Calls now and then during other work let long messages advance.
+    /// Not collective, does not wait. Receives the messages that have arrived so far and returns whether all
+    /// have. Calls now and then during other work let long messages advance.
     pub fn progress(&mut self) -> bool {
         // By source, never "any": a fast neighbour's next message must not be taken for this one.
         for (slot, &source) in self.incoming.iter_mut().zip(self.neighbours.iter()) {

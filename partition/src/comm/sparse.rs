@@ -10,9 +10,9 @@ use super::request::{Incoming, Mode, Outgoing, Patience};
 use super::{Comm, tag};
 
 impl Comm {
-    /// Collective. Sends each `(rank, message)` and returns what arrived as `(rank, message)`,
-    /// sorted by source; two messages from one source stay in the order in which it gave them.
-    /// Empty messages arrive too. A rank may send to itself.
+    /// Collective. Sends each `(rank, message)` and returns the messages received as `(rank, message)`,
+    /// sorted by source; two messages from one source stay in the order in which it gave them. Empty messages
+    /// arrive too. A rank may send to itself.
     ///
     /// The receivers need not know who sends. The cost grows with the number of partners and the
     /// logarithm of the number of ranks: sends complete when they are received; when all own ones

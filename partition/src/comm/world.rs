@@ -23,11 +23,12 @@ const PANIC_CODE: i32 = 101;
 static STEP: AtomicU64 = AtomicU64::new(NO_STEP);
 const NO_STEP: u64 = u64::MAX;
 
-/// Set by the first panic of this process: threads that share a bug must not repeat the message.
+/// Set by the first panic of this process: threads that panic for the same reason must not repeat the
+/// message.
 static TOLD: AtomicBool = AtomicBool::new(false);
 
-/// Ranks that share a bug must not all report it: the others give rank 0 this long to end the job first.
-/// Longer than Open MPI takes between SIGTERM, which the program may catch, and SIGKILL (1 s).
+/// Ranks that panic for the same reason must not all report it: the others give rank 0 this long to end the
+/// job first. Longer than Open MPI takes between SIGTERM, which the program may catch, and SIGKILL (1 s).
 const RANK_0_FIRST: Duration = Duration::from_millis(1500);
 
 /// Why MPI could not be started.
@@ -197,7 +198,7 @@ fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
         NO_STEP => String::new(),
         step => format!(", step {step}"),
     };
-    // In one piece, or `mpirun` may put its own words between pieces; a closed pipe is no error.
+    // In one piece, or `mpirun` may put its own text between pieces; a closed pipe is no error.
     let text = format!("agimp: rank {rank}{step}: {message}{place}\n");
     let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
     if size > 1 && running {

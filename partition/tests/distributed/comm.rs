@@ -60,7 +60,7 @@ pub(crate) fn agree(comm: &Comm) {
     let (rank, size) = (comm.rank(), comm.size());
     assert_eq!(comm.agree::<_, String>(Ok(rank)).expect("all agree"), rank);
     for failing in 0..size {
-        // All ranks from `failing` on fail; the message of the lowest one is told.
+        // All ranks from `failing` on fail; the message of the lowest one is reported.
         let result = if rank >= failing { Err(format!("mishap {rank}")) } else { Ok(()) };
         let error = comm.agree(result).expect_err("some rank failed");
         assert_eq!((error.rank, error.failed), (failing, size - failing));

@@ -1,4 +1,4 @@
-//! The same operations on a whole tree in one place, as plainly as possible.
+//! The same operations on a whole tree in one place, in the simplest form.
 
 use std::collections::BTreeSet;
 
@@ -115,7 +115,7 @@ pub(crate) fn children<const D: usize>(octant: &Octant<D>) -> Vec<Octant<D>> {
     (0..Octant::<D>::CHILDREN).map(|i| octant.child(i)).collect()
 }
 
-/// Collective. Leaves of each rank, everywhere. What the library itself never does.
+/// Collective. Leaves of each rank, everywhere. The library itself never does this.
 pub(crate) fn all_leaves<const D: usize>(comm: &Comm, forest: &Forest<D>) -> Vec<Vec<Octant<D>>> {
     let bytes: Vec<u8> = forest.leaves().iter().flat_map(|leaf| leaf.code().to_ne_bytes()).collect();
     let gathered = comm.gather_bytes(&bytes);

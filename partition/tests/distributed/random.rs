@@ -1,4 +1,4 @@
-//! Repeatable random numbers that any rank can draw without asking another.
+//! Repeatable random numbers that any rank can draw without communication.
 
 /// A sequence of random numbers (SplitMix64).
 pub(crate) struct Random(u64);
@@ -26,7 +26,7 @@ impl Random {
     }
 }
 
-/// A random number that belongs to `item`, the same wherever and whenever it is asked for.
+/// A random number that belongs to `item`, the same on any rank at any time.
 pub(crate) fn hash(seed: u64, item: u64) -> u64 {
     Random::new(Random::new(seed).next() ^ item).next()
 }

@@ -115,7 +115,7 @@ fn balance<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &mut Ora
 }
 
 fn share_out<const D: usize>(comm: &Comm, forest: &mut Forest<D>, oracle: &Oracle<D>, seed: u64) {
-    // Families last: what follows may coarsen.
+    // Families last: the next steps may coarsen.
     for at in [CutAt::Leaves, CutAt::Families] {
         share_out_at(comm, forest, oracle, seed, at);
     }

@@ -6,10 +6,10 @@
 //! | `words` | names and operators, with `libm` behind them |
 //! | `tokens` | text to tokens |
 //! | `program` | tokens to a program in postfix order, and its value |
-//! | this | expressions, and what they say where they have no value |
+//! | this | expressions, and messages where they have no value |
 //!
-//! Two forms that readers read differently are made plain: `-x^2` is `-(x^2)` as on paper, and chains such as
-//! `a^b^c` or `a * -b` ask for parentheses.
+//! Two ambiguous forms are defined or refused: `-x^2` is `-(x^2)` as on paper, and chains such as `a^b^c` or
+//! `a * -b` ask for parentheses.
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::Place;
@@ -37,12 +37,12 @@ pub struct Expression {
     used: u8,
     /// Key of the job that it is the value of.
     key: String,
-    /// Where it had no finite value; set on the way of an error only.
+    /// Where it had no finite value; set in the case of an error only.
     lost: OnceLock<Mutex<Lost>>,
 }
 
 impl Clone for Expression {
-    /// A copy that knows nothing of the values of the original: where one asks for values that the other does
+    /// A copy without the failed values of the original: where one is evaluated at places that the other does
     /// not need, only one fails.
     fn clone(&self) -> Self {
         let (text, key) = (self.text.clone(), self.key.clone());
@@ -50,8 +50,8 @@ impl Clone for Expression {
     }
 }
 
-/// Variables of an evaluation without a finite value, and what came out: of several the least, so that it is
-/// the same on any threads.
+/// Variables of an evaluation without a finite value, and the value: of several the least, so that it is the
+/// same on any threads.
 type Lost = ([f64; VARIABLES.len()], f64);
 
 /// Why a text is no expression.
@@ -303,7 +303,7 @@ mod tests {
         );
     }
 
-    /// The key, the expression and where: of several places the same one, in whichever order they are met.
+    /// The key, the expression and where: of several places the same one, in any order of evaluation.
     #[test]
     fn a_value_that_is_not_finite_is_remembered_with_its_place() {
         let expression = Expression::parse("sqrt(x - 1) / t").unwrap().of_key("gravity[1]".into());

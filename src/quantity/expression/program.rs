@@ -6,7 +6,7 @@ use super::words::{Binary, Function, Meaning, Unary, VARIABLES, operator};
 /// Deepest stack of values that needs no memory from the heap.
 const SHALLOW: usize = 32;
 
-/// A product, and how strongly it binds.
+/// A product, with its rank.
 const PRODUCT: (u8, Binary) = (2, |a, b| a * b);
 
 /// One step on a stack of values.
@@ -96,7 +96,7 @@ impl Program {
 enum Waiting<'a> {
     /// A parenthesis, of a function with its name and the number of arguments that have begun.
     Parenthesis(Option<(&'a str, Function, usize)>),
-    /// An operator with how strongly it binds.
+    /// An operator with its rank.
     Operator(u8, Binary),
 }
 
@@ -231,7 +231,8 @@ impl<'a> Parser<'a> {
         Ok(self.steps)
     }
 
-    /// Takes up an operator after its first operand: those before it that bind as strongly get their values.
+    /// Pushes an operator after its first operand: those before it of the same or a higher rank are
+    /// evaluated.
     fn operator(&mut self, (rank, function): (u8, Binary)) {
         while let Some(&Waiting::Operator(before, function)) = self.waiting.last()
             && before >= rank
@@ -242,7 +243,7 @@ impl<'a> Parser<'a> {
         self.waiting.push(Waiting::Operator(rank, function));
     }
 
-    /// Gives the operators back to the last parenthesis their values.
+    /// Evaluates the operators back to the last parenthesis.
     fn close(&mut self) {
         while let Some(&Waiting::Operator(_, function)) = self.waiting.last() {
             self.waiting.pop();

@@ -3,7 +3,7 @@
 //! in a line.
 use super::{RecordError, Rows, number_of, quoted};
 
-/// Lines among which that with the step is looked for.
+/// Lines in which the step is searched.
 const HEADER: usize = 6;
 
 /// Times and values, if it is such a record.
