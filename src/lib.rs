@@ -23,5 +23,6 @@ pub mod run;
 pub mod setup;
 pub mod simd;
 pub mod solver;
+pub mod source;
 pub mod text;
 pub mod view;

@@ -19,6 +19,7 @@ use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
 use crate::solver::Equilibrium;
+use crate::source::Source;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -118,8 +119,10 @@ pub struct Problem<const D: usize> {
     pub adaptivity: Option<Adaptivity<D>>,
     /// Materials.
     pub materials: Vec<MaterialSetup>,
-    /// Bodies, in the order of the job file.
+    /// Bodies, in the order of the job file; then those of the sources.
     pub bodies: Vec<Body<D>>,
+    /// Sources, in the order of the job file.
+    pub sources: Vec<Source<D>>,
     /// Acceleration of gravity.
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
@@ -142,6 +145,8 @@ pub struct Problem<const D: usize> {
     pub load_stages: Vec<InStages>,
     /// Stages in which each collider is there.
     pub collider_stages: Vec<InStages>,
+    /// Stages in which each source feeds.
+    pub source_stages: Vec<InStages>,
     /// Treatment of particles that leave the domain.
     pub leaving: LeavingPolicy,
     /// End and time step.
@@ -212,14 +217,50 @@ impl<const D: usize> Problem<D> {
 
     /// Bodies that come with a stage, in the order of the job.
     pub fn bodies_of_stage(&self, stage: usize) -> impl Iterator<Item = usize> + '_ {
-        (0..self.bodies.len()).filter(move |&body| self.bodies[body].stage == stage)
+        (0..self.bodies.len())
+            .filter(move |&body| self.bodies[body].fed.is_none() && self.bodies[body].stage == stage)
     }
 
-    /// Whether two bodies with shapes of their own come with the same stage. The place of earlier bodies by
-    /// then is not that of their shapes.
+    /// Whether two bodies with shapes of their own come with the same stage, or their sources feed at the
+    /// same time. The place of earlier bodies by then is not that of their shapes.
     pub fn come_together(&self, first: usize, second: usize) -> bool {
         let [first, second] = [first, second].map(|body| &self.bodies[body]);
-        first.given.is_none() && second.given.is_none() && first.stage == second.stage
+        if first.given.is_some() || second.given.is_some() {
+            return false;
+        }
+        let begins = |source: usize| self.source_stages[source].has(0) && self.sources[source].from == 0.0;
+        match (first.fed, second.fed) {
+            (None, None) => first.stage == second.stage,
+            (Some(source), None) => second.stage == 0 && begins(source),
+            (None, Some(source)) => first.stage == 0 && begins(source),
+            (Some(first), Some(second)) => {
+                let spans = [first, second].map(|source| {
+                    let source = &self.sources[source];
+                    [
+                        source.from,
+                        (source.total as f64 / source.entries.len() as f64)
+                            .mul_add(source.period, source.from),
+                    ]
+                });
+                self.source_stages[first] == self.source_stages[second]
+                    && spans[0][0] < spans[1][1]
+                    && spans[1][0] < spans[0][1]
+            }
+        }
+    }
+
+    /// The key of a body in the job: `bodies[0]`, or `sources[0]` for that of a source.
+    pub fn key_of_body(&self, body: usize) -> String {
+        match self.bodies[body].fed {
+            Some(source) => format!("sources[{source}]"),
+            None => format!("bodies[{body}]"),
+        }
+    }
+
+    /// Particles of the body of a source, if it is one, by the end of the run; those of the longest run where
+    /// stages decide when it feeds.
+    pub fn fed_by_end(&self, body: usize) -> u64 {
+        self.bodies[body].fed.map_or(0, |source| self.sources[source].particles_before(self.time.end))
     }
 
     /// Gravity of a stage, its time counted from the start of the stage that has set it.
@@ -298,6 +339,8 @@ pub struct Body<const D: usize> {
     pub stress: Option<InitialStress>,
     /// Its particles, where the job gives them one by one; the shape then is a box about them.
     pub given: Option<Arc<Given<D>>>,
+    /// Number of the source that feeds it, if one does: then no particle of it is there from the start.
+    pub fed: Option<usize>,
 }
 
 /// A stage of the run: its changes at the start, and its end.

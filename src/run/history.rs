@@ -9,7 +9,7 @@ use crate::probe;
 use crate::setup;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
-use crate::solver::state::bookings::{ForceAndWork, Reaction};
+use crate::solver::state::bookings::{ForceAndWork, Reaction, SOURCE_SUMS};
 use crate::solver::state::relaxation::Relaxation;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -42,7 +42,7 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
-/// number of the stage, from 1; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain;
+/// number of the stage, from 1; sources; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain;
 /// colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
@@ -58,6 +58,11 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
     }
     if problem.stages.len() > 1 {
         columns.push(("stage".to_owned(), ""));
+    }
+    for source in &problem.sources {
+        columns.push((format!("fed_{}", source.name), "kg"));
+        AXES[..D].iter().for_each(|axis| columns.push((format!("fed_{}{axis}", source.name), "kg m/s")));
+        columns.push((format!("fed_energy_{}", source.name), "J"));
     }
     for load in &problem.loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
@@ -170,6 +175,12 @@ pub fn row(
         crossings.left as f64,
         left_mass,
     ]
+}
+
+/// The values of a row for one source: mass, momentum and kinetic energy.
+pub fn source_values<const D: usize>(sums: &[f64; SOURCE_SUMS]) -> impl Iterator<Item = f64> {
+    let [mass, x, y, z, energy] = *sums;
+    [mass].into_iter().chain([x, y, z].into_iter().take(D)).chain([energy])
 }
 
 /// The values of a row for one load or contact between bodies: the force, if it has one, and the work.

@@ -45,7 +45,7 @@ use crate::io::snapshot::{Outputs, directory};
 use crate::job::Problem;
 use crate::setup::{self, stages};
 use crate::solver::{Clock, Requests, Solver, StepReport};
-use crate::text::quantity;
+use crate::text::{count, quantity};
 
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///
@@ -277,6 +277,20 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
+    /// Collective. Warns of sources whose material came where other material lay.
+    fn tell_blocked_sources(&mut self) {
+        for (source, [fed, met]) in self.problem.sources.iter().zip(self.solver.fed_totals()) {
+            if met > 0 {
+                self.recorder.warning(&format!(
+                    "source {}: {} of {} particles came to places that other material took, and were pushed apart; expected that what it feeds moves away: a longer way ahead of it, a lower rate, or an earlier end",
+                    source.name,
+                    count(met),
+                    count(fed)
+                ));
+            }
+        }
+    }
+
     /// Not collective. Warns of stages that the run has not reached.
     fn tell_missed_stages(&mut self) {
         let missed: Vec<&str> = self
@@ -351,6 +365,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.recorder.finish(self.comm, &self.solver);
         self.tell_equilibrium();
         self.tell_missed_stages();
+        self.tell_blocked_sources();
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;

@@ -80,6 +80,7 @@ pub fn scalars<const D: usize>(
         .collect();
     measures::write(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
+    write_exact_sums("source", &solver.source_sums, comm, &mut reals, &mut exact);
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
     write_exact_sums("contact", &solver.body_sums, comm, &mut reals, &mut exact);
     write_exact_sums("shift", &solver.shift_sums, comm, &mut reals, &mut exact);
@@ -89,6 +90,9 @@ pub fn scalars<const D: usize>(
         reals.extend(RELAXATION.iter().map(|name| String::from(*name)).zip([kinetic, speed, acceleration]));
         let phase = PHASES.iter().position(|other| *other == phase).unwrap_or_default();
         counts.extend([(STOPS.into(), stops), (PHASE.into(), phase as u64)]);
+    }
+    if solver.physics.adaptivity.is_none() && !solver.physics.sources.is_empty() {
+        counts.push((LEDGER[3].into(), solver.ledger.next_root));
     }
     if solver.physics.adaptivity.is_some() {
         let ([splits, _, merges, removed], mut energies) = solver.ledger.gather(comm);
@@ -193,6 +197,9 @@ const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
 /// Takes over the ledger of splits and merges; the sums are on rank 0. `None` if the file lacks one.
 fn restore_ledger<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     if solver.physics.adaptivity.is_none() {
+        if !solver.physics.sources.is_empty() {
+            solver.ledger.next_root = scalars.count(LEDGER[3])?;
+        }
         return Some(());
     }
     let energy = |name: &str| ExactSum::from_words(scalars.exact(name)?);
@@ -351,6 +358,8 @@ fn restored<const D: usize>(
     restore_colliders(&mut solver, scalars)
         .and_then(|()| restore_exact_sums("collider", &mut solver.contacts.sums, rank, scalars))
         .ok_or_else(|| refused("the state of a collider is missing"))?;
+    restore_exact_sums("source", &mut solver.source_sums, rank, scalars)
+        .ok_or_else(|| refused("the sums of a source are missing"))?;
     restore_exact_sums("load", &mut solver.load_sums, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
     restore_exact_sums("contact", &mut solver.body_sums, rank, scalars)

@@ -36,6 +36,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
+        sources: problem.sources.clone(),
         faces: problem.faces,
         with_moments: with_moments(problem),
         absorbing: problem.absorbing.clone(),

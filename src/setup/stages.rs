@@ -34,6 +34,10 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     for (collider, stages) in physics.colliders.iter_mut().zip(&problem.collider_stages) {
         collider.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
     }
+    for (source, stages) in physics.sources.iter_mut().zip(&problem.source_stages) {
+        source.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
+        source.material = material_of(problem, usize::from(source.body), stage) as u16;
+    }
     if physics.has_fluids() {
         let fields = 0..physics.body_contacts.fields();
         physics.fill_densities =

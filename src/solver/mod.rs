@@ -68,6 +68,9 @@ impl<const D: usize> Solver<D> {
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
             body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
             shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
+            source_sums: ExactSums::new(physics.sources.len(), clock.time),
+            fed: vec![[0; 2]; physics.sources.len()],
+            conveyed: Vec::new(),
             pushes: Vec::new(),
             near: Vec::new(),
             relaxation: Relaxation::default(),
@@ -150,8 +153,10 @@ impl<const D: usize> Solver<D> {
         self.fill_nodes();
         let departed = self.nodes_to_particles(&rates, to, dt);
         self.book_pushes(dt);
+        self.book_conveyed();
         self.book_met(&mut impulses);
         let moved = self.migrate_particles(departed);
+        self.feed(to);
         self.move_colliders(&rates, &pushes, impulses, to, dt);
         // A rank that has failed serves its neighbours to the end of the step.
         sorted?;

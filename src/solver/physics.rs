@@ -12,6 +12,7 @@ use crate::particle::followed::Followed;
 use crate::particle::group::Group;
 use crate::particle::strain;
 use crate::quantity::{NotFinite, Quantity};
+use crate::source::Source;
 
 /// The problem that the solver solves: the same on every rank, constant over a stage of the run.
 pub struct Physics<const D: usize> {
@@ -29,6 +30,8 @@ pub struct Physics<const D: usize> {
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
+    /// Sources, in the order in which they feed.
+    pub sources: Vec<Source<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
     /// Bodies whose particles come with the affine state of APIC, from another run.

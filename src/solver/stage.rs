@@ -23,8 +23,11 @@ pub struct Change<const D: usize> {
 impl<const D: usize> Solver<D> {
     /// Collective. The lowest root that no particle has; see [`crate::adaptivity::resample::ids`].
     pub fn next_root(&self) -> u64 {
-        // Roots that merges have used and given up count as well.
-        if self.physics.adaptivity.is_some() { self.ledger.next_root } else { self.first_free_root() }
+        // Roots that merges have used and given up count as well, and those of particles that have left.
+        match self.physics.adaptivity.is_some() || !self.physics.sources.is_empty() {
+            true => self.ledger.next_root,
+            false => self.first_free_root(),
+        }
     }
 
     /// Collective. Goes on with the physics of another stage after a change of the particles, and with the

@@ -33,6 +33,7 @@ mod report;
 mod rigid_contact;
 mod soak;
 mod softening;
+mod sources;
 mod spin;
 mod stages;
 mod surface_loads;

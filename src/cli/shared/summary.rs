@@ -8,6 +8,7 @@ use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
 use crate::solver::state::bookings::CarriedTotals;
+use crate::source::Source;
 use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time};
 
 /// Longest name that is printed, in characters.
@@ -40,9 +41,10 @@ pub(in crate::cli) fn write<const D: usize>(
     let least = if estimate.is_cut { "at least " } else { "" };
     writeln!(out, "particles    {least}{}", grouped(estimate.total_particles()))?;
     for (body, count) in problem.bodies.iter().zip(&estimate.particles).take(MOST_BODIES) {
+        let when = if body.fed.is_some() { ", from its source by the end" } else { "" };
         writeln!(
             out,
-            "  {:18} {:>14}  {}",
+            "  {:18} {:>14}  {}{when}",
             excerpt(&body.name, NAME),
             grouped(*count),
             excerpt(&problem.materials[body.material].name, NAME)
@@ -56,6 +58,13 @@ pub(in crate::cli) fn write<const D: usize>(
         for (number, collider) in problem.colliders.iter().enumerate() {
             let stages = in_stages(problem, &problem.collider_stages[number]);
             writeln!(out, "  {:18} {}{stages}", excerpt(&collider.name, NAME), collider)?;
+        }
+    }
+    if !problem.sources.is_empty() {
+        writeln!(out, "sources      {}", problem.sources.len())?;
+        for (source, stages) in problem.sources.iter().zip(&problem.source_stages) {
+            let stages = in_stages(problem, stages);
+            writeln!(out, "  {:18} {}{stages}", excerpt(&source.name, NAME), source_in_words(source))?;
         }
     }
     let contacts = &problem.body_contacts;
@@ -187,6 +196,25 @@ fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String
     format!("on {particles} particles{area}, force ({force}) at {}", quantity(time, "s"))
 }
 
+/// What a source feeds, and when.
+fn source_in_words<const D: usize>(source: &Source<D>) -> String {
+    let velocity: Vec<String> = source.velocity.iter().map(|&v| quantity(v, "m/s")).collect();
+    let count = source.entries.len();
+    let rate = quantity(source.mass * count as f64 / source.period, "kg/s");
+    let all = if source.total == u64::MAX {
+        String::new()
+    } else {
+        format!(", {} particles", grouped(source.total))
+    };
+    format!(
+        "{rate} at ({}), a layer of {} every {} from {} on{all}",
+        velocity.join(", "),
+        grouped(count as u64),
+        quantity(source.period, "s"),
+        quantity(source.from, "s")
+    )
+}
+
 /// The stages in which something acts, in words, if it names them.
 fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String {
     stages.0.as_ref().map_or_else(String::new, |stages| {
@@ -195,6 +223,7 @@ fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String 
     })
 }
 
+/// What a load does, and where and when.
 fn load_in_words<const D: usize>(load: &Load<D>) -> String {
     let value = |quantity: &Quantity, unit: &str| match quantity {
         Quantity::Constant(value) => self::quantity(*value, unit),

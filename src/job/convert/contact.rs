@@ -17,7 +17,7 @@ type Law = (PairLaw, u16, bool);
 
 /// All contacts between bodies, or faults.
 pub(super) fn body_contacts(checks: &mut Checks, file: &JobFile, path: &Path) -> Option<BodyContacts> {
-    let bodies: Vec<&str> = file.bodies.iter().map(|body| body.name.as_str()).collect();
+    let bodies = file.body_names();
     let mut laws: BTreeMap<[u16; 2], Law> = BTreeMap::new();
     let (mut names, mut sound) = (Vec::<(String, bool)>::new(), true);
     for (number, written) in file.contact.iter().enumerate() {

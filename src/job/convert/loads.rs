@@ -36,7 +36,7 @@ pub(super) fn loads<const D: usize>(
         );
         return None;
     }
-    let bodies: Vec<&str> = file.bodies.iter().map(|body| body.name.as_str()).collect();
+    let bodies = file.body_names();
     let (mut all, mut columns) = (Vec::new(), 0);
     for (i, written) in loads.iter().enumerate() {
         let here = path.index(i);

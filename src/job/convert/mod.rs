@@ -11,6 +11,7 @@
 //! | `contact` | contact between bodies |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
+//! | `sources` | sources |
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
@@ -44,6 +45,7 @@ mod overlap;
 mod probes;
 pub(super) mod settings;
 mod shapes;
+mod sources;
 mod stages;
 mod stress;
 
@@ -97,7 +99,11 @@ fn problem<const D: usize>(
     };
     let faces_with_sums = if file.history.face_forces { 2 * D } else { 0 };
     let body_contacts = body_contacts(checks, file, &root.key("contact"));
-    let taken = 6 * file.colliders.len() + D * faces_with_sums + file.fluxes.len() + 4 * file.contact.len();
+    let taken = 6 * file.colliders.len()
+        + D * faces_with_sums
+        + file.fluxes.len()
+        + 4 * file.contact.len()
+        + 5 * file.sources.len();
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let stages = stages::stages(checks, file, &root);
     let load_stages =
@@ -108,10 +114,16 @@ fn problem<const D: usize>(
         file.colliders.iter().map(|collider| &collider.stages),
         &root.key("colliders"),
     );
+    let source_stages =
+        stages::of_each(checks, file, file.sources.iter().map(|source| &source.stages), &root.key("sources"));
     let faces = faces(checks, &file.boundaries, &root.key("boundaries"));
     let absorbing = settings::absorbing(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
-    let (tree, bodies, faces) = (tree?, bodies?, faces?);
+    let (tree, mut bodies, faces) = (tree?, bodies?, faces?);
+    let context = sources::Context { file, space: &space, tree: &tree, root_edge };
+    let (sources, fed): (Vec<_>, Vec<_>) =
+        sources::sources(checks, &context, &root.key("sources"))?.into_iter().unzip();
+    bodies.extend(fed);
     let context = Context { file, space: &space, tree: &tree, bodies: &bodies, boxes, root_edge };
     let adaptivity = adaptivity(checks, &context, &root.key("adaptivity"));
     let probes = probes::probes(checks, file, &space, &root.key("probes"));
@@ -141,6 +153,7 @@ fn problem<const D: usize>(
         adaptivity,
         materials,
         bodies,
+        sources,
         gravity: gravity?,
         load_places: (0..file.loads.len()).map(|i| checks.place(&root.key("loads").index(i))).collect(),
         loads: loads?,
@@ -153,6 +166,7 @@ fn problem<const D: usize>(
         stages: stages?,
         load_stages,
         collider_stages,
+        source_stages,
         time: TimeSetup {
             end: file.time.end,
             cfl: file.time.cfl,
@@ -183,8 +197,12 @@ fn problem<const D: usize>(
     for overlap in overlap::find(&problem) {
         let [first, second] = overlap.bodies.map(|body| excerpt(&problem.bodies[body].name, QUOTED));
         let point = space.words(&overlap.point);
+        let key = match problem.bodies[overlap.bodies[1]].fed {
+            Some(source) => root.key("sources").index(source),
+            None => root.key("bodies").index(overlap.bodies[1]),
+        };
         checks.fault(
-            &root.key("bodies").index(overlap.bodies[1]).key("shape"),
+            &key.key("shape"),
             format!("found the body \"{second}\" overlapping \"{first}\" at {point}; expected bodies without a common point"),
         );
     }
@@ -335,7 +353,9 @@ fn bodies<const D: usize>(
     space: &Space<D>,
     path: &Path,
 ) -> Option<Vec<Body<D>>> {
-    names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
+    if file.sources.is_empty() || !file.bodies.is_empty() {
+        names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
+    }
     // Of equal names the first counts, as elsewhere.
     let mut numbers = FxHashMap::default();
     for (number, material) in file.materials.iter().enumerate() {
@@ -440,6 +460,7 @@ fn body<const D: usize>(
         particles_per_cell: body.particles_per_cell,
         sampling: sampling(checks, body, path)?,
         given,
+        fed: None,
         stress: match &body.stress {
             Some(written) => {
                 let here = path.key("stress");
@@ -450,11 +471,20 @@ fn body<const D: usize>(
     })
 }
 
+/// The condition on a face of the domain, where the job names one.
+fn face(boundaries: &file::Boundaries, axis: usize, side: usize) -> Option<&file::Face> {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    [[x_min, x_max], [y_min, y_max], [z_min, z_max]][axis][side].as_ref()
+}
+
 /// Whether a face of the domain is a plane of symmetry.
 fn is_symmetric(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
-    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
-    let face = [[x_min, x_max], [y_min, y_max], [z_min, z_max]][axis][side];
-    matches!(face, Some(file::Face::Symmetric {}))
+    matches!(face(boundaries, axis, side), Some(file::Face::Symmetric {}))
+}
+
+/// Whether material leaves through a face of the domain.
+fn is_outflow(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
+    matches!(face(boundaries, axis, side), Some(file::Face::Outflow {}))
 }
 
 /// Arrangement of the particles of a body.

@@ -25,7 +25,7 @@ pub(super) fn probes<const D: usize>(
             Some(shape) => checks.shape(shape, space, &here.key("shape")).map(Some),
             None => Some(None),
         };
-        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         if let (Some(region), Some(bodies)) = (region, bodies) {
             let quantities = written.quantities.clone();
             all.push(Probe { name: written.name.clone(), region, bodies, quantities });
@@ -50,7 +50,7 @@ pub(super) fn tracks<const D: usize>(
         checks.column_name(&written.name, before, &here.key("name"));
         each_once(checks, &written.quantities, &here.key("quantities"));
         let point = checks.point(&written.point, space, &here.key("point"));
-        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         if let (Some(point), Some(bodies)) = (point, bodies) {
             let quantities = written.quantities.clone();
             all.push(Track { name: written.name.clone(), point, bodies, quantities });
@@ -165,7 +165,7 @@ pub(super) fn lines<const D: usize>(
             checks.fault(&here.key(key), message);
             None
         });
-        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         if let ([Some(from), Some(to)], Some(bodies)) = (ends, bodies) {
             let last = f64::from(written.points - 1);
             let point = |k: u32| {
@@ -192,7 +192,7 @@ pub(super) fn maps<const D: usize>(
         let here = path.index(i);
         let before = file.maps[..i].iter().map(|map| &*map.name);
         checks.column_name(&written.name, before, &here.key("name"));
-        let bodies = checks.bodies(written.bodies.as_deref(), &body_names(file), &here.key("bodies"));
+        let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         let mut corner = |given: &Option<Vec<f64>>, key: &'static str, usual: f64| {
             let Some(given) = given else {
                 return Some(std::array::from_fn(|a| if a < D - 1 { usual * space.size[a] } else { 0.0 }));
@@ -230,10 +230,6 @@ pub(super) fn maps<const D: usize>(
         }
     }
     (all.len() == file.maps.len()).then_some(all)
-}
-
-fn body_names(file: &JobFile) -> Vec<&str> {
-    file.bodies.iter().map(|body| body.name.as_str()).collect()
 }
 
 /// Faults for quantities that are named again.

@@ -69,13 +69,13 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
             format!("found a stage that begins at {begins} s; expected it before time.end = {end} s");
         checks.fault(path, message);
     }
-    let bodies = || file.bodies.iter().map(|body| body.name.as_str());
+    let bodies = || file.body_names().into_iter();
     let materials_known = || file.materials.iter().map(|material| material.name.as_str());
     let mut removed = Vec::new();
     for (i, name) in written.remove.iter().enumerate() {
         let here = path.key("remove").index(i);
         let body = checks.named(name, "body", bodies, &here)?;
-        let comes = file.bodies[body].stage.as_ref();
+        let comes = file.bodies.get(body).and_then(|body| body.stage.as_ref());
         let comes =
             comes.and_then(|name| file.stages.iter().position(|stage| stage.name == *name)).unwrap_or(0);
         if index <= comes {
@@ -134,7 +134,7 @@ pub(super) fn of_body(checks: &mut Checks, body: &Body, file: &JobFile, path: &P
     stage_named(checks, file, name, &path.key("stage")).unwrap_or(0)
 }
 
-/// The stages in which each load or collider acts, or faults.
+/// The stages in which each load, collider or source acts, or faults.
 pub(super) fn of_each<'a>(
     checks: &mut Checks,
     file: &JobFile,

@@ -9,6 +9,7 @@ pub use super::contact::BodyContact;
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 pub use super::probes::{Flux, Line, Map, Probe, Track};
+pub use super::sources::Source;
 pub use super::stages::Stage;
 pub use super::stress::Stress;
 use crate::geometry::written::Shape;
@@ -58,9 +59,14 @@ pub struct JobFile {
     /// Materials.
     #[schemars(length(max = 65_535))]
     pub materials: Vec<Material>,
-    /// Bodies.
+    /// Bodies; none in a job with sources alone.
+    #[serde(default)]
     #[schemars(length(max = 65_535))]
     pub bodies: Vec<Body>,
+    /// Sources: material that enters during the run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 12))]
+    pub sources: Vec<Source>,
     /// Loads, in the order in which they act.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
@@ -118,6 +124,14 @@ pub struct JobFile {
     /// Evaluation at the end of the run.
     #[serde(default)]
     pub report: Option<Report>,
+}
+
+impl JobFile {
+    /// Names of all bodies by their numbers: those of the job, then those of its sources.
+    pub fn body_names(&self) -> Vec<&str> {
+        let bodies = self.bodies.iter().map(|body| body.name.as_str());
+        bodies.chain(self.sources.iter().map(|source| source.name.as_str())).collect()
+    }
 }
 
 /// The computational domain: a box of cubic root octants.
@@ -309,7 +323,7 @@ pub enum Sampling {
     Poisson,
 }
 
-fn two() -> f64 {
+pub(super) fn two() -> f64 {
     2.0
 }
 

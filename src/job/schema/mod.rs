@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`stages`], [`stress`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`sources`], [`stages`], [`stress`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
@@ -17,6 +17,7 @@ pub mod loads;
 pub mod output;
 pub mod probes;
 pub mod reference;
+pub mod sources;
 pub mod stages;
 pub mod stress;
 

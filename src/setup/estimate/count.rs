@@ -77,7 +77,9 @@ pub(super) fn count<const D: usize>(problem: &Problem<D>) -> Result<Tally, SeedE
         hi: problem.brick.roots,
         settled: None,
         regions: (0..problem.tree.regions.len() as u32).collect(),
-        bodies: (0..problem.bodies.len() as u32).collect(),
+        bodies: (0..problem.bodies.len() as u32)
+            .filter(|&body| problem.bodies[body as usize].fed.is_none())
+            .collect(),
     });
     while let Some(part) = counter.parts.pop_front() {
         if counter.work > MOST_WORK || counter.pushed > MOST_PARTS {

@@ -37,8 +37,9 @@ pub enum EstimateError {
 /// Size and cost of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Particles of each body, in the order of the job; on the tree that the job gives, unless that of
-    /// [`Estimate::for_tree`] is another, since criteria of dynamic refinement need the particles themselves.
+    /// Particles of each body, in the order of the job, those of sources by the end of the run; on the tree
+    /// that the job gives, unless that of [`Estimate::for_tree`] is another, since criteria of dynamic
+    /// refinement need the particles themselves.
     pub particles: Vec<u64>,
     /// Leaves of that tree by level, from level 0 to the finest one.
     pub levels: Vec<LevelCount>,
@@ -256,6 +257,11 @@ pub fn tree_memory<const D: usize>([particles, leaves, filled]: Size) -> f64 {
 }
 
 fn add_bytes<const D: usize>(problem: &Problem<D>, estimate: &mut Estimate) {
+    for (body, particles) in estimate.particles.iter_mut().enumerate() {
+        if problem.bodies[body].fed.is_some() {
+            *particles = problem.fed_by_end(body);
+        }
+    }
     let particles = estimate.total_particles() as f64;
     let leaves = estimate.total_leaves() as f64;
     let state = state_bytes::<D>();

@@ -52,7 +52,8 @@ pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) 
                     ActsOn::Particles => "which keeps it there: it may leave, and does not go deeper",
                 };
                 all.push(format!(
-                    "bodies[{number}].shape: \"{}\" starts partly inside the collider \"{name}\", {what}: move one of them",
+                    "{}.shape: \"{}\" starts partly inside the collider \"{name}\", {what}: move one of them",
+                    problem.key_of_body(number),
                     excerpt(&body.name, NAME)
                 ));
             }

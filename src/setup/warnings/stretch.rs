@@ -18,7 +18,8 @@ const TIMES: u32 = 32;
 
 /// Warns of elastic bodies that are drawn, thrown or pulled apart.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    for (index, body) in problem.bodies.iter().enumerate().filter(|(_, body)| body.given.is_none()) {
+    let shaped = problem.bodies.iter().enumerate();
+    for (index, body) in shaped.filter(|(_, body)| body.given.is_none() && body.fed.is_none()) {
         let Some(young) = young(&problem.materials[body.material].model) else { continue };
         let limit = greatest_stretch(problem);
         let density = problem.materials[body.material].density;

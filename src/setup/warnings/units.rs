@@ -90,11 +90,11 @@ fn of_body<const D: usize>(
     all: &mut Vec<String>,
 ) {
     let (wave, density) = (material.wave_speed(), problem.materials[body.material].density);
-    let name = excerpt(&body.name, NAME);
+    let (name, key) = (excerpt(&body.name, NAME), problem.key_of_body(index));
     let speed = greatest_speed(problem, body);
     if speed > BODY * wave {
         all.push(format!(
-            "bodies[{index}].velocity: \"{name}\" moves at {}, {} times the speed of waves in its material; expected at most {BODY} times: check the units of speed, stiffness and density",
+            "{key}.velocity: \"{name}\" moves at {}, {} times the speed of waves in its material; expected at most {BODY} times: check the units of speed, stiffness and density",
             quantity(speed, "m/s"),
             number(speed / wave, 2)
         ));
@@ -103,7 +103,7 @@ fn of_body<const D: usize>(
     let pressure = density * greatest_fall(problem, body, WEIGHT * wave * wave);
     if pressure > WEIGHT * stiffness {
         all.push(format!(
-            "bodies[{index}].material: the weight of \"{name}\" is a pressure of {} at its foot, {} of the stiffness of its material ({}); expected at most {WEIGHT}, beyond which it strains by its own size: check the units of stiffness, density and gravity",
+            "{key}.material: the weight of \"{name}\" is a pressure of {} at its foot, {} of the stiffness of its material ({}); expected at most {WEIGHT}, beyond which it strains by its own size: check the units of stiffness, density and gravity",
             quantity(pressure, "Pa"),
             number(pressure / stiffness, 2),
             quantity(stiffness, "Pa")

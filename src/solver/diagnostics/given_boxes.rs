@@ -98,6 +98,7 @@ impl<const D: usize> GivenBoxes<D> {
             stage_starts: vec![0.0],
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
+            sources: Vec::new(),
             body_contacts: crate::boundary::BodyContacts::default(),
             faces: [[Contact::Slip; 2]; D],
             with_moments: Vec::new(),

@@ -37,6 +37,15 @@ impl Fluxes {
         }
     }
 
+    /// Books a particle that a source has fed: what begins beyond a section has not passed it.
+    pub(in crate::solver) fn book_fed(&mut self, place: &[f64], mass: f64) {
+        for (section, sum) in self.sections.iter().zip(&mut self.sums) {
+            if section.is_beyond(place) {
+                sum.add(-mass);
+            }
+        }
+    }
+
     /// Adds masses (kg, with signs) that crossed openings, each with the number of the section.
     pub(super) fn book_passed(&mut self, passed: &[(u32, f64)]) {
         passed.iter().for_each(|&(number, mass)| self.sums[number as usize].add(mass));

@@ -93,6 +93,20 @@ pub const FACE_SUMS: usize = 3;
 /// m/s), and the work since the start (J), of the nodes that this rank counts.
 pub const LOAD_SUMS: usize = 4;
 
+/// Sums of a source since the start: mass (kg), three components of momentum (kg m/s), kinetic energy (J).
+pub const SOURCE_SUMS: usize = 5;
+
+/// What a source gives in one step to a particle in its shape, to keep its velocity.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct SourcePush<const D: usize> {
+    /// Number of the source.
+    pub source: u32,
+    /// Impulse, kg m/s.
+    pub impulse: [f64; D],
+    /// Kinetic energy, J.
+    pub work: f64,
+}
+
 /// A load's force on one particle in one step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct ParticlePush<const D: usize> {

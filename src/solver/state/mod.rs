@@ -24,7 +24,9 @@ use crate::particle::Chunk;
 use crate::probe::{Maxima, Tracked};
 use crate::quantity::NotFinite;
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush};
+use crate::solver::state::bookings::{
+    Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush, SOURCE_SUMS, SourcePush,
+};
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
@@ -138,6 +140,13 @@ pub struct Solver<const D: usize> {
     pub body_sums: ExactSums<LOAD_SUMS>,
     /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
     pub shift_sums: ExactSums<1>,
+    /// What sources have brought since the start.
+    pub source_sums: ExactSums<SOURCE_SUMS>,
+    /// Particles that each source has fed on this rank since the start of this process, and those of them
+    /// that came where other material lay.
+    pub fed: Vec<[u64; 2]>,
+    /// What sources gave to particles in their shapes in the last step, by own leaf; empty without sources.
+    pub(super) conveyed: Vec<Vec<SourcePush<D>>>,
     /// Forces that particles carried in the last step, by own leaf; empty without such loads.
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// Particles near colliders that act on particles, by own leaf; empty without such colliders.

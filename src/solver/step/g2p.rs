@@ -24,7 +24,7 @@ use crate::solver::sorting::bins::{BinLists, OfLeaf};
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::{Near, ParticlePush};
+use crate::solver::state::bookings::{Near, ParticlePush, SourcePush};
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
@@ -33,6 +33,7 @@ use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::fill::means::MeanVolumes;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
+use crate::solver::step::sources::{Conveyed, Conveyors, conveyors};
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -104,6 +105,8 @@ struct Sweep<'a, const D: usize> {
     displacement: Option<usize>,
     /// First columns of tensors that follow the deformation.
     tensors: Vec<usize>,
+    /// Sources that convey, with their numbers.
+    conveyors: Conveyors<'a, D>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
     /// How materials flow, and how full nodes are; where there are fluids.
@@ -140,6 +143,7 @@ struct Notes<'a, const D: usize> {
     signal: &'a mut f64,
     pushes: &'a mut [ParticlePush<D>],
     near: &'a mut [Near<D>],
+    conveyed: &'a mut Vec<SourcePush<D>>,
     /// Mass times shift, kg m.
     shift: &'a mut [f64; D],
 }
@@ -161,6 +165,7 @@ impl<const D: usize> Solver<D> {
         self.leaf_data.begin_gather(&self.chunks);
         self.pushes.resize_with(self.chunks.len(), Vec::new);
         self.near.resize_with(self.chunks.len(), Vec::new);
+        self.conveyed.resize_with(self.chunks.len(), Vec::new);
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
@@ -182,19 +187,21 @@ impl<const D: usize> Solver<D> {
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
             displacement: self.physics.displacement_column(),
             tensors: self.physics.tensor_columns(),
+            conveyors: conveyors(&self.physics, self.clock.time),
             openings: self.crossings.fluxes.openings(),
             fill: fill.as_ref().filter(|_| !flows.is_empty()).map(|fill| &fill.of_nodes[..]),
             flows,
         };
-        let (chunks, pushes, near) = (&mut self.chunks, &mut self.pushes, &mut self.near);
+        let (chunks, pushes) = (&mut self.chunks, &mut self.pushes);
+        let (near, conveyed) = (&mut self.near, &mut self.conveyed);
         let departed = self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
-            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts);
+            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
-                let ((((((chunk, bins), maxima), signal), pushes), near), shift) = notes;
+                let (((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed) = notes;
                 // Of empty leaves there may be very many, and to take the time costs more than they do.
                 let is_empty = chunk.is_empty();
-                let notes = Notes { maxima, signal, pushes, near, shift };
+                let notes = Notes { maxima, signal, pushes, near, conveyed, shift };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
@@ -255,13 +262,20 @@ impl<const D: usize> Sweep<'_, D> {
         bins: OfLeaf<'_, D>,
         notes: Notes<'_, D>,
     ) -> Departed {
-        let Notes { maxima, signal, pushes, near, shift } = notes;
+        let Notes { maxima, signal, pushes, near, conveyed, shift } = notes;
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         let follows = self.displacement.is_some() || !self.openings.is_empty();
         let start = follows.then(|| positions(chunk));
+        let in_sources = Conveyed::of_leaf(&self.conveyors, chunk, self.borders.of_leaf(leaf));
         *signal = self.gather(scratch, leaf, chunk, &bins);
         *shift = scratch.shifted.total();
+        conveyed.clear();
+        if !in_sources.is_empty() {
+            in_sources.convey(&self.conveyors, chunk, self.dt, conveyed);
+            scratch.leavers.look_again(chunk, &in_sources.indices());
+            scratch.gradients.retain(|(p, _)| !in_sources.has(*p));
+        }
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
             scratch.leavers.look_again(chunk, &held);

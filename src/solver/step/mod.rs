@@ -15,6 +15,7 @@
 //! | `contact` | contact of particles with colliders |
 //! | [`between`] | contact between bodies |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
+//! | `sources` | material that enters during the run |
 //! | `ties` | surface nodes that move with the material beside them |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
 //! | [`carried`] | loads that particles carry: their impulse and work; areas follow the deformation |
@@ -32,5 +33,6 @@ mod mean_dilation;
 pub mod node_update;
 pub mod p2g;
 pub mod relax;
+mod sources;
 mod ties;
 pub mod time_step;

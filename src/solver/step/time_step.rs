@@ -7,6 +7,7 @@ use crate::simd::{Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::relaxation::{FROM_REST, RelaxPhase};
+use crate::source::Source;
 
 /// Least length of a step on the way to equilibrium, as a share of what the material allows. A stop shortens the step, and growth makes up for it in
 /// four steps: where stops follow each other faster, as those of noise do that no transfer keeps, lengths would fall without end. That a step is
@@ -20,6 +21,7 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
         let bound = if self.clock.bound.is_finite() { self.clock.bound } else { self.free_bound() };
+        let bound = bound.min(self.physics.source_bound(self.clock.time));
         let mut dt = bound.min(control.dt_max.unwrap_or(f64::INFINITY));
         // Where no material bounds the step, there is nothing that a longer one could disturb.
         if self.clock.dt > 0.0 && self.clock.bound.is_finite() {
@@ -76,6 +78,23 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Physics<D> {
+    /// Bound of the sources on a step from a time (s): no material that enters in it moves on by more than a
+    /// part of a cell, or as much as waves in it may cross.
+    fn source_bound(&self, time: f64) -> f64 {
+        let of_each = self.sources.iter().map(|source| {
+            let cell = self.root_edge / f64::from(4_u32 << source.level);
+            (self.control.cfl * cell / self.signal_of(source, cell)).max(source.next_layer(time) - time)
+        });
+        of_each.fold(f64::INFINITY, f64::min)
+    }
+
+    /// `c + |v|` of the material of a source, m/s, on cells of edge `cell` (m).
+    pub(in crate::solver) fn signal_of(&self, source: &Source<D>, cell: f64) -> f64 {
+        let material = &self.materials[usize::from(source.material)];
+        let speed = source.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+        material.wave_speed() + material.viscous_speed(cell) + speed
+    }
+
     /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest on cells of edge `cell` (m).
     fn signal_at_rest(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let mut fastest: f64 = 0.0;

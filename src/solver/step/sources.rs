@@ -1,0 +1,171 @@
+//! Sources in a step: particles in their shapes move with their velocity, and new layers enter at the end.
+//!
+//! What a source conveys takes part in the sums of nodes with its velocity, and keeps its state through the
+//! step: it pushes what lies ahead like a piston, and bears no load. The momentum and the kinetic energy that
+//! this takes are booked with those that it brought.
+use crate::geometry::{Aabb, Side};
+use crate::grid::leaf_geometry::position_key;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SourcePush;
+use crate::source::Source;
+
+/// Particles of a leaf that are in the shapes of their sources, with their state ahead of the step.
+#[derive(Debug, Default)]
+pub(super) struct Conveyed {
+    /// Their indices, ascending, with the places of their sources in the list.
+    particles: Vec<(u32, usize)>,
+    /// All columns of one after those of another.
+    state: Vec<f64>,
+}
+
+/// Sources that convey, with their numbers.
+pub(super) type Conveyors<'a, const D: usize> = Vec<(u32, &'a Source<D>)>;
+
+/// The sources that convey in a step from a time, s.
+pub(super) fn conveyors<const D: usize>(physics: &Physics<D>, time: f64) -> Conveyors<'_, D> {
+    (0..).zip(&physics.sources).filter(|(_, source)| source.conveys(time)).collect()
+}
+
+impl Conveyed {
+    /// Those of a leaf with these corners, m.
+    pub(super) fn of_leaf<const D: usize>(
+        conveyors: &[(u32, &Source<D>)],
+        chunk: &Chunk<D>,
+        (lower, upper): &([f64; D], [f64; D]),
+    ) -> Self {
+        let mut found = Self::default();
+        let cell = Aabb::new(*lower, *upper);
+        let is_near = |source: &Source<D>| source.shape.classify(&cell) != Side::Outside;
+        let near: Vec<usize> = (0..conveyors.len()).filter(|&i| is_near(conveyors[i].1)).collect();
+        if near.is_empty() {
+            return found;
+        }
+        for (p, &tag) in chunk.tags().iter().enumerate() {
+            let body = Tag::unpack(tag).body;
+            let own = near.iter().find(|&&i| conveyors[i].1.body == body);
+            let Some(&own) = own.filter(|&&i| conveyors[i].1.shape.contains(&chunk.position(p))) else {
+                continue;
+            };
+            found.particles.push((p as u32, own));
+            found.state.extend(chunk.tile_of(p).iter().map(|line| line[p % line.len()]));
+        }
+        found
+    }
+
+    /// Whether there are any.
+    pub(super) fn is_empty(&self) -> bool {
+        self.particles.is_empty()
+    }
+
+    /// Their indices, ascending.
+    pub(super) fn indices(&self) -> Vec<u32> {
+        self.particles.iter().map(|(p, _)| *p).collect()
+    }
+
+    /// Whether a particle is one of them.
+    pub(super) fn has(&self, p: u32) -> bool {
+        self.particles.binary_search_by_key(&p, |(p, _)| *p).is_ok()
+    }
+
+    /// Gives them the state back that they had ahead of a step of length `dt` (s), moved with their sources,
+    /// and notes what that took.
+    pub(super) fn convey<const D: usize>(
+        &self,
+        conveyors: &[(u32, &Source<D>)],
+        chunk: &mut Chunk<D>,
+        dt: f64,
+        pushes: &mut Vec<SourcePush<D>>,
+    ) {
+        let states = self.state.chunks_exact(Layout::<D>::REALS);
+        for (&(p, own), state) in self.particles.iter().zip(states) {
+            let (p, (number, source)) = (p as usize, conveyors[own]);
+            let gathered: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
+            chunk.write(0, p, state);
+            let x: [f64; D] =
+                std::array::from_fn(|a| dt.mul_add(source.velocity[a], state[Layout::<D>::POSITION + a]));
+            chunk.write(Layout::<D>::POSITION, p, &x);
+            chunk.write(Layout::<D>::VELOCITY, p, &source.velocity);
+            (0..D).for_each(|row| chunk.write(Layout::<D>::AFFINE + D * row, p, &[0.0; D]));
+            let mass = state[Layout::<D>::MASS];
+            let impulse = std::array::from_fn(|a| mass * (source.velocity[a] - gathered[a]));
+            let work = 0.5 * mass * (square(&source.velocity) - square(&gathered));
+            pushes.push(SourcePush { source: number, impulse, work });
+        }
+    }
+}
+
+fn square<const D: usize>(velocity: &[f64; D]) -> f64 {
+    velocity.iter().map(|v| v * v).sum()
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Books what sources gave to particles in their shapes.
+    pub(in crate::solver) fn book_conveyed(&mut self) {
+        for push in self.conveyed.iter().flatten() {
+            let sums = &mut self.source_sums.of[push.source as usize];
+            (0..D).for_each(|a| sums[1 + a].add(push.impulse[a]));
+            sums[4].add(push.work);
+        }
+    }
+
+    /// Not collective. Layers enter that are due in the step under way, which ends at the time `to`, s. All
+    /// ranks number all particles, and make those in their own leaves; behind the arrivals there, as if they
+    /// came from leaves at the end of the curve.
+    pub(in crate::solver) fn feed(&mut self, to: f64) {
+        let Self { physics, grid, chunks, leaf_data, crossings, ledger, source_sums, fed, clock, .. } = self;
+        let (plan, extent) = (&grid.plan, grid.plan.extent());
+        for (number, source) in physics.sources.iter().enumerate() {
+            let mut columns = vec![0.0_f64; Layout::<D>::REALS];
+            (0..3).for_each(|diagonal| columns[Layout::<D>::LEFT_CAUCHY_GREEN + diagonal] = 1.0);
+            columns[Layout::<D>::VELOCITY..][..D].copy_from_slice(&source.velocity);
+            columns[Layout::<D>::MASS] = source.mass;
+            columns[Layout::<D>::HALF] = 0.5 * source.spacing;
+            let history = physics.materials[usize::from(source.material)].initial_history();
+            columns[Layout::<D>::HISTORY..][..history.len()].copy_from_slice(&history);
+            let tag = Tag { material: source.material, body: source.body, level: source.level }.pack();
+            for layer in source.layers_before(clock.time)..source.layers_before(to) {
+                for x in source.layer(layer, to) {
+                    let id = ledger.next_root;
+                    ledger.next_root += 1;
+                    // A shape at a face of the domain may end within the way of a step.
+                    let x: [f64; D] = std::array::from_fn(|a| x[a].clamp(0.0, extent[a].next_down()));
+                    let tree = &plan.tree;
+                    let known = tree.locate(position_key(x, tree.brick().roots, physics.root_edge));
+                    let Some(leaf) = known.and_then(|known| tree.local(known)) else { continue };
+                    let chunk = &mut chunks[leaf];
+                    fed[number][0] += 1;
+                    fed[number][1] += u64::from(is_taken(chunk, &x, 0.5 * source.spacing));
+                    columns[Layout::<D>::POSITION..][..D].copy_from_slice(&x);
+                    let words: Vec<u64> = columns.iter().map(|value| value.to_bits()).collect();
+                    chunk.push_words(&words, id, tag, &[]);
+                    let signal = &mut leaf_data.signal[leaf];
+                    *signal = signal.max(physics.signal_of(source, plan.finest_cell(leaf)));
+                    crossings.fluxes.book_fed(&x, source.mass);
+                    let sums = &mut source_sums.of[number];
+                    sums[0].add(source.mass);
+                    (0..D).for_each(|a| sums[1 + a].add(source.mass * source.velocity[a]));
+                    sums[4].add(0.5 * source.mass * square(&source.velocity));
+                }
+            }
+        }
+    }
+
+    /// Collective. Particles that each source has fed since the start of this process, and those of them that
+    /// came where other material lay.
+    pub fn fed_totals(&self) -> Vec<[u64; 2]> {
+        let mut all = self.fed.clone();
+        self.comm.sum_u64(all.as_flattened_mut());
+        all
+    }
+}
+
+/// Whether half of the box of a particle that comes, along each axis, lies in that of one that is there.
+fn is_taken<const D: usize>(chunk: &Chunk<D>, x: &[f64; D], half: f64) -> bool {
+    let halves = chunk.column(Layout::<D>::HALF);
+    (0..chunk.len()).any(|q| {
+        let (y, near) = (chunk.position(q), 0.5 * (half + halves[q]));
+        (0..D).all(|a| (x[a] - y[a]).abs() < near)
+    })
+}
