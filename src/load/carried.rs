@@ -22,7 +22,8 @@ pub struct Carried<const D: usize> {
 /// What a force that particles carry is.
 #[derive(Clone, Debug)]
 pub enum CarriedForce<const D: usize> {
-    /// Dead traction t (Pa): `t A` with the undeformed area A (m², in plane strain m), which is the particle's only number.
+    /// Dead traction t (Pa): `t A` with the undeformed area A (m², in plane strain m), which is the
+    /// particle's only number; where t depends on the place, the undeformed area vector follows.
     Traction([Quantity; D]),
     /// Pressure p (Pa) against the outward normal: `-p a` with the area vector a (m², in plane strain m), one number per axis.
     Pressure {
@@ -44,6 +45,7 @@ impl<const D: usize> CarriedForce<D> {
     /// Numbers that a particle carries for it.
     pub fn columns(&self) -> usize {
         match self {
+            Self::Traction(_) if self.depends_on_place() => 1 + D,
             Self::Traction(_) | Self::Point { .. } => 1,
             Self::Pressure { .. } => D,
         }
@@ -55,6 +57,11 @@ impl<const D: usize> CarriedForce<D> {
             Self::Traction(components) | Self::Point { force: components, .. } => components.iter().collect(),
             Self::Pressure { pressure, .. } => vec![pressure],
         }
+    }
+
+    /// Whether it differs from place to place.
+    pub fn depends_on_place(&self) -> bool {
+        self.quantities().into_iter().any(Quantity::depends_on_place)
     }
 
     /// Whether it depends on places of the undeformed body.
@@ -83,7 +90,42 @@ impl<const D: usize> Carried<D> {
     pub fn of_surface(&self, area: &[f64; D]) -> Vec<f64> {
         match self.force {
             CarriedForce::Pressure { .. } => area.to_vec(),
+            CarriedForce::Traction(_) if self.force.depends_on_place() => {
+                [length(area)].into_iter().chain(*area).collect()
+            }
             _ => vec![length(area)],
+        }
+    }
+
+    /// The way (m) from the centre of a particle that carries these numbers to the surface that they stand
+    /// for, where a force on surfaces depends on the place; `half` are the half widths of its box, m. On an
+    /// inclined surface particles lie at all distances: their mean.
+    pub fn way_to_surface(&self, numbers: &[f64], half: impl FnOnce() -> [f64; D]) -> [f64; D] {
+        let first = match self.force {
+            CarriedForce::Pressure { .. } => 0,
+            CarriedForce::Traction(_) => 1,
+            CarriedForce::Point { .. } => return [0.0; D],
+        };
+        if !self.force.depends_on_place() {
+            return [0.0; D];
+        }
+        let area: [f64; D] = std::array::from_fn(|a| numbers[first + a]);
+        let size = length(&area);
+        if size == 0.0 {
+            return [0.0; D];
+        }
+        // Along the main axis of the normal each line of particles has one at the surface, half a width from
+        // it in the mean.
+        let (normal, half) = (area.map(|a| a / size), half());
+        let main = normal.iter().fold(0.0_f64, |greatest, n| greatest.max(n.abs()));
+        std::array::from_fn(|a| main * normal[a] * half[a])
+    }
+
+    /// The size of the area that a particle with these numbers stands for, m².
+    pub fn area(&self, numbers: &[f64]) -> f64 {
+        match self.force {
+            CarriedForce::Pressure { .. } => numbers[..D].iter().map(|a| a * a).sum::<f64>().sqrt(),
+            _ => numbers[0].abs(),
         }
     }
 
@@ -189,7 +231,12 @@ mod tests {
         );
         let traction = load(CarriedForce::Traction([time, Quantity::Constant(3.0)]));
         let carried = traction.carried().unwrap();
-        assert_eq!(carried.of_surface(&[3.0, 4.0]), [5.0]);
+        // With the area vector, for the place of the surface.
+        assert_eq!(carried.of_surface(&[3.0, 4.0]), [5.0, 3.0, 4.0]);
+        let way = carried.way_to_surface(&[5.0, 0.0, -5.0], || [0.1, 0.2]);
+        assert_eq!(way, [0.0, -0.2]);
+        let way = carried.way_to_surface(&[2.0, 1.0, 1.0], || [0.1, 0.2]);
+        assert!((way[0] - 0.05).abs() < 1e-15 && (way[1] - 0.1).abs() < 1e-15);
         assert_eq!(
             traction.force(carried, &[5.0], &traction.place(&[0.5, 0.0], &[0.0; 2]), 2.0),
             [105.0, 15.0]

@@ -318,6 +318,30 @@ fn a_thick_cylinder_widens_as_lame_says() {
     assert!((force / 5000.0 - 1.0).abs() < 2e-3, "{force}");
 }
 
+/// A block of ice floats at the depth at which it displaces its weight: pressure and traction that grow with
+/// depth act at the surface, and not at the centres of particles, half of their distance further inside.
+#[test]
+fn a_block_floats_at_its_draught() {
+    let sea = "1025 * 9.81 * max(0, 1.8 - y)";
+    for load in [
+        format!("kind = 'pressure'\npressure = '{sea}'"),
+        format!("kind = 'traction'\ntraction = [0, '{sea}']\nfacing = [0, -1]"),
+    ] {
+        let job = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [3.2, 3.2]\nroot_edge = 0.4\n\
+             [boundaries]\nx_min.kind = 'separating'\nx_max.kind = 'separating'\ny_min.kind = 'separating'\ny_max.kind = 'separating'\n\
+             [[materials]]\nname = 'ice'\ndensity = 917\nmodel = 'hencky'\nyoung = 1e6\npoisson = 0.3\n\
+             [[bodies]]\nname = 'berg'\nmaterial = 'ice'\nshape = {{ kind = 'box', min = [0.6, 1.0], max = [2.6, 2.0] }}\n\
+             [[loads]]\nname = 'sea'\n{load}\n[[loads]]\nname = 'drag'\nkind = 'damping'\nrate = 3\n\
+             [[probes]]\nname = 'berg'\nquantities = ['centre']\n[time]\nend = 4\n[output]\npicture = false\n"
+        );
+        let history = history(&job, "berg");
+        let draught = 1.8 - (history.last("centre_berg_y") - 0.5);
+        println!("{load}: draught {draught} m, expected {} m", 917.0 / 1025.0);
+        assert!((draught / (917.0 / 1025.0) - 1.0).abs() < 0.01, "{load}: {draught} m");
+    }
+}
+
 /// The message for a wrong load names its key, the fault, and what would be right; by `check` and by `run`.
 #[test]
 fn wrong_loads_are_refused_with_their_key() {

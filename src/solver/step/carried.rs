@@ -11,6 +11,9 @@ use crate::exact_sum::ExactSum;
 use crate::load::{Carried, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::strain;
+use crate::simd::Vector;
+use crate::solver::sorting::bins::BoxWidths;
+use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{CarriedTotals, ParticlePush};
 use crate::solver::state::phases::Phase;
@@ -18,16 +21,35 @@ use crate::solver::state::phases::Phase;
 /// Velocities of particles as they were ahead of a push.
 pub(in crate::solver) type Velocities<const D: usize> = Vec<(u32, [f64; D])>;
 
+/// Most numbers that a particle carries for a load.
+const MOST: usize = 4;
+
 /// Numbers that a particle carries for a load; `None` if it carries nothing of it.
-fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> Option<[f64; D]> {
+fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> Option<[f64; MOST]> {
     let columns = carried.force.columns();
     let number = |i: usize| chunk.carried(carried.first + i).get(p).copied().unwrap_or(0.0);
     let numbers = std::array::from_fn(|i| if i < columns { number(i) } else { 0.0 });
     numbers.iter().any(|&number| number != 0.0).then_some(numbers)
 }
 
+/// Where a force on the surface at a particle is taken, m: at the surface where it depends on the place.
+fn surface_at<const D: usize>(
+    widths: &Widths<'_, D>,
+    chunk: &Chunk<D>,
+    carried: &Carried<D>,
+    numbers: &[f64],
+    p: usize,
+    cell: f64,
+) -> [f64; D] {
+    let half = || widths.of_batch(chunk, &[p as u32], cell).map(|half| half.to_array()[0]);
+    let (x, way) = (chunk.position(p), carried.way_to_surface(numbers, half));
+    std::array::from_fn(|a| x[a] + way[a])
+}
+
 /// What pushes particles in a step.
 struct Pushing<'a, const D: usize> {
+    /// Half widths of boxes.
+    widths: Widths<'a, D>,
     /// Loads that act on particles, with their numbers.
     loads: Vec<(usize, &'a Load<D>)>,
     /// First column of the displacement, if particles carry it.
@@ -41,15 +63,21 @@ struct Pushing<'a, const D: usize> {
 }
 
 impl<const D: usize> Pushing<'_, D> {
-    /// Pushes the particles of a leaf, which move with `scale` times their mass. Returns the velocities that they had, and adds what pushed
-    /// them to `pushes`.
-    fn push(&self, chunk: &mut Chunk<D>, scale: f64, pushes: &mut Vec<ParticlePush<D>>) -> Velocities<D> {
+    /// Pushes the particles of a leaf with cells of this edge (m), which move with `scale` times their mass.
+    /// Returns the velocities that they had, and adds what pushed them to `pushes`.
+    fn push(
+        &self,
+        chunk: &mut Chunk<D>,
+        cell: f64,
+        scale: f64,
+        pushes: &mut Vec<ParticlePush<D>>,
+    ) -> Velocities<D> {
         let mut before = Vec::new();
         for p in 0..chunk.len() {
             let from = pushes.len();
             let mass = chunk.column(Layout::<D>::MASS)[p];
             for &(number, load) in &self.loads {
-                if let Some(force) = self.force(chunk, p, load, mass / scale) {
+                if let Some(force) = self.force(chunk, p, load, cell, mass / scale) {
                     let way = chunk.position(p);
                     pushes.push(ParticlePush { particle: p as u32, load: number as u32, force, way });
                 }
@@ -69,15 +97,18 @@ impl<const D: usize> Pushing<'_, D> {
     }
 
     /// Force of a load on a particle of this mass (kg), N, if it has any.
-    fn force(&self, chunk: &Chunk<D>, p: usize, load: &Load<D>, mass: f64) -> Option<[f64; D]> {
-        let x = chunk.position(p);
-        let place = || load.place(&x, &displacement(chunk, self.displacement, p));
+    fn force(&self, chunk: &Chunk<D>, p: usize, load: &Load<D>, cell: f64, mass: f64) -> Option<[f64; D]> {
+        let place = |x: &[f64; D]| load.place(x, &displacement(chunk, self.displacement, p));
         match load.carried() {
             Some(carried) => {
                 let numbers = numbers(chunk, carried, p)?;
-                Some(load.force(carried, &numbers, &place(), self.middle - load.start))
+                let x = surface_at(&self.widths, chunk, carried, &numbers, p, cell);
+                Some(load.force(carried, &numbers, &place(&x), self.middle - load.start))
             }
-            None => load.body_force(&x, &place(), self.middle).map(|per_mass| per_mass.map(|a| mass * a)),
+            None => {
+                let x = chunk.position(p);
+                load.body_force(&x, &place(&x), self.middle).map(|per_mass| per_mass.map(|a| mass * a))
+            }
         }
     }
 }
@@ -100,7 +131,9 @@ impl<const D: usize> Solver<D> {
             return Vec::new();
         }
         let middle = time + 0.5 * dt;
+        let plan = &self.grid.plan;
         let pushing = Pushing {
+            widths: physics.widths(plan),
             all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
             displacement: physics.displacement_column(),
@@ -109,7 +142,6 @@ impl<const D: usize> Solver<D> {
             dt,
         };
         self.pushes.resize_with(self.chunks.len(), Vec::new);
-        let plan = &self.grid.plan;
         let leaves = self.chunks.par_iter_mut().zip(&mut self.pushes).enumerate().with_min_len(32);
         self.phases.time(Phase::Scatter, || {
             let before = leaves.map(|(leaf, (chunk, pushes))| {
@@ -118,7 +150,7 @@ impl<const D: usize> Solver<D> {
                     false => Vec::new(),
                     true => {
                         let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
-                        pushing.push(chunk, scale, pushes)
+                        pushing.push(chunk, plan.finest_cell(leaf), scale, pushes)
                     }
                 }
             });
@@ -160,19 +192,23 @@ impl<const D: usize> Solver<D> {
     /// Collective. What particles carry now of each load that they carry, and its force when it begins, or now if it has begun.
     pub fn carried_totals(&self) -> Vec<CarriedTotals> {
         let (mut all, moved) = (Vec::new(), self.physics.displacement_column());
+        let widths = self.physics.widths(&self.grid.plan);
         for load in &self.physics.loads {
             let Some(carried) = load.carried() else { continue };
             let own = self.clock.time - load.start;
             let time = load.from.max(own);
             let (mut count, mut sums) = ([0], [(); 4].map(|()| ExactSum::new()));
-            for chunk in self.chunks.iter().filter(|chunk| chunk.carried_columns() > 0) {
+            let carrying = self.chunks.iter().enumerate().filter(|(_, chunk)| chunk.carried_columns() > 0);
+            for (leaf, chunk) in carrying {
                 for p in 0..chunk.len() {
                     let Some(numbers) = numbers(chunk, carried, p) else { continue };
                     count[0] += 1;
-                    let place = load.place(&chunk.position(p), &displacement(chunk, moved, p));
+                    let x =
+                        surface_at(&widths, chunk, carried, &numbers, p, self.grid.plan.finest_cell(leaf));
+                    let place = load.place(&x, &displacement(chunk, moved, p));
                     let force = load.force(carried, &numbers, &place, time);
                     (0..D).for_each(|a| sums[a].add(force[a]));
-                    sums[3].add(numbers.iter().map(|c| c * c).sum::<f64>().sqrt());
+                    sums[3].add(carried.area(&numbers));
                 }
             }
             self.comm.sum_u64(&mut count);
