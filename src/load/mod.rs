@@ -69,6 +69,9 @@ pub enum Kind<const D: usize> {
     Velocity([Option<Quantity>; D]),
     /// Drag in proportion to mass, with a rate r (1/s): `v *= exp(-r Δt)`.
     Damping(Quantity),
+    /// Local damping (Cundall 1987), with a share α of the unbalanced force f of the step, against the
+    /// velocity v at its start: `v_i -= α |Δt f_i / m| sign(v_i)`.
+    LocalDamping(f64),
     /// A force that particles carry; nothing at nodes.
     Carried(Carried<D>),
 }
@@ -87,7 +90,7 @@ impl<const D: usize> Load<D> {
             Kind::BodyForce(acceleration) => {
                 are_masses_scaled || acceleration.iter().any(Quantity::names_undeformed)
             }
-            Kind::Velocity(_) | Kind::Damping(_) => false,
+            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) => false,
         }
     }
 
@@ -96,7 +99,7 @@ impl<const D: usize> Load<D> {
         match &self.kind {
             Kind::BodyForce(acceleration) => acceleration.iter().any(Quantity::names_undeformed),
             Kind::Carried(carried) => carried.force.names_undeformed(),
-            Kind::Velocity(_) | Kind::Damping(_) => false,
+            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) => false,
         }
     }
 
@@ -106,6 +109,7 @@ impl<const D: usize> Load<D> {
             Kind::BodyForce(acceleration) => acceleration.iter().collect(),
             Kind::Velocity(prescribed) => prescribed.iter().flatten().collect(),
             Kind::Damping(rate) => vec![rate],
+            Kind::LocalDamping(_) => Vec::new(),
             Kind::Carried(carried) => carried.force.quantities(),
         }
     }
@@ -137,13 +141,27 @@ impl<const D: usize> Load<D> {
         self.region.as_ref().is_none_or(|region| region.distance(x) <= 0.0)
     }
 
+    /// Whether it needs the velocities of nodes at the start of a step.
+    pub fn needs_start(&self) -> bool {
+        matches!(self.kind, Kind::LocalDamping(_))
+    }
+
+    /// Damps the velocity (m/s) of a node that was `start` at the start of the step, in a local way; nothing
+    /// for other kinds.
+    pub fn damp(&self, velocity: &mut [f64; D], start: &[f64; D]) {
+        let Kind::LocalDamping(share) = self.kind else { return };
+        for (v, start) in velocity.iter_mut().zip(start).filter(|(_, start)| **start != 0.0) {
+            *v -= share * (*v - start).abs() * start.signum();
+        }
+    }
+
     /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
     /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
     /// the prescribed motion to second order.
     pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
         let (place, middle) = (in_job(&self.origin, x), middle - self.start);
         match &self.kind {
-            Kind::Carried(_) => {}
+            Kind::Carried(_) | Kind::LocalDamping(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
                     velocity[axis] = dt.mul_add(acceleration[axis].at(place, middle), velocity[axis]);
@@ -214,6 +232,18 @@ mod tests {
         assert!(!ramp.is_active(1.5) && ramp.is_active(101.5));
         ramp.start = f64::INFINITY;
         assert!(!ramp.is_active(1.5) && !ramp.is_active(101.5));
+    }
+
+    /// Speeding up takes 1 - α of the force, slowing down 1 + α; what is at rest is not damped.
+    #[test]
+    fn local_damping_is_a_share_of_the_unbalanced_force() {
+        let damping = load(Kind::LocalDamping(0.25));
+        let mut velocity = [3.0, 1.0];
+        damping.damp(&mut velocity, &[2.0, 2.0]);
+        assert_eq!(velocity, [2.75, 0.75]);
+        let mut velocity = [-3.0, 1.0];
+        damping.damp(&mut velocity, &[-2.0, 0.0]);
+        assert_eq!(velocity, [-2.75, 1.0]);
     }
 
     /// Two half steps damp as much as a whole one.

@@ -87,6 +87,38 @@ fn damping_decays_as_an_exponential() {
     assert!((history.last("work_drag") / -lost - 1.0).abs() < 0.01, "{} {lost}", history.last("work_drag"));
 }
 
+/// Local damping takes the share α of the unbalanced force: a block thrown up slows down with (1 + α) g and
+/// falls with (1 - α) g, whatever the transfer. Its work is the energy lost.
+#[test]
+fn local_damping_takes_a_share_of_the_unbalanced_force() {
+    for transfer in ["", "[numerics]\ntransfer = 'flip'\n"] {
+        let damping = "[[loads]]\nname = 'local'\nkind = 'local_damping'\nfactor = 0.5\n";
+        let thrown = text("[0, -10]", 0.2, &format!("{damping}{transfer}"))
+            .replace("material = 'rubber'", "velocity = [0, 1]\nmaterial = 'rubber'");
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("body.toml");
+        std::fs::write(&path, thrown).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "body");
+        let (up, down) = (15.0, 5.0);
+        let expected = |t: f64| if t < 1.0 / up { 1.0 - up * t } else { -down * (t - 1.0 / up) };
+        for (time, momentum) in history.column("time").iter().zip(history.column("momentum_y")) {
+            let found = momentum / history.last("mass");
+            // The force turns in the step after the velocity has: half of g over a step of 1 ms.
+            assert!(
+                (found - expected(*time)).abs() < 0.011,
+                "{found} at {time} s, expected {}",
+                expected(*time)
+            );
+        }
+        let energy =
+            |row: usize| history.column("kinetic_energy")[row] + history.column("gravitational_energy")[row];
+        let lost = energy(history.column("time").len() - 1) - energy(0);
+        let work = history.last("work_local");
+        assert!(lost < 0.0 && (work / lost - 1.0).abs() < 0.03, "{work} J of {lost} J");
+    }
+}
+
 /// A gripped bar follows the prescribed velocity at its end; pulled slowly, it carries E' strain.
 #[test]
 fn grips_stretch_a_bar() {

@@ -241,6 +241,7 @@ fn load_in_words<const D: usize>(load: &Load<D>) -> String {
             let given: Vec<String> = given.map(|(c, axis)| format!("{axis}: {}", value(c, "m/s"))).collect();
             format!("velocity {}", given.join(", "))
         }
+        LoadKind::LocalDamping(factor) => format!("local damping {factor}"),
         LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),
         LoadKind::Carried(carried) => {
             let vector = |components: &[Quantity; D], unit: &str| {

@@ -100,6 +100,7 @@ fn load<const D: usize>(
             }
             Kind::Damping(rate)
         }
+        LoadKind::LocalDamping { factor } => Kind::LocalDamping(*factor),
         LoadKind::Traction { traction, bodies: on, facing } => Kind::Carried(Carried {
             force: CarriedForce::Traction(vector(checks, traction, &path.key("traction"))?),
             first: 0,

@@ -121,6 +121,16 @@ pub enum LoadKind {
         /// Rate, 1/s.
         rate: Quantity,
     },
+    /// Local, non-viscous damping (Cundall): on each node a force of `factor` times its unbalanced force,
+    /// against its velocity, component by component. It brings a body to rest in proportion to its own
+    /// period, and leaves one that moves steadily, or is in equilibrium, as it is. The unbalanced force is
+    /// that of stress, gravity and the loads before it in the job.
+    LocalDamping {
+        /// Share of the unbalanced force. From one turn to the next amplitudes fall by √((1 - factor) / (1 +
+        /// factor)).
+        #[schemars(range(min = 0.0, max = 0.99))]
+        factor: f64,
+    },
     /// A dead force per undeformed area on the surface of bodies.
     Traction {
         /// Components, Pa: as many as the job has dimensions.

@@ -283,7 +283,8 @@ impl<const D: usize> Solids<D> {
     }
 }
 
-/// Rows of all nodes that a step with increments keeps beside the node fields; empty for other transfers.
+/// Rows of all nodes that a step keeps beside the node fields, for transfers by increments and for loads;
+/// empty without these.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct Increments {
     /// Base of the increments, which is subtracted from the new velocity: v_0 (FLIP), or `-Σ v_k` over k from
@@ -291,11 +292,13 @@ pub(in crate::solver) struct Increments {
     pub(in crate::solver) base: Block<Row>,
     /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
     pub rows: Block<Row>,
+    /// Velocities at the start of the step, where a load needs them.
+    pub(in crate::solver) start: Block<Row>,
 }
 
 impl Increments {
     /// Heap bytes held.
     pub(crate) fn heap_bytes(&self) -> usize {
-        size_of_val(&*self.base) + size_of_val(&*self.rows)
+        size_of_val(&*self.base) + size_of_val(&*self.rows) + size_of_val(&*self.start)
     }
 }

@@ -27,8 +27,15 @@ fn subtract(to: &mut [Row], from: &[Row]) {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Before P2G: velocities of the nodes without the impulse of stress.
+    /// Before P2G: velocities of the nodes without the impulse of stress, for transfers and for loads that
+    /// need them.
     pub(in crate::solver) fn note_velocities(&mut self) {
+        let time = self.clock.time;
+        let is_needed = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));
+        if is_needed {
+            self.scatter_velocities();
+            self.grid.increments.start.clone_from(&self.grid.fields.rows);
+        }
         let sweeps = match self.physics.transfer {
             Transfer::Apic | Transfer::Tpic => return,
             Transfer::Flip { .. } => 0,
@@ -39,7 +46,9 @@ impl<const D: usize> Solver<D> {
             base.resize(self.grid.fields.rows.len());
             base.fill(Row::default());
         } else {
-            self.scatter_velocities();
+            if !is_needed {
+                self.scatter_velocities();
+            }
             base.clone_from(&self.grid.fields.rows);
         }
         if sweeps > 0 {

@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
+use crate::kernel::Row;
 use crate::load::Load;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
@@ -15,10 +16,12 @@ pub(in crate::solver) struct Push<const D: usize> {
     impulse: [f64; D],
 }
 
-/// Applies the loads to the velocities of real nodes, in the order of the job. Returns what the nodes that this rank counts
-/// get, in the order of the nodes.
+/// Applies the loads to the velocities of real nodes, in the order of the job; `start` has those at the start
+/// of the step, where a load needs them. Returns what the nodes that this rank counts get, in the order of
+/// the nodes.
 fn apply<const D: usize>(
     fields: &mut NodeFields<D>,
+    start: &[Row],
     plan: &GridPlan<D>,
     loads: &[(usize, &Load<D>)],
     middle: f64,
@@ -40,6 +43,10 @@ fn apply<const D: usize>(
             for &(number, load) in loads.iter().filter(|(_, load)| load.reaches(&x)) {
                 let before = velocity;
                 load.apply(&mut velocity, &x, middle, dt);
+                if load.needs_start() {
+                    let start = &start[index * nodes + bit].0;
+                    load.damp(&mut velocity, &std::array::from_fn(|a| start[a]));
+                }
                 if block.owned >> bit & 1 == 1 {
                     let impulse = std::array::from_fn(|a| mass * (velocity[a] - before[a]));
                     pushes.push(Push { load: number, node: index * nodes + bit, impulse });
@@ -64,7 +71,10 @@ impl<const D: usize> Solver<D> {
             return Vec::new();
         }
         let grid = &mut self.grid;
-        self.phases.time(Phase::Nodes, || apply(&mut grid.fields, &grid.plan, &active, time + 0.5 * dt, dt))
+        self.phases.time(Phase::Nodes, || {
+            let start = &grid.increments.start[..];
+            apply(&mut grid.fields, start, &grid.plan, &active, time + 0.5 * dt, dt)
+        })
     }
 
     /// Not collective. Books impulse and work of the loads once nodes have their final velocities.
