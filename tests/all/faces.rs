@@ -172,6 +172,47 @@ fn waves_leave_through_absorbing_faces() {
     assert!(left < 1e-3, "{left}");
 }
 
+/// Of a packet of waves at a right angle a face returns less than 1 % of the amplitude at 20 cells to a wave, whatever the
+/// time step: the dashpot acts in the middle of it.
+#[test]
+fn a_face_returns_less_than_a_percent_of_the_amplitude() {
+    // A packet cos(k s) exp(-s²/2σ²) that moves to the right, s = x - 1.5, σ = 0.5 m, of waves of 0.6 m at 5 m/s.
+    let packet = |size: f64, cfl: f64| {
+        let slope = "(exp(-2 * (x - 1.5)^2) * (-4 * (x - 1.5) * cos(10.471975512 * (x - 1.5)) - 10.471975512 * sin(10.471975512 * (x - 1.5))))";
+        let job = format!(
+            "version = 1\ndimension = 2\n[domain]\nsize = [{size}, 0.125]\nroot_edge = 0.125\n\
+             [boundaries]\nx_min.kind = 'outflow'\ny_min.kind = 'slip'\ny_max.kind = 'slip'\n\
+             x_max = {{ kind = 'absorbing', density = 1000, p_speed = 5, s_speed = 3.5355339059327378 }}\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'fixed_corotated'\nyoung = 25000\npoisson = 0\n\
+             [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0, 0], max = [{size}, 0.125] }}\n\
+             velocity = ['-5e-5 * {slope}', 0]\nstress = {{ kind = 'components', xx = '0.25 * {slope}' }}\n\
+             [[tracks]]\nname = 'probe'\npoint = [3.5, 0.0625]\nquantities = ['centre']\n\
+             [time]\nend = 1.2\ncfl = {cfl}\n[output]\npicture = false\nrestart = false\n[history]\nevery_steps = 1\n"
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("packet.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "packet");
+        (history.column("time").to_vec(), history.column("centre_probe_x").to_vec())
+    };
+    for cfl in [0.4, 0.2] {
+        let ((times, near), (other_times, far)) = (packet(5.0, cfl), packet(7.5, cfl));
+        let start = near[0];
+        let amplitude = far.iter().map(|x| (x - start).abs()).fold(0.0, f64::max);
+        let mut returned: f64 = 0.0;
+        for (i, (time, x)) in times.iter().zip(&near).enumerate().take(far.len()) {
+            // Steps are the same but for the speed of particles, 1e-4 of that of waves.
+            assert!((time - other_times[i]).abs() < 1e-3 * time.max(1e-9), "{time} and {}", other_times[i]);
+            if (0.75..1.2).contains(time) {
+                returned = returned.max((x - far[i]).abs());
+            }
+        }
+        println!("Courant number {cfl}: {:.3} % of the amplitude comes back", 100.0 * returned / amplitude);
+        assert!(amplitude > 5e-6 && returned < 0.01 * amplitude, "{returned} of {amplitude}");
+    }
+}
+
 /// Under a lasting stress an absorbing face does not creep, if its pressure is that of the material.
 #[test]
 fn the_pressure_of_an_absorbing_face_holds() {

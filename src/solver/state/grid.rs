@@ -292,7 +292,7 @@ pub(in crate::solver) struct Increments {
     pub(in crate::solver) base: Block<Row>,
     /// Changes of velocity (FLIP), or new velocities of particles (XPIC).
     pub rows: Block<Row>,
-    /// Velocities at the start of the step, where a load needs them.
+    /// Velocities at the start of the step, where a load or a face needs them.
     pub(in crate::solver) start: Block<Row>,
 }
 

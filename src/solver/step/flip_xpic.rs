@@ -31,7 +31,9 @@ impl<const D: usize> Solver<D> {
     /// need them.
     pub(in crate::solver) fn note_velocities(&mut self) {
         let time = self.clock.time;
-        let is_needed = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));
+        let absorbs = self.physics.absorbing.as_flattened().iter().any(Option::is_some);
+        let damps = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));
+        let is_needed = absorbs || damps;
         if is_needed {
             self.scatter_velocities();
             self.grid.increments.start.clone_from(&self.grid.fields.rows);

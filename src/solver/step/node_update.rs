@@ -63,7 +63,8 @@ impl<const D: usize> Solver<D> {
     pub(super) fn apply_faces(&mut self, dt: f64, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
         let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
-        let faces = Faces { contacts: faces, absorbing: Some(absorbing), origin: *origin, middle, dt };
+        let start = &grid.increments.start[..];
+        let faces = Faces { contacts: faces, absorbing: Some(absorbing), start, origin: *origin, middle, dt };
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() || !is_step {
@@ -131,6 +132,8 @@ pub struct Faces<'a, const D: usize> {
     pub contacts: &'a [[Contact; 2]; D],
     /// What is beyond those that absorb waves.
     pub absorbing: Option<&'a AbsorbingFaces<D>>,
+    /// Velocities of nodes at the start of the step, m/s, where any face absorbs.
+    pub start: &'a [Row],
     /// Lower corner of the domain in the job's coordinates, m.
     pub origin: [f64; D],
     /// Middle of the step, s.
@@ -142,7 +145,7 @@ pub struct Faces<'a, const D: usize> {
 impl<'a, const D: usize> Faces<'a, D> {
     /// Contacts alone, for velocities that no step has changed.
     pub fn without_absorption(contacts: &'a [[Contact; 2]; D]) -> Self {
-        Self { contacts, absorbing: None, origin: [0.0; D], middle: 0.0, dt: 0.0 }
+        Self { contacts, absorbing: None, start: &[], origin: [0.0; D], middle: 0.0, dt: 0.0 }
     }
 }
 
@@ -169,10 +172,11 @@ pub fn apply_faces<const D: usize>(
                             let block = &plan.blocks[node as usize / block_nodes(D)];
                             let x = plan.node_place(block, node as usize % block_nodes(D));
                             let pressure = face.pressure.at(in_job(&faces.origin, &x), faces.middle);
+                            let start = faces.start.get(node as usize).map_or([0.0; 4], |row| row.0);
                             face.apply(
                                 &mut velocity,
-                                axis,
-                                inward,
+                                &std::array::from_fn(|a| start[a]),
+                                (axis, inward),
                                 pressure,
                                 faces.dt,
                                 plan.cell(block.level),
