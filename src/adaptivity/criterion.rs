@@ -1,12 +1,12 @@
-//! What a criterion wants of a leaf, by the value that its indicator finds there.
+//! Level that a criterion requests for a leaf, by the value of its indicator there.
 use std::sync::Arc;
 
 use super::leaf_view::{LeafView, Value};
 use crate::text::quantity;
 
-/// What a criterion looks at.
+/// Indicator of a criterion.
 pub(crate) trait Indicator<const D: usize>: std::fmt::Debug + Send + Sync {
-    /// What is to be found out for it beside particles, nodes and colliders.
+    /// Data that it needs beside particles, nodes and colliders.
     fn needs(&self) -> Needs {
         Needs::default()
     }
@@ -14,17 +14,17 @@ pub(crate) trait Indicator<const D: usize>: std::fmt::Debug + Send + Sync {
     /// Its value in a leaf with particles.
     fn value(&self, leaf: &LeafView<'_, D>, thresholds: &Thresholds) -> Value;
 
-    /// Where it wants fine leaves, in words.
+    /// Description of where it requests fine leaves.
     fn describe(&self, thresholds: &Thresholds) -> String;
 
-    /// Index of the collider whose surroundings it wants fine, if it is one of those.
+    /// Index of the collider around which it requests fine leaves, if it is such a criterion.
     fn collider(&self) -> Option<usize> {
         None
     }
 }
 
-/// What indicators look at and what is found out for them alone: extrema that G2P notes while the particles are in the
-/// cache, and what leaves have around them.
+/// Data found for indicators alone: extrema that G2P records while the particles are in the cache, and the
+/// surroundings of leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Needs {
     /// Greatest plastic strain.
@@ -38,7 +38,7 @@ pub(crate) struct Needs {
 }
 
 impl Needs {
-    /// What either needs.
+    /// Union of two sets of needs.
     pub(crate) fn and(self, other: Self) -> Self {
         Self {
             plastic_strain: self.plastic_strain || other.plastic_strain,
@@ -49,19 +49,19 @@ impl Needs {
     }
 }
 
-/// Which values ask for fine leaves.
+/// Thresholds of an indicator for fine leaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Value at which a leaf becomes finer.
     pub refine: f64,
-    /// Value between which and `refine` a leaf stays as it is.
+    /// Value up to which a leaf may coarsen; between it and `refine` the leaf keeps its level.
     pub coarsen: f64,
-    /// Whether small values ask for fine leaves: those of distances do.
+    /// Whether small values request fine leaves, as distances do.
     pub is_distance: bool,
 }
 
 impl Thresholds {
-    /// Of indicators that are 1 where leaves shall be fine and 0 elsewhere.
+    /// Thresholds of indicators that are 1 where leaves shall be fine and 0 elsewhere.
     pub(crate) const YES: Self = Self::from_value(1.0, 1.0);
 
     /// Leaves become finer from a value on, and stay fine from another on.
@@ -90,22 +90,22 @@ impl Thresholds {
 /// One reason for fine leaves.
 #[derive(Clone, Debug)]
 pub struct Criterion<const D: usize> {
-    /// What it looks at.
+    /// Its indicator.
     pub(crate) indicator: Arc<dyn Indicator<D>>,
-    /// Level that it wants.
+    /// Level that it requests.
     pub level: u8,
-    /// Which values ask for it.
+    /// Thresholds for that level.
     pub thresholds: Thresholds,
 }
 
-/// What a criterion wants of a leaf.
+/// Request of a criterion for a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Want {
-    /// The criterion's level.
+    /// Refinement to the criterion's level.
     Refine,
-    /// Not coarser than it is.
+    /// No coarsening.
     Hold,
-    /// Nothing.
+    /// No request: the leaf may coarsen.
     Nothing,
 }
 
@@ -120,20 +120,20 @@ impl<const D: usize> Criterion<D> {
         self.indicator.value(leaf, &self.thresholds)
     }
 
-    /// Where it wants fine leaves, in words.
+    /// Description of where it requests fine leaves.
     pub fn describe(&self) -> String {
         self.indicator.describe(&self.thresholds)
     }
 
-    /// Index of the collider whose surroundings it wants fine, if it is one of those.
+    /// Index of the collider around which it requests fine leaves, if it is such a criterion.
     pub fn collider(&self) -> Option<usize> {
         self.indicator.collider()
     }
 
-    /// What the values of a leaf ask for.
+    /// Request for a leaf with these values.
     pub fn want(&self, value: Value) -> Want {
         let Thresholds { refine, coarsen, is_distance } = self.thresholds;
-        // A sign makes large values the urgent ones.
+        // With this sign, larger values are more urgent.
         let sign = if is_distance { -1.0 } else { 1.0 };
         if sign * value.leaf >= sign * refine {
             Want::Refine
@@ -144,8 +144,8 @@ impl<const D: usize> Criterion<D> {
         }
     }
 
-    /// Level wanted for a leaf of `level` with these values; 0 if none. One level finer than the leaf at most: only
-    /// its children know which of them need more.
+    /// Level wanted for a leaf of `level` with these values; 0 if none. At most one level finer than the
+    /// leaf: only the children show which of them need more.
     pub fn wanted_level(&self, value: Value, level: u8) -> u8 {
         match self.want(value) {
             Want::Refine => self.level.min(level + 1),
@@ -154,8 +154,8 @@ impl<const D: usize> Criterion<D> {
         }
     }
 
-    /// How urgent the value of a leaf is, for people: 1 where refinement begins, larger where there is more reason. Distances
-    /// give 1 within the refinement distance and fall to 0 at twice that.
+    /// Urgency of the value of a leaf, for display: 1 where refinement begins, larger where the value exceeds
+    /// the threshold. Distances give 1 within the refinement distance and fall to 0 at twice that.
     pub fn urgency(&self, value: f64) -> f64 {
         let Thresholds { refine, is_distance, .. } = self.thresholds;
         match is_distance {

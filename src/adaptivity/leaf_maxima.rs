@@ -20,7 +20,7 @@ pub(crate) struct LeafMaxima<const D: usize> {
     pub stretch: f64,
     /// Mean rate of the plastic strain in the last step, 1/s.
     pub plastic_rate: f64,
-    /// What their tags say; `None` if nothing is known.
+    /// Levels in their tags; `None` if unknown.
     pub levels: Option<Levels>,
 }
 
@@ -37,7 +37,7 @@ impl<const D: usize> Default for LeafMaxima<D> {
     }
 }
 
-/// What to note.
+/// Quantities to record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Watch {
     /// Velocities and tags.
@@ -67,7 +67,7 @@ impl Watch {
         self.look(chunk, maxima);
     }
 
-    /// What follows from the state alone.
+    /// Records the quantities that follow from the state alone.
     pub(crate) fn look<const D: usize>(self, chunk: &Chunk<D>, maxima: &mut LeafMaxima<D>) {
         if self.velocity {
             let ranges: [[f64; 2]; D] =

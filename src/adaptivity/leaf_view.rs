@@ -1,7 +1,7 @@
-//! What criteria may look at: one leaf with its particles, nodes and surroundings, after a step.
+//! View of one leaf for criteria: its particles, nodes and surroundings, after a step.
 //!
-//! Everything follows from the particles of the leaf, from nodes that its rank sums anyway and from which leaves are
-//! empty, so the values do not depend on the partition.
+//! Everything follows from the particles of the leaf, from nodes that its rank sums anyway and from which
+//! leaves are empty, so the values do not depend on the partition.
 use partition::Octant;
 
 use super::leaf_maxima::LeafMaxima;
@@ -15,23 +15,23 @@ use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::{Row, Scheme, Select, domain};
 use crate::particle::Chunk;
 
-/// What a criterion finds.
+/// Value of an indicator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Value {
     /// In the leaf.
     pub leaf: f64,
-    /// In the leaf's parent, as far as it is known without the parent's other children. A leaf becomes coarser only
-    /// if that would not make the parent finer again.
+    /// In the leaf's parent, as far as it is known without the parent's other children. A leaf becomes
+    /// coarser only if that would not make the parent finer again.
     pub parent: f64,
 }
 
 impl Value {
-    /// One that is taken for the parent's too.
+    /// The same value for the leaf and for its parent.
     pub(crate) const fn of_leaf(value: f64) -> Self {
         Self { leaf: value, parent: value }
     }
 
-    /// 1 where something holds, 0 elsewhere.
+    /// 1 if true, else 0, for the leaf and for its parent.
     pub(crate) fn flag(holds: bool) -> Self {
         Self::of_leaf(f64::from(u8::from(holds)))
     }
@@ -88,7 +88,7 @@ impl<'a, const D: usize> LeafView<'a, D> {
         &self.state.chunks[self.number]
     }
 
-    /// What was noted of its particles. Only what criteria need is.
+    /// Extrema of its particles; only those that criteria need are recorded.
     pub(crate) fn maxima(&self) -> &'a LeafMaxima<D> {
         &self.state.maxima[self.number]
     }
@@ -116,7 +116,7 @@ impl<'a, const D: usize> LeafView<'a, D> {
         self.state.time
     }
 
-    /// What follows from the box of an octant alone (m): for the leaf and for its parent.
+    /// Value for the leaf and for its parent of a function of the box of an octant (m).
     pub(crate) fn in_boxes(&self, value: impl Fn(&Aabb<D>) -> f64) -> Value {
         let of = |octant: &Octant<D>| {
             let (lower, upper) = leaf_box(octant, self.state.root_edge);
@@ -127,8 +127,8 @@ impl<'a, const D: usize> LeafView<'a, D> {
         Value { leaf, parent: here.parent().map_or(leaf, |parent| of(&parent)) }
     }
 
-    /// Whether the leaf touches one without particles, or nodes around are free of material. Only where the criterion
-    /// needs it.
+    /// Whether the leaf touches one without particles, or nodes around are free of material. Only where the
+    /// criterion needs it.
     pub(crate) fn is_exposed(&self) -> bool {
         let RankState { plan, fields, surroundings, masses, beside_empty, .. } = self.state;
         beside_empty[self.number] || surroundings.is_exposed(self.number, plan, fields, masses)

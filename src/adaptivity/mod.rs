@@ -1,4 +1,4 @@
-//! Where a job wants fine leaves, and what happens to particles when leaves change.
+//! Criteria for fine leaves, and the treatment of particles when leaves change.
 //!
 //! A criterion looks at one occupied leaf and wants it fine, lets it stay as it is, or has no objection to
 //! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any criterion
@@ -7,10 +7,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`criteria`] | the criteria, one file each |
-//! | `criterion` | what a criterion wants of a leaf |
-//! | `leaf_view` | what criteria may look at in a leaf |
-//! | `leaf_maxima` | what G2P notes of a leaf's particles for criteria and splitting |
-//! | `surroundings` | what leaves have around them |
+//! | `criterion` | level that a criterion requests for a leaf |
+//! | `leaf_view` | view of a leaf for criteria |
+//! | `leaf_maxima` | extrema of a leaf's particles that G2P records for criteria and splitting |
+//! | `surroundings` | surroundings of leaves |
 //! | [`resample`] | particles split and merge |
 use self::criterion::Needs;
 pub use self::criterion::{Criterion, Thresholds, Want};
@@ -26,12 +26,12 @@ pub(crate) mod leaf_view;
 pub mod resample;
 pub(crate) mod surroundings;
 
-/// Dynamic refinement as a job asks for it.
+/// Dynamic refinement of a job.
 #[derive(Clone, Debug)]
 pub struct Adaptivity<const D: usize> {
     /// Steps from one regrid to the next.
     pub every: u64,
-    /// Width of the layer around what a criterion wants, in leaves of the wanted level.
+    /// Width of the layer around the leaves that a criterion requests, in leaves of the requested level.
     pub buffer: u32,
     /// Coarsest level of all leaves.
     pub base_level: u8,
@@ -41,9 +41,10 @@ pub struct Adaptivity<const D: usize> {
     pub criteria: Vec<Criterion<D>>,
     /// Width of a box over that of an undeformed particle of its leaf's level above which particles split.
     pub split_stretch: Option<f64>,
-    /// Width of the space of a particle, in cells of its leaf, above which it becomes two: see [`resample::Gap`].
+    /// Width of the space of a particle, in cells of its leaf, above which it becomes two: see
+    /// [`resample::Gap`].
     pub split_gap: Option<f64>,
-    /// How different particles may be that merge; `None`: they never do.
+    /// Limits on the differences of particles that merge; `None`: they never merge.
     pub merge: Option<Limits>,
     /// Half width of an undeformed particle of level 0 by body, m.
     pub nominal: Vec<f64>,
@@ -61,16 +62,16 @@ impl<const D: usize> Adaptivity<D> {
         f64::from(1u32 << self.finest_level()) / root_edge
     }
 
-    /// What the criteria look at that is found out for them alone.
+    /// Data found for the criteria alone.
     pub(crate) fn needs(&self) -> Needs {
         let each = self.criteria.iter().map(|criterion| criterion.indicator.needs());
         each.fold(Needs::default(), Needs::and)
     }
 
-    /// What is to be noted of particles in the step of that number (the first is 1).
+    /// Quantities to record of particles in the step of that number (the first is 1).
     pub(crate) fn watch(&self, step: u64) -> Watch {
         let needs = self.needs();
-        // Files show the rate whenever they are written.
+        // Output files show the rate at any step.
         let rate = needs.plastic_rate;
         if !step.is_multiple_of(self.every) {
             return Watch { rate, ..Watch::default() };

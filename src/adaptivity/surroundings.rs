@@ -1,4 +1,4 @@
-//! What leaves have around them, found once per tree, and how much mass the nodes there have.
+//! Surroundings of leaves, found once per tree, and the masses of the nodes there.
 use partition::comm::Comm;
 use partition::{Forest, Octant, Region};
 use rayon::prelude::*;
@@ -28,7 +28,8 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Not collective. Finds everything anew if the tree or the partition has changed; the plan is that of the forest.
+    /// Not collective. Recomputes everything if the tree or the partition has changed; the plan is that of
+    /// the forest.
     pub(crate) fn update<const D: usize>(&mut self, forest: &Forest<D>, plan: &GridPlan<D>) {
         if self.revision == Some(forest.revision()) {
             return;
@@ -75,8 +76,9 @@ impl Surroundings {
         beside
     }
 
-    /// Whether any real node in the arena of a leaf's own bin is free of material. Only nodes on the leaf and on leaves
-    /// of its level count: the lattice goes on over finer leaves, but what is there has its mass on finer nodes.
+    /// Whether any real node in the arena of a leaf's own bin is free of material. Only nodes on the leaf and
+    /// on leaves of its level count: the lattice goes on over finer leaves, but material there has its mass
+    /// on finer nodes.
     pub(crate) fn is_exposed<const D: usize>(
         &self,
         leaf: usize,
@@ -95,7 +97,8 @@ impl Surroundings {
             let on_leaf = if of_level >> index & 1 == 1 { u64::MAX } else { on_leaf::<D>(index) };
             MassRange::of::<D>(fields, number, block.real_nodes() & mask & on_leaf)
         };
-        // Most leaves have as much mass on all nodes of all blocks around, the nodes beyond the arena included.
+        // Most leaves have as much mass on all nodes of all blocks around, the nodes beyond the arena
+        // included.
         let wide =
             blocks().fold(MassRange::NONE, |range, (index, &number)| match of_level >> index & 1 == 1 {
                 true => range.with(masses[number as usize]),
@@ -121,7 +124,7 @@ fn on_leaf<const D: usize>(index: usize) -> u64 {
     }))
 }
 
-/// What [`Surroundings`] has of one leaf.
+/// Entry of one leaf in [`Surroundings`].
 struct Around {
     touching: Vec<u32>,
     at_seam: bool,
@@ -174,14 +177,14 @@ impl MassRange {
         Self { least: self.least.min(other.least), greatest: self.greatest.max(other.greatest) }
     }
 
-    /// Whether some of the nodes are free of material. More nodes never undo that.
+    /// Whether some of the nodes are free of material. Further nodes cannot make it false.
     fn has_gap(self) -> bool {
         self.least < NEXT_TO_NOTHING * self.greatest
     }
 
     fn of<const D: usize>(fields: &NodeFields<D>, block: u32, nodes: u64) -> Self {
         if !fields.may_hold(block as usize) {
-            // To read rows that were never written would make the system find pages for them.
+            // Reading rows that were never written would make the system allocate pages for them.
             return if nodes == 0 { Self::NONE } else { Self { least: 0.0, greatest: 0.0 } };
         }
         let rows = &fields.rows[block as usize * block_nodes(D)..][..block_nodes(D)];
@@ -191,7 +194,7 @@ impl MassRange {
         })
     }
 
-    /// Of all real nodes of each block.
+    /// Ranges of all real nodes of each block.
     pub(crate) fn of_blocks<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<Self> {
         let blocks = plan.blocks.par_iter().enumerate().with_min_len(64);
         blocks.map(|(number, block)| Self::of::<D>(fields, number as u32, block.real_nodes())).collect()

@@ -1,13 +1,13 @@
-//! Faces that absorb waves: dashpots that take what arrives as the material beyond would.
+//! Faces that absorb waves: dashpots that absorb waves as the material beyond the face would.
 use crate::quantity::Quantity;
 
-/// What is beyond the lower and the upper face along each axis, where they absorb waves.
+/// Material beyond the lower and the upper face along each axis; `None` where the face absorbs no waves.
 pub type AbsorbingFaces<const D: usize> = [[Option<Box<Absorbing>>; 2]; D];
 
 /// A face that absorbs waves (Lysmer and Kuhlemeyer 1969), with the pressure that holds the material at rest.
 ///
-/// Beyond the face material goes on for ever: where the face moves with v, it pulls with `ρ c_p v_n` and `ρ c_s v_t` per area.
-/// Waves that arrive at a right angle are taken as a whole, others for the most part.
+/// Beyond the face the material is unbounded: where the face moves with v, it pulls with `ρ c_p v_n` and
+/// `ρ c_s v_t` per area. Waves at normal incidence are absorbed completely, others for the most part.
 #[derive(Clone, Debug)]
 pub struct Absorbing {
     /// Speed of compression waves, m/s.
@@ -21,14 +21,16 @@ pub struct Absorbing {
 }
 
 impl Absorbing {
-    /// Changes the velocity (m/s) of a node on the face with normal `inward` along `axis` in a step of length `dt` (s), at
-    /// whose start it was `start`. `pressure` is that at the node, Pa; `cell` is the edge of its cells, m.
+    /// Changes the velocity (m/s) of a node on the face with normal `inward` along `axis` in a step of length
+    /// `dt` (s), at whose start it was `start`. `pressure` is the pressure at the node, Pa; `cell` is the
+    /// edge of its cells, m.
     ///
-    /// The node has the mass of half a cell, `m = ρ A h / 2`. Velocities are those of the middles of steps, between which
-    /// stress acts, so the dashpot takes the mean over the step; with that at its end it would lag by half a step, as if
-    /// `ρ c Δt / 2` of mass lay before it: `v_n = (v_n* - c_p Δt / h v_n⁰ ± 2 Δt p / (ρ h)) / (1 + c_p Δt / h)`,
-    /// `v_t = (v_t* - c_s Δt / h v_t⁰) / (1 + c_s Δt / h)`. A node with less material stands for less area, and the
-    /// same holds.
+    /// The node has the mass of half a cell, `m = ρ A h / 2`. Velocities are those at the middles of steps,
+    /// between which stress acts, so the dashpot acts on the mean over the step. With the velocity at its end
+    /// it would lag by half a step, as if a mass of `ρ c Δt / 2` per area were in front of it:
+    /// `v_n = (v_n* - c_p Δt / h v_n⁰ ± 2 Δt p / (ρ h)) / (1 + c_p Δt / h)`,
+    /// `v_t = (v_t* - c_s Δt / h v_t⁰) / (1 + c_s Δt / h)`. A node with less material stands for less area,
+    /// so the result is the same.
     pub fn apply<const D: usize>(
         &self,
         velocity: &mut [f64; D],

@@ -1,33 +1,36 @@
 //! Contact between bodies that deform.
 //!
-//! Bodies in contact move with velocity fields of their own. At a real node where two fields have mass, the share that each body takes of the
-//! volume of the node's basis function, `φ = Σ V w / ∫N`, says where its surface lies: a plane at a distance s of the node, in cells,
-//! leaves the share `Φ(s)` behind it, where Φ is the distribution function of the hat. Boxes that tile a body make φ exact, and two surfaces
-//! that touch have `φ_a + φ_b = 1` at each node, so that contact begins at the surface and not a cell ahead of it. The normal follows
-//! from the gradients of both volumes (Nairn 2013, average volume gradient): `n ∝ Σ V_a ∇w - Σ V_b ∇w`.
+//! Bodies in contact move with velocity fields of their own. At a real node where two fields have mass, the
+//! share that each body takes of the volume of the node's basis function, `φ = Σ V w / ∫N`, says where its
+//! surface lies: a plane at a distance s of the node, in cells, leaves the share `Φ(s)` behind it, where Φ is
+//! the distribution function of the hat. Boxes that tile a body make φ exact, and two surfaces in contact
+//! have `φ_a + φ_b = 1` at each node, so contact begins at the surface and not a cell ahead of it. The normal
+//! follows from the gradients of both volumes (Nairn 2013, average volume gradient):
+//! `n ∝ Σ V_a ∇w - Σ V_b ∇w`.
 
 use std::fmt;
 
 use super::motion::length;
 use crate::text::{number, quantity};
 
-/// Which velocity field each body moves with, and what holds where two meet.
+/// Velocity field of each body, and the law of contact of each pair of fields.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyContacts {
     /// Number of the velocity field of each body; empty where all move with one.
     pub field_of_body: Vec<u8>,
-    /// What holds between two fields, in the order of their numbers; the others stick.
+    /// Contacts between two fields, in the order of their numbers; other pairs stick.
     pub pairs: Vec<Pair>,
-    /// Name of each contact of the job, and whether it is between two sides, so that its force has a direction.
+    /// Name of each contact of the job, and whether it is between two sides, so that its force has a
+    /// direction.
     pub names: Vec<(String, bool)>,
 }
 
-/// What holds between two velocity fields.
+/// Contact between two velocity fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
     /// Numbers of the fields, ascending.
     pub fields: [u8; 2],
-    /// What holds.
+    /// Law of contact.
     pub law: PairLaw,
     /// Number of the contact in the job.
     pub contact: u16,
@@ -35,20 +38,20 @@ pub struct Pair {
     pub turned: bool,
 }
 
-/// What holds where two bodies touch.
+/// Law of contact between two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PairLaw {
     /// They move as one.
     Sticky,
-    /// Once they touch they stay together and slide freely.
+    /// Bodies in contact stay together and slide freely.
     Slip,
     /// They part freely, up to a tension; Coulomb friction with cohesion.
     Separating {
         /// Coefficient of friction.
         friction: f64,
-        /// Shear stress that holds without pressure, Pa.
+        /// Shear strength without pressure, Pa.
         cohesion: f64,
-        /// Tension up to which they do not part, Pa.
+        /// Tensile strength, Pa.
         tension: f64,
     },
 }
@@ -58,13 +61,14 @@ pub enum PairLaw {
 pub struct Meeting<const D: usize> {
     /// Unit normal from the first to the second.
     pub normal: [f64; D],
-    /// Distance between the surfaces along it, m; below 0 they overlap.
+    /// Distance between the surfaces along the normal, m; negative for an overlap.
     pub gap: f64,
-    /// Area of the surface that is the node's, m² (in plane strain m).
+    /// Area of the surface that belongs to the node, m² (in plane strain m).
     pub area: f64,
 }
 
-/// Distance between surfaces up to which bodies that hold together do, in cells.
+/// Distance between surfaces, in cells, up to which bodies count as touching for `slip`, cohesion and tensile
+/// strength.
 const TOUCH: f64 = 0.05;
 
 impl BodyContacts {
@@ -73,32 +77,32 @@ impl BodyContacts {
         self.field_of_body.iter().max().map_or(1, |&last| usize::from(last) + 1)
     }
 
-    /// What holds between two fields, whose numbers ascend.
+    /// Contact between two fields, whose numbers ascend; `None` if they stick.
     pub fn pair(&self, fields: [usize; 2]) -> Option<&Pair> {
         let place = self.pairs.binary_search_by_key(&fields, |pair| pair.fields.map(usize::from));
         place.ok().map(|place| &self.pairs[place])
     }
 }
 
-/// Distance of a plane from a node that leaves this share of the volume of its hat behind it, in cells, from -1 to 1: the inverse
-/// of the distribution function of the hat. Hats across which a plane lies obliquely have the same variance and nearly the
-/// same function.
+/// Distance of a plane from a node that leaves this share of the volume of its hat behind it, in cells, from
+/// -1 to 1: the inverse of the distribution function of the hat. Hats across which a plane lies obliquely
+/// have the same variance and nearly the same function.
 pub fn place_of_surface(share: f64) -> f64 {
     let share = share.clamp(0.0, 1.0);
     if share < 0.5 { (2.0 * share).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - share)).sqrt() }
 }
 
 impl<const D: usize> Meeting<D> {
-    /// Two bodies at a node with cells of this edge (m) and a hat of this volume, from the sums `Σ V ∇w` and `Σ V w` of each. `None` where
-    /// these say nothing of a surface between them.
+    /// Two bodies at a node with cells of this edge (m) and a hat of this volume, from the sums `Σ V ∇w` and
+    /// `Σ V w` of each. `None` where these define no surface between them.
     pub fn new(sums: [([f64; D], f64); 2], volume: f64, cell: f64, on_faces: u8) -> Option<Self> {
         let [(first, a), (second, b)] = sums;
         let across = std::array::from_fn(|k| {
-            // Beyond a face of the domain there is nothing, which is no surface of either.
+            // A face of the domain is no surface of either body.
             if on_faces >> (2 * k) & 3 != 0 { 0.0 } else { first[k] - second[k] }
         });
         let size = length(&across);
-        // The least share counts: the strain of the particle that has it does not vanish with it.
+        // The smallest share counts: the strain of its particle does not vanish with the share.
         if !(size > 0.0 && a.min(b) > 0.0) {
             return None;
         }
@@ -109,7 +113,7 @@ impl<const D: usize> Meeting<D> {
 }
 
 impl fmt::Display for PairLaw {
-    /// The name and what it is given.
+    /// Name and parameters.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sticky => f.write_str("sticky"),
@@ -125,11 +129,12 @@ impl fmt::Display for PairLaw {
 }
 
 impl PairLaw {
-    /// Impulse on the second of two bodies with these masses (kg) that meet at a node, kg m/s; the first takes the opposite. `relative` is the
-    /// velocity of the first less that of the second, m/s, in a step of length `dt`, s.
+    /// Impulse on the second of two bodies with these masses (kg) that meet at a node, kg m/s; the first
+    /// takes the opposite. `relative` is the velocity of the first less that of the second, m/s, in a step of
+    /// length `dt`, s.
     ///
-    /// A gap may close within the step, so bodies approach up to `gap / dt` freely. The impulse of friction is bounded by Coulomb's law for the
-    /// impulse of the step, `|J_t| ≤ μ J_n + c A Δt`.
+    /// A gap may close within the step, so bodies approach freely at up to `gap / dt`. The impulse of
+    /// friction is bounded by Coulomb's law for the impulse of the step, `|J_t| ≤ μ J_n + c A Δt`.
     pub fn impulse<const D: usize>(
         &self,
         relative: &[f64; D],

@@ -12,7 +12,7 @@ use crate::geometry::vector::in_space;
 use crate::geometry::{Aabb, Shape};
 use crate::text::quantity;
 
-/// On what a collider acts.
+/// Nodes or particles, on which a collider acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ActsOn {
     /// On the real nodes inside it.
@@ -27,7 +27,7 @@ pub enum ActsOn {
 pub struct Collider<const D: usize> {
     /// Name.
     pub name: String,
-    /// Where it is in the job; of one that deforms as it is in the step.
+    /// Shape in its place in the job; of a deforming collider the shape of the step.
     pub shape: Shape<D>,
     /// How it deforms.
     pub deforming: Option<Deforming>,
@@ -35,9 +35,9 @@ pub struct Collider<const D: usize> {
     pub reference: [f64; D],
     /// Unit axis of rotations; z in 2D.
     pub axis: [f64; 3],
-    /// What it does to material.
+    /// Law of contact with the material.
     pub contact: Contact,
-    /// On what it acts.
+    /// Whether it acts on nodes or on particles.
     pub acts_on: ActsOn,
     /// How it moves.
     pub motion: Motion<D>,
@@ -45,10 +45,10 @@ pub struct Collider<const D: usize> {
     pub start: f64,
 }
 
-/// Where a collider is and how fast it moves, between two steps.
+/// Pose and velocity of a collider, between two steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColliderState<const D: usize> {
-    /// Where it is.
+    /// Pose.
     pub pose: Pose<D>,
     /// Velocities; of a prescribed motion the mean ones of the step done last.
     pub rate: Rate<D>,
@@ -76,7 +76,8 @@ impl<const D: usize> Collider<D> {
         self.start.is_finite()
     }
 
-    /// A state from its numbers: way of the reference point (m) with the angle (rad), and velocities.
+    /// A state from its numbers: displacement of the reference point (m) with the angle (rad), and
+    /// velocities.
     pub fn state(&self, place: ([f64; D], f64), rate: Rate<D>) -> ColliderState<D> {
         ColliderState { pose: Pose::new(place.0, place.1, self.axis), rate, momentum: [0.0; 3] }
     }
@@ -86,7 +87,8 @@ impl<const D: usize> Collider<D> {
         if let Motion::Free(free) = &self.motion { Some(free) } else { None }
     }
 
-    /// What it does to other colliders, of a free body that is there and feels them.
+    /// Friction and restitution in collisions with other colliders, if this is a free body that is present
+    /// and collides.
     pub fn meeting(&self) -> Option<Meeting> {
         self.free().and_then(|free| free.meeting).filter(|_| self.is_present())
     }
@@ -126,14 +128,14 @@ impl<const D: usize> Collider<D> {
         std::array::from_fn(|i| (0..D).fold(0.0, |sum, j| pose.rotation[i][j].mul_add(own[j], sum)))
     }
 
-    /// Signed distance of a point `x` (m) to the surface of the collider in a pose, m; negative inside. For booleans
-    /// of shapes a bound, never larger in magnitude (see [`crate::geometry`]).
+    /// Signed distance of a point `x` (m) to the surface of the collider in a pose, m; negative inside. For
+    /// booleans of shapes a bound, never larger in magnitude (see [`crate::geometry`]).
     pub fn distance(&self, x: &[f64; D], pose: &Pose<D>) -> f64 {
         self.shape.distance(&self.to_own(x, pose))
     }
 
-    /// Lower bound on the distance of a box to the collider in a pose, m: the distance of its centre less its half
-    /// diagonal. Not above 0 for every box that meets the collider.
+    /// Lower bound on the distance of a box to the collider in a pose, m: the distance of its centre less its
+    /// half diagonal. Not above 0 for every box that meets the collider.
     pub fn distance_to_box(&self, aabb: &Aabb<D>, pose: &Pose<D>) -> f64 {
         self.distance(&aabb.centre(), pose) - aabb.half_diagonal()
     }
@@ -143,7 +145,7 @@ impl<const D: usize> Collider<D> {
         self.turned(&self.shape.gradient(&self.to_own(x, pose)), pose)
     }
 
-    /// Goes to the shape that it has at a time (s), if it deforms.
+    /// Sets the shape that it has at a time (s), if it deforms.
     pub fn deform(&mut self, time: f64) {
         let (is_present, start) = (self.is_present(), self.start);
         let Some(deforming) = self.deforming.as_mut().filter(|_| is_present) else { return };
@@ -152,7 +154,8 @@ impl<const D: usize> Collider<D> {
         }
     }
 
-    /// Velocity of the collider at a point `x` of its surface: `V + ω × (x - c)`, and that of its deformation, m/s.
+    /// Velocity of the collider at a point `x` of its surface: `V + ω × (x - c)`, and that of its
+    /// deformation, m/s.
     pub fn velocity_at(&self, x: &[f64; D], pose: &Pose<D>, rate: &Rate<D>) -> [f64; D] {
         let rigid = self.rigid_velocity_at(x, pose, rate);
         let (Some(deforming), Shape::Mesh(mesh)) = (&self.deforming, &self.shape) else { return rigid };
@@ -176,8 +179,8 @@ impl<const D: usize> Collider<D> {
         std::array::from_fn(|a| rate.spin.mul_add(cross[a], rate.velocity[a]))
     }
 
-    /// Mean velocities over the step from `time` to `time + dt` (s). A free body gains `dt g`; what the material does
-    /// to it in the step acts from the next one on.
+    /// Mean velocities over the step from `time` to `time + dt` (s). A free body gains `dt g`; the impulse of
+    /// the material in the step acts from the next one on.
     pub fn step_rate(&self, state: &ColliderState<D>, gravity: &[f64; D], time: f64, dt: f64) -> Rate<D> {
         match &self.motion {
             _ if !self.is_present() => Rate::REST,
@@ -198,15 +201,15 @@ impl<const D: usize> Collider<D> {
         }
     }
 
-    /// Where it is after a step that ends at `time` (s) and was `dt` long, in which it moved with `mean`: what material does to a free body in a
-    /// step moves it in the next.
+    /// Pose after a step of length `dt` (s) that ends at `time` (s), in which the collider moved with `mean`:
+    /// the impulse of the material on a free body in a step moves it in the next.
     pub fn next_pose(&self, state: &ColliderState<D>, mean: &Rate<D>, [time, dt]: [f64; 2]) -> Pose<D> {
         self.advanced(state, mean, &[0.0; D], [time, dt], [0.0; D], [0.0; 3]).pose
     }
 
-    /// The state after a step that ends at `time` (s) and was `dt` long, in which the collider moved with `mean`
-    /// and got the given impulse (kg m/s) and angular impulse about its reference point (kg m²/s). Without contact a
-    /// free body follows the parabola of its fall exactly.
+    /// The state after a step that ends at `time` (s) and was `dt` long, in which the collider moved with
+    /// `mean` and got the given impulse (kg m/s) and angular impulse about its reference point (kg m²/s).
+    /// Without contact a free body follows the parabola of its fall exactly.
     pub fn advanced(
         &self,
         state: &ColliderState<D>,
@@ -243,8 +246,8 @@ impl<const D: usize> Collider<D> {
         self.state((translation, angle), rate)
     }
 
-    /// Bound on the speed of any point of the collider within `extent` (the upper corner of the domain, m) from
-    /// `time` on, m/s; of a free body that of the state.
+    /// Bound on the speed of any point of the collider within `extent` (the upper corner of the domain, m)
+    /// from `time` on, m/s; of a free body that of the state.
     pub fn greatest_speed(&self, state: &ColliderState<D>, extent: &[f64; D], time: f64) -> f64 {
         let (speed, spin) = match &self.motion {
             _ if !self.is_present() => (0.0, 0.0),
@@ -259,8 +262,8 @@ impl<const D: usize> Collider<D> {
         if spin == 0.0 {
             return speed;
         }
-        // The farthest point: of a bounded shape a corner of its box; of others one of the domain, from the place
-        // that the reference point has now.
+        // The farthest point: of a bounded shape a corner of its box; of others one of the domain, from the
+        // place that the reference point has now.
         let farthest = |from: &[f64; D], aabb: &Aabb<D>| {
             let arm: [f64; D] =
                 std::array::from_fn(|a| (from[a] - aabb.lower[a]).abs().max((aabb.upper[a] - from[a]).abs()));

@@ -1,10 +1,10 @@
-//! What holds for the velocity of material at a surface: a face of the domain, or a collider.
+//! Boundary condition for the velocity of material at a surface: a face of the domain, or a collider.
 use std::fmt;
 
 use super::motion::length;
 use crate::text::number;
 
-/// What happens to material at a surface. A face of the domain is a contact with an axis as normal.
+/// Boundary condition of material at a surface. A face of the domain is a contact with an axis as normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
     /// The material moves with the surface.
@@ -18,10 +18,10 @@ pub enum Contact {
     },
     /// Mirror plane, of faces only; for velocities the same as `slip`.
     Symmetric,
-    /// No condition, of faces only: material moves out as it would without the face, and particles that cross it leave the
-    /// domain.
+    /// No condition, of faces only: material flows out as it would without the face, and particles that cross
+    /// it leave the domain.
     Outflow,
-    /// Waves go out, of faces only; see [`super::Absorbing`].
+    /// Waves are absorbed, of faces only; see [`super::Absorbing`].
     Absorbing,
 }
 

@@ -1,4 +1,5 @@
-//! Boundary conditions on the velocities of real nodes, contact at particles, and what becomes of particles that leave.
+//! Boundary conditions on the velocities of real nodes, contact at particles, and the treatment of particles
+//! that leave.
 pub mod absorbing;
 pub mod bodies;
 pub mod collider;
@@ -13,7 +14,7 @@ pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
 pub use touching::{Touching, meets};
 
-/// What happens to particles that leave the domain.
+/// Treatment of particles that leave the domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Leaving {
     /// The run ends with an error that names them.

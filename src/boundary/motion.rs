@@ -4,10 +4,10 @@ use super::rigid::turning::{Inertia, Quaternion, UPRIGHT, matrix};
 use crate::geometry::rotation;
 use crate::quantity::smooth_step;
 
-/// Where a collider is: shifted from its place in the job and turned about its reference point.
+/// Pose of a collider: translation from its place in the job and rotation about its reference point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose<const D: usize> {
-    /// Way of the reference point from its place in the job, m.
+    /// Displacement of the reference point from its place in the job, m.
     pub translation: [f64; D],
     /// Angle about the collider's axis, rad.
     pub angle: f64,
@@ -29,7 +29,7 @@ impl<const D: usize> Pose<D> {
     }
 }
 
-/// How fast a collider moves.
+/// Velocities of a collider.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate<const D: usize> {
     /// Velocity of the reference point, m/s.
@@ -60,7 +60,7 @@ impl<const D: usize> Rate<D> {
 pub struct Knot<const D: usize> {
     /// Time, s.
     pub time: f64,
-    /// Way of the reference point from its place in the job, m.
+    /// Displacement of the reference point from its place in the job, m.
     pub translation: [f64; D],
     /// Angle about the collider's axis, rad.
     pub angle: f64,
@@ -71,7 +71,8 @@ pub struct Knot<const D: usize> {
 pub struct Table<const D: usize> {
     /// The rows.
     pub rows: Vec<Knot<D>>,
-    /// Whether it comes to rest at each row, on half a period of a cosine from one to the next; else it is linear.
+    /// Whether it comes to rest at each row, on half a period of a cosine from one to the next; else it is
+    /// linear.
     pub is_smooth: bool,
 }
 
@@ -82,13 +83,16 @@ pub struct Free<const D: usize> {
     pub mass: f64,
     /// Axes along which it may move.
     pub along: [bool; D],
-    /// Moment of inertia about the collider's axis through the reference point, kg m²; `None`: it does not turn.
+    /// Moment of inertia about the collider's axis through the reference point, kg m²; `None`: it does not
+    /// turn.
     pub inertia: Option<f64>,
     /// Inertia about the centre of mass, which is the reference point, of a body that turns about any axis.
     pub turning: Option<Inertia>,
-    /// What it does to faces of the domain and to other colliders; `None`: it does not feel them.
+    /// Friction and restitution in collisions with faces of the domain and other colliders; `None`: it does
+    /// not collide.
     pub meeting: Option<Meeting>,
-    /// Table that it follows along the other axes, and in its rotation unless it turns; empty: it does neither.
+    /// Table that it follows along the other axes, and in its rotation unless it turns; empty: it does
+    /// neither.
     pub driven: Table<D>,
     /// Velocity and angular velocity at the start.
     pub start: Rate<D>,
@@ -131,8 +135,8 @@ impl<const D: usize> Motion<D> {
     }
 
     /// Mean velocity and angular velocity over a step from `time` to `time + dt` (s): the derivative of the
-    /// interpolation, averaged. So the collider and the material that it carries move by the same amount, also across
-    /// rows of a table. Of a free body: those at the start.
+    /// interpolation, averaged. So the collider and the material that it carries move by the same amount,
+    /// also across rows of a table. Of a free body: those at the start.
     pub fn mean_rate(&self, time: f64, dt: f64) -> Rate<D> {
         match self {
             Self::Fixed => Rate::REST,
@@ -146,8 +150,8 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// The greatest speed of the reference point (m/s) and the greatest angular speed (rad/s) from `time` on; of a
-    /// free body those at the start.
+    /// The greatest speed of the reference point (m/s) and the greatest angular speed (rad/s) from `time` on;
+    /// of a free body those at the start.
     pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
         match self {
             Self::Fixed => (0.0, 0.0),
@@ -171,7 +175,7 @@ fn risen(time: f64, span: f64) -> f64 {
 }
 
 impl<const D: usize> Table<D> {
-    /// Share of the way from one row to the next at this share of the time between them.
+    /// Share of the change from one row to the next at this share of the time between them.
     fn progress(&self, part: f64) -> f64 {
         if self.is_smooth { smooth_step(part) } else { part }
     }
@@ -221,7 +225,8 @@ impl<const D: usize> Table<D> {
         mean
     }
 
-    /// The greatest speeds (m/s, rad/s) from a time (s) on: of a smooth motion half π times those of a linear one.
+    /// The greatest speeds (m/s, rad/s) from a time (s) on: of a smooth motion half π times those of a linear
+    /// one.
     pub fn greatest_speeds(&self, time: f64) -> (f64, f64) {
         let peak = if self.is_smooth { std::f64::consts::FRAC_PI_2 } else { 1.0 };
         let speeds = self.ahead(time).windows(2).map(|pair| slope(pair).speeds());
@@ -270,7 +275,7 @@ mod tests {
         Motion::Table(Table { is_smooth: true, ..table })
     }
 
-    /// The mean velocity of a step moves by what the motion moves, rows within the step included.
+    /// The mean velocity of a step gives the displacement of the motion, rows within the step included.
     #[test]
     fn mean_rates_add_up_to_the_way() {
         for motion in [table(), smooth(), Motion::Rising(Rate::about_axis([3.0, 0.0], 1.0), 1.7)] {
@@ -301,7 +306,7 @@ mod tests {
         assert_eq!(motion.greatest_speeds(0.0), (4.0 * peak, peak));
     }
 
-    /// Half of the steady way is lost during the start.
+    /// The start costs half of the steady displacement.
     #[test]
     fn a_rising_motion_becomes_steady() {
         let motion = Motion::<2>::Rising(Rate::about_axis([2.0, 0.0], -1.0), 0.5);

@@ -1,17 +1,21 @@
-//! Contact of one particle with a collider: the impulse that keeps it out, bounded by Coulomb's law; and ways that meet a surface.
+//! Contact of one particle with a collider: the impulse that keeps it out, bounded by Coulomb's law; and
+//! paths that reach a surface.
 //!
-//! A particle of half widths h touches a plane of unit normal n at the distance `r = √Σ (h_k n_k)²` of its centre: that of the face
-//! of its box along an axis, of the ellipsoid in the box elsewhere. Corners of boxes would not do: they stick out of the
-//! body that the particles fill, by up to 0.2 of a cell where a surface is not along an axis.
+//! A particle of half widths h touches a plane of unit normal n at the distance `r = √Σ (h_k n_k)²` of its
+//! centre: that of the face of its box along an axis, of the ellipsoid in the box elsewhere. Corners of boxes
+//! are unsuitable: they stick out of the body that the particles fill, by up to 0.2 of a cell where a surface
+//! is not along an axis.
 //!
-//! The impulse J acts at the point of the surface that is nearest to the particle. It takes the relative velocity v there to one that
-//! keeps the particle out over the step, `v · n ≥ -(φ - r) / Δt` with the distance φ, of which it takes at most μ times as much along the
-//! surface as across it (Moreau 1988: a measure of contact for the step, without a penalty).
+//! The impulse J acts at the point of the surface that is nearest to the particle. It takes the relative
+//! velocity v there to one that keeps the particle out over the step, `v · n ≥ -(φ - r) / Δt` with the
+//! distance φ, of which it takes at most μ times as much along the surface as across it (Moreau 1988: a
+//! measure of contact for the step, without a penalty).
 use super::Contact;
 use super::collider::Collider;
 use super::motion::{Pose, Rate, length};
 
-/// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces hold it.
+/// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces keep
+/// it.
 const HELD: f64 = 0.01;
 
 /// One particle at one collider in one step.
@@ -21,7 +25,7 @@ pub struct Touching<const D: usize> {
     pub collider: usize,
     /// Unit normal, from the surface to the particle.
     pub normal: [f64; D],
-    /// From the centre of the particle to the point of the surface, m.
+    /// From the centre of the particle to the point of contact on the surface, m.
     pub arm: [f64; D],
     /// Velocity of the collider there, m/s.
     pub surface: [f64; D],
@@ -43,8 +47,9 @@ pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> 
 }
 
 impl<const D: usize> Touching<D> {
-    /// A particle with its centre at `x` (m), of these half widths (m), in a step of length `dt` (s). `None` if the gap to the surface is wider than
-    /// `reach`, m, which is told the normal, the velocity of the surface and the distance at which the particle touches.
+    /// A particle with its centre at `x` (m), of these half widths (m), in a step of length `dt` (s). `None`
+    /// if the gap to the surface is wider than `reach`, m, a function of the normal, the velocity of the
+    /// surface and the distance at which the particle touches.
     pub fn new(
         number: usize,
         collider: &Collider<D>,
@@ -64,14 +69,16 @@ impl<const D: usize> Touching<D> {
         if gap > reach(&normal, &surface, touching) {
             return None;
         }
-        // Who is closer already, or inside, does not come closer. To be lifted out would give energy to it.
+        // A particle that is closer already, or inside, does not come closer. Pushing it out would add
+        // energy.
         let least = -gap.max(0.0) / dt;
         let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
         let (law, impulse) = (collider.contact, [0.0; D]);
         Some(Self { collider: number, normal, arm, surface, least, held, law, compliance: 0.0, impulse })
     }
 
-    /// Corrects the impulse for the velocity of the particle at the point of contact, m/s; returns what comes to it, kg m/s.
+    /// Corrects the impulse for the velocity of the particle at the point of contact, m/s; returns its
+    /// change, kg m/s.
     pub fn correct(&mut self, velocity: &[f64; D]) -> [f64; D] {
         if self.compliance <= 0.0 {
             return [0.0; D];
@@ -102,17 +109,18 @@ impl<const D: usize> Touching<D> {
     }
 }
 
-/// Where a way meets the surface of a shape, which may have no thickness, in the frame of the shape.
+/// Intersection of a path with the surface of a shape, which may have no thickness, in the frame of the
+/// shape.
 pub struct Met<const D: usize> {
     /// The last place short of the surface, m.
     pub place: [f64; D],
-    /// Normal there, towards where the way comes from.
+    /// Normal there, towards the start of the path.
     pub normal: [f64; D],
 }
 
-/// Follows the way from one place to another (m) in the frame of a collider, up to a distance `close` (m) from its surface. `None` if it
-/// comes to no surface: from inside a solid, and away from a surface, all ways are free. Steps as long as the distance cannot jump over anything
-/// (Hart 1996, sphere tracing).
+/// Follows the path from one place to another (m) in the frame of a collider, up to a distance `close` (m)
+/// from its surface. `None` if it reaches no surface: from inside a solid, and away from a surface, all paths
+/// are free. Steps as long as the distance cannot jump over anything (Hart 1996, sphere tracing).
 pub fn meets<const D: usize>(
     collider: &Collider<D>,
     from: &[f64; D],

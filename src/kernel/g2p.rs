@@ -4,8 +4,8 @@
 //! ```text
 //! v = Σ w v_j,  ∇v = Σ v_j ⊗ ∇w,  B = Σ w (v_j ⊗ d + V_j),  D_k = Σ w (d_k² + S_j,k)
 //! ```
-//! where V and S are the first and second moments that constrained nodes inherit (see [`super::hanging`]; zero
-//! on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
+//! where V and S are the first and second moments that constrained nodes inherit (see [`super::hanging`];
+//! zero on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 use super::batch::{Batch, Batches, Tile};
 use super::domain::AtWall;
@@ -20,7 +20,7 @@ use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
-/// Memory that is used from bin to bin, as it takes a while to set it up.
+/// Memory reused from bin to bin, as setting it up is slow.
 pub struct Scratch<const D: usize> {
     weights: Weights<D>,
     nodes: NodeWeights,
@@ -34,7 +34,7 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-/// What gathering for the particles of a bin and advancing them needs.
+/// Input and output of the gather for the particles of a bin, and of their advance.
 pub struct Gather<'a, const D: usize> {
     /// Memory of the thread.
     pub scratch: &'a mut Scratch<D>,
@@ -42,26 +42,27 @@ pub struct Gather<'a, const D: usize> {
     pub chunk: &'a mut Chunk<D>,
     /// The block.
     pub frame: &'a Frame<D>,
-    /// What holds for all particles.
+    /// Properties of the run, the same for all particles.
     pub scheme: &'a Scheme<'a>,
     /// Length of the step, s.
     pub dt: f64,
     /// Velocities of the nodes.
     pub fields: &'a Fields<'a>,
-    /// Notes the particles that leave its box.
+    /// Receives the particles that leave the box of the block.
     pub leavers: &'a mut Leavers<D>,
-    /// By particle, what is added to each diagonal component of its velocity gradient where that strains it, 1/s; empty for nothing.
+    /// By particle, the rate added to each diagonal component of its velocity gradient for the strain, 1/s;
+    /// empty for none.
     pub dilation: &'a [f64],
-    /// What keeps fluids in their volume, where there are any; the nodes then say how full they are.
+    /// Data that keep fluids at their volume, in jobs with fluids; `fields` then has how full nodes are.
     pub filling: Option<&'a Filling<'a>>,
-    /// Sums up how that shifts particles.
+    /// Sum of the shifts that this gives to particles.
     pub shifted: &'a mut Shifted<D>,
 }
 
 impl<const D: usize> Gather<'_, D> {
-    /// Gathers for the selected particles and advances them. Returns the greatest sum of wave speed and particle speed, m/s, for
-    /// the time step; infinite if the state of any particle is not finite or its det b is not above zero. `next` is the place of
-    /// the chunk that will be read after this one.
+    /// Gathers for the selected particles and advances them. Returns the greatest sum of wave speed and
+    /// particle speed, m/s, for the time step; infinite if the state of any particle is not finite or its det
+    /// b is not above zero. `next` is the place of the chunk that will be read after this one.
     pub fn whole_boxes(self, select: Select, next: Place) -> f64 {
         widest(WholeBoxes { bin: self, select, next })
     }
@@ -79,7 +80,7 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> f64 {
-        // Two copies of the loop, so that bins away from walls do not ask at every particle.
+        // Two copies of the loop, so that bins away from walls make no test at every particle.
         if self.bin.frame.is_at_wall() {
             self.advance_all::<V, true>()
         } else {
@@ -152,7 +153,8 @@ pub fn gather_sub_boxes<const D: usize>(
     }
 }
 
-/// Advances the particles of a list with what they gathered, in a domain `[0, extent]`. Returns as [`Gather::whole_boxes`].
+/// Advances the particles of a list with the gathered values, in a domain `[0, extent]`. Returns as
+/// [`Gather::whole_boxes`].
 pub fn advance_gathered<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &mut Chunk<D>,
@@ -183,8 +185,8 @@ pub fn advance_gathered<const D: usize>(
     largest(greatest)
 }
 
-/// Gathers velocities for the selected particles, `Σ w v_j`, and calls `each` with the particle and its velocity.
-/// Changes no particle.
+/// Gathers velocities for the selected particles, `Σ w v_j`, and calls `each` with the particle and its
+/// velocity. Changes no particle.
 pub fn interpolate<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
@@ -209,8 +211,8 @@ pub fn interpolate<const D: usize>(
     }
 }
 
-/// Gathers for the selected particles and calls `each` with the particle and what it gathered, as [`Gather::whole_boxes`] does.
-/// Changes no particle.
+/// Gathers for the selected particles as [`Gather::whole_boxes`] does, and calls `each` with the particle and
+/// the gathered values. Changes no particle.
 pub fn look<const D: usize>(
     scratch: &mut Scratch<D>,
     chunk: &Chunk<D>,
@@ -240,10 +242,10 @@ fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
 }
 
-/// What the advance of particles needs beside what they gathered.
+/// Input of the advance of particles, beside the gathered values.
 #[derive(Clone, Copy)]
 pub struct Advance<'a> {
-    /// What holds for all particles.
+    /// Properties of the run, the same for all particles.
     pub scheme: &'a Scheme<'a>,
     /// Length of the step, s.
     pub dt: f64,
@@ -359,7 +361,7 @@ impl Advance<'_> {
             several => material::update(several, &index, &mut state, &update),
         }
         let result = |lanes: &Lanes| V::load(lanes.as_array());
-        // Not finite as soon as one of them is not.
+        // The sum is not finite if any of them is not.
         let mut sum = zero;
         for c in 0..Layout::<D>::SYMMETRIC {
             elastic[c] = result(&state.elastic[c]);

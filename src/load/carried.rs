@@ -1,31 +1,32 @@
 //! Forces on surfaces and points: particles carry them.
 //!
-//! At the start each particle at a surface gets the area that it stands for, and each particle of a point force its share. These
-//! numbers go with the particles, are shared among children and add up in merges, so that the whole force is that of the
-//! definition at all times.
+//! At the start each particle at a surface gets the area that it stands for, and each particle of a point
+//! force its share. These numbers move with the particles, are shared among children and add up in merges, so
+//! that the total force is that of the definition at all times.
 use super::Load;
 use crate::quantity::{Place, Quantity};
 
 /// A force that particles carry.
 #[derive(Clone, Debug)]
 pub struct Carried<const D: usize> {
-    /// What the force is.
+    /// Kind and values of the force.
     pub force: CarriedForce<D>,
-    /// First of its columns among those of what particles carry.
+    /// First of its columns among the carried columns of particles.
     pub first: usize,
-    /// Numbers of the bodies whose particles carry it; all without.
+    /// Numbers of the bodies whose particles carry it; `None`: all.
     pub bodies: Option<Vec<u16>>,
     /// Unit vector: only surface counts whose outward normal is within 45° of it.
     pub facing: Option<[f64; D]>,
 }
 
-/// What a force that particles carry is.
+/// Force that particles carry.
 #[derive(Clone, Debug)]
 pub enum CarriedForce<const D: usize> {
     /// Dead traction t (Pa): `t A` with the undeformed area A (m², in plane strain m), which is the
-    /// particle's only number; where t depends on the place, the undeformed area vector follows.
+    /// particle's first number; where t depends on the place, the undeformed area vector follows.
     Traction([Quantity; D]),
-    /// Pressure p (Pa) against the outward normal: `-p a` with the area vector a (m², in plane strain m), one number per axis.
+    /// Pressure p (Pa) against the outward normal: `-p a` with the area vector a (m², in plane strain m), one
+    /// number per axis.
     Pressure {
         /// The pressure, Pa.
         pressure: Quantity,
@@ -59,7 +60,7 @@ impl<const D: usize> CarriedForce<D> {
         }
     }
 
-    /// Whether it differs from place to place.
+    /// Whether it depends on the place.
     pub fn depends_on_place(&self) -> bool {
         self.quantities().into_iter().any(Quantity::depends_on_place)
     }
@@ -86,7 +87,7 @@ impl<const D: usize> Carried<D> {
         matches!(self.force, CarriedForce::Pressure { follows: true, .. })
     }
 
-    /// What a particle carries of a piece of surface with this area vector, m²: as many numbers as there are columns.
+    /// Numbers, one per column, that a particle carries for a piece of surface with this area vector, m².
     pub fn of_surface(&self, area: &[f64; D]) -> Vec<f64> {
         match self.force {
             CarriedForce::Pressure { .. } => area.to_vec(),
@@ -97,9 +98,9 @@ impl<const D: usize> Carried<D> {
         }
     }
 
-    /// The way (m) from the centre of a particle that carries these numbers to the surface that they stand
+    /// Vector (m) from the centre of a particle that carries these numbers to the surface that they stand
     /// for, where a force on surfaces depends on the place; `half` are the half widths of its box, m. On an
-    /// inclined surface particles lie at all distances: their mean.
+    /// inclined surface particles lie at all distances, so the vector has their mean.
     pub fn way_to_surface(&self, numbers: &[f64], half: impl FnOnce() -> [f64; D]) -> [f64; D] {
         let first = match self.force {
             CarriedForce::Pressure { .. } => 0,
@@ -139,8 +140,8 @@ impl<const D: usize> Carried<D> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Force (N) on a particle at a place that carries these numbers in the columns of `carried`, which is of this load, at a time
-    /// of its own, s.
+    /// Force (N) on a particle at a place that carries these numbers in the columns of `carried`, which
+    /// belongs to this load, at a time of the load, s.
     pub fn force(&self, carried: &Carried<D>, numbers: &[f64], place: &Place, time: f64) -> [f64; D] {
         let place = *place;
         match &carried.force {
@@ -155,8 +156,8 @@ impl<const D: usize> Load<D> {
     }
 }
 
-/// `J F⁻ᵀ` of a deformation gradient F: what turns undeformed area vectors into deformed ones (Nanson's formula). In plane strain
-/// the thickness stays.
+/// `J F⁻ᵀ` of a deformation gradient F, which maps undeformed area vectors to deformed ones (Nanson's
+/// formula). In plane strain the thickness stays.
 pub fn cofactor<const D: usize>(f: &[[f64; D]; D]) -> [[f64; D]; D] {
     let minor = |i: usize, j: usize| match D {
         2 => {

@@ -1,12 +1,12 @@
-//! Loads: what acts on the material beside stress, contact and the faces of the domain.
+//! Loads: actions on the material beside stress, contact and the faces of the domain.
 //!
-//! A load acts between two times. Most kinds act on real nodes inside their region: each is a variant of [`Kind`] with its
-//! effect on the velocity of a node in [`Load::apply`]. Forces on surfaces and points are carried by particles
-//! ([`Kind::Carried`]). The solver books impulse and work of each load from that alone.
+//! A load acts between two times. Most kinds act on real nodes inside their region: each is a variant of
+//! [`Kind`] with its effect on the velocity of a node in [`Load::apply`]. Forces on surfaces and points are
+//! carried by particles ([`Kind::Carried`]). The solver sums impulse and work of each load from that alone.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `mod.rs` | gravity, loads, and what acts on nodes |
+//! | `mod.rs` | gravity, loads, and their effect on nodes |
 //! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
 mod carried;
 
@@ -20,7 +20,7 @@ use crate::quantity::{Place, Quantity, in_job};
 pub struct Gravity<const D: usize> {
     /// Components, m/s².
     pub acceleration: [Quantity; D],
-    /// Time from which theirs is counted, s.
+    /// Time from which the time of the components is counted, s.
     pub start: f64,
 }
 
@@ -36,7 +36,7 @@ impl<const D: usize> Gravity<D> {
     }
 }
 
-/// Columns of what particles carry for some loads.
+/// Number of columns that particles carry for some loads.
 pub fn columns<const D: usize>(loads: &[Load<D>]) -> usize {
     loads.iter().filter_map(Load::carried).map(|carried| carried.force.columns()).sum()
 }
@@ -46,9 +46,9 @@ pub fn columns<const D: usize>(loads: &[Load<D>]) -> usize {
 pub struct Load<const D: usize> {
     /// Name; part of the names of its columns in the history.
     pub name: String,
-    /// What it does.
+    /// Kind and values of the load.
     pub kind: Kind<D>,
-    /// Where it acts, relative to the lower corner of the domain; everywhere without.
+    /// Region in which it acts, relative to the lower corner of the domain; `None`: everywhere.
     pub region: Option<Shape<D>>,
     /// Time from which its own time is counted, s; infinite where it does not act.
     pub start: f64,
@@ -60,7 +60,7 @@ pub struct Load<const D: usize> {
     pub origin: [f64; D],
 }
 
-/// What a load does to the velocity v of a node in a step of length Δt.
+/// Effect of a load on the velocity v of a node in a step of length Δt.
 #[derive(Clone, Debug)]
 pub enum Kind<const D: usize> {
     /// Force per mass a (m/s²): `v += Δt a`.
@@ -77,13 +77,13 @@ pub enum Kind<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// What particles carry of it, if they do.
+    /// Force that particles carry for it, if they do.
     pub fn carried(&self) -> Option<&Carried<D>> {
         if let Kind::Carried(carried) = &self.kind { Some(carried) } else { None }
     }
 
-    /// Whether particles get its force, and not nodes: what they carry, what depends on places of the undeformed body, and with scaled
-    /// masses all forces.
+    /// Whether it acts on particles and not on nodes: forces that they carry, forces that depend on places of
+    /// the undeformed body, and with scaled masses all forces.
     pub fn acts_on_particles(&self, are_masses_scaled: bool) -> bool {
         match &self.kind {
             Kind::Carried(_) => true,
@@ -114,13 +114,15 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// The place in the job of a point `x` (m from the lower corner of the domain) that is displaced by `u`, m.
+    /// The place in the job of a point `x` (m from the lower corner of the domain) that is displaced by `u`,
+    /// m.
     pub fn place(&self, x: &[f64; D], u: &[f64; D]) -> Place {
         let undeformed = std::array::from_fn(|a| x[a] - u[a]);
         Place { now: in_job(&self.origin, x), undeformed: in_job(&self.origin, &undeformed) }
     }
 
-    /// Force per mass (m/s²) of a body force on a particle at a place and a time (s), where it is in its region; else nothing.
+    /// Force per mass (m/s²) of a body force on a particle at a place and a time (s), where it is in its
+    /// region; else nothing.
     pub fn body_force(&self, x: &[f64; D], place: &Place, time: f64) -> Option<[f64; D]> {
         match &self.kind {
             Kind::BodyForce(acceleration) if self.reaches(x) => {
@@ -146,8 +148,8 @@ impl<const D: usize> Load<D> {
         matches!(self.kind, Kind::LocalDamping(_))
     }
 
-    /// Damps the velocity (m/s) of a node that was `start` at the start of the step, in a local way; nothing
-    /// for other kinds.
+    /// Applies local damping to the velocity (m/s) of a node, which was `start` at the start of the step; no
+    /// effect for other kinds.
     pub fn damp(&self, velocity: &mut [f64; D], start: &[f64; D]) {
         let Kind::LocalDamping(share) = self.kind else { return };
         for (v, start) in velocity.iter_mut().zip(start).filter(|(_, start)| **start != 0.0) {
@@ -155,9 +157,9 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time `middle` (s).
-    /// Forces are taken at the middle; a prescribed velocity is its value there, so that the way of the material is that of
-    /// the prescribed motion to second order.
+    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time
+    /// `middle` (s). Forces are taken at the middle; a prescribed velocity is its value there, so that the
+    /// displacement of the material is that of the prescribed motion to second order.
     pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
         let (place, middle) = (in_job(&self.origin, x), middle - self.start);
         match &self.kind {
@@ -234,7 +236,8 @@ mod tests {
         assert!(!ramp.is_active(1.5) && !ramp.is_active(101.5));
     }
 
-    /// Speeding up takes 1 - α of the force, slowing down 1 + α; what is at rest is not damped.
+    /// A force that accelerates the node acts with 1 - α, one that slows it down with 1 + α; at rest there is
+    /// no damping.
     #[test]
     fn local_damping_is_a_share_of_the_unbalanced_force() {
         let damping = load(Kind::LocalDamping(0.25));

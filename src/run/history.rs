@@ -42,8 +42,8 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
-/// number of the stage, from 1; sources; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain;
-/// colliders.
+/// number of the stage, from 1; sources; loads; contacts between bodies; probes; tracks; fluxes; faces of the
+/// domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();

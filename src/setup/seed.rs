@@ -1,9 +1,9 @@
 //! Fills bodies with particles.
 //!
-//! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per
-//! cell, anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its
-//! own points, on whichever rank it is, and no point is made twice. A body from a file has its particles. Particles lie at these points or, by the sampling of their body, near
-//! them, within the same leaf and body.
+//! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per cell,
+//! anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its own points,
+//! on whichever rank it is, and no point is made twice. A body from a file has the particles of the file.
+//! Particles lie at these points or, by the sampling of their body, near them, within the same leaf and body.
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::material::initial::NoState;
@@ -66,9 +66,9 @@ pub enum SeedError {
         place: String,
         /// The load.
         load: String,
-        /// What it looks for.
+        /// Kind of particle or surface that is missing.
         found: &'static str,
-        /// What would be right.
+        /// Valid input.
         expected: &'static str,
     },
 }
@@ -80,9 +80,9 @@ pub fn leaf_is_touched<const D: usize>(problem: &Problem<D>, octant: &Octant<D>)
     problem.bodies.iter().any(|body| body.shape.classify(&cell) != Side::Outside)
 }
 
-/// Not collective. Appends all particles of the leaf that come with a stage, at rest in their undeformed state except for the
-/// velocity of their body: bodies in the order of the job, points of a body in lexicographic order.
-/// Identifiers are 0; the run numbers them along the curve.
+/// Not collective. Appends all particles of the leaf that come with a stage, at rest in their undeformed
+/// state except for the velocity of their body: bodies in the order of the job, points of a body in
+/// lexicographic order. Identifiers are 0; the run numbers them along the curve.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -126,7 +126,7 @@ pub fn fill_leaf<const D: usize>(
             if given.is_some() {
                 continue;
             }
-            // The identity: xx, yy and zz come first in either dimension.
+            // Identity: xx, yy and zz come first in either dimension.
             for diagonal in 0..3 {
                 set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
             }
@@ -136,8 +136,8 @@ pub fn fill_leaf<const D: usize>(
     })
 }
 
-/// Where the particle of a point of the lattice lies: as the sampling of its body says, or on the same way as near to the point as it takes to
-/// stay in the leaf and in the body and out of others.
+/// Place of the particle of a lattice point: that of the sampling of its body, or nearer to the point on the
+/// same line, so that it stays in the leaf and in the body and out of others.
 fn place_near<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
@@ -161,7 +161,8 @@ fn place_near<const D: usize>(
     places.into_iter().find(fits).unwrap_or(*x)
 }
 
-/// Not collective. Body and place in the lattice of each particle that [`fill_leaf`] makes, in the same order.
+/// Not collective. Body and place in the lattice of each particle that [`fill_leaf`] makes, in the same
+/// order.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -192,8 +193,8 @@ pub fn count_leaf<const D: usize>(
     count_bodies(problem, octant, problem.bodies_of_stage(stage), |body, points| counts[body] += points)
 }
 
-/// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles of in the leaf.
-/// `bodies` are in the order of the job; the others must lie outside the leaf.
+/// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles
+/// of in the leaf. `bodies` are in the order of the job; the others must lie outside the leaf.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -206,7 +207,8 @@ pub fn count_bodies<const D: usize>(
     visit(problem, octant, bodies, |body, points| take(body, points.len() as u64))
 }
 
-/// Not collective. The number of lattice points in a box that a body has in leaves of a level if it fills the box.
+/// Not collective. The number of lattice points in a box that a body has in leaves of a level if it fills the
+/// box.
 pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &Aabb<D>, level: u8) -> u64 {
     if let Some(given) = &problem.bodies[body].given {
         return given.in_box(cell).len() as u64;
@@ -218,7 +220,8 @@ pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &A
     (0..D).fold(1, |all, a| all.saturating_mul(along(a)))
 }
 
-/// Not collective. Checks the number of particles of each body that comes with a stage, in all leaves of all ranks together.
+/// Not collective. Checks the number of particles of each body that comes with a stage, in all leaves of all
+/// ranks together.
 ///
 /// # Errors
 /// A body has none.
@@ -235,12 +238,13 @@ pub fn check_counts<const D: usize>(
     }
 }
 
-/// Not collective. Whether gravity at the start is finite, and what has been taken so far of velocities and stresses of bodies.
+/// Not collective. Checks that gravity at the start is finite, and all velocities and stresses of bodies
+/// evaluated so far.
 ///
 /// # Errors
-/// The first that was not.
+/// The first value that is not finite.
 pub fn check_finite<const D: usize>(problem: &Problem<D>) -> Result<(), SeedError> {
-    // A copy: others may have asked for the gravity of times that never come.
+    // A copy: others may have evaluated gravity at times that are never reached.
     let gravity = problem.gravity_of_stage(0).clone();
     gravity.at(0.0);
     let of_bodies = problem.bodies.iter().flat_map(|body| {
@@ -342,7 +346,7 @@ fn visit<const D: usize>(
         }
         let together = |other: usize| other != index && problem.come_together(index, other);
         for &(other, _) in near.iter().filter(|(other, _)| together(*other)) {
-            // Bodies that touch may both claim a point by a rounding; it belongs to the first.
+            // Two bodies in contact may both contain a point by rounding; it belongs to the first.
             let rounding = -1e-9 * spacing;
             let neighbour = &problem.bodies[other];
             let mut overlap = None;

@@ -12,7 +12,7 @@ where
     any.try_into().unwrap_or_else(|_| panic!("wrong dimension"))
 }
 
-/// All leaves filled, with the checks that hold for every one.
+/// Fills all leaves, and checks each.
 fn seeded<const D: usize>(problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedError> {
     let fill = |leaf| {
         let mut chunk = Chunk::new();
@@ -59,7 +59,7 @@ fn bits(x: [f64; 2]) -> [u64; 2] {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Leaves that tile the domain make the points of one lattice through all of it, each once.
+    /// Leaves that tile the domain make each point of one lattice through all of it once.
     #[test]
     fn leaves_make_the_lattice(level in 0_u8..3, per_cell in 0.5_f64..4.0, radius in 0.2_f64..0.49) {
         let shape = format!("shape = {{ kind = \"circle\", centre = [6.1, -2.5], radius = {radius} }}");
@@ -121,7 +121,7 @@ fn points_in_two_bodies_are_refused_and_adjacent_boxes_share_none() {
     let mut problem = problem::<2>(&job(2, 0, &(first + &second)));
     assert!(seeded(&problem).is_ok());
 
-    // What the check of the file overlooks is found here.
+    // Seeding detects an overlap that the check of the job file misses.
     let mut wider = problem.bodies[1].shape.bounds();
     wider.lower[0] -= 0.2;
     problem.bodies[1].shape = Shape::Box(wider);

@@ -1,10 +1,10 @@
 //! Sources: material that enters the domain during a run.
 //!
-//! A source lays particles into its shape, one layer after another. A layer has one particle in each line of
+//! A source adds particles in its shape, one layer after another. A layer has one particle in each line of
 //! the lattice along the main axis of the velocity, where that line enters the shape. As long as a particle
-//! is in the shape it moves with the velocity of the source, and the next layer enters once this has taken
-//! the one before on by a distance of particles, or later where the mass rate is lower. So layers do not
-//! overlap, whatever lies ahead, and the number of layers at any time follows from that time alone.
+//! is in the shape it moves with the velocity of the source, and the next layer enters once the one before
+//! has moved by the distance between particles, or later where the mass rate is lower. So layers do not
+//! overlap, whatever material is ahead, and the number of layers at any time depends on that time alone.
 use crate::geometry::{Aabb, Shape};
 
 /// A source of a job.
@@ -14,9 +14,9 @@ pub struct Source<const D: usize> {
     pub name: String,
     /// Where its material enters, m from the lower corner of the domain.
     pub shape: Shape<D>,
-    /// Number of the body that its particles are.
+    /// Number of the body to which its particles belong.
     pub body: u16,
-    /// What they are made of when they enter.
+    /// Number of their material when they enter.
     pub material: u16,
     /// Level of the tree that they are made for.
     pub level: u8,
@@ -36,7 +36,7 @@ pub struct Source<const D: usize> {
     pub start: f64,
     /// Its own time at which the first layer enters, s.
     pub from: f64,
-    /// Particles that it feeds at most.
+    /// Greatest number of particles that it feeds.
     pub total: u64,
 }
 
@@ -53,7 +53,7 @@ impl<const D: usize> Source<D> {
     }
 
     /// Where the particles of a layer enter a shape: on each line of the lattice along the main axis of the
-    /// velocity the first point of the shape. `None` if there are more than `most` points to look at.
+    /// velocity the first point of the shape. `None` if there are more than `most` points to test.
     pub fn entries_of(
         shape: &Shape<D>,
         velocity: &[f64; D],
@@ -63,7 +63,7 @@ impl<const D: usize> Source<D> {
     ) -> Option<Vec<[f64; D]>> {
         let axis = Self::main_axis(velocity);
         let bounds = shape.bounds().intersection(&Aabb::new([0.0; D], *size));
-        // One point more on either side: which points belong to the shape it says itself.
+        // One more point on either side: the shape itself decides which points belong to it.
         let range: [(u64, u64); D] = std::array::from_fn(|a| {
             let place = |x: f64| (x / spacing - 0.5).max(0.0);
             (
@@ -109,7 +109,7 @@ impl<const D: usize> Source<D> {
         }
     }
 
-    /// Layers that it feeds at most, the last of them perhaps not whole.
+    /// Greatest number of layers that it feeds; the last may be incomplete.
     fn layers(&self) -> u64 {
         self.total.div_ceil(self.entries.len().max(1) as u64)
     }
@@ -122,7 +122,7 @@ impl<const D: usize> Source<D> {
     /// Number of layers that enter before a time, s.
     pub fn layers_before(&self, time: f64) -> u64 {
         let own = time - self.start;
-        // Also where it does not act: its own time has not begun then.
+        // Also where it does not act: its own time then never begins.
         if own <= self.from {
             return 0;
         }
@@ -160,7 +160,7 @@ impl<const D: usize> Source<D> {
         let all = self.entries.len() as u64;
         let count = self.total.saturating_sub(layer * all).min(all);
         let entries = self.entries.iter().zip(0..all);
-        // Those of a layer that is not whole are spread over it.
+        // The particles of an incomplete layer are spread over it.
         let chosen = entries.filter(move |(_, i)| (i + 1) * count / all > i * count / all);
         chosen.map(move |(entry, _)| std::array::from_fn(|a| way.mul_add(self.velocity[a], entry[a])))
     }
@@ -202,7 +202,7 @@ mod tests {
         assert!(too_many.is_none());
     }
 
-    /// Each layer enters in the one step whose span holds its time, and all together have the particles of
+    /// Each layer enters in the one step whose span contains its time, and all together have the particles of
     /// the source.
     #[test]
     fn layers_are_counted_by_time_alone() {

@@ -172,11 +172,12 @@ fn waves_leave_through_absorbing_faces() {
     assert!(left < 1e-3, "{left}");
 }
 
-/// Of a packet of waves at a right angle a face returns less than 1 % of the amplitude at 20 cells to a wave, whatever the
-/// time step: the dashpot acts in the middle of it.
+/// Of a packet of waves at a right angle a face returns less than 1 % of the amplitude at 20 cells to a wave,
+/// whatever the time step: the dashpot acts in the middle of it.
 #[test]
 fn a_face_returns_less_than_a_percent_of_the_amplitude() {
-    // A packet cos(k s) exp(-s²/2σ²) that moves to the right, s = x - 1.5, σ = 0.5 m, of waves of 0.6 m at 5 m/s.
+    // A packet cos(k s) exp(-s²/2σ²) that moves to the right, s = x - 1.5, σ = 0.5 m, of waves of 0.6 m at 5
+    // m/s.
     let packet = |size: f64, cfl: f64| {
         let slope = "(exp(-2 * (x - 1.5)^2) * (-4 * (x - 1.5) * cos(10.471975512 * (x - 1.5)) - 10.471975512 * sin(10.471975512 * (x - 1.5))))";
         let job = format!(

@@ -182,8 +182,8 @@ fn feeding_goes_on_from_any_step() {
     }
 }
 
-/// A source counts its time from the stage in which it feeds, and says so if its material comes where other material
-/// lies.
+/// A source counts its time from the stage in which it feeds, and says so if its material comes where other
+/// material lies.
 #[test]
 fn sources_feed_in_their_stages_and_tell_when_they_are_blocked() {
     let job = format!(

@@ -1,9 +1,10 @@
 //! The refinement criteria, one file each, and the list of them.
 //!
-//! A file holds the parameters of a criterion as they stand in a job file, with ranges and units, what it looks at in a leaf,
-//! and its words. A line of the list below makes it a choice of the job file, with schema, checks and reference.
+//! A file holds the parameters of a criterion as they stand in a job file, with ranges and units, its
+//! indicator, and its description. A line of the list below makes it a choice of the job file, with schema,
+//! checks and reference.
 //!
-//! | file | wants fine leaves |
+//! | file | requests fine leaves |
 //! |---|---|
 //! | `region.rs` | near a shape that may move |
 //! | `collider.rs` | near a collider |
@@ -29,15 +30,15 @@ pub mod region;
 pub mod stretch;
 pub mod velocity_gradient;
 
-/// The parameters of a criterion as they stand in a job file. Descriptions and ranges of the keys are those of the
-/// schema.
+/// The parameters of a criterion as they stand in a job file. Descriptions and ranges of the keys are those
+/// of the schema.
 pub(crate) trait Keys {
     /// The criterion with these parameters, or faults of the job.
     fn criterion<const D: usize>(&self, job: &mut dyn Job<D>) -> Option<Criterion<D>>;
 }
 
-/// The rest of the job, for criteria that refer to parts of it. `key` is the key of the criterion that does; it is where
-/// faults are noted.
+/// The rest of the job, for criteria that refer to parts of it. `key` is the key of that criterion, for
+/// reports of faults.
 pub(crate) trait Job<const D: usize> {
     /// A shape in coordinates relative to the domain's lower corner.
     fn shape(&mut self, shape: &written::Shape, key: &'static str) -> Option<Shape<D>>;

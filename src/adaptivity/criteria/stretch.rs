@@ -41,7 +41,7 @@ impl<const D: usize> Indicator<D> for Stretch {
 
     fn value(&self, leaf: &LeafView<'_, D>, thresholds: &Thresholds) -> Value {
         let bound = leaf.maxima().stretch;
-        // Only leaves that may have something to say get a close look.
+        // Only leaves that may reach the thresholds are examined closely.
         if bound < thresholds.coarsen {
             return Value::of_leaf(bound);
         }

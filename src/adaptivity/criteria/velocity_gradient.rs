@@ -1,5 +1,5 @@
-//! Fine leaves where the velocity varies: root mean square over the leaf's nodes of the norm of the velocity gradient,
-//! 1/s.
+//! Fine leaves where the velocity varies: root mean square over the leaf's nodes of the norm of the velocity
+//! gradient, 1/s.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

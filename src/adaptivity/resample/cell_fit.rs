@@ -31,7 +31,7 @@ pub struct Resampling<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Resampling<'a, D> {
-    /// For a domain with its upper corner at `extent` (m); `None` if the job wants particles left alone.
+    /// For a domain with its upper corner at `extent` (m); `None` if the job has no splitting and merging.
     pub fn new(
         adaptivity: Option<&'a Adaptivity<D>>,
         scheme: &'a Scheme<'a>,
@@ -39,7 +39,7 @@ impl<'a, const D: usize> Resampling<'a, D> {
     ) -> Option<Self> {
         let adaptivity = adaptivity?;
         let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
-        // The stretch of neighbours' distances stands behind what particles carry for loads.
+        // The stretch of neighbours' distances follows the columns carried for loads.
         let gap = adaptivity.split_gap.map(|cells| Gap { cells, column: scheme.shares });
         Some(Self { scheme, extent, nominal, stretch, gap })
     }
@@ -64,7 +64,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
         self.gap.is_some()
     }
 
-    /// Splits particles that have drifted apart, until none has. Their affine state comes from cells of level `from`.
+    /// Splits particles that have drifted apart, until none has. Their affine state comes from cells of level
+    /// `from`.
     fn close_gaps(&self, chunk: &mut Chunk<D>, level: u8, from: u8, done: &mut Splits) {
         let Some(gap) = self.gap else { return };
         let from = self.setting(from).cell();
@@ -93,8 +94,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
         done.refused += report.refused;
     }
 
-    /// Splits particles of a leaf that are too large for it until none is. Their affine state comes from cells of
-    /// level `from`.
+    /// Splits particles of a leaf that are too large for it until none is. Their affine state comes from
+    /// cells of level `from`.
     pub fn fit(&self, chunk: &mut Chunk<D>, level: u8, from: u8) -> Splits {
         let mut done = Splits::default();
         loop {
@@ -110,7 +111,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
         }
     }
 
-    /// Whether boxes up to `width` (m) may be wider than `stretch` times that of an undeformed particle of a level.
+    /// Whether boxes up to `width` (m) may be wider than `stretch` times that of an undeformed particle of a
+    /// level.
     pub fn may_exceed(&self, width: f64, level: u8, stretch: f64) -> bool {
         let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
         width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)

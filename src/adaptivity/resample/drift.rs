@@ -15,7 +15,7 @@ use crate::simd::{Lanes, Vector};
 /// Greatest volume of the space of a particle over the undeformed one: beyond it material is torn.
 const TORN: f64 = 1.5;
 
-/// When particles split for their distance.
+/// Condition under which particles split for their distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
     /// Width of a particle's space, in cells of its leaf.
@@ -141,8 +141,8 @@ fn edge_of_two(dimension: usize) -> f64 {
     if dimension == 2 { std::f64::consts::SQRT_2 } else { 1.259_921_049_894_873_2 }
 }
 
-/// Stretch of a half, in terms of its own cube, whose edge is `1 / s` of that of the whole, `s = 2^(1/D)`: `s² (b - ¾ λ n ⊗ n) - 1`, where the
-/// longest half axis is √λ along n.
+/// Stretch of a half, in terms of its own cube, whose edge is `1 / s` of that of the whole, `s = 2^(1/D)`:
+/// `s² (b - ¾ λ n ⊗ n) - 1`, where the longest half axis is √λ along n.
 fn halved<const D: usize>(e: &Components, root: f64, n: &[f64; D]) -> Components {
     let square = edge_of_two(D) * edge_of_two(D);
     let mut new = [0.0; 6];

@@ -1,14 +1,15 @@
-//! Siblings: which of them may still find together, and which a face of their leaf keeps apart.
+//! Siblings: which of them may still meet, and which are separated by a face of their leaf.
 //!
-//! The particles of a family that was split from one particle are the only group whose merge gives that particle back.
-//! So siblings wait for each other as long as they may be near: while all of them are in the leaf and not torn apart;
-//! while a sibling in the leaf is itself split; and for a while if the others may be just beyond a face of the leaf. They count
-//! as torn apart when the centres of those in the leaf are further from each other along an axis than those of
-//! undeformed siblings whose boxes just fit the widest box that a merge may make.
+//! The particles of a family that was split from one particle are the only group whose merge gives that
+//! particle back. So siblings wait for each other as long as they may be near: while all of them are in the
+//! leaf and not torn apart; while a sibling in the leaf is itself split; and for a limited number of attempts
+//! if the others may be just beyond a face of the leaf. They count as torn apart when the centres of those in
+//! the leaf are further from each other along an axis than those of undeformed siblings whose boxes just fit
+//! the widest box that a merge may make.
 //!
-//! A family that a face cuts in two is in two leaves, so neither can merge it. [`separated`] says which particles have
-//! to cross to the leaf on the lower side for a while. It cannot know which faces cut a family that is near several, so
-//! the caller tries the combinations of axes in turn.
+//! A family that a face cuts in two is in two leaves, so neither can merge it. [`separated`] returns the
+//! particles that have to cross to the leaf on the lower side for a while. It cannot know which faces cut a
+//! family that is near several, so the caller tries the combinations of axes in turn.
 use super::merge::{Limits, of_level};
 use super::{Setting, ids, merge_backoff};
 use crate::csr::Csr;
@@ -64,7 +65,7 @@ pub(super) fn same_parent(a: &Sibling, b: &Sibling) -> bool {
 
 /// Distance along an axis beyond which siblings of a level count as torn apart, m.
 fn greatest_distance<const D: usize>(setting: &Setting<D>, limits: &Limits, tag: u64, level: u8) -> f64 {
-    // From the width of the merged box half that of a sibling goes off on either side.
+    // The width of the merged box, less half the width of a sibling on either side.
     (2.0 * limits.stretch - 1.0) * setting.nominal(Tag::unpack(tag), level - 1)
 }
 
@@ -96,8 +97,8 @@ fn parents_of_split<const D: usize>(chunk: &Chunk<D>, level: u8) -> Vec<u64> {
     parents
 }
 
-/// Indices of particles of a level with one of the parents (ascending) whose siblings may still come, so
-/// that they are no strangers.
+/// Indices of particles of a level with one of the parents (ascending) whose siblings may still come, so that
+/// they do not merge as strangers.
 pub(super) fn waiting<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
@@ -116,7 +117,7 @@ pub(super) fn waiting<const D: usize>(
         }
         let all = family.len() == 1 << D || parents_of_split.binary_search(&family[0].parent).is_ok();
         let beside_leaf = |x: [f64; D]| {
-            // Nobody waits beyond a wall.
+            // No sibling is beyond a wall.
             (0..D).any(|a| {
                 lower[a] > 0.0 && x[a] < lower[a] + distance
                     || upper[a] < setting.extent[a] && x[a] >= upper[a] - distance
@@ -132,8 +133,8 @@ pub(super) fn waiting<const D: usize>(
     waiting
 }
 
-/// Particles (ascending) of incomplete families finer than the leaf that lie near its lower faces along some of the `axes`
-/// (one bit each), with a place beyond all these faces.
+/// Particles (ascending) of incomplete families finer than the leaf that lie near its lower faces along some
+/// of the `axes` (one bit each), with a place beyond all these faces.
 pub fn separated<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,

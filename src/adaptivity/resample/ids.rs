@@ -1,14 +1,14 @@
-//! Identifiers that know the family of a particle.
+//! Identifiers that encode the family of a particle.
 //!
-//! From the lowest bit: the *root*, the number that seeding or a merge of strangers gave; the *path*, one child number
-//! of `D` bits per split, the first split lowest; and in the three highest bits the *generation*, the number of splits.
-//! A seeded particle has generation 0, so its identifier is its root.
+//! From the lowest bit: the *root*, the number that seeding or a merge of strangers gave; the *path*, one
+//! child number of `D` bits per split, the first split lowest; and in the three highest bits the
+//! *generation*, the number of splits. A seeded particle has generation 0, so its identifier is its root.
 //!
-//! Identifiers of living particles are unique, by this invariant: none is an ancestor of another, where the ancestors
-//! of an identifier are its parent, the parent of that, and so on. It holds for different roots; a split replaces a
-//! living identifier by all its children; the merge of a complete family does the reverse, and as all children were
-//! alive none of them had living descendants; any other merge takes identifiers away and keeps one of them, or uses a
-//! root that no particle had before.
+//! Identifiers of living particles are unique, by this invariant: none is an ancestor of another, where the
+//! ancestors of an identifier are its parent, the parent of that, and so on. It holds for different roots; a
+//! split replaces a living identifier by all its children; the merge of a complete family does the reverse,
+//! and as all children were alive none of them had living descendants; any other merge takes identifiers away
+//! and keeps one of them, or uses a root that no particle had before.
 use crate::particle::Chunk;
 
 /// Greatest number of splits between a particle and its root.

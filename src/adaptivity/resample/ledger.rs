@@ -4,7 +4,8 @@ use partition::comm::Comm;
 use crate::adaptivity::resample::cell_fit::Splits;
 use crate::exact_sum::ExactSum;
 
-/// What splitting and merging have done since the start of the run. Sums of this rank, but for the root.
+/// Counts and energies of splits and merges since the start of the run: sums of this rank, except for the
+/// root.
 #[derive(Clone, Debug, Default)]
 pub struct Ledger {
     /// Particles that were split.
@@ -57,7 +58,7 @@ impl Ledger {
         LedgerTotals { splits, refused, merges, removed, split_energy, merge_energy }
     }
 
-    /// Enters what was split in one leaf.
+    /// Adds the splits of one leaf.
     pub fn enter_splits(&mut self, done: &Splits) {
         self.splits += done.split;
         self.refused += done.refused;

@@ -7,24 +7,24 @@ use super::{Setting, merge_backoff, volume};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// How different particles may be that become one.
+/// Limits on the differences of particles that become one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Greatest difference of a velocity from the affine field through the velocities of the group, as a share of the
-    /// wave speed of the undeformed material. The field is fitted to the centres as if these were boxes, so that a
-    /// quarter of the affine part may count as difference as well.
+    /// Greatest difference of a velocity from the affine field through the velocities of the group, as a
+    /// share of the wave speed of the undeformed material. The field is fitted to the centres as if these
+    /// were boxes, so that a quarter of the affine part may count as difference as well.
     pub velocity: f64,
     /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm).
     pub strain: f64,
-    /// Greatest difference from the mean of the logarithm of the plastic volume ratio: by how much some grains are
-    /// further apart than others.
+    /// Greatest difference from the mean of the logarithm of the plastic volume ratio: a difference in the
+    /// distance of grains.
     pub volume: f64,
     /// Greatest difference of the first history variable (plastic strain) from the mean.
     pub history: f64,
-    /// Greatest half width of the merged box, and of a box about the boxes of a family, over that of an undeformed
-    /// particle of the new level. Above 1, and below the stretch at which particles split, so that a merge does not
-    /// undo that. A box about those of strangers may be wider by half: they share a cell of the lattice, out of which
-    /// halves of boxes stand.
+    /// Greatest half width of the merged box, and of a box about the boxes of a family, over that of an
+    /// undeformed particle of the new level. Above 1, and below the stretch at which particles split, so that
+    /// a merge does not undo that. A box about those of strangers may be wider by half: they share a cell of
+    /// the lattice, out of which halves of boxes stand.
     pub stretch: f64,
 }
 
@@ -34,36 +34,39 @@ impl Default for Limits {
     }
 }
 
-/// What [`merge`] did.
+/// Results of [`merge`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Merged {
     /// Particles that stand for a group now.
     pub merged: u64,
     /// Those among them that were complete families, and are the parent again.
     pub families: u64,
-    /// By how many the number of particles fell.
+    /// Decrease of the number of particles.
     pub removed: u64,
-    /// Indices, ascending, of particles that stand for a group of strangers and carry the smallest identifier of the
-    /// group. That is unique among the living; a caller who numbers these along the curve, from the first root that no
-    /// particle ever had, makes it unique for ever and gives back the generations they used up (see [`super::ids`]).
+    /// Indices, ascending, of particles that stand for a group of strangers and carry the smallest identifier
+    /// of the group. That identifier is unique among living particles. A caller that numbers these along the
+    /// curve, from the first root that no particle ever had, makes it unique for the whole run and restores
+    /// the generations used up (see [`super::ids`]).
     pub unnamed: Vec<u32>,
-    /// Identifiers of particles that the limits keep apart, or that are alone.
+    /// Identifiers of particles whose merge the limits forbid, or that have no partner.
     pub refused: FxHashSet<u64>,
 }
 
-/// Merges particles made for levels finer than that of the leaf, level by level from the finest: first complete
-/// families of siblings, then, with the `bounds` of the leaf given, strangers: particles of one material and body whose
-/// centres lie in one cell of the lattice that seeding uses on the next coarser level, in the order of the chunk, as many
-/// as fill the volume of an undeformed particle of that level. Only groups within the `limits` merge, and only where
-/// `may_merge` allows it for their centre of mass.
+/// Merges particles made for levels finer than that of the leaf, level by level from the finest: first
+/// complete families of siblings, then, with the `bounds` of the leaf given, strangers: particles of one
+/// material and body whose centres lie in one cell of the lattice that seeding uses on the next coarser
+/// level, in the order of the chunk, as many as fill the volume of an undeformed particle of that level. Only
+/// groups within the `limits` merge, and only where `may_merge` allows it for their centre of mass.
 ///
-/// Strangers that fill less than half of that volume become one particle of the level they have. Siblings that may
-/// still find together are no strangers (see [`super::family`]): a merge of strangers breaks up families for ever, and
-/// leaves particles of uneven size, while a family gives back the particle that was split.
+/// Strangers that fill less than half of that volume become one particle of the level they have. Siblings
+/// that may still meet do not merge as strangers (see [`super::family`]): a merge of strangers breaks up
+/// families for good, and leaves particles of uneven size, while a family restores the particle that was
+/// split.
 ///
-/// A merged particle takes the place of the first of its group; all others keep their order. Mass, volume and plastic
-/// work are kept, momentum and, with APIC, angular momentum to round-off; the current volume is kept and the stress is
-/// admissible. `book` gets the kinetic energy that each merge removes, J, which is not negative.
+/// A merged particle takes the place of the first of its group; all others keep their order. Mass, volume and
+/// plastic work are conserved, momentum and, with APIC, angular momentum to round-off; the current volume is
+/// conserved and the stress is admissible. `book` receives the kinetic energy that each merge removes, J,
+/// which is not negative.
 pub fn merge<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
@@ -123,8 +126,8 @@ fn centre<const D: usize>(chunk: &Chunk<D>, group: &Group) -> [f64; D] {
     })
 }
 
-/// Writes the merged particles (index in the chunk, number in `merged`) over the first of their groups and takes
-/// out those that do not stay.
+/// Writes the merged particles (index in the chunk, number in `merged`) over the first of their groups and
+/// takes out those that do not stay.
 fn replace<const D: usize>(
     chunk: &mut Chunk<D>,
     unnamed: &mut Vec<bool>,
@@ -146,7 +149,8 @@ fn replace<const D: usize>(
     }
 }
 
-/// Complete families of a level with one of the given members, by identifier. Children in the order of their numbers.
+/// Complete families of a level with one of the given members, by identifier. Children in the order of their
+/// numbers.
 fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Group> {
     let siblings = family::siblings(chunk, level, &family::parents(chunk, with.iter().copied()));
     let whole = siblings.items().chunk_by(family::same_parent).filter(|siblings| siblings.len() == 1 << D);
@@ -155,9 +159,9 @@ fn families<const D: usize>(chunk: &Chunk<D>, level: u8, with: &[u32]) -> Vec<Gr
         .collect()
 }
 
-/// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level, by material,
-/// body and cell; in cells where one of the given ones is. Identifiers of those among the given ones that are alone are
-/// added to `refused`.
+/// Particles of a level that wait for no siblings and share a cell of the lattice of the next coarser level,
+/// by material, body and cell; in cells where one of the given ones is. Identifiers of those among the given
+/// ones that are alone are added to `refused`.
 fn strangers<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
@@ -174,7 +178,7 @@ fn strangers<const D: usize>(
         waiting.iter().for_each(|&p| waits[p as usize] = true);
         waits
     };
-    // Most of those that the limits keep apart wait for siblings; their cells need not be searched.
+    // Most particles refused by the limits wait for siblings; their cells need not be searched.
     let waits = waiting(with);
     let with: Vec<u32> = with.iter().copied().filter(|&p| !waits[p as usize]).collect();
     if with.is_empty() {
@@ -184,7 +188,7 @@ fn strangers<const D: usize>(
     let per_spacing: Vec<f64> = (0..setting.nominal.len() as u16).map(per_spacing).collect();
     let cell_of = |p: u32, tag: u64| {
         let per_spacing = per_spacing[usize::from(Tag::unpack(tag).body)];
-        // In one number, which is quick to hash: 42 bits for each coordinate, in their order.
+        // Cell as one number, which is quick to hash: 42 bits for each coordinate, in their order.
         let place = |x: f64| ((x * per_spacing).floor() as i64 + (1 << 41)) as u128;
         (tag, chunk.position(p as usize).iter().fold(0, |cell, &x| cell << 42 | place(x)))
     };
@@ -201,8 +205,8 @@ fn strangers<const D: usize>(
     let cells = Csr::new(in_order.len(), members.iter().copied());
     for (number, (tag, _)) in in_order.iter().enumerate() {
         let edge = 2.0 * setting.nominal(Tag::unpack(*tag), level - 1);
-        // A lattice of equal parts fills the volume to round-off. More must not come in: boxes wider than a cell by more
-        // than that would need another grid.
+        // A lattice of equal parts fills the volume to round-off. More must not come in: boxes wider than a
+        // cell by more than that would need another grid.
         let room = (1..D).fold(edge, |volume, _| volume * edge) * (1.0 + 8.0 * f64::EPSILON);
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;

@@ -1,15 +1,23 @@
-//! When a merge that could not be is tried again.
+//! Backoff of failed merges: the regrids at which a merge is tried again.
 //!
-//! Particles that are finer than their leaf are tried at every regrid at first, then more and more rarely, since what
-//! keeps them apart does not go away soon as a rule, and looking is dear. How often a particle has been tried in vain is
-//! part of its state: eight bits of its packed tag. The time between two tries becomes four times as long with each, so that nobody
-//! waits longer than about four times what was needed. From every sixteenth regrid on leaves have their turns at different
-//! regrids, so that the work is spread.
+//! A particle finer than its leaf is tried at every regrid at first, then more and more rarely, since a merge
+//! that fails once usually fails again, and each try is expensive. Seven bits of its packed tag count its
+//! failed tries; the interval between tries doubles every eight counts. An eighth bit, `MET`, is set once all
+//! its siblings have been in one leaf.
 //!
-//! Particles whose siblings may still come are tried eight times, at every regrid, and eight times at every second, before
-//! they take their chance with strangers: siblings meet across faces of leaves only at the right turn (see [`super::family`]), which is one of
-//! three or seven, and the same for all leaves. Families that met and were too different go on. Those in leaves beside finer ones, which keep siblings apart as well, go on
-//! waiting instead, and begin anew when the finer leaves are gone.
+//! | state | a failed try adds | tried at one regrid in | until |
+//! |---|---|---|---|
+//! | waiting for siblings | 1 | 1, then 2 | it gives up after 16 tries |
+//! | given up: merges with strangers too | 1 | 4 to 64 | it merges |
+//! | siblings met, but too far apart | 1 | 1 to 8 | it merges |
+//! | refused by the limits | 16 | 4 times as many, to 256 | it merges |
+//! | parked: after 16 tries beside finer leaves | 0 | 64 | no finer leaf is beside; then it waits anew |
+//!
+//! So no particle waits longer than about four times the time needed. Up to intervals of 8 all leaves have
+//! the same regrids, since siblings meet across faces of leaves only at the regrids of one combination of
+//! axes of three or seven (see [`super::family`]). Longer intervals fall on other regrids from leaf to leaf,
+//! which spreads the work. Finer leaves separate siblings too, so beside them a particle parks and does not
+//! give up. The count of a particle that fits its leaf is cleared.
 use rustc_hash::FxHashSet;
 
 use crate::particle::Chunk;
@@ -21,21 +29,22 @@ const SHIFT: u32 = 40;
 const COUNT: u64 = 0x7f << SHIFT;
 /// Bit of particles whose whole family has been seen together, if not yet close enough.
 const MET: u64 = 1 << 47;
-/// All that is noted in a tag.
+/// All bits of the tag that belong to the backoff.
 const BITS: u64 = COUNT | MET;
-/// By how much the count grows from one interval to the next, which is twice as long. A particle that limits keep from merging goes on
-/// by two of them.
+/// Increase of the count from one interval to the next, which is twice as long. A particle that the limits
+/// refuse advances by two intervals.
 const DOUBLING: u64 = 8;
-/// Greatest count of a particle that limits keep from merging: tried at one regrid of 256.
+/// Greatest count of a particle that the limits refuse: tried at one regrid in 256.
 const REFUSED: u64 = 8 * DOUBLING;
-/// Greatest count of a particle that waits for its siblings, or is too near to finer leaves: at one of 64.
+/// Greatest count of a particle whose family is incomplete: tried at one regrid in 64.
 const WAITING: u64 = 6 * DOUBLING;
-/// Greatest count of one of a family that has been seen together: at one of eight, when all leaves have their turn.
+/// Greatest count of a particle whose family has been seen together: tried at one regrid in 8, the same in
+/// all leaves.
 const TOGETHER: u64 = 4 * DOUBLING - 1;
-/// Count from which on nobody waits for siblings who have not come, and most likely have become one with others: after
-/// all turns of the axes.
+/// Count from which on a particle stops waiting for missing siblings, which most likely have merged with
+/// others: after all combinations of axes have had their turn.
 const GIVEN_UP: u64 = 2 * DOUBLING;
-/// Count of a particle that waits for siblings, or to get away from finer leaves, as long as its leaf is beside finer ones.
+/// Count of a particle that keeps waiting, as its leaf touches finer ones.
 const PARKED: u64 = 0x7f;
 /// Bits of the level in a packed tag.
 const LEVEL: u64 = 0xff << 32;
@@ -45,7 +54,7 @@ pub fn plain(tag: u64) -> u64 {
     tag & !BITS
 }
 
-/// Who in a leaf is tried at a regrid.
+/// Particles of a leaf that are tried at a regrid, by their interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RetrySlot {
     /// One bit for each interval between tries.
@@ -55,10 +64,10 @@ pub struct RetrySlot {
 }
 
 impl RetrySlot {
-    /// Everybody, in a leaf that is not beside finer ones.
+    /// All particles, in a leaf that touches no finer ones.
     pub const ALL: Self = Self { intervals: u32::MAX, beside_finer: false };
 
-    /// At regrid `number` in the leaf that begins at a key of the curve.
+    /// Slot of regrid `number` in the leaf that begins at a key of the curve.
     pub fn new(number: u64, leaf: u64, beside_finer: bool) -> Self {
         let own = number.wrapping_add(leaf.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48);
         let is_due = |interval: u64| match interval {
@@ -76,7 +85,7 @@ impl RetrySlot {
     }
 }
 
-/// How often a particle has been tried, more or less.
+/// Count of a particle: about the number of tries.
 fn count_of(tag: u64) -> u64 {
     (tag & COUNT) >> SHIFT
 }
@@ -98,12 +107,12 @@ pub fn due<const D: usize>(chunk: &Chunk<D>, level: u8, turn: RetrySlot) -> Vec<
     each.filter(|(_, tag)| **tag & LEVEL == level && turn.has(**tag)).map(|(p, _)| p).collect()
 }
 
-/// Whether all tags are of a level, as in a tag, and without counts: those of most leaves are.
+/// Whether all tags have a level (as packed in a tag) and no count: the case in most leaves.
 fn are_plain(tags: &[u64], level: u64) -> bool {
     tags.iter().fold(0, |differs, tag| differs | (tag ^ level)) & (LEVEL | BITS) == 0
 }
 
-/// What the tags of a chunk say, without the level of its leaf.
+/// Summary of the tags of a chunk, independent of the level of its leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Levels {
     /// Coarsest level that a particle was made for, as in a tag.
@@ -117,7 +126,7 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Of some tags.
+    /// Summary of some tags.
     pub fn of(tags: &[u64]) -> Self {
         let coarsest = tags.iter().fold(LEVEL, |least, tag| least.min(tag & LEVEL));
         let mut levels = Self { coarsest, of_coarsest: 0, of_finer: 0, tried: false };
@@ -136,7 +145,8 @@ impl Levels {
         levels
     }
 
-    /// What this means in a leaf of a level; `None` if particles of the leaf's level cannot be told from others.
+    /// State in a leaf of a level; `None` if the summary does not separate particles of the leaf's level from
+    /// others.
     pub fn look(self, level: u8, turn: RetrySlot) -> Option<BackoffState> {
         let (finer, stale) = match self.coarsest.cmp(&(u64::from(level) << 32)) {
             _ if self.of_coarsest == 0 => (0, false),
@@ -148,7 +158,7 @@ impl Levels {
     }
 }
 
-/// How the particles of a chunk fit a leaf of a level.
+/// State of the particles of a chunk in a leaf of a level.
 pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: RetrySlot) -> BackoffState {
     let own = u64::from(level) << 32;
     let mut look = BackoffState::default();
@@ -164,19 +174,19 @@ pub fn look<const D: usize>(chunk: &Chunk<D>, level: u8, turn: RetrySlot) -> Bac
     look
 }
 
-/// What [`look`] sees.
+/// State of the particles of a leaf with respect to its level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BackoffState {
-    /// Particles made for coarser leaves.
+    /// Whether there are particles made for coarser leaves.
     pub coarser: bool,
-    /// Particles made for finer leaves, some of them due.
+    /// Whether particles made for finer leaves are due.
     pub due: bool,
-    /// Particles that fit their leaf have been tried elsewhere.
+    /// Whether particles that fit the leaf still have a count from another leaf.
     pub stale: bool,
 }
 
-/// After a turn: counts those that were tried in vain, and forgets about those that fit the leaf. `refused`: identifiers
-/// of those that the limits keep apart.
+/// Updates the counts after a regrid: increases those of particles tried in vain, and clears those of
+/// particles that fit the leaf. `refused`: identifiers of particles that the limits refuse.
 pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: RetrySlot, refused: &FxHashSet<u64>) {
     for p in 0..chunk.len() {
         let (tag, id) = (chunk.tags()[p], chunk.ids()[p]);
@@ -188,7 +198,7 @@ pub fn count<const D: usize>(chunk: &mut Chunk<D>, level: u8, turn: RetrySlot, r
     }
 }
 
-/// Notes that the families of some particles (identifiers) have been seen together.
+/// Marks particles (identifiers) whose families have been seen together.
 pub fn met<const D: usize>(chunk: &mut Chunk<D>, together: &FxHashSet<u64>) {
     for p in 0..if together.is_empty() { 0 } else { chunk.len() } {
         if together.contains(&chunk.ids()[p]) {
@@ -197,7 +207,7 @@ pub fn met<const D: usize>(chunk: &mut Chunk<D>, together: &FxHashSet<u64>) {
     }
 }
 
-/// The tag after one more try in vain.
+/// Tag after one more try in vain.
 fn tried_again(tag: u64, is_refused: bool, beside_finer: bool) -> u64 {
     let tries = count_of(tag);
     let tries = match (is_refused, tries) {
@@ -250,15 +260,16 @@ mod tests {
     fn ever_more_rarely() {
         assert_eq!(turns(0, true, |_| false), [0, 4, 16, 64, 256, 512, 768, 1024]);
         let waiting = turns(0, false, |_| false);
-        // All turns of the axes come round before siblings are given up.
+        // All combinations of axes have their turn before siblings are given up.
         assert_eq!(waiting[..18], [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28]);
         assert_eq!(waiting[waiting.len() - 2..], [1024, 1088]);
-        // Beside finer leaves nobody gives up; once these are gone, all turns of the axes come again.
+        // Beside finer leaves no particle gives up; once these are gone, all combinations of axes have their
+        // turn again.
         let parked = turns(0, false, |number| number < 601);
         assert_eq!(parked[14..18], [20, 22, 64, 128]);
         let freed = parked.iter().position(|&number| number == 601).expect("tried at once");
         assert_eq!(parked[freed..][..10], [601, 602, 603, 604, 605, 606, 607, 608, 609, 610]);
-        // Other leaves, other times.
+        // Other leaves have other regrids.
         let others = turns(5 << 40, true, |_| false);
         assert_eq!(others[..2], [0, 4]);
         assert!(

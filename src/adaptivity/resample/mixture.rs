@@ -32,16 +32,17 @@ impl Group {
 
 /// Merged particles, one per group.
 pub(super) struct Mixtures<const D: usize> {
-    /// The groups within the limits of what is quick to find, in their order.
+    /// The groups that pass the quick tests, in their order.
     pub groups: Vec<Group>,
     /// Their particles.
     pub chunk: Chunk<D>,
-    /// Kinetic energy that the merge would remove, J; `None` if the group is not within the other limits either.
+    /// Kinetic energy that the merge would remove, J; `None` if the group is not within the other limits
+    /// either.
     pub energy: Vec<Option<f64>>,
 }
 
-/// Merges each group into a particle of a level, and says which may do so. Identifiers of the others are added to
-/// `refused`.
+/// Merges each group into a particle of a level, and finds which groups are within the limits. Identifiers of
+/// the others are added to `refused`.
 pub(super) fn mixtures<const D: usize>(
     chunk: &Chunk<D>,
     setting: &Setting<D>,
@@ -50,7 +51,7 @@ pub(super) fn mixtures<const D: usize>(
     level: u8,
     refused: &mut FxHashSet<u64>,
 ) -> Mixtures<D> {
-    // What takes least time to find comes first.
+    // The quickest test comes first.
     keep(&mut groups, chunk, refused, |_, group| is_alike(chunk, group, limits));
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
@@ -98,8 +99,9 @@ pub(super) fn mixtures<const D: usize>(
         if exceeds(half, limits.stretch) || exceeds(&motions[number].reach, reach) {
             energy[number] = None;
         }
-        // Strangers that fill less than half of a particle of the level are still one of the finer level, which may
-        // merge again; else it would split into crumbs as soon as it meets finer cells.
+        // Strangers that fill less than half of a particle of the level become one of the finer level, which
+        // may merge again; as one of the coarser level it would split into tiny particles as soon as it
+        // entered finer cells.
         let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
         if !groups[number].is_family && volume(&out, number) < 0.5 * whole * (1.0 - 1e-9) {
             out.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
@@ -108,7 +110,7 @@ pub(super) fn mixtures<const D: usize>(
     Mixtures { groups, chunk: out, energy }
 }
 
-/// Leaves the groups that pass and returns their numbers; identifiers of all others are added to `refused`.
+/// Keeps the groups that pass and returns their numbers; identifiers of all others are added to `refused`.
 fn keep<const D: usize>(
     groups: &mut Vec<Group>,
     chunk: &Chunk<D>,
@@ -130,9 +132,10 @@ fn keep<const D: usize>(
     kept
 }
 
-/// Whether no member differs from the first by so much that one of them must be too far from the mean: either may be as far
-/// from it on its own side. Strains are not known yet; as `|a - b| <= λ |ln a - ln b|` for the greatest eigenvalue λ of
-/// two positive definite tensors, which is below the greater trace, those of b give a bound.
+/// False if a member differs from the first by so much that one of them must be too far from the mean, even
+/// if both are at the limit on opposite sides. Strains are not known yet; as `|a - b| <= λ |ln a - ln b|` for
+/// the greatest eigenvalue λ of two positive definite tensors, which is below the greater trace, those of b
+/// give a bound.
 fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) -> bool {
     let first = group.members[0] as usize;
     let within = |column: usize, limit: f64| {
@@ -192,7 +195,7 @@ fn shares(values: Vec<f64>) -> (Vec<f64>, f64) {
     (values.into_iter().map(|value| value / sum).collect(), sum)
 }
 
-/// How the members of a group move against each other.
+/// Relative motion of the members of a group.
 struct Motion<const D: usize> {
     /// Kinetic energy of the differences of velocity, J.
     energy: f64,
@@ -290,7 +293,7 @@ fn divide<const D: usize>(n: [[f64; D]; D], mut a: [[f64; D]; D]) -> [[f64; D]; 
     n
 }
 
-/// How the matter of the members of a group differs from the mean.
+/// Greatest differences of the material state of the members of a group from the mean.
 struct Difference {
     /// Of the Hencky strain.
     strain: f64,
@@ -300,8 +303,8 @@ struct Difference {
     history: f64,
 }
 
-/// Reference volume, history, plastic work and what particles carry for loads. Returns the elastic Hencky strain as well, from which [`restore`] makes
-/// the elastic deformation and the stress.
+/// Reference volume, history, plastic work and the columns carried for loads. Returns the elastic Hencky
+/// strain as well, from which [`restore`] makes the elastic deformation and the stress.
 fn mix_matter<const D: usize>(
     out: &mut Chunk<D>,
     number: usize,
@@ -383,8 +386,9 @@ fn hencky<const D: usize>(chunk: &Chunk<D>, list: &[u32]) -> Vec<[f64; 6]> {
     out
 }
 
-/// Elastic deformation from Hencky strains, and stress by an update of the material without increment, which maps the
-/// strain to the yield surface should it lie outside. What that dissipates is plastic work.
+/// Elastic deformation from Hencky strains, and stress by an update of the material without increment, which
+/// maps the strain to the yield surface should it lie outside. The dissipation of that update is plastic
+/// work.
 fn restore<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, strains: &[[f64; 6]]) {
     for (first, strains) in (0..).step_by(LANES).zip(strains.chunks(LANES)) {
         let count = strains.len();

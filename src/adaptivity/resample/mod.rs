@@ -1,9 +1,9 @@
 //! Splitting and merging of particles, so that their size follows that of the cells.
 //!
-//! Pure functions on the chunk of one leaf: they know neither tree nor ranks, and the result depends on the content of
-//! the chunk alone. After either, particles may lie in another leaf (children do where a box crosses a face), so the
-//! caller sorts them into leaves afterwards. What is conserved, and why, is derived in
-//! `docs/design/resampling.md`.
+//! Pure functions on the chunk of one leaf: they use neither tree nor ranks, and the result depends on the
+//! content of the chunk alone. After either, particles may lie in another leaf (children do where a box
+//! crosses a face), so the caller sorts them into leaves afterwards. `docs/design/resampling.md` derives
+//! which quantities are conserved.
 use crate::kernel::{BoxPolicy, Scheme, Select, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -23,7 +23,7 @@ pub use drift::Gap;
 pub use merge::{Limits, Merged, merge};
 pub use split::{Split, split};
 
-/// What splitting and merging need to know beside the particles of a leaf.
+/// Input of splitting and merging, beside the particles of a leaf.
 #[derive(Clone, Copy)]
 pub struct Setting<'a, const D: usize> {
     /// Box policy, transfer and materials.
@@ -32,10 +32,10 @@ pub struct Setting<'a, const D: usize> {
     pub extent: [f64; D],
     /// Level of the leaf.
     pub level: u8,
-    /// Half width of an undeformed particle of level 0 by body, m: half a cell of level 0 over the particles per cell
-    /// and direction. On level k it is this over 2^k.
+    /// Half width of an undeformed particle of level 0 by body, m: half a cell of level 0 over the particles
+    /// per cell and direction. On level k it is this over 2^k.
     pub nominal: &'a [f64],
-    /// Who is tried for a merge.
+    /// Particles that are tried for a merge.
     pub turn: merge_backoff::RetrySlot,
 }
 
@@ -50,9 +50,9 @@ impl<const D: usize> Setting<'_, D> {
         self.nominal[usize::from(tag.body)] / f64::from(1u32 << level.min(31))
     }
 
-    /// Half widths of the space that belongs to each of the selected particles, m: its box, except that boxes of one
-    /// cell overlap those of their neighbours, so that there the part of the box counts that the particle's volume
-    /// fills. Cut at the walls of the domain.
+    /// Half widths of the space that belongs to each of the selected particles, m: its box, except that boxes
+    /// of one cell overlap those of their neighbours, so that there the part of the box counts that the
+    /// particle's volume fills. Cut at the walls of the domain.
     fn territories(&self, chunk: &Chunk<D>, select: Select) -> Vec<[f64; D]> {
         let cell = self.cell();
         let mut out = Vec::new();
@@ -78,10 +78,11 @@ pub struct Wanted {
     pub refused: u64,
 }
 
-/// Particles that [`split()`] should treat: those made for a level coarser than that of the leaf, and, where boxes follow
-/// the stretch ([`BoxPolicy::Volume`]), those whose box is wider along some axis than `stretch` times that of an
-/// undeformed particle of the leaf's level. The latter are measured against the leaf and not against themselves, so
-/// that their children do not split again before they have stretched as much once more.
+/// Particles that [`split()`] should treat: those made for a level coarser than that of the leaf, and, where
+/// boxes follow the stretch ([`BoxPolicy::Volume`]), those whose box is wider along some axis than `stretch`
+/// times that of an undeformed particle of the leaf's level. The latter are measured against the leaf and not
+/// against themselves, so that their children do not split again before they have stretched as much once
+/// more.
 pub fn needs_split<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, stretch: Option<f64>) -> Wanted {
     let stretch = stretch.filter(|_| matches!(setting.scheme.boxes, BoxPolicy::Volume { .. }));
     let half = stretch.map(|limit| (limit, setting.territories(chunk, Select::All)));
@@ -108,7 +109,8 @@ fn volume<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     (1..D).fold(edge, |volume, _| volume * edge)
 }
 
-/// Velocity gradient (1/s) that a transfer keeps in the affine matrix of a particle whose weights have these second moments, m².
+/// Velocity gradient (1/s) that a transfer keeps in the affine matrix of a particle whose weights have these
+/// second moments, m².
 fn gradient<const D: usize>(transfer: Transfer, matrix: &[[f64; D]; D], spread: &[f64; D]) -> [[f64; D]; D] {
     match transfer {
         Transfer::Apic => matrix.map(|row| std::array::from_fn(|k| row[k] / spread[k])),
@@ -124,7 +126,8 @@ fn read_matrix<const D: usize>(chunk: &Chunk<D>, p: usize) -> [[f64; D]; D] {
 
 /// Places at a distance of about `offset` on both sides of x within the domain, whose mean is x exactly.
 fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
-    // Half the way to a wall at most: a box is wider than that only within a millionth of a cell of the wall.
+    // At most half the distance to a wall: a box is wider than that only within a millionth of a cell of the
+    // wall.
     let offset = offset.min(0.5 * x).min(0.5 * (extent - x)).max(0.0);
     let (lower, upper) = opposite(x, offset);
     if upper < extent { (lower, upper) } else { (x, x) }
@@ -132,14 +135,14 @@ fn sides(x: f64, offset: f64, extent: f64) -> (f64, f64) {
 
 /// `(a - b', a + b')` with b' next to b, such that both are exact where `|b| <= |a|`; else rounded.
 fn opposite(a: f64, b: f64) -> (f64, f64) {
-    // Away from zero numbers are coarser. What the sum there has of b is a multiple of the spacing of numbers at a,
-    // so that taking it off again is exact.
+    // Away from zero numbers are coarser. The part of b that the sum retains is a multiple of the spacing of
+    // numbers at a, so subtracting it again is exact.
     let far = a + b.abs().copysign(a);
     let near = a - (far - a);
     if b.is_sign_negative() == a.is_sign_negative() { (near, far) } else { (far, near) }
 }
 
-/// Writes what [`read_matrix`] reads.
+/// Writes the affine columns of particle `p` from a matrix.
 fn write_matrix<const D: usize>(chunk: &mut Chunk<D>, p: usize, matrix: &[[f64; D]; D]) {
     for (i, row) in matrix.iter().enumerate() {
         chunk.write(Layout::<D>::AFFINE + D * i, p, row);

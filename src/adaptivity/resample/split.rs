@@ -3,7 +3,7 @@ use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// What [`split`] did.
+/// Results of [`split`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
     /// Particles that were replaced by their children.
@@ -12,14 +12,16 @@ pub struct Split {
     pub refused: u64,
 }
 
-/// Replaces the particles `which` (ascending) by `2^D` children each, of the next level, in their place: child 0 first,
-/// where bit a of a child's number says that it lies on the upper side along axis a. All others keep their order.
+/// Replaces the particles `which` (ascending) by `2^D` children each, of the next level, in their place:
+/// child 0 first, where bit a of a child's number says that it lies on the upper side along axis a. All
+/// others keep their order.
 ///
-/// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it its affine
-/// matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children stand at a quarter of the particle's
-/// box, so that theirs tile it. Each gets an equal share of what the particle carries for loads. Mass, volume and centre of mass are kept bit for bit, momentum where the affine part of a
-/// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book` gets the
-/// kinetic energy that each split adds, J, which comes out of the affine part.
+/// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it
+/// its affine matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children lie at the quarter
+/// points of the particle's box, so that their boxes tile it. Each gets an equal share of the columns carried
+/// for loads. Mass, volume and centre of mass are conserved bit for bit, momentum where the affine part of a
+/// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book`
+/// receives the kinetic energy that each split adds, J, which is taken from the affine part.
 pub fn split<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
@@ -55,7 +57,8 @@ pub fn split<const D: usize>(
     report
 }
 
-/// Turns `2^D` copies of a particle from index `first` into its children. Returns the kinetic energy added, J.
+/// Turns `2^D` copies of a particle from index `first` into its children. Returns the kinetic energy added,
+/// J.
 fn divide<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
@@ -105,7 +108,8 @@ fn divide<const D: usize>(
             chunk.write(Layout::<D>::VELOCITY, p, &velocity);
             chunk.write(Layout::<D>::MASS, p, &[mass * share]);
             chunk.write(Layout::<D>::HALF, p, &[0.5 * width]);
-            // A power of two: the children carry exactly what the particle carried, about the same point.
+            // The number of children is a power of two: together they carry exactly the values of the
+            // particle, about the same point.
             let shares = chunk.carried_columns().min(setting.scheme.shares);
             (0..shares).for_each(|column| chunk.carried_mut(column)[p] *= share);
             write_matrix(chunk, p, &kept);

@@ -8,11 +8,12 @@ use crate::boundary::motion::length;
 use crate::geometry::vector::in_space;
 use crate::geometry::{Frustum, Mesh, Shape};
 
-/// Parts of an edge of a box, of the height of a cylinder, and of the longest edge of the box around a boolean.
+/// Parts of an edge of a box, of the height of a cylinder, and of the longest edge of the box around a
+/// boolean.
 const PARTS: usize = 8;
 /// Cells along the longest edge of the box around a boolean, or a mesh of many vertices.
 const CELLS: usize = 24;
-/// Vertices of a mesh that are all looked at.
+/// Greatest number of vertices of a mesh of which all are used.
 const MOST_VERTICES: usize = 1000;
 
 /// A part of a surface that is nearest to another one at a point that can be found.
@@ -37,14 +38,14 @@ pub struct Features<const D: usize> {
 }
 
 impl<const D: usize> Features<D> {
-    /// Of all colliders; none if no free body feels others.
+    /// Features of all colliders; none if no free body collides with others.
     pub fn of_all(colliders: &[Collider<D>]) -> Vec<Self> {
         let is_any =
             colliders.iter().any(|collider| collider.free().is_some_and(|free| free.meeting.is_some()));
         if is_any { colliders.iter().map(Self::of_collider).collect() } else { Vec::new() }
     }
 
-    /// Of a collider; none of one that deforms, which others feel by its distance alone.
+    /// Features of a collider; none of a deforming one, whose contacts come from its distance alone.
     fn of_collider(collider: &Collider<D>) -> Self {
         match collider.deforming {
             Some(_) => Self { all: Vec::new(), centre: [0.0; 3], radius: f64::INFINITY },
@@ -52,7 +53,7 @@ impl<const D: usize> Features<D> {
         }
     }
 
-    /// Of a shape.
+    /// Features of a shape.
     pub fn of(shape: &Shape<D>) -> Self {
         let bounds = shape.bounds();
         let mut all = Vec::new();
@@ -112,7 +113,7 @@ fn collect<const D: usize>(
     }
 }
 
-/// Vertices of a mesh; of one that has many, those farthest from its middle in each cell of a lattice.
+/// Vertices of a mesh; if there are many, those farthest from its middle in each cell of a lattice.
 fn thinned(mesh: &Mesh) -> Vec<[f64; 3]> {
     let vertices: Vec<[f64; 3]> = mesh.vertices().collect();
     if vertices.len() <= MOST_VERTICES {
@@ -146,7 +147,7 @@ fn of_frustum<const D: usize>(
         let t = part as f64 / PARTS as f64;
         let radius = t.mul_add(upper_radius - lower_radius, *lower_radius);
         if D == 2 {
-            // Across the axis: it turned by a quarter.
+            // Perpendicular to the axis.
             let x = at(t);
             let across: [f64; D] = std::array::from_fn(|a| if a == 0 { -axis[1] } else { axis[0] });
             for sign in [-radius, radius] {

@@ -1,4 +1,5 @@
-//! Contacts of rigid bodies: points of one against the signed distance of the other, and against the faces of the domain.
+//! Contacts of rigid bodies: points of one against the signed distance of the other, and against the faces of
+//! the domain.
 use super::features::{Feature, points_of_rim};
 use super::{Surroundings, dot, in_plane};
 use crate::boundary::motion::{Pose, Rate, length};
@@ -7,11 +8,12 @@ use crate::geometry::vector::in_space;
 
 /// Most contacts between two bodies.
 const MOST: usize = 8;
-/// Gap, as a share of a body's size, up to which points are looked at however slow bodies are; and the depth inside a body at which normals
-/// are taken: at the surface that of a point above an edge is not sure.
+/// Gap, as a share of a body's size, up to which points are tested however slow bodies are; also the depth
+/// inside a body at which normals are evaluated: at the surface the normal of a point above an edge is
+/// ambiguous.
 const SMALL: f64 = 1e-3;
 
-/// A point at which two bodies touch, or may in this step.
+/// A point at which two bodies touch, or may touch in this step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     /// The free body.
@@ -33,7 +35,7 @@ pub(super) struct Found {
 /// A candidate: place, normal to the body whose point it is, gap.
 type Candidate = ([f64; 3], [f64; 3], f64);
 
-/// Signed distance and normal of what a body may touch.
+/// Signed distance and normal of an obstacle.
 type Distance<'a> = dyn Fn(&[f64; 3]) -> (f64, [f64; 3]) + 'a;
 
 /// All contacts, in a fixed order.
@@ -95,12 +97,12 @@ pub(super) fn contacts<const D: usize>(
     found
 }
 
-/// Whether points of the second body have to be looked at as well: a ball alone touches wherever its centre says.
+/// Whether points of the second body have to be tested as well: for a ball its centre suffices.
 fn is_mixed<const D: usize>(all: &Surroundings<'_, D>, body: usize, other: usize) -> bool {
     !matches!(all.features[body].all[..], [Feature::Ball { .. }]) && !all.features[other].all.is_empty()
 }
 
-/// Gap up to which points of a collider are looked at, m.
+/// Gap up to which points of a collider are tested, m.
 fn reach<const D: usize>(all: &Surroundings<'_, D>, rates: &[Rate<D>], c: usize, dt: f64) -> f64 {
     let size = all.features[c].radius;
     let (now, mean) = (all.states[c].rate.speeds(), rates[c].speeds());
@@ -136,7 +138,7 @@ fn middle<const D: usize>(all: &Surroundings<'_, D>, poses: &[Pose<D>], c: usize
     (in_space(&all.colliders[c].to_space(&in_plane(&features.centre), &poses[c])), features.radius)
 }
 
-/// Points of a collider that are nearer than `near` (m) to what `distance` tells, with its normal.
+/// Points of a collider at a `distance` of less than `near` (m), with the normal there.
 fn candidates<const D: usize>(
     all: &Surroundings<'_, D>,
     poses: &[Pose<D>],
@@ -182,7 +184,8 @@ fn candidates<const D: usize>(
     found
 }
 
-/// Of many candidates the deepest, and then each time the one farthest from those taken, up to a share of the body's size.
+/// Selection of candidates: the deepest, then repeatedly the one farthest from those selected, while that
+/// distance is above a share of the body's size.
 fn chosen(candidates: Vec<Candidate>, size: f64) -> Vec<Candidate> {
     let mut taken: Vec<Candidate> = Vec::new();
     let deepest = candidates.iter().fold(None, |best: Option<&Candidate>, one| match best {

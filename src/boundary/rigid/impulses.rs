@@ -1,9 +1,10 @@
 //! Impulses at the contacts of rigid bodies in a step.
 //!
-//! Moreau's time stepping (Moreau 1988; Jean 1999): where a gap would close within the step, the normal velocity at its end is at least
-//! -e times that at its start, and the impulse along the surface is at most μ times that across it. Impulses are found one
-//! after the other in a fixed order, over and over (Gauss and Seidel), until none changes. Bodies move with the mean of their velocities at start
-//! and end. An overlap that is left at the end is taken back in part by a second pass that moves bodies and gives them no velocity.
+//! Moreau's time stepping (Moreau 1988; Jean 1999): where a gap would close within the step, the normal
+//! velocity at its end is at least -e times that at its start, and the impulse along the surface is at most μ
+//! times that across it. Impulses are found one after the other in a fixed order, over and over (Gauss and
+//! Seidel), until none changes. Bodies move with the mean of their velocities at start and end. A second pass
+//! removes part of the overlap that remains at the end: it moves bodies and gives them no velocity.
 use super::find::Found;
 use super::{Push, Surroundings, dot};
 use crate::boundary::collider::cross;
@@ -14,7 +15,7 @@ use crate::geometry::vector::in_space;
 const SWEEPS: usize = 1000;
 /// Change of velocity, relative to the greatest one at a contact, at which the sweeps end.
 const CONVERGED: f64 = 1e-12;
-/// Share of an overlap that a step takes back.
+/// Share of an overlap that a step removes.
 const TAKEN_BACK: f64 = 0.15;
 
 /// A collider among contacts.
@@ -97,7 +98,8 @@ struct Touch {
     shift: f64,
 }
 
-/// Finds the impulses; changes mean velocities of free bodies, and adds to what colliders get.
+/// Finds the impulses, changes the mean velocities of free bodies and adds the impulses to those of the
+/// colliders.
 pub(super) fn solve<const D: usize>(
     all: &Surroundings<'_, D>,
     poses: &[Pose<D>],
@@ -143,7 +145,8 @@ pub(super) fn solve<const D: usize>(
     }
 }
 
-/// Corrects all contacts, in their order and backwards in turns (in stacks that needs half the sweeps), until none changes by more than `least`, m/s.
+/// Corrects all contacts, forwards and backwards in turns (stacks then need half the sweeps), until no
+/// velocity changes by more than `least`, m/s.
 fn sweep(touches: &mut [Touch], least: f64, mut correct: impl FnMut(&mut Touch) -> f64) {
     for turn in 0..SWEEPS {
         let change = match turn % 2 {
@@ -217,7 +220,7 @@ impl Touch {
         std::array::from_fn(|a| own[a] - theirs[a])
     }
 
-    /// What an impulse on the body gives to both: number of the body, impulse, and its arm.
+    /// Impulses on both bodies by an impulse on the first: number of the body, impulse, and its arm.
     fn both(&self, impulse: &[f64; 3]) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> {
         let bodies = [(Some(self.found.body), *impulse), (self.found.other, impulse.map(|c| -c))];
         bodies.into_iter().zip(self.arms).filter_map(|((body, impulse), arm)| Some((body?, impulse, arm)))
@@ -259,7 +262,7 @@ impl Touch {
         });
         let most = self.found.friction * self.normal;
         if length(&sliding) > most {
-            // What slides: the same factor along both tangents, so that friction is against the velocity.
+            // Sliding: the same factor along both tangents, so that friction opposes the velocity.
             sliding = std::array::from_fn(|k| (-self.least_along).mul_add(slip[k], self.sliding[k]));
             let size = length(&sliding);
             if size > most {

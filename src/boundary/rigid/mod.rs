@@ -1,9 +1,10 @@
-//! Free rigid bodies: how they turn, and their contact with faces of the domain, with other colliders and with each other.
+//! Free rigid bodies: their rotation, and their contact with faces of the domain, with other colliders and
+//! with each other.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `turning` | inertia, orientation, and the turning of a body without torque |
-//! | `numbers` | the state of a free body as checkpoints keep it |
+//! | `turning` | inertia, orientation, and the rotation of a body without torque |
+//! | `numbers` | the state of a free body as stored in checkpoints |
 //! | `features` | points of a body that may touch something |
 //! | `find` | contacts of bodies in a step |
 //! | `impulses` | impulses at all of them |
@@ -21,22 +22,22 @@ pub use features::Features;
 use super::motion::{Motion, Pose, Rate};
 use super::{Collider, ColliderState, Contact};
 
-/// What a free body does to what it meets.
+/// Friction and restitution of a free body in collisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
     /// Coefficient of friction.
     pub friction: f64,
-    /// Coefficient of restitution: speed after over speed before a blow.
+    /// Coefficient of restitution: speed after over speed before the collision.
     pub restitution: f64,
 }
 
-/// What bodies meet in a step.
+/// Colliders and faces of the domain that bodies may touch in a step.
 pub struct Surroundings<'a, const D: usize> {
     /// All colliders, in their order.
     pub colliders: &'a [Collider<D>],
-    /// Where they are at the start of the step.
+    /// Their states at the start of the step.
     pub states: &'a [ColliderState<D>],
-    /// Points of each that may touch.
+    /// Points of each collider that may touch something.
     pub features: &'a [Features<D>],
     /// Conditions on the lower and upper face of the domain along each axis.
     pub faces: &'a [[Contact; 2]; D],
@@ -54,7 +55,8 @@ pub struct Push {
 }
 
 impl<const D: usize> Surroundings<'_, D> {
-    /// Changes the mean velocities of free bodies that touch something in a step of length `dt` (s). Returns what each collider gets.
+    /// Changes the mean velocities of free bodies that touch something in a step of length `dt` (s). Returns
+    /// the impulses on each collider.
     pub fn touch(&self, rates: &mut [Rate<D>], dt: f64) -> Vec<Push> {
         let mut pushes = vec![Push::default(); self.colliders.len()];
         if dt <= 0.0 || !self.colliders.iter().any(|collider| collider.meeting().is_some()) {
@@ -69,8 +71,8 @@ impl<const D: usize> Surroundings<'_, D> {
         pushes
     }
 
-    /// Where a collider is in the middle of the step if nothing meets it: there contacts are looked for, so that an impulse in the middle
-    /// of the step keeps the angular momentum of both bodies.
+    /// Pose of a collider in the middle of the step if nothing touches it. Contacts are found there, so that
+    /// an impulse in the middle of the step conserves the angular momentum of both bodies.
     fn halfway(&self, c: usize, mean: &Rate<D>, dt: f64) -> Pose<D> {
         let (collider, state) = (&self.colliders[c], &self.states[c]);
         let pose = &state.pose;

@@ -1,11 +1,11 @@
-//! The state of a free body as numbers, as checkpoints keep it.
+//! The state of a free body as numbers, as stored in checkpoints.
 use super::turning::Quaternion;
 use crate::boundary::motion::{Pose, Rate};
 use crate::boundary::{Collider, ColliderState};
 
 impl<const D: usize> Collider<D> {
-    /// A state as numbers: translation, velocity, angle, angular velocity, and of a body that turns about any axis
-    /// orientation and angular momentum.
+    /// A state as numbers: translation, velocity, angle, angular velocity, and of a body that turns about any
+    /// axis orientation and angular momentum.
     pub fn numbers(&self, state: &ColliderState<D>) -> Vec<f64> {
         let ColliderState { pose, rate, momentum } = state;
         let mut all = pose.translation.to_vec();
@@ -18,7 +18,7 @@ impl<const D: usize> Collider<D> {
         all
     }
 
-    /// A state from its numbers, which `number` tells. `None` if it lacks one.
+    /// A state from its numbers, each given by `number`. `None` if one is missing.
     pub fn from_numbers(&self, number: impl Fn(usize) -> Option<f64>) -> Option<ColliderState<D>> {
         let (mut translation, mut velocity) = ([0.0; D], [0.0; D]);
         for a in 0..D {

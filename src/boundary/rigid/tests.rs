@@ -90,7 +90,7 @@ fn cuboid(lower: [f64; 3], upper: [f64; 3]) -> Shape<3> {
     Shape::Box(Aabb::new(lower, upper))
 }
 
-/// Heights between bounces are e² times those before, and all bounces end when the series says.
+/// Each bounce reaches e² times the height of the one before, and all bounces end at the limit of the series.
 #[test]
 fn balls_bounce_as_restitution_says() {
     for e in [1.0, 0.5, 0.8] {
@@ -114,8 +114,8 @@ fn balls_bounce_as_restitution_says() {
     }
 }
 
-/// Down a slope a ball that rolls gains 5/7 g sin α, one that slips g (sin α - μ cos α), a box that slides the same; above
-/// tan α a box stays.
+/// Down a slope a ball that rolls gains 5/7 g sin α, one that slips g (sin α - μ cos α), a box that slides
+/// the same; above tan α a box stays.
 #[test]
 fn balls_roll_and_boxes_slide_down_slopes() {
     let slope = |degrees: f64| {
@@ -182,7 +182,7 @@ fn balls_slide_until_they_roll() {
     }
 }
 
-/// Three boxes on each other stay where they are, turned or not.
+/// Three boxes on top of each other stay at rest, rotated or not.
 #[test]
 fn stacks_rest() {
     for degrees in [0.0_f64, 20.0] {
@@ -209,8 +209,9 @@ fn stacks_rest() {
     }
 }
 
-/// Two balls that hit off their centres with friction: momentum and angular momentum stay to round-off; without friction, energy as well. Places
-/// near 50 m are rounded to 7e-15 m, and the arm of the angular momentum is 0.09 m: that is 1e-13 of it each time.
+/// Two balls in an off-centre collision with friction: momentum and angular momentum are conserved to
+/// round-off; without friction, energy as well. Places near 50 m are rounded to 7e-15 m, and the arm of the
+/// angular momentum is 0.09 m: that is an error of 1e-13 in each collision.
 #[test]
 fn blows_keep_momentum_and_angular_momentum() {
     for friction in [0.0, 0.4] {

@@ -8,7 +8,8 @@ pub type Quaternion = [f64; 4];
 /// No rotation.
 pub const UPRIGHT: Quaternion = [1.0, 0.0, 0.0, 0.0];
 
-/// Greatest angle of a stage of the integration, rad: its energy is right to 1e-8 there, with the fourth power of the angle.
+/// Greatest angle of a stage of the integration, rad: the relative error of the energy is 1e-8 there, and
+/// grows with the fourth power of the angle.
 const ANGLE: f64 = 0.05;
 
 /// Inertia of a body about its centre of mass.
@@ -16,7 +17,7 @@ const ANGLE: f64 = 0.05;
 pub struct Inertia {
     /// Principal moments, kg m².
     pub moments: [f64; 3],
-    /// Columns: the principal axes in the body as the job has it.
+    /// Columns: the principal axes in the body as defined in the job.
     pub axes: [[f64; 3]; 3],
 }
 
@@ -78,11 +79,12 @@ impl Inertia {
         self.in_space(&std::array::from_fn(|k| w[k] * self.moments[k]), orientation)
     }
 
-    /// Mean angular velocity (rad/s) over a step of length `dt` (s) in which the angular momentum (kg m²/s) stays: the rotation over the
-    /// step is the one about this vector by its length times dt.
+    /// Mean angular velocity (rad/s) over a step of length `dt` (s) in which the angular momentum (kg m²/s)
+    /// stays: the rotation over the step is the one about this vector by its length times dt.
     ///
-    /// Euler's equations are split into turning about one principal axis after the other, each exact, so that the angular momentum in space
-    /// never changes (McLachlan 1993; Reich 1994); Suzuki's composition (1990) makes of it a symmetric method of fourth order.
+    /// Euler's equations are split into turning about one principal axis after the other, each exact, so that
+    /// the angular momentum in space never changes (McLachlan 1993; Reich 1994); Suzuki's composition (1990)
+    /// makes of it a symmetric method of fourth order.
     pub fn mean_spin(&self, momentum: &[f64; 3], orientation: &Quaternion, dt: f64) -> [f64; 3] {
         let mut m = self.along_axes(momentum, orientation);
         let spin = length(&std::array::from_fn::<f64, 3, _>(|k| m[k] / self.moments[k]));
@@ -110,7 +112,7 @@ impl Inertia {
     }
 }
 
-/// The rotation vector (rad) of a unit quaternion.
+/// Rotation vector (rad) of a unit quaternion.
 fn rotation_vector(q: &Quaternion) -> [f64; 3] {
     let (w, v) = if q[0] < 0.0 { (-q[0], [-q[1], -q[2], -q[3]]) } else { (q[0], [q[1], q[2], q[3]]) };
     let sine = length(&v);
@@ -178,8 +180,9 @@ mod tests {
         }
     }
 
-    /// A top without torque that turns about its middle axis: its angular momentum stays, its energy to 1e-8, and where it is after several
-    /// somersaults (Dzhanibekov) agrees with Euler's equations integrated by Runge and Kutta's method in steps of a tenth.
+    /// A top without torque that turns about its middle axis: its angular momentum is conserved, its energy
+    /// to 1e-8, and its orientation after several somersaults (Dzhanibekov) agrees with Euler's equations
+    /// integrated by Runge and Kutta's method in steps of a tenth.
     #[test]
     fn a_top_without_torque_keeps_what_it_must() {
         let inertia = Inertia::new([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.5]]);

@@ -196,7 +196,7 @@ fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String
     format!("on {particles} particles{area}, force ({force}) at {}", quantity(time, "s"))
 }
 
-/// What a source feeds, and when.
+/// Velocity, layers and times of a source, in words.
 fn source_in_words<const D: usize>(source: &Source<D>) -> String {
     let velocity: Vec<String> = source.velocity.iter().map(|&v| quantity(v, "m/s")).collect();
     let count = source.entries.len();
@@ -223,7 +223,7 @@ fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String 
     })
 }
 
-/// What a load does, and where and when.
+/// Kind, value, region and times of a load, in words.
 fn load_in_words<const D: usize>(load: &Load<D>) -> String {
     let value = |quantity: &Quantity, unit: &str| match quantity {
         Quantity::Constant(value) => self::quantity(*value, unit),

@@ -30,7 +30,7 @@ impl LeafWords {
         let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
         let answers = comm.sparse_exchange(requests);
         let mut ranks: Vec<usize> = answers.iter().map(|(rank, _)| *rank).chain(asked).collect();
-        // A rank that is asked without asking back must hear of it, so that both list each other.
+        // A rank that receives a request and sends none must learn of it, so that both list each other.
         let told = comm.sparse_exchange(ranks.iter().map(|&rank| (rank, vec![0u8])).collect());
         ranks.extend(told.iter().map(|(rank, _)| *rank));
         ranks.sort_unstable();
@@ -56,7 +56,8 @@ impl LeafWords {
         self.exchange.traffic()
     }
 
-    /// Collective over neighbours. Leaves in `all` the words of all known leaves, from those of the own leaves.
+    /// Collective over neighbours. Fills `all` with the words of all known leaves, from those of the own
+    /// leaves.
     pub(super) fn share<const D: usize>(&mut self, tree: &KnownTree<D>, own: &[u64], all: &mut Vec<u64>) {
         all.clear();
         all.resize(tree.leaves().len(), 0);

@@ -1,15 +1,16 @@
 //! Surface nodes tied: nodes of no well filled cell move with the material beside them.
 //!
-//! A node that only the edges of a few boxes reach has little mass and a force that does not shrink with it. Left free, it moves until
-//! it takes the stress of these boxes away. Such a node j is tied: its velocity is that of the plane through the corners r of the nearest
-//! well filled cells, `v_j = Σ P_r v_r` (aggregation; Coombs, Bird and Pretti 2025). Each tie is a constraint that acts by an impulse J
-//! on the node and by `-P_r J` on the corners. As P reproduces affine fields, J changes neither momentum nor angular
-//! momentum, and it is zero in affine motion. All impulses together are sought by sweeps of Jacobi's method,
+//! A node that only the edges of a few boxes reach has little mass and a force that does not shrink with it.
+//! Left free, it moves until it relieves the stress of these boxes. Such a node j is tied: its velocity is
+//! that of the plane through the corners r of the nearest well filled cells, `v_j = Σ P_r v_r` (aggregation;
+//! Coombs, Bird and Pretti 2025). Each tie is a constraint that acts by an impulse J on the node and by
+//! `-P_r J` on the corners. As P reproduces affine fields, J changes neither momentum nor angular momentum,
+//! and it is zero in affine motion. All impulses together are sought by sweeps of Jacobi's method,
 //! ```text
 //! J_j = (Σ P_r v_r - v_j) / (1/m_j + Σ |P_r| S_r / m_r),   S_r = Σ |P_r| over all ties of r
 //! ```
-//! whose denominators are row sums of the matrix of compliances, so that no sweep adds kinetic energy, whatever the masses are. A light
-//! node, for which ties matter, has its velocity after the first sweep.
+//! whose denominators are row sums of the matrix of compliances, so that no sweep adds kinetic energy,
+//! whatever the masses are. A light node, for which ties matter, has its velocity after the first sweep.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -33,9 +34,9 @@ use super::sums::node_fields::NodeFields;
 /// Sweeps over all ties in a step.
 const SWEEPS: usize = 1;
 
-/// Blocks around those of its bins, counted along each axis, in which a rank needs all nodes, to find what ties do to its nodes by
-/// itself: a corner gets impulses that depend on all ties of the corners of its ties, and these on the cells beside their nodes, four times
-/// the reach of a tie away.
+/// Blocks around those of its bins, counted along each axis, in which a rank needs all nodes to compute the
+/// effect of ties on its own nodes without messages: a corner gets impulses that depend on all ties of the
+/// corners of its ties, and these on the cells beside their nodes, four times the reach of a tie away.
 pub const HALO: u32 = 3;
 
 /// Ties of one plan and, of the last step, which cells are well filled.
@@ -44,16 +45,16 @@ pub struct Ties<const D: usize> {
     finder: Finder<D>,
 }
 
-/// What ties are found with.
+/// Input and memory of the search for ties.
 struct Finder<const D: usize> {
     rings: Vec<Vec<[i32; D]>>,
-    /// By block, as far as it has been asked for.
+    /// Neighbourhood of each block, found on demand.
     around: Vec<Option<Box<Neighbourhood>>>,
-    /// By block, nodes on faces of the domain.
+    /// Nodes of each block on faces of the domain.
     on_faces: Vec<u64>,
     /// Well filled cells of each known leaf.
     filled: Vec<u64>,
-    /// By node; zero between two uses.
+    /// Sum of weights at each node; zero between two uses.
     shares: Vec<f64>,
 }
 
@@ -117,8 +118,9 @@ impl<const D: usize> Ties<D> {
         self.words.share(&plan.tree, own, &mut self.finder.filled);
     }
 
-    /// Not collective. Ties the nodes of a velocity field, whose rows hold velocities and masses. `held` says which of some nodes of a block others
-    /// hold in place; these are not tied, nor is anything tied to them.
+    /// Not collective. Ties the nodes of a velocity field, whose rows hold velocities and masses. `held`
+    /// returns those of some nodes of a block that are fixed by other conditions; these are not tied, nor is
+    /// anything tied to them.
     pub fn tie(
         &mut self,
         plan: &GridPlan<D>,
@@ -160,7 +162,7 @@ impl<const D: usize> Finder<D> {
         self.pull(fields, &tied);
     }
 
-    /// Finds what lies around the blocks that hold mass.
+    /// Finds the neighbourhoods of the blocks that hold mass.
     fn look_around(&mut self, plan: &GridPlan<D>, fields: &NodeFields<D>) {
         self.around.resize_with(plan.blocks.len(), || None);
         let all = self.around.par_iter_mut().zip(&fields.active).enumerate().with_min_len(64);
@@ -168,7 +170,8 @@ impl<const D: usize> Finder<D> {
         new.for_each(|(block, (around, _))| *around = Some(Box::new(Neighbourhood::of(plan, block))));
     }
 
-    /// Blocks with real nodes that have mass and touch no well filled cell, and these nodes. All around them there are leaves of their level.
+    /// Blocks with real nodes that have mass and touch no well filled cell, and these nodes. All leaves
+    /// around them have their level.
     fn loose(&self, plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<(usize, u64)> {
         let blocks = self.around.par_iter().zip(&fields.active).enumerate().with_min_len(64);
         let loose = blocks.filter_map(|(block, (around, active))| {
@@ -191,7 +194,7 @@ impl<const D: usize> Finder<D> {
         loose.collect()
     }
 
-    /// The ties of loose nodes that are not held.
+    /// The ties of loose nodes that are not fixed.
     fn find(&self, plan: &GridPlan<D>, fields: &NodeFields<D>, loose: &[(usize, u64)], held: &[u64]) -> Tied {
         let blocks = loose.par_iter().with_min_len(8).map(|&(block, nodes)| {
             let mut tied = Tied::default();
@@ -237,7 +240,7 @@ impl<const D: usize> Finder<D> {
         all
     }
 
-    /// Gives nodes the impulses of their ties.
+    /// Applies the impulses of ties to nodes.
     fn pull(&mut self, fields: &mut NodeFields<D>, tied: &Tied) {
         self.shares.resize(fields.rows.len(), 0.0);
         tied.corners.iter().for_each(|&(corner, weight)| self.shares[corner] += weight.abs());
@@ -287,7 +290,7 @@ fn push<const D: usize>(row: &mut [f64; 4], impulse: &[f64; D], share: f64) {
 /// Least mass of a node that is tied, kg: the inverse of less may not be finite.
 const LEAST_MASS: f64 = 1e-150;
 
-/// Those of some nodes of a block that have mass.
+/// Nodes among those given of a block that have mass.
 fn with_mass<const D: usize>(fields: &NodeFields<D>, block: usize, nodes: u64) -> u64 {
     let rows = &fields.rows[block * block_nodes(D)..][..block_nodes(D)];
     bits(nodes).filter(|&bit| rows[bit as usize].0[3] > LEAST_MASS).fold(0, |nodes, bit| nodes | 1 << bit)

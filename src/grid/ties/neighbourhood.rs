@@ -9,7 +9,7 @@ use crate::kernel::BLOCK;
 /// No leaf of the block's level: outside the domain, or on another level.
 const NO_LEAF: u32 = u32::MAX;
 
-/// What lies around a block, by offset number.
+/// Blocks and leaves around a block, by offset number.
 #[derive(Clone, Debug)]
 pub(super) struct Neighbourhood {
     /// Blocks of the plan; [`NO_BLOCK`] where the plan has none.
@@ -18,7 +18,8 @@ pub(super) struct Neighbourhood {
     leaves: [u32; 27],
 }
 
-/// The block around that holds something at a place counted from the lower corner of the block, and its number there.
+/// Offset number of the block around that contains a cell or node at a place counted from the lower corner of
+/// the block, and the number of the cell or node in it.
 fn split<const D: usize>(place: [i32; D]) -> (usize, u32) {
     let edge = BLOCK as i32;
     let index = offset_index(place.map(|x| x.div_euclid(edge)));
@@ -27,7 +28,7 @@ fn split<const D: usize>(place: [i32; D]) -> (usize, u32) {
 }
 
 impl Neighbourhood {
-    /// Of a block of a plan.
+    /// Neighbourhood of a block of a plan.
     pub(super) fn of<const D: usize>(plan: &GridPlan<D>, block: usize) -> Self {
         let (level, coord) = (plan.blocks[block].level, plan.blocks[block].coord);
         let place = |level: u8, coord: [u32; D]| (level, Octant { level, coord }.key(), coord);
@@ -41,8 +42,8 @@ impl Neighbourhood {
         Self { blocks, leaves }
     }
 
-    /// Whether a cell is well filled, with the well filled cells of all known leaves; `None` where no leaf of the level of the block has
-    /// the cell. `place` counts cells from the lower corner of the block.
+    /// Whether a cell is well filled, given the well filled cells of all known leaves; `None` where no leaf
+    /// of the level of the block has the cell. `place` counts cells from the lower corner of the block.
     pub(super) fn is_filled<const D: usize>(&self, filled: &[u64], place: [i32; D]) -> Option<bool> {
         let (index, bit) = split(place);
         let leaf = self.leaves[index];

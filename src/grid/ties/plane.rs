@@ -1,13 +1,13 @@
 //! The plane through the corners of the cells next to a node.
-/// How far the cells lie of which the nearest are sought: the farthest of their corners, in cells along each axis.
+/// Reach of the search for the nearest cells: their farthest corner, in cells along each axis.
 pub(super) const REACH: i32 = 2;
 /// Nodes along an axis at most [`REACH`] away.
 const EDGE: usize = 2 * REACH as usize + 1;
 /// Nodes in reach, most of which no plane needs.
 const WINDOW: usize = EDGE * EDGE * EDGE;
 
-/// Lower corners of the cells in reach of a node that do not touch it, counted from the node, by distance; those of the same distance
-/// together.
+/// Lower corners of the cells in reach of a node that do not touch it, counted from the node, by distance;
+/// those of the same distance together.
 pub(super) fn rings<const D: usize>() -> Vec<Vec<[i32; D]>> {
     let edge = 2 * REACH;
     let mut all: Vec<(i32, [i32; D])> = (0..edge.pow(D as u32))
@@ -28,9 +28,10 @@ pub(super) struct Plane<const D: usize> {
 }
 
 impl<const D: usize> Plane<D> {
-    /// The mean over some cells, given by their lower corners, of the plane that fits the values at their corners best:
-    /// `P_r = 2^-D (1 + 2 Σ_k s_k t_k)`, where s = ±1 says on which side of the cell the corner lies and t is the place of the node
-    /// from the cell's centre, in cells. The weights add up to 1 and their mean place is the node.
+    /// The mean over some cells, given by their lower corners, of the plane that fits the values at their
+    /// corners best: `P_r = 2^-D (1 + 2 Σ_k s_k t_k)`, where s = ±1 says on which side of the cell the corner
+    /// lies and t is the place of the node from the cell's centre, in cells. The weights add up to 1 and
+    /// their mean place is the node.
     pub(super) fn of(cells: &[[i32; D]]) -> Self {
         let mut weights = [0.0; WINDOW];
         let share = 1.0 / (cells.len() << D) as f64;
@@ -63,7 +64,7 @@ impl<const D: usize> Plane<D> {
 mod tests {
     use super::*;
 
-    /// Whatever cells there are, values of an affine field give that of the node.
+    /// For any set of cells, values of an affine field reproduce its value at the node.
     fn check_affine<const D: usize>() {
         let rings = rings::<D>();
         assert_eq!(rings.len(), D);

@@ -11,10 +11,10 @@ use crate::source::{Source, particles_in};
 use crate::text::{number as rounded, quantity, written as number};
 use rustc_hash::FxHashMap;
 
-/// Points of the lattice in the shape of a source that are looked at.
+/// Greatest number of lattice points to test in the shape of a source.
 const MOST_POINTS: f64 = 2e7;
 
-/// What sources need to know of the job.
+/// Parts of the job that sources need.
 pub(super) struct Context<'a, const D: usize> {
     pub file: &'a JobFile,
     pub space: &'a Space<D>,

@@ -96,7 +96,8 @@ pub const LOAD_SUMS: usize = 4;
 /// Sums of a source since the start: mass (kg), three components of momentum (kg m/s), kinetic energy (J).
 pub const SOURCE_SUMS: usize = 5;
 
-/// What a source gives in one step to a particle in its shape, to keep its velocity.
+/// Impulse and work of a source on a particle in its shape in one step, which keep the velocity of the
+/// particle.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct SourcePush<const D: usize> {
     /// Number of the source.

@@ -18,11 +18,11 @@ pub(in crate::solver) struct Inside<const D: usize> {
     pub normals: Vec<[f64; D]>,
 }
 
-/// Nodes inside colliders that never move, by block and collider: found once where they are asked for, since to ask a mesh or a
-/// terrain takes longer than all else that happens to a node.
+/// Nodes inside colliders that never move, by block and collider: found once, on demand, since the distance
+/// to a mesh or a terrain takes longer than all other work at a node.
 pub(in crate::solver) type InsideStill<const D: usize> = Vec<Vec<Option<Inside<D>>>>;
 
-/// What is known of blocks by place and real nodes, on the way from one plan to the next.
+/// Known nodes of blocks by place and real nodes, to carry them from one plan to the next.
 pub(in crate::solver) struct KnownInside<const D: usize>(FxHashMap<Place<D>, Vec<Option<Inside<D>>>>);
 
 /// Level and coordinate of a block, and its real nodes.
@@ -33,13 +33,13 @@ fn place<const D: usize>(block: &Block<D>) -> Place<D> {
 }
 
 impl<const D: usize> KnownInside<D> {
-    /// What is known of the blocks of a plan.
+    /// Known nodes of the blocks of a plan.
     pub(in crate::solver) fn of(plan: &GridPlan<D>, still: InsideStill<D>) -> Self {
         let known = plan.blocks.iter().zip(still).filter(|(_, still)| !still.is_empty());
         Self(known.map(|(block, still)| (place(block), still)).collect())
     }
 
-    /// What of it is of the blocks of a plan.
+    /// The known nodes that belong to the blocks of a plan.
     pub(in crate::solver) fn for_plan(mut self, plan: &GridPlan<D>) -> InsideStill<D> {
         if self.0.is_empty() {
             return Vec::new();
@@ -49,7 +49,7 @@ impl<const D: usize> KnownInside<D> {
 }
 
 impl<const D: usize> Inside<D> {
-    /// Those among `nodes` of a block.
+    /// Nodes inside among `nodes` of a block.
     pub(in crate::solver) fn find(
         plan: &GridPlan<D>,
         block: &Block<D>,

@@ -140,12 +140,13 @@ pub struct Solver<const D: usize> {
     pub body_sums: ExactSums<LOAD_SUMS>,
     /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
     pub shift_sums: ExactSums<1>,
-    /// What sources have brought since the start.
+    /// Mass, momentum and kinetic energy that sources have added since the start.
     pub source_sums: ExactSums<SOURCE_SUMS>,
-    /// Particles that each source has fed on this rank since the start of this process, and those of them
-    /// that came where other material lay.
+    /// Particles that each source has fed on this rank since the start of this process, and those among them
+    /// that entered where other material was.
     pub fed: Vec<[u64; 2]>,
-    /// What sources gave to particles in their shapes in the last step, by own leaf; empty without sources.
+    /// Impulse and work of sources on particles in their shapes in the last step, by own leaf; empty without
+    /// sources.
     pub(super) conveyed: Vec<Vec<SourcePush<D>>>,
     /// Forces that particles carried in the last step, by own leaf; empty without such loads.
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,

@@ -1,10 +1,11 @@
-//! Forces on particles: those that they carry (tractions, pressures, point forces), and body forces that belong to places of the undeformed
-//! body. With mass scaling gravity and all body forces are among them: they act on the mass that material has, not on that with which it
-//! moves.
+//! Forces on particles: those that they carry (tractions, pressures, point forces), and body forces that
+//! belong to places of the undeformed body. With mass scaling gravity and all body forces are among them:
+//! they act on the mass of the material, not on the scaled mass.
 //!
-//! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the particle has the velocity
-//! `v + Δt f / m`, and its own again afterwards: the force takes the way of momentum through parts of boxes and constrained nodes,
-//! and no kernel knows of loads. Its work is `f · Δx` with the way Δx of the particle.
+//! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the
+//! particle has the velocity `v + Δt f / m`, and its own again afterwards: the force passes through parts of
+//! boxes and constrained nodes like momentum, and no kernel handles loads. Its work is `f · Δx` with the
+//! displacement Δx of the particle.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
@@ -18,13 +19,13 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{CarriedTotals, ParticlePush};
 use crate::solver::state::phases::Phase;
 
-/// Velocities of particles as they were ahead of a push.
+/// Velocities of particles before an impulse.
 pub(in crate::solver) type Velocities<const D: usize> = Vec<(u32, [f64; D])>;
 
-/// Most numbers that a particle carries for a load.
+/// Greatest number of columns that a particle carries for a load.
 const MOST: usize = 4;
 
-/// Numbers that a particle carries for a load; `None` if it carries nothing of it.
+/// Numbers that a particle carries for a load; `None` if all are 0.
 fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> Option<[f64; MOST]> {
     let columns = carried.force.columns();
     let number = |i: usize| chunk.carried(carried.first + i).get(p).copied().unwrap_or(0.0);
@@ -32,7 +33,8 @@ fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> 
     numbers.iter().any(|&number| number != 0.0).then_some(numbers)
 }
 
-/// Where a force on the surface at a particle is taken, m: at the surface where it depends on the place.
+/// Place (m) at which a force on the surface is evaluated for a particle: at the surface if the force depends
+/// on the place.
 fn surface_at<const D: usize>(
     widths: &Widths<'_, D>,
     chunk: &Chunk<D>,
@@ -46,7 +48,7 @@ fn surface_at<const D: usize>(
     std::array::from_fn(|a| x[a] + way[a])
 }
 
-/// What pushes particles in a step.
+/// Loads and gravity that act on particles in a step.
 struct Pushing<'a, const D: usize> {
     /// Half widths of boxes.
     widths: Widths<'a, D>,
@@ -54,17 +56,17 @@ struct Pushing<'a, const D: usize> {
     loads: Vec<(usize, &'a Load<D>)>,
     /// First column of the displacement, if particles carry it.
     displacement: Option<usize>,
-    /// Gravity, m/s², where masses are scaled; else nodes have it.
+    /// Gravity, m/s², where masses are scaled; else 0, as gravity acts on nodes.
     gravity: [f64; D],
-    /// Whether all particles are pushed, and not those alone that carry something.
+    /// Whether forces act on all particles, and not only on those that carry something.
     all: bool,
     middle: f64,
     dt: f64,
 }
 
 impl<const D: usize> Pushing<'_, D> {
-    /// Pushes the particles of a leaf with cells of this edge (m), which move with `scale` times their mass.
-    /// Returns the velocities that they had, and adds what pushed them to `pushes`.
+    /// Applies the impulses to the particles of a leaf with cells of this edge (m), which move with `scale`
+    /// times their mass. Returns their velocities before, and adds the forces to `pushes`.
     fn push(
         &self,
         chunk: &mut Chunk<D>,
@@ -120,8 +122,8 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Gives particles the impulse of what acts on them, for P2G. Returns the velocities that they had, by leaf, for
-    /// [`Solver::take_back_push`]; nothing where nothing does.
+    /// Not collective. Gives particles the impulse of the forces on them, for P2G. Returns their velocities
+    /// before, by leaf, for [`Solver::take_back_push`]; empty if no force acts.
     pub(in crate::solver) fn push_particles(&mut self, dt: f64) -> Vec<Velocities<D>> {
         let (physics, time) = (&self.physics, self.clock.time);
         let scaled = physics.has_scaled_masses();
@@ -158,8 +160,8 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Not collective. Gives particles the masses with which they move, or back their own, where the stage asks for mass scaling. Factors
-    /// are powers of two, so no mass changes.
+    /// Not collective. Gives particles their scaled masses, or their own again, in stages with mass scaling.
+    /// Factors are powers of two, so no mass changes.
     pub(in crate::solver) fn scale_masses(&mut self, change: fn(f64, f64) -> f64) {
         if !self.physics.has_scaled_masses() {
             return;
@@ -171,14 +173,15 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Particles have the velocities again that they had.
+    /// Not collective. Restores the velocities before the impulses.
     pub(in crate::solver) fn take_back_push(&mut self, before: &[Velocities<D>]) {
         for (chunk, before) in self.chunks.iter_mut().zip(before) {
             before.iter().for_each(|(p, velocity)| chunk.write(Layout::<D>::VELOCITY, *p as usize, velocity));
         }
     }
 
-    /// Not collective. Books impulse and work of what particles carry, once they have moved.
+    /// Not collective. Adds impulse and work of the forces on particles to the sums of the loads, after
+    /// particles have moved.
     pub(in crate::solver) fn book_pushes(&mut self, dt: f64) {
         for push in self.pushes.iter().flatten() {
             let sums = &mut self.load_sums.of[push.load as usize];
@@ -189,7 +192,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Collective. What particles carry now of each load that they carry, and its force when it begins, or now if it has begun.
+    /// Collective. Number and area of the particles that carry each load, and its force when it begins, or
+    /// now if it has begun.
     pub fn carried_totals(&self) -> Vec<CarriedTotals> {
         let (mut all, moved) = (Vec::new(), self.physics.displacement_column());
         let widths = self.physics.widths(&self.grid.plan);
@@ -221,11 +225,11 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// The ways that pushed particles of a leaf went, now that they have moved.
+/// Sets the displacements of the particles in `pushes`, after they have moved.
 pub(super) fn note_ways<const D: usize>(chunk: &Chunk<D>, pushes: &mut [ParticlePush<D>]) {
     for push in pushes {
         let x = chunk.position(push.particle as usize);
-        // Exact, since a step is short.
+        // The difference is exact, since a step is short.
         push.way = std::array::from_fn(|a| x[a] - push.way[a]);
     }
 }
@@ -235,7 +239,7 @@ pub(super) fn positions<const D: usize>(chunk: &Chunk<D>) -> Vec<[f64; D]> {
     (0..chunk.len()).map(|p| chunk.position(p)).collect()
 }
 
-/// Adds the way of a step to the displacements that particles carry from column `first` on.
+/// Adds the displacement of a step to the displacements that particles carry from column `first` on.
 pub(super) fn add_ways<const D: usize>(chunk: &mut Chunk<D>, first: usize, start: &[[f64; D]]) {
     let end = positions(chunk);
     if end == *start {
@@ -248,7 +252,8 @@ pub(super) fn add_ways<const D: usize>(chunk: &mut Chunk<D>, first: usize, start
     }
 }
 
-/// Total strains that particles carry from column `first` on follow a step with this velocity gradient (1/s).
+/// Updates the total strain that a particle carries from column `first` on, by a step with this velocity
+/// gradient (1/s).
 pub(super) fn strain<const D: usize>(
     chunk: &mut Chunk<D>,
     first: usize,
@@ -267,7 +272,8 @@ pub(super) fn has_followers<const D: usize>(chunk: &Chunk<D>, following: &[&Carr
     !following.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
 }
 
-/// Areas that a particle carries follow a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
+/// Updates the areas that a particle carries, by a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`,
+/// `f = 1 + Δt ∇v`.
 pub(super) fn follow<const D: usize>(
     chunk: &mut Chunk<D>,
     following: &[&Carried<D>],

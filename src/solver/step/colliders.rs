@@ -17,7 +17,7 @@ use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::{Inside, InsideStill, is_still};
 use crate::solver::state::phases::Phase;
 
-/// What one node or particle gives to a collider.
+/// Impulse of one node or particle on a collider.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch<const D: usize> {
     pub collider: usize,
@@ -112,8 +112,8 @@ impl<const D: usize> Solver<D> {
         all.map(|(collider, state)| collider.step_rate(state, &gravity, self.clock.time, dt)).collect()
     }
 
-    /// Contact of free bodies with faces of the domain and other colliders: changes their mean velocities over the next step. Returns
-    /// what each collider gets; the same on all ranks.
+    /// Contact of free bodies with faces of the domain and other colliders: changes their mean velocities
+    /// over the next step. Returns the impulses on each collider; the same on all ranks.
     pub(in crate::solver) fn meet_bodies(&self, rates: &mut [Rate<D>], dt: f64) -> Vec<Push> {
         let all = Surroundings {
             colliders: &self.physics.colliders,
@@ -125,7 +125,7 @@ impl<const D: usize> Solver<D> {
         all.touch(rates, dt)
     }
 
-    /// Nothing on any collider.
+    /// Sums of 0 for each collider.
     pub(super) fn no_impulses(&self) -> Vec<[ExactSum; SUMS]> {
         vec![std::array::from_fn(|_| ExactSum::new()); self.physics.colliders.len()]
     }
@@ -182,8 +182,8 @@ impl<const D: usize> Solver<D> {
         self.physics.deform_colliders(to);
     }
 
-    /// Collective. Mean force and torque on each collider since the last row of the history, that is, the momentum
-    /// given to it over the time since. Exact before it is rounded once.
+    /// Collective. Mean force and torque on each collider since the last row of the history, that is, the
+    /// momentum given to it over the time since. Exact before it is rounded once.
     pub fn reactions(&self) -> Vec<Reaction> {
         let sums = &self.contacts.sums;
         let mean = |impulse: f64| sums.mean(impulse, self.clock.time);
@@ -192,13 +192,13 @@ impl<const D: usize> Solver<D> {
             .collect()
     }
 
-    /// Not collective. Starts the means of [`Solver::reactions`] anew.
+    /// Not collective. Resets the means of [`Solver::reactions`].
     pub fn forget_reactions(&mut self) {
         self.contacts.sums.forget(SUMS, self.clock.time);
     }
 
-    /// Not collective. Bound on a step without material, in which free colliders move alone, s: none goes further than the Courant
-    /// number's part of a cell of a root octant, also from rest. The same on all ranks.
+    /// Not collective. Bound on a step without material, in which free colliders move alone, s: none moves
+    /// further than the Courant number times a cell of a root octant, also from rest. The same on all ranks.
     pub(super) fn free_bound(&self) -> f64 {
         let (physics, extent, time) = (&self.physics, self.grid.plan.extent(), self.clock.time);
         let way = physics.control.cfl * physics.root_edge / f64::from(BLOCK as u32);
@@ -210,8 +210,8 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Bound on the next step from the colliders: none may cross more than the Courant number's part of a cell of a
-    /// leaf with particles, and one that is away may use up its way there as well, s.
+    /// Bound on the next step from the colliders: none may cross more than the Courant number times a cell of
+    /// a leaf with particles; a collider further away may also travel up to the nearest such leaf, s.
     pub(super) fn collider_bound(&self) -> f64 {
         let mut bound = f64::INFINITY;
         let (plan, time) = (&self.grid.plan, self.clock.time);

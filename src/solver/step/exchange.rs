@@ -1,4 +1,4 @@
-//! What lives on the grid for one tree and one partition, and the exchanges of a step.
+//! The grid of one tree and one partition, and the exchanges of a step.
 use partition::comm::Traffic;
 use rayon::prelude::*;
 
@@ -11,8 +11,9 @@ use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
 
-/// By how much boxes may widen until the tree changes next without a new grid in between. A grid for boxes wider than a cell has
-/// bins of every leaf in those around it and takes three times as long to make.
+/// Factor by which boxes may widen until the next change of the tree without a new grid in between. A grid
+/// for boxes wider than a cell has bins of every leaf in those around it and takes three times as long to
+/// make.
 const GROWTH: f64 = 1.1;
 
 /// Reach that boxes of a half width need, which is given in cells.
@@ -22,8 +23,8 @@ pub(in crate::solver) fn reach_of_width(cells: f64) -> u32 {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Reach that the boxes of this rank need if they become `growth` times as wide. Where a reach is `known`,
-    /// boxes are not looked at whose bounds do not ask for more.
+    /// Not collective. Reach that the boxes of this rank need if they become `growth` times as wide. Boxes
+    /// whose bounds need no more than the `known` reach are not examined.
     fn local_reach(&self, growth: f64, known: u32) -> u32 {
         let widths = self.physics.widths(&self.grid.plan);
         let root_edge = self.physics.root_edge;
@@ -39,8 +40,8 @@ impl<const D: usize> Solver<D> {
         reaches.max().unwrap_or(0)
     }
 
-    /// Collective. Reach for a new grid: what the boxes of all ranks need, also when they have become a little wider, and once
-    /// particles that are due to merge have done so.
+    /// Collective. Reach for a new grid: enough for the boxes of all ranks, with a margin for their growth,
+    /// and for particles that are due to merge.
     pub(in crate::solver) fn agreed_reach(&self) -> u32 {
         let mut reach = [u64::from(self.local_reach(GROWTH, 0).max(self.reach_of_merges()))];
         self.comm.max_u64(&mut reach);
@@ -68,7 +69,7 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Has the arenas of a step stay as they are until the next, for measurements.
+    /// Keeps the arenas of a step until the next, for measurements.
     pub fn keep_arenas(&mut self) {
         self.grid.arenas.keep();
     }
@@ -78,12 +79,13 @@ impl<const D: usize> Solver<D> {
         &self.grid
     }
 
-    /// Not collective. Notes what the surface between partitions needs, while the arenas are those of the present tree.
+    /// Not collective. Records the data of the surface between partitions, while the arenas are those of the
+    /// present tree.
     pub(in crate::solver) fn note_surface(&mut self) {
         self.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
     }
 
-    /// Collective. What this rank holds of the tree and sends in the exchange done last.
+    /// Collective. Parts of the tree on this rank, and messages of its last exchange.
     pub fn statistics(&self) -> Statistics {
         let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
         Statistics {
@@ -96,8 +98,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Collective over neighbours. Moves particles to the leaves that contain them; those of other leaves than `may_stray` says
-    /// are in theirs.
+    /// Collective over neighbours. Moves particles to the leaves that contain them; only leaves for which
+    /// `may_stray` is true may contain others.
     pub(in crate::solver) fn migrate(
         &mut self,
         may_stray: impl Fn(usize) -> bool + Sync,
@@ -114,7 +116,8 @@ impl<const D: usize> Solver<D> {
         moved
     }
 
-    /// Collective over neighbours. Particles that have left their leaf go to the leaf, and rank, that contains them.
+    /// Collective over neighbours. Particles that have left their leaf go to the leaf, and rank, that
+    /// contains them.
     ///
     /// # Errors
     /// A particle that has left the domain or moved too far, on the rank that finds it.

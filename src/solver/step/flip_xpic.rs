@@ -1,13 +1,13 @@
 //! Velocities of the nodes before the impulse of stress, for transfers whose particles take increments.
 //!
-//! P2G adds momentum and the impulse of stress in one pass. FLIP needs the velocities without the latter as well, and
-//! XPIC filters them: with S from nodes to particles and S⁺ back, the particles of XPIC(m) take on (Hammerquist &
-//! Nairn 2017)
+//! P2G adds momentum and the impulse of stress in one pass. FLIP needs the velocities without the latter as
+//! well, and XPIC filters them: with S from nodes to particles and S⁺ back, the particles of XPIC(m) take on
+//! (Hammerquist & Nairn 2017)
 //! ```text
 //! S (Δv + Σ_{k<m} v_k),  v_0 = S⁺ V,  v_k = (1 - S⁺ S) v_{k-1}
 //! ```
-//! where V are their velocities before and Δv the change on the nodes. Each v_k is one more sweep of P2G with one
-//! more exchange, so FLIP pays for one and XPIC(m) for m beside the usual one; APIC and TPIC pay nothing.
+//! where V are their velocities before and Δv the change on the nodes. Each v_k is one more sweep of P2G with
+//! one more exchange, so FLIP needs one and XPIC(m) needs m beside the usual one; APIC and TPIC need none.
 use rayon::prelude::*;
 
 use super::node_update::{Faces, apply_faces, update_velocity};

@@ -1,6 +1,7 @@
 //! G2P: nodes to particles, in parallel over leaves.
 //!
-//! All that happens to the particles of a leaf happens at once, while they are in the cache: see `Sweep::advance_leaf`.
+//! All work on the particles of a leaf is done in one go, while they are in the cache: see
+//! `Sweep::advance_leaf`.
 use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
@@ -70,7 +71,7 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 impl<const D: usize> Scratch<D> {
-    /// Makes room for what so many cut boxes gather.
+    /// Makes room for the gathered values of cut boxes.
     fn begin_cut(&mut self, boxes: usize) {
         self.gathered.clear();
         self.gathered.resize(boxes, Gathered::default());
@@ -82,7 +83,7 @@ fn cut_of<const D: usize>(lists: Option<&LeafBins<D>>) -> &[u32] {
     lists.map_or(&[], |bins| &bins.cut)
 }
 
-/// What G2P in all leaves shares.
+/// Input of G2P, the same for all leaves.
 struct Sweep<'a, const D: usize> {
     dt: f64,
     scheme: &'a Scheme<'a>,
@@ -105,11 +106,11 @@ struct Sweep<'a, const D: usize> {
     displacement: Option<usize>,
     /// First columns of tensors that follow the deformation.
     tensors: Vec<usize>,
-    /// Sources that convey, with their numbers.
+    /// Sources that convey, with their numbers in the job.
     conveyors: Conveyors<'a, D>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
-    /// How materials flow, and how full nodes are; where there are fluids.
+    /// Flow of each material, and fill of the nodes, in jobs with fluids.
     flows: Vec<Flow>,
     fill: Option<&'a [f64]>,
 }
@@ -137,7 +138,7 @@ struct Members<'a, const D: usize> {
     lists: Option<&'a LeafBins<D>>,
 }
 
-/// What is noted of the particles of a leaf.
+/// Output of the advance of a leaf, beside its particles.
 struct Notes<'a, const D: usize> {
     maxima: &'a mut LeafMaxima<D>,
     signal: &'a mut f64,
@@ -199,7 +200,7 @@ impl<const D: usize> Solver<D> {
             let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
                 let (((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed) = notes;
-                // Of empty leaves there may be very many, and to take the time costs more than they do.
+                // There may be very many empty leaves, and measuring the time costs more than their work.
                 let is_empty = chunk.is_empty();
                 let notes = Notes { maxima, signal, pushes, near, conveyed, shift };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
@@ -252,8 +253,8 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Sweep<'_, D> {
-    /// All that happens to the particles of a leaf: they advance, their extrema are noted, those that leave are taken out, and
-    /// the others are sorted for the next P2G.
+    /// All work on the particles of a leaf: they advance, their extrema are recorded, those that leave are
+    /// taken out, and the others are sorted for the next P2G.
     fn advance_leaf(
         &self,
         scratch: &mut Scratch<D>,
@@ -308,7 +309,7 @@ impl<const D: usize> Sweep<'_, D> {
         departed
     }
 
-    /// Notes the masses of a leaf that have passed openings on their ways from `start`.
+    /// Records the masses of a leaf that have passed openings on their paths from `start`.
     fn note_passed(&self, chunk: &Chunk<D>, start: &[[f64; D]], passed: &mut Vec<(u32, f64)>) {
         for (number, opening) in &self.openings {
             for (p, start) in start.iter().enumerate() {
@@ -329,7 +330,8 @@ impl<const D: usize> Sweep<'_, D> {
         first.into_iter().chain(others)
     }
 
-    /// Advances the particles of a leaf, bin by bin, and notes those that leave it. Returns the greatest `c + |v|`, m/s.
+    /// Advances the particles of a leaf, bin by bin, and records those that leave it. Returns the greatest
+    /// `c + |v|`, m/s.
     fn gather(
         &self,
         scratch: &mut Scratch<D>,
@@ -363,13 +365,13 @@ impl<const D: usize> Sweep<'_, D> {
         if self.scheme.f_bar {
             scratch.mean_dilation.average_pressure(chunk);
         }
-        // Bins take them in turn.
+        // Bins add them one after the other.
         scratch.leavers.found.sort_unstable();
         fastest
     }
 
-    /// Advances the members of a bin whose boxes are whole; adds up what parts of the others gather. Returns as
-    /// [`Sweep::gather`].
+    /// Advances the members of a bin whose boxes are whole; sums the gathered values of the parts of the
+    /// others. Returns as [`Sweep::gather`].
     fn gather_bin(
         &self,
         scratch: &mut Scratch<D>,
@@ -401,12 +403,13 @@ impl<const D: usize> Sweep<'_, D> {
             .whole_boxes(whole, next)
     }
 
-    /// What keeps the fluids of a leaf in their volume, if there are any.
+    /// Data that keep the fluids of a leaf at their volume, if there are any.
     fn filling<'b>(&'b self, means: &'b MeanVolumes) -> Option<Filling<'b>> {
         self.fill.map(|_| Filling { flows: &self.flows, means: &means.of_particles })
     }
 
-    /// Notes the velocity gradients of the particles of a leaf; with F-bar also what the mean rate of dilation of each cell adds to them.
+    /// Records the velocity gradients of the particles of a leaf; with F-bar also the correction by the mean
+    /// rate of dilation of each cell.
     fn note_gradients(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
         let Scratch { kernel, arena, gathered, gradients, mean_dilation, .. } = scratch;
         for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {
@@ -422,12 +425,13 @@ impl<const D: usize> Sweep<'_, D> {
         }
     }
 
-    /// Whether particles of a leaf carry what follows the deformation: areas or total strains.
+    /// Whether particles of a leaf carry quantities that follow the deformation: areas or total strains.
     fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
         !self.tensors.is_empty() || has_followers(chunk, self.following)
     }
 
-    /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as [`Sweep::gather`].
+    /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as
+    /// [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
         let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, shifted, .. } = scratch;
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());

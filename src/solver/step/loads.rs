@@ -1,4 +1,4 @@
-//! Loads in a step: their effect on nodes, and what is booked of it.
+//! Loads in a step: their effect on nodes, with the sums of impulse and work.
 use rayon::prelude::*;
 
 use crate::grid::mask::block_nodes;
@@ -9,7 +9,7 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::phases::Phase;
 
-/// What a load gives to one node in one step.
+/// Impulse of a load on one node in one step.
 pub(in crate::solver) struct Push<const D: usize> {
     load: usize,
     node: usize,
@@ -17,8 +17,8 @@ pub(in crate::solver) struct Push<const D: usize> {
 }
 
 /// Applies the loads to the velocities of real nodes, in the order of the job; `start` has those at the start
-/// of the step, where a load needs them. Returns what the nodes that this rank counts get, in the order of
-/// the nodes.
+/// of the step, where a load needs them. Returns the impulses on the nodes that this rank counts, in the
+/// order of the nodes.
 fn apply<const D: usize>(
     fields: &mut NodeFields<D>,
     start: &[Row],
@@ -60,7 +60,8 @@ fn apply<const D: usize>(
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Loads change the velocities of real nodes. Returns what they gave, for [`Solver::book_loads`].
+    /// Not collective. Applies loads to the velocities of real nodes. Returns their impulses, for
+    /// [`Solver::book_loads`].
     pub(in crate::solver) fn apply_loads(&mut self, dt: f64) -> Vec<Push<D>> {
         let time = self.clock.time;
         let scaled = self.physics.has_scaled_masses();
@@ -77,7 +78,8 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Not collective. Books impulse and work of the loads once nodes have their final velocities.
+    /// Not collective. Adds impulse and work of the loads to their sums, once nodes have their final
+    /// velocities.
     pub(in crate::solver) fn book_loads(&mut self, pushes: &[Push<D>]) {
         for push in pushes {
             let row = &self.grid.fields.rows[push.node].0;

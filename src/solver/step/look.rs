@@ -1,4 +1,4 @@
-//! What the particles of a leaf gather from the nodes, without an advance.
+//! Gather for the particles of a leaf, without an advance.
 use crate::grid::arenas::Arenas;
 use crate::grid::sums::node_fields::VelocityArena;
 use crate::grid::{GridPlan, NodeFields};
@@ -8,7 +8,7 @@ use crate::particle::Chunk;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::leaf_bins::LeafBins;
 
-/// What all leaves share.
+/// Input of the gather, the same for all leaves.
 pub(super) struct Look<'a, const D: usize> {
     pub plan: &'a GridPlan<D>,
     /// Velocities of the nodes.
@@ -18,8 +18,8 @@ pub(super) struct Look<'a, const D: usize> {
 }
 
 impl<const D: usize> Look<'_, D> {
-    /// Calls `each` with the particles of an own leaf and what they gather: bin by bin those whose boxes are whole, then those whose
-    /// boxes are cut. `kernel`, `arena` and `gathered` are memory of the thread.
+    /// Calls `each` with the particles of an own leaf and their gathered values: bin by bin those whose boxes
+    /// are whole, then those whose boxes are cut. `kernel`, `arena` and `gathered` are memory of the thread.
     pub(super) fn at_leaf(
         &self,
         (kernel, arena, gathered): (&mut g2p::Scratch<D>, &mut VelocityArena<D>, &mut Vec<Gathered<D>>),

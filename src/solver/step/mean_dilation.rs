@@ -1,20 +1,22 @@
 //! F-bar: rate of dilation and pressure as means over each cell, against volumetric locking.
 //!
-//! Where plastic flow keeps the volume, every particle asks for no change of volume, which is more than the nodes of a cell can
-//! give: the material is too stiff and its pressure alternates. With F-bar the particles of a cell strain with
-//! `∇v + (θ̄ - tr ∇v) 1 / D`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the particles of the same material in the cell (de Souza Neto et
-//! al. 1996; for the material point method Coombs et al. 2018), and push with the same mean of their pressures,
-//! `τ + (p̄ - p) 1`, `p = Σ τ_ii / D`. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that of the
-//! strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of the leaf, so ranks have no part in it.
+//! Where plastic flow conserves volume, every particle requires zero dilation, which is more constraints than
+//! the nodes of a cell can satisfy: the material is too stiff and its pressure alternates. With F-bar the
+//! particles of a cell strain with `∇v + (θ̄ - tr ∇v) 1 / D`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the
+//! particles of the same material in the cell (de Souza Neto et al. 1996; for the material point method
+//! Coombs et al. 2018), and their stress acts with the same mean of their pressures, `τ + (p̄ - p) 1`,
+//! `p = Σ τ_ii / D`. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that
+//! of the strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of
+//! the leaf, so no messages are needed.
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
-/// What F-bar does in a leaf. A thread reuses its memory.
+/// F-bar in a leaf. A thread reuses its memory.
 #[derive(Default)]
 pub(in crate::solver) struct MeanDilation {
-    /// By particle: while it is found, the trace of the velocity gradient, 1/s; then what is added to its diagonal, 1/s. Empty
-    /// without F-bar.
+    /// By particle: at first the trace of the velocity gradient, 1/s; after `average` the correction
+    /// of its diagonal, 1/s. Empty without F-bar.
     pub added: Vec<f64>,
     /// Material and cell of each particle, as one number.
     places: Vec<u32>,
@@ -23,7 +25,7 @@ pub(in crate::solver) struct MeanDilation {
 }
 
 impl MeanDilation {
-    /// Begins with the particles of a leaf, where they are ahead of their advance.
+    /// Starts with the particles of a leaf, at their places before the advance.
     pub(in crate::solver) fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, cells: &LeafCells<D>) {
         self.added.clear();
         self.added.resize(chunk.len(), 0.0);
@@ -34,12 +36,12 @@ impl MeanDilation {
         }));
     }
 
-    /// Notes the velocity gradient of a particle, 1/s.
+    /// Records the velocity gradient of a particle, 1/s.
     pub(in crate::solver) fn note<const D: usize>(&mut self, p: usize, gradient: &[[f64; D]; D]) {
         self.added[p] = (0..D).map(|i| gradient[i][i]).sum();
     }
 
-    /// Sums up a value of each particle, by volume.
+    /// Sums a value of each particle in each cell, weighted by volume.
     fn sum<const D: usize>(&mut self, chunk: &Chunk<D>, value: impl Fn(usize) -> f64) {
         let half = chunk.column(Layout::<D>::HALF);
         self.sums.clear();
@@ -60,7 +62,7 @@ impl MeanDilation {
         sum / volume
     }
 
-    /// Once all gradients are noted: what the mean adds to them.
+    /// Once all gradients are recorded: replaces the traces by the corrections.
     pub(in crate::solver) fn average<const D: usize>(&mut self, chunk: &Chunk<D>) {
         let rates = std::mem::take(&mut self.added);
         self.sum(chunk, |p| rates[p]);
@@ -70,7 +72,7 @@ impl MeanDilation {
         }
     }
 
-    /// Once all have advanced: each has the mean pressure of the cell in which it was.
+    /// Once all particles have advanced: gives each the mean pressure of the cell in which it was.
     pub(in crate::solver) fn average_pressure<const D: usize>(&mut self, chunk: &mut Chunk<D>) {
         let diagonal = |chunk: &Chunk<D>, p: usize| chunk.read::<D>(Layout::<D>::STRESS, p);
         let mean = |stress: [f64; D]| stress.iter().sum::<f64>() / D as f64;
@@ -98,7 +100,8 @@ mod tests {
         chunk
     }
 
-    /// Each cell keeps its rate of change of volume, which its particles share; materials do not mix.
+    /// Each cell keeps its rate of change of volume, the same for all its particles of a material; materials
+    /// do not mix.
     #[test]
     fn particles_of_a_cell_share_its_dilation() {
         let chunk = leaf(&[

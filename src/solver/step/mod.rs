@@ -6,7 +6,7 @@
 //! | [`p2g`] | particles to nodes, over all bins |
 //! | [`node_update`] | velocities of nodes; conditions on faces |
 //! | [`g2p`] | nodes to particles, over all leaves |
-//! | `look` | what the particles of a leaf gather, without an advance |
+//! | `look` | gather for the particles of a leaf, without an advance |
 //! | `mean_dilation` | F-bar: dilation as the mean over cells |
 //! | `fill` | fluids keep their volume |
 //! | `exchange` | sums and particles between ranks |

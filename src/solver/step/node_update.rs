@@ -26,7 +26,7 @@ impl<const D: usize> Solver<D> {
         dt: f64,
         rates: &[Rate<D>],
     ) -> (Vec<[ExactSum; SUMS]>, Result<(), BinMissing>) {
-        // With mass scaling particles have brought their weight.
+        // With mass scaling the weight of particles is in their momentum.
         let gravity = match self.physics.has_scaled_masses() {
             false => self.physics.gravity.at(self.clock.time + 0.5 * dt),
             true => [0.0; D],
@@ -58,8 +58,8 @@ impl<const D: usize> Solver<D> {
         (impulses, held)
     }
 
-    /// Not collective. Holds the nodes on faces of the domain to their conditions, and sums up the impulses on these if that is asked
-    /// for and this is part of a step, from the nodes that this rank counts.
+    /// Not collective. Applies the conditions of the faces of the domain to the nodes on them. In a step, it
+    /// also sums the impulses on the faces from the nodes that this rank counts, if these are needed.
     pub(super) fn apply_faces(&mut self, dt: f64, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
         let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
@@ -79,14 +79,15 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and upper along each axis; nothing
-    /// where nobody asks.
+    /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and
+    /// upper along each axis; empty if not needed.
     pub fn face_forces(&self) -> Vec<[f64; 3]> {
         let mean = |impulse: f64| self.face_sums.mean(impulse, self.clock.time);
         self.face_sums.totals(&self.comm).into_iter().map(|impulse| impulse.map(mean)).collect()
     }
 
-    /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the increments alike.
+    /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the
+    /// increments alike.
     pub(in crate::solver) fn prolong_velocities(&mut self) {
         self.for_each_field(|solver, _| {
             solver.form_increments();
@@ -94,7 +95,7 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Interpolates what the rows of real nodes hold on constrained nodes.
+    /// Not collective. Interpolates the rows of constrained nodes from those of real nodes.
     pub(in crate::solver) fn prolong(&mut self) {
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
@@ -149,8 +150,8 @@ impl<'a, const D: usize> Faces<'a, D> {
     }
 }
 
-/// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` gets face, node and what the node gives
-/// to the face, kg m/s.
+/// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` receives
+/// face, node and the impulse of the node on the face, kg m/s.
 pub fn apply_faces<const D: usize>(
     fields: &mut NodeFields<D>,
     plan: &GridPlan<D>,

@@ -11,8 +11,8 @@ use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
-    /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut. Each velocity field has lists
-    /// of its own particles.
+    /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut.
+    /// Each velocity field has lists of its own particles.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.
@@ -39,9 +39,9 @@ impl<const D: usize> Solver<D> {
         self.grid.others = others;
     }
 
-    /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on real nodes, summed over all
-    /// ranks, with the forces f that act on particles; with FLIP and XPIC also `p_j` without forces. With mass scaling m is the mass with
-    /// which a particle moves.
+    /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on
+    /// real nodes, summed over all ranks, with the forces f that act on particles; with FLIP and XPIC also
+    /// `p_j` without forces. With mass scaling m is the mass with which a particle moves.
     pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
         self.scatter_volumes();
         self.scale_masses(|mass, scale| mass * scale);
@@ -52,7 +52,8 @@ impl<const D: usize> Solver<D> {
         self.scale_masses(|mass, scale| mass / scale);
     }
 
-    /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in each velocity field.
+    /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in
+    /// each velocity field.
     pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
         self.for_each_field(|solver, _| solver.field_from_particles(dt));
     }
@@ -65,8 +66,9 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Turns affine matrices C, as a new state gives them, into the `B = C D` that APIC keeps; transfers by increments
-    /// keep none. In each own leaf the first particles, as many as `done`, have theirs, and so have those of bodies that bring them.
+    /// Turns the affine matrices C of a new state into the `B = C D` that APIC keeps; transfers by increments
+    /// keep none. The first particles of each own leaf, as many as `done`, already have B, and so have
+    /// particles of bodies that come with it.
     pub(in crate::solver) fn moments_from_affine(&mut self, done: &[usize]) -> Result<(), BinMissing> {
         match self.physics.transfer {
             Transfer::Apic => {}
@@ -91,7 +93,7 @@ impl<const D: usize> Solver<D> {
         let with_moments = &self.physics.with_moments;
         let chunks = self.chunks.par_iter_mut().enumerate().filter(|(leaf, _)| lists.has_members(*leaf));
         chunks.for_each(|(leaf, chunk)| {
-            // Those of other fields keep theirs.
+            // Particles of other fields keep theirs.
             let spreads =
                 spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme);
             let tags: Vec<u64> = if with_moments.is_empty() { Vec::new() } else { chunk.tags().to_vec() };
@@ -130,7 +132,8 @@ pub(super) fn scatter<const D: usize>(
     }
 }
 
-/// Second moments D of the weights, m², of the particles of a leaf that are sorted into these bins; 1 for others.
+/// Second moments D of the weights, m², of the particles of a leaf that are sorted into these bins; 1 for
+/// others.
 pub(super) fn spreads<'a, const D: usize>(
     bins: impl Iterator<Item = BinView<'a, D>>,
     chunk: &Chunk<D>,

@@ -1,8 +1,10 @@
 //! The way to equilibrium: kinetic damping.
 //!
-//! While matter falls towards equilibrium its kinetic energy rises; where it has passed a peak, all velocities are set to 0, and the
-//! next fall begins from rest closer to it (Cundall 1976). The step from rest shows the unbalanced force, with the reactions of loads,
-//! colliders and faces: nodes then have the velocity `Δt f / m`. After it all keeps 1/√2 of its velocity, so that stops add to no mode. The energy is an exact sum over nodes, so the peaks do not depend on ranks.
+//! While material moves towards equilibrium its kinetic energy rises; after a peak all velocities are set to
+//! 0, and motion starts again from rest, closer to equilibrium (Cundall 1976). The step from rest shows the
+//! unbalanced force, with the reactions of loads, colliders and faces: nodes then have the velocity
+//! `Δt f / m`. After it all velocities are multiplied by 1/√2, so that stops excite no mode. The energy is an
+//! exact sum over nodes, so the peaks do not depend on ranks.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
@@ -14,9 +16,10 @@ use crate::solver::state::Solver;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Sums over the real nodes that this rank counts, for [`Solver::relax`], in jobs that ask for equilibrium: kinetic
-    /// energy of the masses with which they move; masses of the material; and `½ s m v²` with mass scaling by s, so that after a step from
-    /// rest, `v = Δt f / m`, it is `½ Δt² f² s / m`, the force over the mass of the material.
+    /// Not collective. Sums over the real nodes that this rank counts, for [`Solver::relax`], in jobs that
+    /// relax to equilibrium: kinetic energy of the masses with which they move; masses of the material; and
+    /// `½ s m v²` with mass scaling by s, so that after a step from rest, `v = Δt f / m`, it is
+    /// `½ Δt² f² s / m`, the force over the mass of the material.
     pub(in crate::solver) fn note_motion(&mut self) {
         if self.physics.equilibrium.is_none() {
             return;
@@ -55,8 +58,8 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Collective. Sets velocities to 0 after a step in which the kinetic energy fell, in jobs that ask for equilibrium. True once
-    /// that is reached.
+    /// Collective. Sets velocities to 0 after a step in which the kinetic energy fell, in jobs that relax to
+    /// equilibrium. True once that is reached.
     pub(in crate::solver) fn relax(&mut self, dt: f64) -> bool {
         let Some(asked) = self.physics.equilibrium else { return false };
         let (comm, motion) = (&self.comm, &mut self.motion);

@@ -1,8 +1,8 @@
 //! Sources in a step: particles in their shapes move with their velocity, and new layers enter at the end.
 //!
-//! What a source conveys takes part in the sums of nodes with its velocity, and keeps its state through the
-//! step: it pushes what lies ahead like a piston, and bears no load. The momentum and the kinetic energy that
-//! this takes are booked with those that it brought.
+//! Particles in the shape of a source contribute to the sums of nodes with its velocity, and keep their state
+//! through the step: they push the material ahead like a piston, and bear no load. The momentum and the
+//! kinetic energy that this requires are added to those of the particles that enter.
 use crate::geometry::{Aabb, Side};
 use crate::grid::leaf_geometry::position_key;
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -11,16 +11,16 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::SourcePush;
 use crate::source::Source;
 
-/// Particles of a leaf that are in the shapes of their sources, with their state ahead of the step.
+/// Particles of a leaf that are in the shapes of their sources, with their state before the step.
 #[derive(Debug, Default)]
 pub(super) struct Conveyed {
     /// Their indices, ascending, with the places of their sources in the list.
     particles: Vec<(u32, usize)>,
-    /// All columns of one after those of another.
+    /// All columns, particle by particle.
     state: Vec<f64>,
 }
 
-/// Sources that convey, with their numbers.
+/// Sources that convey, with their numbers in the job.
 pub(super) type Conveyors<'a, const D: usize> = Vec<(u32, &'a Source<D>)>;
 
 /// The sources that convey in a step from a time, s.
@@ -29,7 +29,7 @@ pub(super) fn conveyors<const D: usize>(physics: &Physics<D>, time: f64) -> Conv
 }
 
 impl Conveyed {
-    /// Those of a leaf with these corners, m.
+    /// Conveyed particles of a leaf with these corners, m.
     pub(super) fn of_leaf<const D: usize>(
         conveyors: &[(u32, &Source<D>)],
         chunk: &Chunk<D>,
@@ -69,8 +69,8 @@ impl Conveyed {
         self.particles.binary_search_by_key(&p, |(p, _)| *p).is_ok()
     }
 
-    /// Gives them the state back that they had ahead of a step of length `dt` (s), moved with their sources,
-    /// and notes what that took.
+    /// Restores the state that they had before a step of length `dt` (s), moved with their sources, and
+    /// records the impulse and work of that.
     pub(super) fn convey<const D: usize>(
         &self,
         conveyors: &[(u32, &Source<D>)],
@@ -101,7 +101,7 @@ fn square<const D: usize>(velocity: &[f64; D]) -> f64 {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Books what sources gave to particles in their shapes.
+    /// Not collective. Adds the impulse and work of sources on particles in their shapes to the sums.
     pub(in crate::solver) fn book_conveyed(&mut self) {
         for push in self.conveyed.iter().flatten() {
             let sums = &mut self.source_sums.of[push.source as usize];
@@ -110,7 +110,7 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Not collective. Layers enter that are due in the step under way, which ends at the time `to`, s. All
+    /// Not collective. Adds the layers that are due in the present step, which ends at the time `to`, s. All
     /// ranks number all particles, and make those in their own leaves; behind the arrivals there, as if they
     /// came from leaves at the end of the curve.
     pub(in crate::solver) fn feed(&mut self, to: f64) {
@@ -129,7 +129,7 @@ impl<const D: usize> Solver<D> {
                 for x in source.layer(layer, to) {
                     let id = ledger.next_root;
                     ledger.next_root += 1;
-                    // A shape at a face of the domain may end within the way of a step.
+                    // A shape at a face of the domain may end within the displacement of a step.
                     let x: [f64; D] = std::array::from_fn(|a| x[a].clamp(0.0, extent[a].next_down()));
                     let tree = &plan.tree;
                     let known = tree.locate(position_key(x, tree.brick().roots, physics.root_edge));
@@ -152,8 +152,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Collective. Particles that each source has fed since the start of this process, and those of them that
-    /// came where other material lay.
+    /// Collective. Particles that each source has fed since the start of this process, and those among them
+    /// that entered where other material was.
     pub fn fed_totals(&self) -> Vec<[u64; 2]> {
         let mut all = self.fed.clone();
         self.comm.sum_u64(all.as_flattened_mut());
@@ -161,7 +161,8 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Whether half of the box of a particle that comes, along each axis, lies in that of one that is there.
+/// Whether half of the box of an entering particle, along each axis, lies in the box of a particle of the
+/// chunk.
 fn is_taken<const D: usize>(chunk: &Chunk<D>, x: &[f64; D], half: f64) -> bool {
     let halves = chunk.column(Layout::<D>::HALF);
     (0..chunk.len()).any(|q| {

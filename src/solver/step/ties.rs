@@ -1,4 +1,5 @@
-//! Surface nodes that move with the material beside them: which cells are well filled, and what holds nodes.
+//! Surface nodes that move with the material beside them: which cells are well filled, and which nodes are
+//! fixed by other conditions.
 use rayon::prelude::*;
 
 use crate::boundary::Collider;
@@ -13,11 +14,13 @@ use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::{Inside, is_still};
 use crate::solver::state::phases::Phase;
 
-/// Share of its volume from which a cell is well filled. A little less than one half, so that cells that are half full, as at the surface of
-/// a body that ends in the middle of cells, do not change sides with every wave.
+/// Share of its volume from which a cell is well filled. A little less than one half, so that cells that are
+/// half full, as at the surface of a body that ends in the middle of cells, do not change state with every
+/// wave.
 const WELL_FILLED: f64 = 0.47;
 
-/// The cells of a leaf that particles with their centres in them fill well, a bit each. `volume` is that of a cell.
+/// The cells of a leaf that particles with their centres in them fill well, a bit each. `volume` is that of a
+/// cell.
 fn well_filled<const D: usize>(
     chunk: &Chunk<D>,
     cells: &LeafCells<D>,
@@ -45,8 +48,9 @@ fn well_filled<const D: usize>(
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, which is in the place of the first and whose
-    /// rows hold velocities, in jobs with ties. Nodes on faces of the domain and inside colliders stay with these.
+    /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, which is in
+    /// the place of the first and whose rows hold velocities, in jobs with ties. Nodes on faces of the domain
+    /// and inside colliders follow these.
     pub(super) fn tie_surface(&mut self, field: usize) {
         let Some(mut ties) = self.grid.ties.take() else { return };
         let group = self.physics.group(field);
@@ -76,7 +80,7 @@ impl<const D: usize> Solver<D> {
         self.phases.time(Phase::Nodes, || {
             ties.tie(plan, fields, |block, nodes| {
                 let all = colliders.iter().map(|&(index, collider)| {
-                    // What is known of colliders that never move is known of all real nodes.
+                    // The known nodes inside colliders that never move cover all real nodes.
                     let known = still.get(block).and_then(|of_block| of_block.get(index)?.as_ref());
                     match known.filter(|_| is_still(collider)) {
                         Some(inside) => inside.nodes & nodes,

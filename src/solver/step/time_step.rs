@@ -9,9 +9,11 @@ use crate::solver::state::Solver;
 use crate::solver::state::relaxation::{FROM_REST, RelaxPhase};
 use crate::source::Source;
 
-/// Least length of a step on the way to equilibrium, as a share of what the material allows. A stop shortens the step, and growth makes up for it in
-/// four steps: where stops follow each other faster, as those of noise do that no transfer keeps, lengths would fall without end. That a step is
-/// shorter after a stop is of use: a stop comes one step late, and so does nothing to motions of whose period a few steps are half.
+/// Least length of a step on the way to equilibrium, as a share of the bound from the material. A stop
+/// shortens the step, and growth recovers that in four steps: if stops follow each other faster, as with
+/// noise that the transfer does not retain, lengths would decrease without limit. The shorter step after a
+/// stop is useful: a stop comes one step late, and so has no effect on motions with a period of only a few
+/// steps.
 const SHORTEST: f64 = 0.5;
 
 impl<const D: usize> Solver<D> {
@@ -23,7 +25,7 @@ impl<const D: usize> Solver<D> {
         let bound = if self.clock.bound.is_finite() { self.clock.bound } else { self.free_bound() };
         let bound = bound.min(self.physics.source_bound(self.clock.time));
         let mut dt = bound.min(control.dt_max.unwrap_or(f64::INFINITY));
-        // Where no material bounds the step, there is nothing that a longer one could disturb.
+        // Without a bound from material, a longer step disturbs nothing.
         if self.clock.dt > 0.0 && self.clock.bound.is_finite() {
             let least = if self.physics.equilibrium.is_some() { SHORTEST * bound } else { 0.0 };
             dt = dt.min((control.growth * self.clock.dt).max(least));
@@ -34,12 +36,13 @@ impl<const D: usize> Solver<D> {
         dt.min(limit)
     }
 
-    /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over
-    /// the sum of wave speed and particle speed; nor may gravity take a particle at rest further than that part of a cell,
-    /// `g Δt² ≤ cfl h`. Colliders bound the step as well. With mass scaling by s, waves and falls are slower by √s.
+    /// Courant bound of this rank's particles: the finest cell that the particles of a leaf touch, over the
+    /// sum of wave speed and particle speed; also, gravity may move a particle at rest by at most that share
+    /// of a cell, `g Δt² ≤ cfl h`. Colliders bound the step as well. With mass scaling by s, waves and falls
+    /// are slower by √s.
     pub(in crate::solver) fn local_bound(&self) -> f64 {
         let plan = &self.grid.plan;
-        // Scaled, so that no square overflows.
+        // Scaled so that no square overflows.
         let gravity = self.physics.gravity.at(self.clock.time);
         let greatest = gravity.iter().fold(0.0, |greatest: f64, g| greatest.max(g.abs()));
         let gravity = match greatest > 0.0 {
@@ -57,16 +60,16 @@ impl<const D: usize> Solver<D> {
         particles.min(self.collider_bound())
     }
 
-    /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, m/s, from the materials at rest: quick, for
-    /// each change of the tree.
+    /// Not collective. Greatest sum of wave speed and particle speed in each own leaf, m/s, from the
+    /// materials at rest: quick, for each change of the tree.
     pub(in crate::solver) fn signals_at_rest(&self) -> Vec<f64> {
         let (physics, plan) = (&self.physics, &self.grid.plan);
         let signal = |(leaf, chunk): (usize, _)| physics.signal_at_rest(chunk, plan.finest_cell(leaf));
         self.chunks.par_iter().enumerate().with_min_len(64).map(signal).collect()
     }
 
-    /// Not collective. The same with the wave speeds under the stress that the particles have, where these are greater: for the
-    /// first step of bodies that begin under stress.
+    /// Not collective. The same with the wave speeds under the stress that the particles have, where these
+    /// are greater: for the first step of bodies that begin under stress.
     pub(in crate::solver) fn signals_under_stress(&self) -> Vec<f64> {
         let (physics, plan) = (&self.physics, &self.grid.plan);
         let signal = |(leaf, chunk): (usize, _)| {
@@ -78,8 +81,8 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Physics<D> {
-    /// Bound of the sources on a step from a time (s): no material that enters in it moves on by more than a
-    /// part of a cell, or as much as waves in it may cross.
+    /// Bound of the sources on a step from a time (s): the Courant bound of the material that enters, or the
+    /// time until the next layer if that is longer.
     fn source_bound(&self, time: f64) -> f64 {
         let of_each = self.sources.iter().map(|source| {
             let cell = self.root_edge / f64::from(4_u32 << source.level);
@@ -95,7 +98,8 @@ impl<const D: usize> Physics<D> {
         material.wave_speed() + material.viscous_speed(cell) + speed
     }
 
-    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest on cells of edge `cell` (m).
+    /// Greatest `c + |v|` of a leaf's particles, m/s, with the wave speed c of their material at rest on
+    /// cells of edge `cell` (m).
     fn signal_at_rest(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let mut fastest: f64 = 0.0;
         for (tile, tags) in tiles_of(chunk) {
@@ -107,8 +111,8 @@ impl<const D: usize> Physics<D> {
         fastest
     }
 
-    /// Greatest `c + |v|` of those of a leaf's particles, eight at a time, that are under stress, m/s, on cells of
-    /// edge `cell` (m).
+    /// Greatest `c + |v|` of those of a leaf's particles, eight at a time, that are under stress, m/s, on
+    /// cells of edge `cell` (m).
     fn signal_under_stress(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let mut fastest: f64 = 0.0;
         for (tile, tags) in tiles_of(chunk) {

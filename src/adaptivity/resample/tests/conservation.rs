@@ -1,4 +1,4 @@
-//! What splits and merges keep.
+//! Conservation in splits and merges.
 use super::*;
 
 fn splitting_conserves<const D: usize>(seed: u64) {
@@ -66,7 +66,7 @@ fn merging_strangers_conserves<const D: usize>(seed: u64) {
     let scheme = scheme(&materials, Transfer::Apic);
     for kind in 0..KINDS {
         let mut chunk = particles::<D>(seed, 1, 2, Some(kind));
-        // As large as on level 2, which they are made for.
+        // Sizes of level 2, for which they are made.
         (0..chunk.len()).for_each(|p| {
             let tag = Tag::unpack(chunk.tags()[p]);
             chunk.tags_mut()[p] = Tag { level: 2, ..tag }.pack();
@@ -78,7 +78,7 @@ fn merging_strangers_conserves<const D: usize>(seed: u64) {
         assert_eq!(report.unnamed.len() as u64, report.merged);
         assert!(chunk.ids().iter().all(|id| ids.contains(id)));
         let after = totals(&chunk);
-        // Where the material flows on return, that work comes on top.
+        // Where the return mapping flows, its work is added.
         assert_conserved(&before, &after, 2e-14, 1);
         let work = before.sums.len() - 1;
         assert!(after.sums[work].0 >= before.sums[work].0 * (1.0 - 1e-13));
@@ -104,8 +104,8 @@ fn assert_admissible<const D: usize>(chunk: &Chunk<D>, p: usize) {
     assert!(material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0] > 0.0);
 }
 
-/// Drawn out along some line to three times their width while they get thinner, particles become two, and these again two where the
-/// line is not yet filled.
+/// Drawn out along some line to three times their width while they get thinner, particles become two, and
+/// these again two where the line is not yet filled.
 fn closing_gaps_conserves<const D: usize>(seed: u64) {
     let materials = materials();
     let scheme = Scheme { shares: 1, ..scheme(&materials, Transfer::Apic) };
@@ -145,7 +145,7 @@ fn closing_gaps_conserves<const D: usize>(seed: u64) {
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), 2 * number);
-    // What has grown as well is torn, and stays.
+    // Particles whose space has also grown in volume are torn, and do not split.
     (1..=columns).for_each(|c| {
         chunk.carried_mut(c).iter_mut().for_each(|e| *e = if c <= D.min(2) { 99.0 } else { 0.0 })
     });

@@ -47,7 +47,8 @@ fn limits_are_respected() {
     );
 }
 
-/// What is found from elastic tensors, before there are strains, must not keep anyone apart whom the limit does not.
+/// The test by elastic tensors, before strains are known, must refuse no group that the limit on strain
+/// admits.
 #[test]
 fn strains_count_whatever_the_stretch() {
     let materials = materials();
@@ -57,7 +58,7 @@ fn strains_count_whatever_the_stretch() {
     split_all(&mut family, &setting(&scheme, 2));
     for strain in [1e-6, 0.01, 0.2, 0.7] {
         for (child, sign) in [(0, 1.0), (0, -1.0), (3, 1.0), (3, -1.0)] {
-            // A quarter of what one of four differs by is in the mean.
+            // The mean contains a quarter of the difference of one of four.
             let merges = |difference: f64| {
                 let mut chunk = family.clone();
                 let xx = &mut chunk.column_mut(Layout::<2>::LEFT_CAUCHY_GREEN)[child];
@@ -175,6 +176,6 @@ fn families_wait_for_siblings_beyond_a_face() {
     assert_eq!(separated(&family, &setting, &OPEN, &upper_leaf, 0b11), []);
     assert_eq!(merged(&mut family, &upper_leaf), 3);
     assert_eq!(family.ids(), [parent]);
-    // Far from all faces the others will not come any more.
+    // Far from all faces, the missing siblings cannot come.
     assert_eq!(merged(&mut upper, &everywhere()), 1);
 }

@@ -1,4 +1,4 @@
-//! Tests of splitting and merging: what they share.
+//! Tests of splitting and merging: common set-up and comparisons.
 use super::family::{Bounds, separated};
 use super::*;
 use crate::kernel::Transfer;
@@ -51,8 +51,8 @@ impl Numbers {
     }
 }
 
-/// Particles of a level, each at random in its own cell of a lattice of `1 / per_edge` of the nominal spacing of that
-/// level, in states that their materials admit. Materials by index, or the one given.
+/// Particles of a level, each at random in its own cell of a lattice of `1 / per_edge` of the nominal spacing
+/// of that level, in states that their materials admit. Materials by index, or the one given.
 fn particles<const D: usize>(seed: u64, level: u8, per_edge: usize, kind: Option<u16>) -> Chunk<D> {
     let mut numbers = Numbers(seed);
     let mut chunk = Chunk::new();
@@ -105,7 +105,7 @@ fn elastic<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 6] {
     })
 }
 
-/// What is conserved, each with the sum of absolute values that its rounding errors scale with.
+/// Conserved quantities, each with the sum of absolute values with which its rounding errors scale.
 #[derive(Default)]
 struct Totals {
     mass: f64,
@@ -163,7 +163,7 @@ fn spreads<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, which: &[u32]
     half.iter().map(|half| half.map(|half| half * half / 3.0 + cell * cell / 8.0)).collect()
 }
 
-/// Splits all particles; returns the energy booked.
+/// Splits all particles; returns the kinetic energy added, J.
 fn split_all<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>) -> f64 {
     let wanted = needs_split(chunk, setting, None);
     assert_eq!((wanted.which.len(), wanted.refused), (chunk.len(), 0));
@@ -188,8 +188,8 @@ fn merge_all<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, limits:
     (report, energy)
 }
 
-/// Compares all particles; columns to `tolerance` of their greatest value (stress: of the modulus), identifiers and tags
-/// exactly.
+/// Compares all particles; columns to `tolerance` of their greatest value (stress: of the modulus),
+/// identifiers and tags exactly.
 fn assert_same<const D: usize>(a: &Chunk<D>, b: &Chunk<D>, tolerance: f64) {
     assert_eq!(a.ids(), b.ids());
     assert_eq!(a.tags(), b.tags());

@@ -16,7 +16,7 @@ use crate::solver::state::grid::{BetweenBodies, Grid, Solids, VelocityField};
 use crate::solver::step::p2g::scatter;
 
 impl<const D: usize> Grid<D> {
-    /// Per block, its real nodes at which two velocity fields have mass.
+    /// Real nodes of each block at which two velocity fields have mass.
     pub(super) fn nodes_where_fields_meet(&self) -> Vec<u64> {
         let nodes = block_nodes(D);
         let all: Vec<&NodeFields<D>> = self.all_fields().collect();
@@ -180,7 +180,7 @@ impl<const D: usize> Solver<D> {
         let plan = &self.grid.plan;
         let own_bins = (0..self.chunks.len()).map(|leaf| (plan.leaf_bins(leaf).start, Window::FULL));
         self.grid.arenas.occupy(plan, &self.grid.seam, own_bins);
-        // What bins tell of their members is not asked for.
+        // Members of bins are not used.
         let cells: Vec<f64> = (0..plan.levels()).map(|level| plan.cell(level as u8)).collect();
         let levels: Vec<u8> = plan.bins.iter().map(|bin| bin.block.level).collect();
         self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
@@ -196,7 +196,8 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Calls `each` with the nodes of an arena that are corners of cells of the leaf's block, and the number of these cells.
+/// Calls `each` with the nodes of an arena that are corners of cells of the leaf's block, and the number of
+/// these cells.
 fn for_each_corner<const D: usize>(mut each: impl FnMut(usize, u32)) {
     let along = BLOCK + 1;
     for corner in 0..along.pow(D as u32) {

@@ -47,8 +47,8 @@ impl<const D: usize> Solver<D> {
         sorted
     }
 
-    /// Collective. Mean force of each contact of the job on its first side since the last row of the history, and its work since the
-    /// start.
+    /// Collective. Mean force of each contact of the job on its first side since the last row of the history,
+    /// and its work since the start.
     pub fn body_totals(&self) -> Vec<ForceAndWork> {
         self.body_sums.force_and_work(&self.comm, self.clock.time)
     }

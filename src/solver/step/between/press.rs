@@ -1,4 +1,4 @@
-//! Impulses at the nodes where bodies meet.
+//! Impulses of contact at the nodes where bodies meet.
 use rayon::prelude::*;
 
 use crate::boundary::BodyContacts;
@@ -12,22 +12,23 @@ use crate::solver::state::phases::Phase;
 /// Sweeps over the pairs of a node where more than two bodies meet; one is exact for two.
 const SWEEPS: usize = 8;
 
-/// Least area of surface at a node whose pressure particles take, in faces of its cells. A surface that has less is nearly a cell from the node, where
-/// the mass of one of the bodies, and with it the force, is small and its error is not.
+/// Least area of surface at a node whose pressure particles take, in faces of its cells. A surface that has
+/// less is nearly a cell from the node, where the mass of one of the bodies, and with it the force, is small
+/// but its error is not.
 const LEAST_AREA: f64 = 0.25;
 
-/// What the nodes of one block have got in one step.
+/// Results at the nodes of one block in a step.
 #[derive(Default)]
 struct Pressed<const D: usize> {
     /// New velocities, with the numbers of their nodes and fields.
     velocities: Vec<(usize, usize, [f64; D])>,
-    /// Of the nodes that this rank counts.
+    /// Impulse and work at the nodes that this rank counts.
     booked: Vec<Booked<D>>,
-    /// How bodies press, if particles carry it.
+    /// Normal forces, if particles carry the pressure of contact.
     forces: Vec<NormalForce>,
 }
 
-/// How others press on a body at a node.
+/// Normal force of other bodies on a body at a node.
 pub(super) struct NormalForce {
     /// Number of the node.
     pub(super) node: usize,
@@ -39,7 +40,7 @@ pub(super) struct NormalForce {
     pub(super) area: f64,
 }
 
-/// What a pair of bodies gives to the contact of the job that it belongs to.
+/// Impulse and work of a pair of bodies, for the contact of the job to which it belongs.
 struct Booked<const D: usize> {
     contact: u16,
     /// Impulse on the contact's first side, kg m/s.
@@ -58,17 +59,18 @@ struct Body<const D: usize> {
     pressed: [f64; 2],
 }
 
-/// What a pair of bodies does to each other at a node.
+/// Impulse and normal force between a pair of bodies at a node.
 struct Exchange<const D: usize> {
-    /// Impulse on the second, kg m/s.
+    /// Impulse on the second body, kg m/s.
     impulse: [f64; D],
     /// Normal force, N, and the area on which it acts, m² (in plane strain m).
     pressed: [f64; 2],
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Presses the bodies at the real nodes where fields meet, given block by block, and books it from the nodes that
-    /// this rank counts. Returns the normal forces at these nodes if particles carry their pressure.
+    /// Not collective. Applies the impulses of contact at the real nodes where fields meet, given block by
+    /// block, and sums impulse and work over the nodes that this rank counts. Returns the normal forces at
+    /// these nodes if particles carry their pressure.
     pub(super) fn press(&mut self, meets: &[u64], dt: f64) -> Vec<NormalForce> {
         let grid = &self.grid;
         let press = Press {
@@ -103,7 +105,7 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// What pressing needs to know.
+/// Input of contact between bodies at nodes.
 struct Press<'a, const D: usize> {
     plan: &'a GridPlan<D>,
     /// Velocities and masses of each field.
@@ -111,13 +113,13 @@ struct Press<'a, const D: usize> {
     /// Where the surfaces are.
     between: Option<&'a BetweenBodies<D>>,
     contacts: &'a BodyContacts,
-    /// Whether normal forces are asked for.
+    /// Whether normal forces are needed.
     finds_forces: bool,
     dt: f64,
 }
 
 impl<const D: usize> Press<'_, D> {
-    /// These nodes of a block, where bodies meet.
+    /// Contact at these nodes of a block, where bodies meet.
     fn block(&self, block: usize, nodes: u64) -> Pressed<D> {
         let first = block * block_nodes(D);
         let mut pressed = Pressed::default();
@@ -150,7 +152,8 @@ impl<const D: usize> Press<'_, D> {
         pressed
     }
 
-    /// Presses the bodies at a node, pair by pair. Adds what is to be booked if the node is counted. Returns whether any has another velocity.
+    /// Applies the contact of bodies at a node, pair by pair. Adds impulse and work to the sums if the node
+    /// is counted. Returns whether any velocity changes.
     fn node(
         &self,
         node: usize,
@@ -190,7 +193,7 @@ impl<const D: usize> Press<'_, D> {
         is_pressed
     }
 
-    /// What two bodies do to each other at a node. `None` where nothing says how they meet.
+    /// Impulse and normal force between two bodies at a node. `None` where no surface between them is known.
     fn exchange(&self, node: usize, bodies: [Body<D>; 2], pair: Option<&Pair>) -> Option<Exchange<D>> {
         let [first, second] = bodies;
         let relative = std::array::from_fn(|a| first.velocity[a] - second.velocity[a]);

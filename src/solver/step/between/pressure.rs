@@ -7,11 +7,11 @@ use crate::solver::state::Solver;
 use crate::solver::state::grid::Solids;
 use crate::solver::state::phases::Phase;
 
-/// Share of the last step in the mean that particles carry.
+/// Weight of the last step in the mean that particles carry.
 const LAST: f64 = 0.05;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Has the mean of the pressure fade by one step, ahead of what the step adds.
+    /// Not collective. Reduces the mean of the pressure by one step, before the step adds its share.
     pub(super) fn fade_pressures(&mut self) {
         let Some(column) = self.physics.contact_pressure_column() else { return };
         let chunks = self.chunks.par_iter_mut().with_min_len(64);
@@ -19,7 +19,8 @@ impl<const D: usize> Solver<D> {
         carrying.for_each(|chunk| chunk.carried_mut(column).iter_mut().for_each(|mean| *mean *= 1.0 - LAST));
     }
 
-    /// Not collective. Gives particles near nodes where bodies meet the pressure `Σ w F / Σ w A` of the normal forces F on areas A there.
+    /// Not collective. Gives particles near nodes where bodies meet the pressure `Σ w F / Σ w A` of the
+    /// normal forces F on areas A there.
     pub(super) fn carry_pressures(&mut self, forces: &[NormalForce]) {
         let (Some(column), Some(mut between)) =
             (self.physics.contact_pressure_column(), self.grid.between.take())

@@ -16,12 +16,13 @@ use crate::solver::state::phases::Phase;
 /// Gap up to which particles at rest are in contact, as a share of the distance at which they touch.
 const REACH: f64 = 0.25;
 
-/// How many times the way that a particle goes in a step it looks ahead.
+/// Look-ahead distance of a particle over its displacement in a step.
 const AHEAD: f64 = 2.0;
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. The particles of each own leaf in reach of the colliders that act on particles that move with the velocity field numbered
-    /// `field`, and in `near` those of all fields so far that may come to one in this step.
+    /// Not collective. The particles of each own leaf in reach of the colliders that act on particles that
+    /// move with the velocity field numbered `field`, and in `near` those of all fields so far that may reach
+    /// one in this step.
     pub(super) fn find_contacts(&mut self, field: usize, dt: f64, rates: &[Rate<D>]) -> Vec<InContact<D>> {
         let colliders: Vec<_> =
             self.physics.colliders.iter().enumerate().zip(&self.contacts.states).zip(rates).collect();
@@ -42,7 +43,7 @@ impl<const D: usize> Solver<D> {
                 }
                 let (lower, upper) = leaf_box(octant, plan.root_edge);
                 let aabb = Aabb::new(lower, upper);
-                // No particle goes farther in a step than a cell.
+                // No particle moves further in a step than a cell.
                 let way = plan.finest_cell(leaf);
                 let farthest = widths.bound(chunk) + way;
                 for &(((number, collider), state), rate) in &colliders {
@@ -95,7 +96,8 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> InContact<D> {
-    /// Adds a contact of a particle of a chunk: a copy that carries only an impulse, with a mass of 1 kg and no stress.
+    /// Adds a contact of a particle of a chunk: a copy that has only an impulse, with a mass of 1 kg and no
+    /// stress.
     fn push(&mut self, chunk: &Chunk<D>, p: usize, contact: Touching<D>) {
         let own = self.particles.len();
         self.particles.push_from(chunk, p);

@@ -1,8 +1,9 @@
-//! Ways of particles that meet a surface after all.
+//! Paths of particles that still reach a surface.
 //!
-//! The impulses on nodes keep particles out as far as a few sweeps can. What is left over is small, but a surface of no thickness must not let
-//! anything pass, ever. So the way of each particle near a surface is followed, and one that meets it ends there; the rest of the way goes along
-//! the surface, and the law of the surface holds for the velocity of the particle. What this takes is booked as an impulse on the collider.
+//! The impulses on nodes keep particles out as far as a few sweeps can. The rest is small, but a surface of
+//! no thickness must never let a particle pass. So the path of each particle near a surface is followed, and
+//! one that reaches it ends there; the rest of the path goes along the surface, and the law of the surface
+//! applies to the velocity of the particle. The momentum that this takes is an impulse on the collider.
 use crate::boundary::motion::{Pose, Rate};
 use crate::boundary::{Collider, ColliderState, meets};
 use crate::exact_sum::ExactSum;
@@ -11,7 +12,7 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{Near, SUMS};
 use crate::solver::step::colliders::Touch;
 
-/// Distance from a surface at which a way ends, as a share of the half width of a particle.
+/// Distance from a surface at which a path ends, as a share of the half width of a particle.
 const CLOSE: f64 = 0.01;
 
 /// The colliders over one step.
@@ -19,14 +20,15 @@ pub(in crate::solver) struct Guard<'a, const D: usize> {
     colliders: &'a [Collider<D>],
     states: &'a [ColliderState<D>],
     rates: &'a [Rate<D>],
-    /// Where they are after the step.
+    /// Poses after the step.
     next: Vec<Pose<D>>,
     /// Size of the domain, m.
     extent: [f64; D],
 }
 
 impl<'a, const D: usize> Guard<'a, D> {
-    /// Over a step to the time `to` (s) of length `dt`, in a domain of this size (m); `None` without colliders that act on particles.
+    /// Over a step to the time `to` (s) of length `dt`, in a domain of this size (m); `None` without
+    /// colliders that act on particles.
     pub(in crate::solver) fn new(
         colliders: &'a [Collider<D>],
         states: &'a [ColliderState<D>],
@@ -40,7 +42,8 @@ impl<'a, const D: usize> Guard<'a, D> {
         is_any.then(|| Self { colliders, states, rates, next: next.collect(), extent })
     }
 
-    /// Holds back the particles of a leaf that have moved through a surface; notes what they gave. Returns those held back, ascending.
+    /// Stops the particles of a leaf that have moved through a surface, and records their impulses. Returns
+    /// those stopped, ascending.
     pub(in crate::solver) fn hold(&self, chunk: &mut Chunk<D>, near: &mut [Near<D>]) -> Vec<u32> {
         let mut held = Vec::new();
         for near in near {
@@ -51,14 +54,14 @@ impl<'a, const D: usize> Guard<'a, D> {
             let close = CLOSE * chunk.column(Layout::<D>::HALF)[p];
             let mut place = collider.to_own(&to, pose);
             let Some(met) = meets(collider, &from, &place, close) else { continue };
-            // The rest of the way, along the surface.
+            // The rest of the path, along the surface.
             let rest: [f64; D] = std::array::from_fn(|a| place[a] - met.place[a]);
             let inward = (0..D).fold(0.0, |sum, a| rest[a].mul_add(met.normal[a], sum)).min(0.0);
             place = std::array::from_fn(|a| (-inward).mul_add(met.normal[a], met.place[a] + rest[a]));
             if let Some(again) = meets(collider, &met.place, &place, close) {
                 place = again.place;
             }
-            // The rest of the way takes no particle through a face that its own way has not reached.
+            // The rest of the path takes no particle through a face that its own path has not reached.
             let mut at = collider.to_space(&place, pose);
             for axis in 0..D {
                 let edge = 1e-6 * close;
@@ -84,7 +87,7 @@ impl<'a, const D: usize> Guard<'a, D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Adds what particles gave to the colliders whose surface they met.
+    /// Not collective. Adds the impulses of particles on the colliders whose surface they reached.
     pub(in crate::solver) fn book_met(&self, sums: &mut [[ExactSum; SUMS]]) {
         for near in self.near.iter().flatten().filter(|near| near.impulse != [0.0; D]) {
             let touch =

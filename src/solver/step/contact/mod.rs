@@ -1,20 +1,22 @@
 //! Contact of particles with the colliders that act on particles.
 //!
-//! For each particle in reach of a surface an impulse J is sought that keeps it out over the step and obeys Coulomb's law
-//! ([`crate::boundary::touching`]). It goes to the nodes as the affine momentum of the particle does, with the weights
-//! `W_j = w_j (1 + (x_j - x) · D⁻¹ a)` of the point of contact x + a: they add up to 1 and their mean is x + a, so that momentum and angular momentum are
-//! those of J at that point, and the velocity `Σ W_j v_j` of that point, which the law asks for, is the adjoint. All impulses
-//! together are the solution of a problem of complementarity (Moreau 1988, Jean 1999); here it is sought from zero by a fixed number of Jacobi's
-//! sweeps, each scaled by what an impulse on all particles at once brings, so that uniform pressure is right after the first.
+//! For each particle in reach of a surface an impulse J is sought that keeps it out over the step and obeys
+//! Coulomb's law ([`crate::boundary::touching`]). It goes to the nodes as the affine momentum of the particle
+//! does, with the weights `W_j = w_j (1 + (x_j - x) · D⁻¹ a)` of the point of contact x + a: they add up to 1
+//! and their mean is x + a, so that momentum and angular momentum are those of J at that point, and the
+//! velocity `Σ W_j v_j` of that point, which the law asks for, is the adjoint. All impulses together are the
+//! solution of a problem of complementarity (Moreau 1988, Jean 1999); here it is sought from zero by a fixed
+//! number of Jacobi's sweeps, each scaled by the response to an impulse on all particles at once, so that
+//! uniform pressure is exact after the first.
 //!
-//! The particles in contact are copied into chunks of their own, which take the way of all others through bins, sums over ranks and constrained
-//! nodes: no bit depends on ranks.
+//! The particles in contact are copied into chunks of their own, which pass through bins, sums over ranks and
+//! constrained nodes like all others: no bit depends on ranks.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `find` | particles in reach of surfaces |
 //! | `sweeps` | from particles to nodes and back |
-//! | `guard` | ways of particles that meet a surface after all |
+//! | `guard` | paths of particles that still reach a surface |
 mod find;
 pub(super) mod guard;
 mod sweeps;
@@ -49,8 +51,9 @@ impl<const D: usize> Solver<D> {
         self.physics.colliders.iter().any(Collider::acts_on_particles)
     }
 
-    /// Collective. Gives the nodes of the velocity field numbered `field` the impulses that keep its particles out of the colliders that act
-    /// on particles, with the conditions of other colliders and of faces. Adds what particles give to the colliders.
+    /// Collective. Gives the nodes of the velocity field numbered `field` the impulses that keep its
+    /// particles out of the colliders that act on particles, with the conditions of other colliders and of
+    /// faces. Adds the impulses of particles on the colliders.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.

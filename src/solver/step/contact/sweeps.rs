@@ -44,8 +44,8 @@ impl<const D: usize> Solver<D> {
         spreads.collect()
     }
 
-    /// Collective over neighbours. Velocity at each point of contact that an impulse of 1 kg m/s on all particles in contact brings. `other` has the masses
-    /// of the nodes.
+    /// Collective over neighbours. Velocity at each point of contact by an impulse of 1 kg m/s on all
+    /// particles in contact. `other` has the masses of the nodes.
     pub(super) fn find_compliances(
         &mut self,
         other: &mut VelocityField<D>,
@@ -80,7 +80,7 @@ impl<const D: usize> Solver<D> {
                 let (j, arm) = (impulse(leaf, p), &touching[leaf][p].arm);
                 chunk.write(Layout::<D>::VELOCITY, p, &j);
                 for k in 0..D {
-                    // What APIC keeps is not yet divided by D.
+                    // The affine matrix of APIC is not yet divided by D.
                     let share = match scheme.transfer {
                         Transfer::Apic => arm[k],
                         _ => arm[k] / spreads[leaf][p][k],
@@ -121,7 +121,7 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. `Σ W_j v_j` at each point of contact, with what real nodes have as v.
+    /// Not collective. `Σ W_j v_j` at each point of contact, with the velocities v of real nodes.
     pub(super) fn velocities_in_contact(
         &mut self,
         chunks: &[Chunk<D>],

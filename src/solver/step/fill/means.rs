@@ -9,9 +9,10 @@ use crate::simd::{Lanes, Vector};
 /// The means of a leaf. A thread reuses its memory.
 #[derive(Default)]
 pub(in crate::solver::step) struct MeanVolumes {
-    /// By particle, `J̄ = Σ V₀ J / Σ V₀` over the particles of its fluid in its cell; 1 for what is no fluid. Empty in jobs without fluids.
+    /// By particle, `J̄ = Σ V₀ J / Σ V₀` over the particles of its fluid in its cell; 1 for other materials.
+    /// Empty in jobs without fluids.
     pub of_particles: Vec<f64>,
-    /// Material and cell of each particle, as one number; [`NONE`] for what is no fluid.
+    /// Material and cell of each particle, as one number; [`NONE`] for other materials.
     places: Vec<u32>,
     /// Of each material and cell: `Σ V₀ J` and `Σ V₀`, in units of `2^D m³`.
     sums: Vec<[f64; 2]>,
@@ -21,7 +22,7 @@ pub(in crate::solver::step) struct MeanVolumes {
 const NONE: u32 = u32::MAX;
 
 impl MeanVolumes {
-    /// Finds the means of the particles of a leaf, where they are ahead of their advance.
+    /// Finds the means of the particles of a leaf, at their places before the advance.
     pub(in crate::solver::step) fn find<const D: usize>(
         &mut self,
         chunk: &Chunk<D>,
@@ -69,7 +70,8 @@ impl MeanVolumes {
 mod tests {
     use super::*;
 
-    /// Each fluid has a mean of its own in each cell, weighed by reference volumes; what is no fluid has none.
+    /// Each fluid has a mean of its own in each cell, weighted by reference volume; other materials have
+    /// none.
     #[test]
     fn fluids_have_means_in_each_cell() {
         let particles = [

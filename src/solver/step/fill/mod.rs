@@ -1,12 +1,14 @@
-//! Fluids keep their volume: how full nodes are, and means over cells; [`crate::kernel::fill`] has what particles do with both.
+//! Fluids keep their volume: how full nodes are, and means over cells; [`crate::kernel::fill`] has the effect
+//! of both on particles.
 //!
-//! Everything follows from the state at hand: nothing is carried from step to step but the work of the shift, for the history.
-//! Sums over nodes are those of masses, means those of one leaf; so ranks need no further message in jobs with one density.
+//! Everything follows from the present state: only the work of the shifts is kept from step to step, for the
+//! history. Sums over nodes are those of masses, means those of one leaf; so jobs with one density need no
+//! further messages between ranks.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `nodes` | how full nodes are |
-//! | `solid` | what colliders take of the room at nodes |
+//! | `solid` | space at nodes that colliders occupy |
 //! | `means` | mean volume ratios of the cells of a leaf |
 pub(super) mod means;
 mod nodes;
@@ -18,7 +20,7 @@ use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Physics<D> {
-    /// How materials flow in a step of this length (s) at a time (s), by index; nothing where there are no fluids.
+    /// Flow of each material in a step of this length (s) at a time (s), by index; empty without fluids.
     pub(super) fn flows(&self, time: f64, dt: f64) -> Vec<Flow> {
         if !self.keeps_volumes() {
             return Vec::new();
@@ -37,8 +39,8 @@ impl<const D: usize> Physics<D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Books the work of the shifts of a step in the middle of which gravity acts at `time` (s): `-Σ m g · δx`. One sum
-    /// of masses times ways for each own leaf, kg m.
+    /// Not collective. Adds the work of the shifts of a step, `-Σ m g · δx`, with gravity at the middle
+    /// `time` (s) of the step. `shifts` has the sum of mass times shift of each own leaf, kg m.
     pub(super) fn book_shifts(&mut self, shifts: &[[f64; D]], time: f64) {
         let gravity = self.physics.gravity.at(time);
         let Some([sum]) = self.shift_sums.of.first_mut() else { return };

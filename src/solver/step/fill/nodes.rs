@@ -12,8 +12,9 @@ use crate::solver::state::node_fill::NodeFill;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. Sums up the reference volumes of all material at the nodes of velocity fields that bodies of unlike density
-    /// share, ahead of P2G, in jobs with fluids. What is no fluid counts with the volume that it has.
+    /// Collective over neighbours. Sums up the reference volumes of all material at the nodes of velocity
+    /// fields that bodies of unlike density share, ahead of P2G, in jobs with fluids. Other materials count
+    /// with their current volume.
     pub(in crate::solver) fn scatter_volumes(&mut self) {
         if !self.physics.keeps_volumes() || self.physics.fill_densities.iter().all(Option::is_some) {
             return;
@@ -50,8 +51,8 @@ impl<const D: usize> Solver<D> {
         grid.fill.get_or_insert_with(|| Box::new(NodeFill::new(&grid.plan)))
     }
 
-    /// Not collective. Finds how full the nodes are that the gather reads, in jobs with fluids: real ones from their masses, constrained
-    /// ones from their parents.
+    /// Not collective. Finds how full the nodes are that G2P reads, in jobs with fluids: real ones from their
+    /// masses, constrained ones from their parents.
     pub(in crate::solver) fn fill_nodes(&mut self) {
         if !self.physics.keeps_volumes() {
             return;
@@ -85,7 +86,7 @@ impl<const D: usize> Solver<D> {
                         None => scattered[number][first + bit],
                     };
                     match volumes {
-                        // No node is constrained; nodes that nothing reaches have no mass.
+                        // No node is constrained; nodes that no particle reaches have no mass.
                         OfBlock::Same(volume) => {
                             let inverse = 1.0 / volume;
                             (0..nodes).for_each(|bit| values[bit] += of_node(bit) * inverse);

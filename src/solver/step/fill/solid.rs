@@ -1,4 +1,4 @@
-//! What colliders take of the room at nodes.
+//! Space at nodes that colliders occupy.
 use crate::boundary::{Collider, ColliderState};
 use crate::geometry::Aabb;
 use crate::grid::GridPlan;
@@ -8,8 +8,8 @@ use crate::kernel::BLOCK;
 use crate::solver::state::inside::is_still;
 use crate::solver::state::node_fill::OpenShares;
 
-/// Adds to how full the real nodes of a block are the shares of their basis functions that lie inside colliders. `still` has what is known of those that never
-/// move.
+/// Adds the shares of basis functions inside colliders to the fill of the real nodes of a block. `still` has
+/// the known shares of colliders that never move.
 pub(super) fn add_solids<const D: usize>(
     plan: &GridPlan<D>,
     block: &Block<D>,
@@ -40,7 +40,7 @@ pub(super) fn add_solids<const D: usize>(
         .for_each(|(value, open)| *value += 1.0 - open);
 }
 
-/// Takes the share inside a collider off the open shares of a block, which are all 1 while there are none.
+/// Subtracts the share inside a collider from the open shares of a block, which are all 1 if empty.
 fn cut<const D: usize>(
     plan: &GridPlan<D>,
     block: &Block<D>,
@@ -68,11 +68,12 @@ fn cut<const D: usize>(
     }
 }
 
-/// Depth below its surface, in cells, that a collider which acts on particles must have to count: behind thinner walls and sheets there may be
-/// material as well.
+/// Depth below its surface, in cells, that a collider which acts on particles must have to count: behind
+/// thinner walls and sheets there may be material too.
 const THICK: f64 = 0.5;
 
-/// Whether a collider is deeper than `depth` (m) below the point of its surface that is nearest to `x`, at this distance.
+/// Whether a collider is deeper than `depth` (m) below the point of its surface that is nearest to `x`, at
+/// this distance.
 fn is_thick<const D: usize>(
     collider: &Collider<D>,
     state: &ColliderState<D>,
@@ -85,7 +86,8 @@ fn is_thick<const D: usize>(
     distance <= -depth || collider.distance(&below, &state.pose) < 0.0
 }
 
-/// Share of a hat function that lies outside a plane surface, which is that of an axis. Its centre is so many cells outside.
+/// Share of a hat function that lies outside a plane surface, which is that of an axis. Its centre is so many
+/// cells outside.
 fn open_share(distance: f64) -> f64 {
     let beyond = (1.0 - distance.abs()).max(0.0);
     let less = 0.5 * beyond * beyond;
