@@ -1,8 +1,9 @@
 //! Criteria for fine leaves, and the treatment of particles when leaves change.
 //!
 //! A criterion looks at one occupied leaf and wants it fine, lets it stay as it is, or has no objection to
-//! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any criterion
-//! wants that, and coarsened when none objects. The solver changes the tree (`solver/refinement/regrid.rs`).
+//! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any
+//! criterion wants that, and coarsened when none objects. The solver changes the tree
+//! (`solver/refinement/regrid.rs`).
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -48,6 +49,15 @@ pub struct Adaptivity<const D: usize> {
     pub merge: Option<Limits>,
     /// Half width of an undeformed particle of level 0 by body, m.
     pub nominal: Vec<f64>,
+}
+
+/// How elastic bodies hold together that are stretched (see `resample/halve.rs`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cohesion {
+    /// Half width of an undeformed particle of level 0 by body, m.
+    pub nominal: Vec<f64>,
+    /// Greatest ratio of the half width of a box to that of its undeformed whole.
+    pub stretch: f64,
 }
 
 impl<const D: usize> Adaptivity<D> {

@@ -6,6 +6,7 @@ use super::batch::{Batch, Batches, Tile};
 use super::{BoxPolicy, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::particle::halvings;
 use crate::particle::volume::det_f;
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector, VectorMask, prefetch};
@@ -246,8 +247,14 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
         BoxPolicy::Volume { min_stretch, max_stretch } => {
             let original: V = batch.load(tile, Layout::<D>::HALF);
             let mut half: [V; D] = stretches(tile, tags, batch, scheme);
-            for half in &mut half {
-                *half = original * half.max(V::splat(min_stretch)).min(V::splat(max_stretch));
+            if scheme.has_halves || is_far(&half, scheme, max_stretch) {
+                let mut arrays = half.map(V::to_array);
+                far_stretched(&original.to_array(), &mut arrays, tags, batch, scheme);
+                half = arrays.map(V::new);
+            } else {
+                for half in &mut half {
+                    *half = original * half.max(V::splat(min_stretch)).min(V::splat(max_stretch));
+                }
             }
             half
         }
@@ -256,6 +263,47 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
         *half = half.min(V::splat(greatest));
     }
     half
+}
+
+/// Whether any box of a batch is stretched beyond what boxes of materials that flow may be, and others may.
+#[inline(always)]
+fn is_far<V: Vector, const D: usize>(stretches: &[V; D], scheme: &Scheme, max_stretch: f64) -> bool {
+    if scheme.elastic_stretch <= max_stretch {
+        return false;
+    }
+    let mut greatest = stretches[0];
+    for stretch in stretches {
+        greatest = greatest.max(*stretch);
+    }
+    V::splat(max_stretch).lt(greatest).any()
+}
+
+/// From stretches to half widths, where particles of elastic materials have been halved or are stretched far.
+/// The bounds are those of the whole: parts of a wide box are narrow. A call, so that the kernels keep their
+/// registers for what is usual.
+#[cold]
+#[inline(never)]
+fn far_stretched<const D: usize>(
+    original: &[f64; LANES],
+    stretches: &mut [[f64; LANES]; D],
+    tags: &[u64],
+    batch: &Batch,
+    scheme: &Scheme,
+) {
+    let BoxPolicy::Volume { min_stretch, max_stretch } = scheme.boxes else { return };
+    let plastic = plastic_lanes(|| batch.materials(tags), scheme);
+    for lane in 0..LANES {
+        let tag = tags[batch.particle(lane)];
+        let most = if plastic >> lane & 1 == 1 { max_stretch } else { scheme.elastic_stretch };
+        let (shape, whole) = match halvings::is_any([tag]) {
+            true => (halvings::shape::<D>(tag), halvings::edge_of_whole::<D>(halvings::number::<D>(tag))),
+            false => ([1.0; D], 1.0),
+        };
+        for (stretch, shape) in stretches.iter_mut().zip(shape) {
+            let own = (shape * stretch[lane].max(min_stretch)).min(whole * most);
+            stretch[lane] = original[lane] * own;
+        }
+    }
 }
 
 /// Half widths of one box over its undeformed one, as `whole_of_batch` has them where a box follows the
@@ -329,7 +377,17 @@ pub(super) fn plastic_lanes(index: impl Fn() -> [u16; LANES], scheme: &Scheme) -
 
 /// A bound on the half widths of a chunk's boxes, m.
 pub fn widest<const D: usize>(chunk: &Chunk<D>) -> f64 {
-    greatest_stretch(chunk) * chunk.column(Layout::<D>::HALF).greatest()
+    greatest_stretch(chunk) * greatest_undeformed(chunk)
+}
+
+/// A bound on the half widths of a chunk's undeformed boxes, m.
+pub fn greatest_undeformed<const D: usize>(chunk: &Chunk<D>) -> f64 {
+    let halves = chunk.column(Layout::<D>::HALF);
+    if !halvings::is_any(chunk.tags().iter().copied()) {
+        return halves.greatest();
+    }
+    let greatest = |tag: u64| halvings::shape::<D>(tag).into_iter().fold(0.0, f64::max);
+    halves.iter().zip(chunk.tags()).map(|(half, &tag)| half * greatest(tag)).fold(0.0, f64::max)
 }
 
 /// A bound on the widths of a chunk's boxes over their undeformed widths.

@@ -139,6 +139,17 @@ pub enum BoxPolicy {
     Cell,
 }
 
+impl BoxPolicy {
+    /// Greatest ratio of a half width to the undeformed one; infinite where boxes do not follow the
+    /// deformation.
+    pub fn greatest_stretch(self) -> f64 {
+        match self {
+            Self::Volume { max_stretch, .. } => max_stretch,
+            Self::Fixed | Self::Cell => f64::INFINITY,
+        }
+    }
+}
+
 impl Default for BoxPolicy {
     fn default() -> Self {
         Self::Volume { min_stretch: 0.25, max_stretch: 2.0 }
@@ -168,6 +179,13 @@ pub struct Scheme<'a> {
     /// Number of carried columns that are shares of a whole, which add up in a merge; those behind are
     /// values, which average.
     pub shares: usize,
+    /// Greatest ratio of a half width to that of the undeformed whole, for boxes of elastic materials that
+    /// keep their volume. Not less than that of others: these particles are halved before their boxes are
+    /// wider than a cell.
+    pub elastic_stretch: f64,
+    /// Whether any particle of the run may have been halved (see [`crate::particle::halvings`]). If not, none
+    /// is asked.
+    pub has_halves: bool,
 }
 
 impl<'a> Scheme<'a> {
@@ -193,7 +211,14 @@ impl<'a> Scheme<'a> {
             softens,
             f_bar: false,
             shares: 0,
+            elastic_stretch: boxes.greatest_stretch(),
+            has_halves: false,
         }
+    }
+
+    /// Greatest ratio of the half width of any box to that of its undeformed whole.
+    pub fn greatest_stretch(&self) -> f64 {
+        if self.is_all_plastic { self.boxes.greatest_stretch() } else { self.elastic_stretch }
     }
 
     /// Edge of a cell of a level, m.

@@ -4,6 +4,7 @@ mod column;
 pub mod followed;
 pub mod given;
 pub mod group;
+pub mod halvings;
 pub mod lanes;
 mod layout;
 pub mod strain;

@@ -306,6 +306,32 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
+    /// Collective. Says which bodies have been stretched so far that particles were halved, and which of them
+    /// have torn.
+    fn tell_torn(&mut self) {
+        if !self.solver.physics.has_halves {
+            return;
+        }
+        let mut halved = [self.solver.ledger.halved];
+        self.comm.sum_u64(&mut halved);
+        if halved[0] > 0 {
+            self.recorder.message(&format!(
+                "{} particles of elastic bodies were stretched so far that they became two",
+                halved[0]
+            ));
+        }
+        let pieces = self.solver.pieces().unwrap_or_default();
+        let bodies = self.problem.bodies.iter().zip(&self.solver.pieces_before).zip(&pieces);
+        for ((body, before), now) in bodies.filter(|((_, before), now)| now > before) {
+            self.recorder.warning(&format!(
+                "body \"{}\" is in {now} pieces, {before} before it was stretched: boxes of its particles no longer \
+                 touch. That is numerical, unless its law softens (hencky, beyond a stretch of 2.7): more \
+                 particles_per_cell or finer cells carry it further",
+                body.name
+            ));
+        }
+    }
+
     /// Not collective. Records why a run ends ahead of its time, on rank 0. The user is told in any case, so
     /// a failure to write the record is ignored.
     fn note_end(&self, outcome: &Result<Outcome, RunError>) {
@@ -366,6 +392,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.tell_equilibrium();
         self.tell_missed_stages();
         self.tell_blocked_sources();
+        self.tell_torn();
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;

@@ -94,6 +94,7 @@ pub fn scalars<const D: usize>(
     if solver.physics.adaptivity.is_none() && !solver.physics.sources.is_empty() {
         counts.push((LEDGER[3].into(), solver.ledger.next_root));
     }
+    counts.extend((0..).zip(&solver.pieces_before).map(|(body, &pieces)| (pieces_name(body), pieces)));
     if solver.physics.adaptivity.is_some() {
         let ([splits, _, merges, removed], mut energies) = solver.ledger.gather(comm);
         let numbers = [splits, merges, removed, solver.ledger.next_root];
@@ -187,6 +188,11 @@ fn restore_relaxation<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars)
     let (kinetic, speed, acceleration, stops) = (kinetic?, speed?, acceleration?, scalars.count(STOPS)?);
     solver.relaxation = Relaxation { kinetic, speed, acceleration, stops, phase };
     Some(())
+}
+
+/// Name of the counter that holds in how many pieces a body was before it was stretched.
+fn pieces_name(body: usize) -> String {
+    format!("pieces_{body}")
 }
 
 /// Names of the counters of splits and merges.
@@ -372,6 +378,8 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of the relaxation to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
+    let pieces = |body| header.scalars.count(&pieces_name(body));
+    solver.pieces_before = (0..problem.bodies.len()).map_while(pieces).collect();
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
     measures::restore(comm.rank(), problem, &mut solver, &header.scalars, path);

@@ -49,6 +49,8 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         fill_densities: Vec::new(),
         transfer: problem.transfer,
         boxes: problem.boxes,
+        cohesion: None,
+        has_halves: false,
         f_bar: problem.f_bar,
         ties: problem.tied_surfaces,
         followed: problem.output.followed,

@@ -2,7 +2,10 @@
 use partition::comm::{Comm, Disagreement};
 
 use super::seed::check_counts;
+use crate::adaptivity::Cohesion;
 use crate::job::Problem;
+use crate::job::problem::BoxPolicy;
+use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
@@ -43,7 +46,23 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
         physics.fill_densities =
             fields.map(|field| density_of_field(problem, &physics, field as u8)).collect();
     }
+    physics.cohesion = cohesion(problem, stage);
     physics
+}
+
+/// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation.
+fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesion> {
+    let BoxPolicy::Volume { max_stretch, .. } = problem.boxes else { return None };
+    let bodies = problem.bodies.iter().enumerate().filter(|(_, body)| body.stage <= stage);
+    let elastic = bodies.filter(|(number, _)| {
+        let setup = &problem.materials[material_of(problem, *number, stage)];
+        !material::build(&setup.model, setup.density).is_plastic()
+    });
+    // Boxes a cell wide are not too wide for any grid.
+    let least = elastic.map(|(_, body)| body.particles_per_cell).reduce(f64::min)?;
+    let half_cell = 0.5 * problem.cell_edge(0);
+    let nominal = problem.bodies.iter().map(|body| half_cell / body.particles_per_cell).collect();
+    Some(Cohesion { nominal, stretch: max_stretch.max(least) })
 }
 
 /// Density of all undeformed material that has moved with a velocity field so far, kg/m³; `None` where it

@@ -95,7 +95,10 @@ impl<const D: usize> Solver<D> {
             partitions: 0,
             is_to_weigh: false,
             weighed: None,
+            has_wide: false,
+            pieces_before: Vec::new(),
         };
+        solver.physics.has_halves = solver.find_halves();
         solver.leaf_data.reset(solver.chunks.len());
         solver.ledger.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
@@ -204,9 +207,11 @@ impl<const D: usize> Solver<D> {
             flag(requests.stop),
             flag(requests.checkpoint),
             -f64::from(reach),
+            flag(self.has_wide_boxes()),
         ];
         self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
-        let [bound, failed, stop, checkpoint, reach] = least;
+        let [bound, failed, stop, checkpoint, reach, wide] = least;
+        self.has_wide = wide < 0.0;
         let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
         self.clock.bound = bound;
         self.provide_reach(-reach as u32);

@@ -1,7 +1,7 @@
 //! The problem that the solver solves.
 use std::ops::Range;
 
-use crate::adaptivity::Adaptivity;
+use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
@@ -57,6 +57,10 @@ pub struct Physics<const D: usize> {
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
+    /// How elastic bodies hold together that are stretched; `None`: their particles are not halved.
+    pub cohesion: Option<Cohesion>,
+    /// Whether any particle has been halved; the same on all ranks.
+    pub has_halves: bool,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
     /// Whether surface nodes are tied.
@@ -198,6 +202,9 @@ impl<const D: usize> Physics<D> {
     /// Properties of the run that the kernels use.
     pub(in crate::solver) fn scheme(&self) -> Scheme<'_> {
         let scheme = Scheme::new(self.boxes, self.root_edge / 4.0, self.transfer, &self.materials);
-        Scheme { f_bar: self.f_bar, shares: self.load_columns(), ..scheme }
+        let elastic_stretch =
+            self.cohesion.as_ref().map_or(scheme.elastic_stretch, |cohesion| cohesion.stretch);
+        let (f_bar, shares, has_halves) = (self.f_bar, self.load_columns(), self.has_halves);
+        Scheme { f_bar, shares, elastic_stretch, has_halves, ..scheme }
     }
 }

@@ -1,6 +1,7 @@
 //! The next stage of a run: other physics, and particles that go, change or come.
 use crate::particle::Chunk;
 use crate::particle::chunk::Tag;
+use crate::particle::halvings;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::relaxation::Relaxation;
@@ -41,6 +42,7 @@ impl<const D: usize> Solver<D> {
             self.clock.dt = 0.0;
         }
         let before = std::mem::replace(&mut self.physics, physics);
+        self.physics.has_halves = before.has_halves;
         self.physics.deform_colliders(self.clock.time);
         for (index, collider) in self.physics.colliders.iter().enumerate() {
             if collider.is_present() && !before.colliders[index].is_present() {
@@ -94,7 +96,7 @@ fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[u16], phy
         if material == was.material {
             continue;
         }
-        chunk.tags_mut()[p] = Tag { material, ..was }.pack();
+        chunk.tags_mut()[p] = halvings::with(chunk.tags()[p], Tag { material, ..was });
         let [old, new] = [was.material, material].map(|m| &physics.materials[usize::from(m)]);
         if old.history_names() != new.history_names() {
             physics.begin_history(chunk, p);

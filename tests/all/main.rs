@@ -5,6 +5,7 @@ mod common;
 
 mod adaptivity;
 mod bad_jobs;
+mod cohesion;
 mod colliders;
 mod command_line;
 mod contact;

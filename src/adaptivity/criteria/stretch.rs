@@ -6,6 +6,7 @@ use super::{Job, Keys};
 use crate::adaptivity::criterion::{Criterion, Indicator, Needs, Thresholds};
 use crate::adaptivity::leaf_view::{LeafView, Value};
 use crate::particle::chunk::Layout;
+use crate::particle::halvings;
 
 /// Stretch of boxes.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -46,8 +47,11 @@ impl<const D: usize> Indicator<D> for Stretch {
             return Value::of_leaf(bound);
         }
         let halves = leaf.half_widths();
-        let undeformed = leaf.chunk().column(Layout::<D>::HALF);
-        let stretches = halves.iter().zip(undeformed).flat_map(|(half, own)| half.map(|half| half / own));
+        let undeformed = leaf.chunk().column(Layout::<D>::HALF).iter().zip(leaf.chunk().tags());
+        let stretches = halves.iter().zip(undeformed).flat_map(|(half, (own, &tag))| {
+            let shape = halvings::shape::<D>(tag);
+            (0..D).map(move |axis| half[axis] / (own * shape[axis]))
+        });
         Value::of_leaf(stretches.fold(0.0, f64::max))
     }
 

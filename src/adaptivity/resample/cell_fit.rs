@@ -8,9 +8,12 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 /// Splits in one leaf.
 #[derive(Clone, Debug, Default)]
 pub struct Splits {
-    pub(super) split: u64,
-    pub(super) refused: u64,
-    pub(super) energies: Vec<f64>,
+    /// Particles that were split.
+    pub split: u64,
+    /// Particles that were not, since their identifiers have no room for another generation.
+    pub refused: u64,
+    /// Kinetic energy that each split added, J.
+    pub energies: Vec<f64>,
 }
 
 impl Splits {
@@ -133,7 +136,7 @@ fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
 /// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d
 /// is the distance to the node below, m². The first part is that of the box, the second that of linear
 /// interpolation between two nodes.
-fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
+pub(super) fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
     let inside = |y: f64| y - cell * (y / cell).floor();
     let box_part = half * half / 3.0;
     if half < 1e-4 * cell {

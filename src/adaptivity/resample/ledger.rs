@@ -10,6 +10,8 @@ use crate::exact_sum::ExactSum;
 pub struct Ledger {
     /// Particles that were split.
     pub splits: u64,
+    /// Those among them that were halved because they were stretched.
+    pub halved: u64,
     /// Particles that could not be split: their identifiers have no room for another generation.
     pub refused: u64,
     /// Particles that stand for several that were merged.

@@ -1,10 +1,11 @@
 //! The particle that stands for a group.
 use rustc_hash::FxHashSet;
 
-use super::{Limits, Setting, read_matrix, volume, write_matrix};
+use super::{Limits, Setting, ids, read_matrix, volume, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::material::{self, HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, Symmetric, eigen};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::halvings;
 use crate::simd::math::{exp, ln};
 use crate::simd::{LANES, Lanes, Vector};
 
@@ -17,6 +18,8 @@ pub(super) struct Group {
     pub id: u64,
     /// Whether these are all children of one parent.
     pub is_family: bool,
+    /// Axis along which the parent was halved, where these are its halves.
+    pub rejoined: Option<usize>,
 }
 
 impl Group {
@@ -26,7 +29,7 @@ impl Group {
             // The merged particle takes the place of the first in the chunk.
             members[..=first].rotate_right(1);
         }
-        Self { members, id, is_family }
+        Self { members, id, is_family, rejoined: None }
     }
 }
 
@@ -78,9 +81,11 @@ pub(super) fn mixtures<const D: usize>(
     for (number, group) in groups.iter().enumerate() {
         let range = start..start + group.members.len();
         start = range.end;
-        let tag = Tag { level, ..Tag::unpack(chunk.tags()[group.members[0] as usize]) };
+        let packed = chunk.tags()[group.members[0] as usize];
+        let tag = halvings::with(packed, Tag { level, ..Tag::unpack(packed) });
         out.ids_mut()[number] = group.id;
-        out.tags_mut()[number] = tag.pack();
+        out.tags_mut()[number] =
+            group.rejoined.map_or(tag, |axis| halvings::rejoined(tag, axis, ids::generation(group.id)));
         let (mean, difference) = mix_matter(&mut out, number, chunk, setting, group, &strain[range]);
         let close = difference.strain <= limits.strain
             && difference.volume <= limits.volume
@@ -104,7 +109,7 @@ pub(super) fn mixtures<const D: usize>(
         // entered finer cells.
         let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
         if !groups[number].is_family && volume(&out, number) < 0.5 * whole * (1.0 - 1e-9) {
-            out.tags_mut()[number] = Tag { level: level + 1, ..tag }.pack();
+            out.tags_mut()[number] = halvings::with(out.tags()[number], Tag { level: level + 1, ..tag });
         }
     }
     Mixtures { groups, chunk: out, energy }

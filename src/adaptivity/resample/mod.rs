@@ -10,11 +10,13 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 pub mod cell_fit;
 mod drift;
 pub mod family;
+pub(crate) mod halve;
 pub mod ids;
 pub mod ledger;
 mod merge;
 pub mod merge_backoff;
 mod mixture;
+mod pair;
 mod split;
 #[cfg(test)]
 mod tests;

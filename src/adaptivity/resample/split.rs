@@ -2,6 +2,7 @@
 use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::halvings;
 
 /// Results of [`split`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,8 +116,9 @@ fn divide<const D: usize>(
             write_matrix(chunk, p, &kept);
             let parent = chunk.ids()[p];
             chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);
-            let tag = Tag::unpack(chunk.tags()[p]);
-            chunk.tags_mut()[p] = Tag { level: tag.level + 1, ..tag }.pack();
+            let packed = halvings::otherwise_split(chunk.tags()[p], ids::generation(parent));
+            let tag = Tag::unpack(packed);
+            chunk.tags_mut()[p] = halvings::with(packed, Tag { level: tag.level + 1, ..tag });
         }
     }
     0.5 * mass * share * energy

@@ -7,6 +7,7 @@ use crate::kernel::BoxPolicy;
 use crate::kernel::domain::stretches_of_one;
 use crate::material::PLASTIC_VOLUME;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::halvings;
 use crate::particle::volume::symmetric;
 
 /// Cells of a leaf along an axis.
@@ -28,21 +29,28 @@ struct Particle {
     /// Left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
     elastic: [f64; 6],
     plastic_volume: f64,
-    tag: Tag,
+    /// Packed.
+    tag: u64,
 }
 
 impl Boxes {
     /// Half widths along the axes, m.
     fn half_widths(&self, particle: &Particle, dimension: usize, root_edge: f64) -> [f64; 3] {
-        let Particle { half, elastic, plastic_volume, tag } = particle;
+        let Particle { half, elastic, plastic_volume, tag: packed } = particle;
+        let tag = Tag::unpack(*packed);
         match self.policy {
             BoxPolicy::Fixed => [*half; 3],
             BoxPolicy::Cell => [0.5 * root_edge / CELLS / f64::from(1_u32 << tag.level.min(31)); 3],
             BoxPolicy::Volume { min_stretch, max_stretch } => {
                 let is_plastic = self.is_plastic.get(usize::from(tag.material)).copied().unwrap_or(true);
-                let limits = [min_stretch, max_stretch];
-                stretches_of_one(elastic, *plastic_volume, dimension, is_plastic, limits)
-                    .map(|stretch| half * stretch)
+                // Those that do not flow are halved before their boxes reach a bound.
+                let limits = [min_stretch, if is_plastic { max_stretch } else { f64::INFINITY }];
+                let stretch = stretches_of_one(elastic, *plastic_volume, dimension, is_plastic, limits);
+                let shape = match (dimension, halvings::shape::<2>(*packed)) {
+                    (2, [x, y]) => [x, y, 1.0],
+                    _ => halvings::shape::<3>(*packed),
+                };
+                std::array::from_fn(|axis| half * shape[axis] * stretch[axis])
             }
         }
     }
@@ -53,7 +61,7 @@ impl Boxes {
             half: chunk.column(Layout::<D>::HALF)[p],
             elastic: symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p),
             plastic_volume: chunk.column(Layout::<D>::PLASTIC_VOLUME)[p],
-            tag: Tag::unpack(chunk.tags()[p]),
+            tag: chunk.tags()[p],
         };
         self.half_widths(&particle, D, root_edge)
     }
@@ -78,7 +86,7 @@ impl Boxes {
                 half: *half,
                 elastic: [at(0), at(1), at(2), at(3), at(5), at(4)],
                 plastic_volume: history.get(PLASTIC_VOLUME).copied().unwrap_or(0.0),
-                tag: Tag::unpack(tag),
+                tag,
             };
             self.half_widths(&particle, header.dimension, header.root_edge)
         });

@@ -394,7 +394,8 @@ pub struct Numerics {
     /// How the box of a particle follows its deformation.
     #[serde(default)]
     pub boxes: Boxes,
-    /// Bounds of half width over undeformed half width for `boxes = "volume"`; [0.25, 2] by default.
+    /// Bounds of half width over undeformed half width for `boxes = "volume"`; [0.25, 2] by default. The upper one is for materials that
+    /// flow: particles of elastic ones become two along an axis where their box is 0.6 cells wide.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 8.0)))]
     pub box_stretch: Option<[f64; 2]>,

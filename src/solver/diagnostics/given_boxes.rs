@@ -109,6 +109,8 @@ impl<const D: usize> GivenBoxes<D> {
             leaving: Leaving::default(),
             transfer: Transfer::Apic,
             boxes: BoxPolicy::Fixed,
+            cohesion: None,
+            has_halves: false,
             f_bar: false,
             ties: false,
             followed: Followed::default(),

@@ -2,6 +2,7 @@
 pub mod given_boxes;
 pub mod lines;
 pub mod maps;
+pub mod pieces;
 pub mod probes;
 pub mod totals;
 pub mod tracks;

@@ -56,16 +56,17 @@ impl<const D: usize> Solver<D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective. After a step: changes the tree where the job's criteria want it, and splits and merges
-    /// particles, if the step is one at which this is due. Everything follows from the state alone. Returns
-    /// whether anything changed.
+    /// Collective. After a step: halves stretched particles, changes the tree where the job's criteria want
+    /// it, and splits and merges particles, if the step is one at which this is due. Everything follows from
+    /// the state alone. Returns whether anything changed.
     ///
     /// # Errors
     /// On all ranks when any rank failed.
     pub fn regrid(&mut self) -> Result<bool, Disagreement> {
+        let is_halved = self.hold_together()?;
         let every = match &self.physics.adaptivity {
             Some(adaptivity) if self.clock.step.is_multiple_of(adaptivity.every) => adaptivity.every,
-            _ => return Ok(false),
+            _ => return Ok(is_halved),
         };
         let (start, phases) = (Instant::now(), self.phases);
         self.regrid_timers.begin();
@@ -126,7 +127,7 @@ impl<const D: usize> Solver<D> {
         // All of it counts as one phase.
         self.phases = phases;
         self.phases.book(Phase::Regrid, start.elapsed());
-        Ok(is_other || merged)
+        Ok(is_halved || is_other || merged)
     }
 
     /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether

@@ -4,6 +4,7 @@ use crate::grid::GridPlan;
 use crate::kernel::{BoxPolicy, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
+use crate::particle::halvings;
 use crate::particle::lanes::{list_lanes, values};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 use crate::solver::physics::Physics;
@@ -38,6 +39,11 @@ impl<const D: usize> Widths<'_, D> {
     }
 }
 
+/// Edge of the cube of which a particle with a packed tag is a part over that of a cube of its volume.
+fn edge_of_whole<const D: usize>(tag: u64) -> f64 {
+    halvings::edge_of_whole::<D>(halvings::number::<D>(tag))
+}
+
 impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
     fn of_batch(&self, chunk: &Chunk<D>, particles: &[u32], cell: f64) -> [Lanes; D] {
         domain::full_half_widths_of(chunk, particles, cell, &self.extent, &self.scheme)
@@ -47,7 +53,11 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
         let half = || values(chunk, Layout::<D>::HALF, first);
         match self.scheme.boxes {
             BoxPolicy::Fixed => half(),
-            BoxPolicy::Volume { max_stretch, .. } => half() * max_stretch,
+            BoxPolicy::Volume { .. } if self.scheme.has_halves => {
+                let whole = |lane| chunk.tags().get(first + lane).map_or(1.0, |&tag| edge_of_whole::<D>(tag));
+                half() * Lanes::new(std::array::from_fn(whole)) * self.scheme.greatest_stretch()
+            }
+            BoxPolicy::Volume { .. } => half() * self.scheme.greatest_stretch(),
             BoxPolicy::Cell => Lanes::new(std::array::from_fn(|lane| {
                 let level = chunk.tags().get(first + lane).map_or(0, |&tag| Tag::unpack(tag).level);
                 0.5 * self.scheme.root_cell / f64::from(1u32 << level)
@@ -62,7 +72,12 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
         match self.scheme.boxes {
             BoxPolicy::Fixed => chunk.greatest_half(),
-            BoxPolicy::Volume { max_stretch, .. } => max_stretch * chunk.greatest_half(),
+            BoxPolicy::Volume { .. } if self.scheme.has_halves => {
+                let halves = chunk.column(Layout::<D>::HALF).iter().zip(chunk.tags());
+                let wholes = halves.map(|(half, &tag)| half * edge_of_whole::<D>(tag));
+                self.scheme.greatest_stretch() * wholes.fold(0.0, f64::max)
+            }
+            BoxPolicy::Volume { .. } => self.scheme.greatest_stretch() * chunk.greatest_half(),
             BoxPolicy::Cell => {
                 let coarsest = chunk.tags().iter().map(|&tag| Tag::unpack(tag).level).min();
                 coarsest.map_or(0.0, |level| 0.5 * self.scheme.root_cell / f64::from(1u32 << level))

@@ -186,4 +186,8 @@ pub struct Solver<const D: usize> {
     pub partitions: u64,
     pub(super) is_to_weigh: bool,
     pub(super) weighed: Option<Weighed>,
+    /// Whether boxes of any rank may have to be halved after this step.
+    pub(super) has_wide: bool,
+    /// In how many pieces each body was when the first particle was halved; empty where that is not known.
+    pub pieces_before: Vec<u64>,
 }

@@ -5,6 +5,7 @@
 use rayon::prelude::*;
 
 use crate::adaptivity::resample::cell_fit::Resampling;
+use crate::adaptivity::resample::halve;
 use crate::adaptivity::{LeafMaxima, Watch};
 use crate::boundary::motion::Rate;
 use crate::grid::arenas::Arenas;
@@ -96,6 +97,8 @@ struct Sweep<'a, const D: usize> {
     resampling: Option<&'a Resampling<'a, D>>,
     widths: &'a Widths<'a, D>,
     watch: Watch,
+    /// Whether the widths of elastic boxes are noted.
+    looks_at_widths: bool,
     /// Where the particles of each leaf lie.
     places: &'a [Place],
     /// Loads with areas that follow the deformation.
@@ -163,6 +166,7 @@ impl<const D: usize> Solver<D> {
         let resampling = Resampling::new(adaptivity, &scheme, self.grid.plan.extent());
         let widths = self.physics.widths(&self.grid.plan);
         let watch = adaptivity.map(|adaptivity| adaptivity.watch(self.clock.step + 1));
+        let looks_at_widths = self.looks_at_widths(self.clock.step + 1);
         self.leaf_data.begin_gather(&self.chunks);
         self.pushes.resize_with(self.chunks.len(), Vec::new);
         self.near.resize_with(self.chunks.len(), Vec::new);
@@ -183,6 +187,7 @@ impl<const D: usize> Solver<D> {
             resampling: resampling.as_ref(),
             widths: &widths,
             watch: watch.unwrap_or_default(),
+            looks_at_widths,
             places,
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
@@ -295,6 +300,9 @@ impl<const D: usize> Sweep<'_, D> {
             self.tensors.iter().for_each(|&first| strain(chunk, first, p, &gradient, self.dt));
         }
         self.watch.after(chunk, self.dt, maxima);
+        if self.looks_at_widths {
+            maxima.elastic_width = halve::widest(chunk, self.scheme);
+        }
         if signal.is_infinite()
             && let Some(error) = self.borders.unsound(chunk)
         {

@@ -1,0 +1,208 @@
+//! Elastic particles that are stretched become two each, and one again once they are not, so that elastic
+//! bodies do not tear.
+//!
+//! Where particles in tension are a cell apart, one sample for each node, their motion in opposite directions
+//! from node to node costs no strain, while the tension gives energy to it: for such modes the least
+//! eigenvalue of the stiffness is negative for any tension, and the body tears (`docs/design/resampling.md`).
+//! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
+//! along it, becomes two, half as wide along this axis alone. Its tag says so (see
+//! [`crate::particle::halvings`]): boxes of halves tile the box of the whole. Mass, momentum and angular
+//! momentum are kept as [`pair::part`] says.
+use super::cell_fit::spread_on_lattice;
+use super::mixture::{Group, mixtures};
+use super::{Limits, Merged, Setting, ids, merge_backoff, pair};
+use crate::kernel::Scheme;
+use crate::material::eigen::decompose;
+use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::{halvings, volume};
+use crate::simd::{Lanes, Vector};
+
+/// Width of a box, in cells of its leaf, from which on it is halved; measured, see
+/// `docs/design/resampling.md`.
+const WIDE: f64 = 0.6;
+/// Stretch from which on it is halved at the earliest: boxes may be wider from the start.
+const GROWN: f64 = 2.0 * WIDE;
+/// Two halves become one where the box of this is narrower than so much of the width at which it was halved.
+const NARROW: f64 = 0.9;
+
+/// A bound on the half widths (m) of the boxes of elastic particles in a chunk that are stretched; 0 if none
+/// is stretched enough to be halved. Particles that flow may be taken for such.
+pub(crate) fn widest<const D: usize>(chunk: &Chunk<D>, scheme: &Scheme) -> f64 {
+    let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+    let square = (first..first + D).map(|column| chunk.column(column).greatest()).fold(0.0, f64::max);
+    if square < GROWN * GROWN {
+        return 0.0;
+    }
+    if !scheme.has_halves {
+        return square.sqrt() * chunk.greatest_half();
+    }
+    let widest = |p: usize| half_widths(chunk, p).into_iter().fold(0.0, f64::max);
+    (0..chunk.len()).map(widest).fold(0.0, f64::max)
+}
+
+/// Whether boxes of these half widths (m) are to be looked at in a leaf with cells of this edge, m.
+pub(crate) fn may_be_wide(half: f64, cell: f64) -> bool {
+    2.0 * half > WIDE * cell
+}
+
+/// Half widths of the box of an elastic particle, without bounds, m.
+pub(crate) fn half_widths<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; D] {
+    let stretch = chunk.read::<D>(Layout::<D>::LEFT_CAUCHY_GREEN, p).map(f64::sqrt);
+    let undeformed = undeformed(chunk, p);
+    std::array::from_fn(|axis| undeformed[axis] * stretch[axis])
+}
+
+/// Half widths of the undeformed box of a particle, m.
+fn undeformed<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; D] {
+    let [half] = chunk.read(Layout::<D>::HALF, p);
+    halvings::shape::<D>(chunk.tags()[p]).map(|shape| half * shape)
+}
+
+/// Half width (m) at which a box of an undeformed half width is halved, on cells of edge `cell`, m.
+fn greatest(undeformed: f64, cell: f64) -> f64 {
+    (0.5 * WIDE * cell).max(GROWN * undeformed)
+}
+
+impl<const D: usize> Setting<'_, D> {
+    fn is_elastic(&self, chunk: &Chunk<D>, p: usize) -> bool {
+        !self.scheme.materials[usize::from(Tag::unpack(chunk.tags()[p]).material)].is_plastic()
+    }
+}
+
+/// Axis along which a particle is to be halved: the one along which its box exceeds what it may have by most.
+fn wide_axis<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize) -> Option<usize> {
+    let (half, undeformed) = (half_widths(chunk, p), undeformed(chunk, p));
+    let (mut most, mut axis) = (1.0, None);
+    for a in 0..D {
+        let excess = half[a] / greatest(undeformed[a], setting.cell());
+        if excess > most && chunk.column(Layout::<D>::STRESS + a)[p] > 0.0 {
+            (most, axis) = (excess, Some(a));
+        }
+    }
+    axis
+}
+
+/// Replaces elastic particles that have become too wide by two each, in their place. `displacement` is the
+/// first column of what particles carry of it. `book` gets the kinetic energy that each split adds, J.
+/// Returns how many were replaced, and how many stayed since their identifiers have no room for another
+/// generation.
+pub(crate) fn halve<const D: usize>(
+    chunk: &mut Chunk<D>,
+    setting: &Setting<D>,
+    displacement: Option<usize>,
+    book: &mut impl FnMut(f64),
+) -> super::Split {
+    let mut report = super::Split::default();
+    let mut wanted = Vec::new();
+    for p in (0..chunk.len()).filter(|&p| setting.is_elastic(chunk, p)) {
+        let Some(axis) = wide_axis(chunk, setting, p) else { continue };
+        match ids::generation(chunk.ids()[p]) < ids::GENERATIONS {
+            true => wanted.push((p as u32, axis)),
+            false => report.refused += 1,
+        }
+    }
+    if wanted.is_empty() {
+        return report;
+    }
+    report.split = wanted.len() as u64;
+    let (doubled, pairs) = pair::doubled(chunk, wanted.iter().map(|(p, _)| *p));
+    *chunk = doubled;
+    for (first, &(_, axis)) in pairs.into_iter().zip(&wanted) {
+        let (x, half) = (chunk.position(first), half_widths(chunk, first));
+        let spread = std::array::from_fn(|a| spread_on_lattice(x[a], half[a], setting.cell()));
+        let mut offset = [0.0; D];
+        offset[axis] = 0.5 * half[axis];
+        book(pair::part(chunk, setting, first, &offset, &spread));
+        let grown = grown(chunk, first, &x);
+        for p in [first, first + 1] {
+            let tag = merge_backoff::plain(chunk.tags()[p]);
+            let split = ids::generation(chunk.ids()[p]) - 1;
+            chunk.tags_mut()[p] = halvings::halved(tag, axis, split);
+            let side = if p == first { -1.0 } else { 1.0 };
+            if let Some(column) = displacement.filter(|first| chunk.carried_columns() >= first + D) {
+                (0..D).for_each(|a| chunk.carried_mut(column + a)[p] += side * grown[a]);
+            }
+        }
+    }
+    report
+}
+
+/// By how much the way of the upper half from the whole, which was at `x`, has grown since the body was
+/// undeformed: `o - V⁻¹ o` with the left stretch V and the offset o, m. What the body has turned is not
+/// known.
+fn grown<const D: usize>(chunk: &Chunk<D>, first: usize, x: &[f64; D]) -> [f64; D] {
+    let [xx, yy, zz, xy, yz, xz] = volume::symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, first);
+    let axes = decompose(&[xx, yy, zz, xy, xz, yz].map(Lanes::splat), D == 2);
+    let upper = chunk.position(first + 1);
+    let offset: [f64; D] = std::array::from_fn(|a| upper[a] - x[a]);
+    let mut grown = offset;
+    for (value, vector) in axes.value.iter().zip(&axes.vector) {
+        let along = (0..D).map(|a| vector[a].to_array()[0] * offset[a]).sum::<f64>();
+        let before = along / value.to_array()[0].sqrt();
+        (0..D).for_each(|a| grown[a] -= before * vector[a].to_array()[0]);
+    }
+    grown
+}
+
+/// Makes one again of halves that are in one chunk and no longer stretched, where their states are alike.
+/// `book` gets the kinetic energy that each merge removes, J.
+pub(crate) fn rejoin<const D: usize>(
+    chunk: &mut Chunk<D>,
+    setting: &Setting<D>,
+    limits: &Limits,
+    book: &mut impl FnMut(f64),
+) -> Merged {
+    let mut report = Merged::default();
+    let groups = narrow_pairs(chunk, setting);
+    let mut levels: Vec<u8> = groups.iter().map(|(level, _)| *level).collect();
+    levels.sort_unstable();
+    levels.dedup();
+    let mut stays = vec![true; chunk.len()];
+    for level in levels {
+        let of_level = groups.iter().filter(|(of, _)| *of == level).map(|(_, group)| group.clone());
+        let mixtures = mixtures(chunk, setting, limits, of_level.collect(), level, &mut report.refused);
+        for (number, group) in mixtures.groups.iter().enumerate() {
+            let Some(energy) = mixtures.energy[number] else { continue };
+            chunk.replace(group.members[0] as usize, &mixtures.chunk, number);
+            group.members[1..].iter().for_each(|&p| stays[p as usize] = false);
+            report.merged += 1;
+            report.removed += group.members.len() as u64 - 1;
+            book(energy);
+        }
+    }
+    if report.merged > 0 {
+        let source: Vec<u32> = (0..).zip(stays).filter(|(_, stays)| *stays).map(|(p, _)| p).collect();
+        chunk.keep(&source);
+    }
+    report
+}
+
+/// Pairs of halves that may become one, with their level, by identifier.
+fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(u8, Group)> {
+    let plain = |p: u32| merge_backoff::plain(chunk.tags()[p as usize]);
+    let mut halves: Vec<(u64, u64, u32)> = (0..chunk.len() as u32)
+        .filter(|&p| halvings::is_any([plain(p)]) && setting.is_elastic(chunk, p as usize))
+        .filter_map(|p| {
+            let (parent, _) = ids::parent::<D>(chunk.ids()[p as usize])?;
+            // Particles of finer levels that came of a half are no halves.
+            halvings::is_half(plain(p), ids::generation(parent)).then_some((parent, plain(p), p))
+        })
+        .collect();
+    halves.sort_unstable();
+    let pairs = halves.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|pair| pair.len() == 2);
+    let narrow = pairs.filter_map(|pair| {
+        let (parent, tag, members) = (pair[0].0, pair[0].1, [pair[0].2, pair[1].2]);
+        let [x, y] = members.map(|p| chunk.position(p as usize));
+        let [half, other] = members.map(|p| half_widths(chunk, p as usize));
+        let undeformed = members.map(|p| undeformed(chunk, p as usize));
+        // Halved along several axes, they became two along the one that has them apart.
+        let share = |a: usize| (y[a] - x[a]).abs() / (half[a] + other[a]);
+        let halved = (0..D).filter(|&a| halvings::along(tag, a) > 0);
+        let axis = halved.max_by(|&a, &b| share(a).total_cmp(&share(b)))?;
+        let limit = NARROW * greatest(2.0 * undeformed[0][axis], setting.cell());
+        let is_narrow = 2.0 * half[axis].max(other[axis]) < limit;
+        let group = Group { rejoined: Some(axis), ..Group::new(members.to_vec(), parent, true) };
+        is_narrow.then_some((Tag::unpack(tag).level, group))
+    });
+    narrow.collect()
+}
