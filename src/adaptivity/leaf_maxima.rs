@@ -1,16 +1,16 @@
-//! What the solver notes of each leaf's particles right after G2P, while they are in the cache: what
-//! refinement criteria and splitting will ask for. Looking at them again later would cost more than all the
-//! rest of a regrid that changes nothing.
+//! Extrema of each leaf's particles for refinement criteria and splitting. The solver records them right
+//! after G2P, while the particles are in the cache: reading the particles again later would cost more than
+//! all the rest of a regrid that changes nothing.
 use super::resample::merge_backoff::Levels;
 use crate::kernel::domain;
 use crate::particle::chunk::{Chunk, Layout};
 
-/// Bounds on the particles of one leaf, before they migrate. One that changes leaf in that very step counts
+/// Bounds on the particles of one leaf, before they migrate. A particle that changes leaf in this step counts
 /// for the leaf that it comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LeafMaxima<const D: usize> {
-    /// Least and greatest velocity along each axis, 0 among them, m/s. Nodes would not do: those with next to
-    /// no mass may be very fast.
+    /// Least and greatest velocity along each axis, 0 among them, m/s. Velocities of nodes are unsuitable:
+    /// nodes of little mass may be very fast.
     pub velocity: [[f64; D]; 2],
     /// Greatest plastic strain.
     pub plastic_strain: f64,
@@ -18,7 +18,8 @@ pub(crate) struct LeafMaxima<const D: usize> {
     pub width: f64,
     /// Bound on the width of any box over its undeformed width.
     pub stretch: f64,
-    /// Bound on the half width (m) of boxes of elastic particles that are stretched (see `resample/halve.rs`).
+    /// Bound on the half width (m) of boxes of elastic particles that are stretched (see
+    /// `resample/halve.rs`).
     pub elastic_width: f64,
     /// Mean rate of the plastic strain in the last step, 1/s.
     pub plastic_rate: f64,

@@ -1,9 +1,8 @@
 //! Criteria for fine leaves, and the treatment of particles when leaves change.
 //!
-//! A criterion looks at one occupied leaf and wants it fine, lets it stay as it is, or has no objection to
-//! coarser ones. What it wants holds for the leaf and a buffer around it. A leaf is refined when any
-//! criterion wants that, and coarsened when none objects. The solver changes the tree
-//! (`solver/refinement/regrid.rs`).
+//! A criterion evaluates one occupied leaf and requests refinement, no coarsening, or nothing. The request
+//! holds for the leaf and a buffer around it. A leaf is refined when any criterion requests it, and coarsened
+//! when no criterion forbids it. The solver changes the tree (`solver/refinement/regrid.rs`).
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -152,7 +152,8 @@ fn pulled_bar_is_as_long_as_theory_says_and_comes_back() {
     );
 }
 
-/// What is halved, joined and refined gives the same on any ranks, also from a checkpoint in between.
+/// A run that halves, joins and refines gives the same result on any ranks, also from a checkpoint in
+/// between.
 #[test]
 fn halves_are_the_same_on_any_ranks_and_across_restart() {
     let rest = "[time]\nend = 0.7\n[history]\nevery_steps = 20\n[checkpoint]\nevery_steps = 150\nkeep = 99\n";

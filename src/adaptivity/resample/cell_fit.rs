@@ -133,9 +133,9 @@ fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
     chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
 }
 
-/// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`, where d
-/// is the distance to the node below, m². The first part is that of the box, the second that of linear
-/// interpolation between two nodes.
+/// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`,
+/// where d is the distance to the node below, m². The first part is that of the box, the second that of
+/// linear interpolation between two nodes.
 pub(super) fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
     let inside = |y: f64| y - cell * (y / cell).floor();
     let box_part = half * half / 3.0;

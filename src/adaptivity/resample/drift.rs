@@ -2,11 +2,11 @@
 //!
 //! Elastic strains stay small where material flows, and with them boxes; but neighbours drift apart by all of
 //! the stretch. Particles carry it as `e = b - 1`, with b of [`crate::particle::strain`] in terms of a cube
-//! of their half width l: the space of a particle is an ellipsoid with half axes l √λ. One whose longest axis
-//! is wider than some cells becomes two, half a half axis to each side, and each has half of that axis. Mass
-//! and momentum are kept as in [`super::split()`], and angular momentum since both take
-//! `B - C (o ⊗ o)` with the offset o. Space that has grown with them is left alone: grains that are apart
-//! (tension cut-off, spray) are no flow.
+//! of their half width l: the space of a particle is an ellipsoid with half axes l √λ. A particle whose
+//! longest axis exceeds some cells becomes two, offset by half a half axis to each side, and each has half of
+//! that axis. Mass and momentum are conserved as in [`super::split()`], and angular momentum since both take
+//! `B - C (o ⊗ o)` with the offset o. Particles whose space has grown in volume are left alone: separated
+//! grains (tension cut-off, spray) are no flow.
 use super::{Setting, ids, pair};
 use crate::material::tensor::eigen::{decompose, determinant};
 use crate::particle::chunk::{Chunk, Layout};
@@ -41,7 +41,7 @@ fn longest<const D: usize>(chunk: &Chunk<D>, p: usize, first: usize) -> Option<(
 }
 
 /// Replaces particles that have drifted apart by two each, in their place. `spread` is the second moment of a
-/// particle's weights in the grid that last gave it its affine matrix, m². `book` gets the kinetic energy
+/// particle's weights in the grid that last gave it its affine matrix, m². `book` receives the kinetic energy
 /// that each split adds, J. Returns how many were replaced.
 pub(super) fn close_gaps<const D: usize>(
     chunk: &mut Chunk<D>,
