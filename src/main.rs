@@ -9,6 +9,22 @@ use std::process::ExitCode;
 static ALLOCATOR: agimp::memory::Allocator = agimp::memory::Allocator;
 
 fn main() -> ExitCode {
+    let missing = agimp::simd::missing();
+    if missing.is_empty() {
+        run()
+    } else {
+        eprintln!(
+            "agimp: this processor lacks {missing}; this program is built for x86-64-v3 (AVX2, FMA, BMI2: 2013 and later). \
+             Use another machine, or build it from source with RUSTFLAGS='-C target-cpu=native'"
+        );
+        ExitCode::FAILURE
+    }
+}
+
+/// The program, on a processor that has its instructions; a function of its own, since its first lines may
+/// use them.
+#[inline(never)]
+fn run() -> ExitCode {
     // First of all, since a batch queue may send its signal while a run starts. An error is reported when the
     // run begins.
     if std::env::args_os().nth(1).is_some_and(|command| command == "run" || command == "sweep") {

@@ -27,7 +27,7 @@ mod weight;
 
 pub use adapt::{Mark, correspondence};
 pub use check::ForestError;
-pub use comm::{Comm, CommError, Disagreement, NeighbourExchange, Pending, RawComm, Traffic, World};
+pub use comm::{Comm, CommError, Disagreement, NeighbourExchange, Pending, Traffic, World};
 pub use forest::Forest;
 pub use key::{Brick, MAX_LEVEL, MAX_ROOTS, Octant};
 pub use migrate::Shipment;

@@ -3,6 +3,8 @@
 use crate::job::JobError;
 use crate::setup::seed::SeedError;
 use clap::{Parser, Subcommand};
+use partition::World;
+use std::sync::LazyLock;
 
 // Private, so that the compiler finds a subcommand that is not in `Command`.
 mod bench;
@@ -21,11 +23,18 @@ pub use self::shared::message::unusable;
 
 /// Adaptive generalized interpolation material point method on a distributed octree.
 #[derive(Debug, Parser)]
-#[command(name = "agimp", version, about, arg_required_else_help = true)]
+#[command(name = "agimp", version, long_version = build(), about, arg_required_else_help = true)]
 pub struct Arguments {
     /// Subcommand.
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// The version, and with which MPI library this program is built.
+fn build() -> &'static str {
+    static BUILD: LazyLock<String> =
+        LazyLock::new(|| format!("{} ({})", env!("CARGO_PKG_VERSION"), World::library()));
+    BUILD.as_str()
 }
 
 /// Subcommands.

@@ -17,6 +17,7 @@ pub use portable::{F64x4, Mask4};
 
 pub use dispatch::{Kernel, widest};
 pub use lanes::{Lanes, Mask};
+pub use processor::missing;
 
 /// 2^52 + 1023: adding it to a small integer leaves that integer, biased as an exponent, in the low bits.
 const EXPONENT_MAGIC: f64 = 4_503_599_627_370_496.0 + 1023.0;
@@ -37,6 +38,7 @@ mod lanes;
 // Public where it replaces AVX2, which it does not in tests on most machines.
 #[cfg_attr(test, allow(unreachable_pub))]
 mod portable;
+mod processor;
 
 /// Prefetches the cache line at an address, which need not be valid; a hint without effect on results.
 #[inline(always)]

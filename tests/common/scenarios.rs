@@ -39,7 +39,8 @@ pub(crate) fn agrees_for(scenario: &str, ranks: &[usize]) {
         return; // somebody has started the tests themselves under mpirun
     }
     let mut first: Option<Vec<String>> = None;
-    for &n in ranks {
+    // Built without MPI there is one rank.
+    for &n in ranks.iter().filter(|&&n| n == 1 || cfg!(feature = "mpi")) {
         let results = results(scenario, &launch(scenario, n));
         println!("{n} ranks: {results:#?}");
         let first = first.get_or_insert(results.clone());
@@ -81,8 +82,12 @@ fn results(scenario: &str, output: &Output) -> Vec<String> {
 }
 
 fn launch(scenario: &str, ranks: usize) -> Output {
-    let mut command = mpirun::command(ranks, LIMIT);
-    command.arg(std::env::current_exe().expect("this binary has a path"));
+    let this = std::env::current_exe().expect("this binary has a path");
+    let mut command = Command::new(&this);
+    if cfg!(feature = "mpi") {
+        command = mpirun::command(ranks, LIMIT);
+        command.arg(this);
+    }
     mpirun::finish(&mut worker(command, scenario))
 }
 

@@ -1,4 +1,5 @@
-//! Messages between ranks. The only folder that names MPI.
+//! Messages between ranks. The only folder that names MPI, and without the feature `mpi` that of a single
+//! rank.
 //!
 //! * [`World`] starts and ends MPI and installs the panic hook,
 //! * [`Comm`] carries collective calls: reductions (`reduce.rs`), the error fence
@@ -6,9 +7,10 @@
 //! * [`NeighbourExchange`] sends one message to each of a fixed set of neighbours, with a begin
 //!   and a finish between which other work can be done (`neighbour.rs`),
 //! * `host.rs` has collective calls of the ranks of one machine,
-//! * `environment.rs` has the differences between MPI libraries,
-//! * `request.rs` owns the buffers of sends under way; it holds the `unsafe` of this crate, but for
-//!   environment variables that are set before MPI starts.
+//! * `environment.rs` knows launchers,
+//! * `incoming.rs` puts messages together from pieces,
+//! * `library/` is the seam below all of these: MPI, or one rank without it; it holds the `unsafe` of this
+//!   crate.
 //!
 //! Everything here runs on the main thread (`MPI_THREAD_FUNNELED`); [`Comm`] is neither `Send`
 //! nor `Sync`, so the compiler keeps it there. No call has a cost that grows like the number of
@@ -16,16 +18,17 @@
 mod agree;
 mod environment;
 mod host;
+mod incoming;
+mod library;
 mod neighbour;
 mod reduce;
-mod request;
 mod sparse;
 mod world;
 
 pub use agree::Disagreement;
 pub use environment::{host, is_launched};
 pub use neighbour::{NeighbourExchange, Pending, Traffic};
-pub use world::{Comm, CommError, RawComm, World};
+pub use world::{Comm, CommError, World};
 
 /// Message tags. Exchanges with different tags cannot receive each other's messages.
 mod tag {

@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use mpi::point_to_point::Source;
-use mpi::traits::Communicator;
+use bytemuck::Pod;
 
-use super::request::{Incoming, Mode, Outgoing, Patience};
+use super::incoming::{Incoming, Patience};
+use super::library::{Mode, Outgoing};
 use super::{Comm, tag};
 
 /// Messages and bytes that an exchange has sent since its creation.
@@ -47,6 +47,21 @@ impl NeighbourExchange {
             traffic: Traffic::default(),
             busy: Rc::new(Cell::new(false)),
         }
+    }
+
+    /// Collective. An exchange with the ranks that get a request from this one and those that send it one; and the
+    /// requests that came, as `(rank, request)` sorted by rank. `requests` has each rank at most once.
+    pub fn by_requests<T: Pod>(
+        comm: &Comm,
+        requests: Vec<(usize, Vec<T>)>,
+        tag: u16,
+    ) -> (Self, Vec<(usize, Vec<T>)>) {
+        let mut ranks: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
+        let came = comm.sparse_exchange(requests);
+        ranks.extend(came.iter().map(|(rank, _)| *rank));
+        ranks.sort_unstable();
+        ranks.dedup();
+        (Self::new(comm, ranks, tag), came)
     }
 
     /// Not collective. The neighbours, in the order of messages.
@@ -118,9 +133,8 @@ impl Pending {
     pub fn progress(&mut self) -> bool {
         // By source, never "any": a fast neighbour's next message must not be taken for this one.
         for (slot, &source) in self.incoming.iter_mut().zip(self.neighbours.iter()) {
-            let process = self.comm.communicator().process_at_rank(source as i32);
             while let Slot::Arriving(incoming) = slot {
-                let Some(found) = process.immediate_matched_probe_with_tag(self.tag) else { break };
+                let Some(found) = self.comm.all().find(Some(source), self.tag) else { break };
                 if let Some(message) = incoming.receive(&self.comm, found) {
                     *slot = Slot::Complete(message);
                     self.missing -= 1;

@@ -1,10 +1,8 @@
 //! Reductions, gathers of a few scalars and broadcasts. Sums are over integers only, so that no
 //! result depends on the number of ranks or on the order in which MPI combines them.
 
-use mpi::collective::SystemOperation;
-use mpi::traits::{Communicator, CommunicatorCollectives, Equivalence, Root};
-
 use super::Comm;
+use super::library::Operation;
 
 impl Comm {
     /// Collective. Smallest value over all ranks. Exact; NaN if any rank has NaN.
@@ -32,7 +30,7 @@ impl Comm {
     pub fn max_f64s(&self, values: &mut [f64]) {
         // MPI leaves the order of -0 and 0 and the meaning of NaN open, so integers are compared.
         let keys: Vec<i64> = values.iter().map(|&v| order_key(v)).collect();
-        let keys = self.reduced(&keys, &SystemOperation::max());
+        let keys = self.all().reduce(&keys, Operation::Largest);
         for (value, key) in values.iter_mut().zip(keys) {
             *value = from_order_key(key);
         }
@@ -44,7 +42,7 @@ impl Comm {
     /// If a sum exceeds 64 bits.
     pub fn sum_u64(&self, values: &mut [u64]) {
         let halves: Vec<u64> = values.iter().flat_map(|&v| [v >> 32, v & 0xffff_ffff]).collect();
-        let halves = self.reduced(&halves, &SystemOperation::sum());
+        let halves = self.all().reduce(&halves, Operation::Sum);
         for (value, half) in values.iter_mut().zip(halves.chunks_exact(2)) {
             let sum = (u128::from(half[0]) << 32) + u128::from(half[1]);
             *value = u64::try_from(sum).expect("a sum over ranks exceeds 64 bits");
@@ -58,7 +56,7 @@ impl Comm {
     pub fn sum_i64(&self, values: &mut [i64]) {
         // Upper and lower half are summed apart, so nothing can wrap unnoticed on the way.
         let halves: Vec<i64> = values.iter().flat_map(|&v| [v >> 32, v & 0xffff_ffff]).collect();
-        let halves = self.reduced(&halves, &SystemOperation::sum());
+        let halves = self.all().reduce(&halves, Operation::Sum);
         for (value, half) in values.iter_mut().zip(halves.chunks_exact(2)) {
             let sum = (i128::from(half[0]) << 32) + i128::from(half[1]);
             *value = i64::try_from(sum).expect("a sum over ranks exceeds 64 bits");
@@ -74,13 +72,13 @@ impl Comm {
 
     /// Collective. Largest of each entry; all ranks give the same number of entries.
     pub fn max_u64(&self, values: &mut [u64]) {
-        let result = self.reduced(values, &SystemOperation::max());
+        let result = self.all().reduce(values, Operation::Largest);
         values.copy_from_slice(&result);
     }
 
     /// Collective. Smallest of each entry; all ranks give the same number of entries.
     pub fn min_u64(&self, values: &mut [u64]) {
-        let result = self.reduced(values, &SystemOperation::min());
+        let result = self.all().reduce(values, Operation::Smallest);
         values.copy_from_slice(&result);
     }
 
@@ -93,31 +91,23 @@ impl Comm {
 
     /// Collective. Sum of the values of all ranks below this one; 0 on rank 0.
     pub fn exclusive_sum_u64(&self, value: u64) -> u64 {
-        let mut sum = 0u64;
-        self.communicator().exclusive_scan_into(&value, &mut sum, SystemOperation::sum());
-        // MPI leaves the result of rank 0 undefined.
-        if self.rank() == 0 { 0 } else { sum }
+        self.all().sum_below(value)
     }
 
     /// Collective. The values of all ranks, in rank order. All ranks give the same number of
     /// values. The result grows with the number of ranks: for a few scalars per rank only.
     pub fn all_gather_u64(&self, values: &[u64]) -> Vec<u64> {
-        let mut all = vec![0u64; values.len() * self.size()];
-        if !values.is_empty() {
-            self.communicator().all_gather_into(values, &mut all[..]);
-        }
-        all
+        self.all().gather(values)
     }
 
     /// Collective. Replaces `bytes` on every rank by those of rank `root`.
     pub fn broadcast_bytes(&self, root: usize, bytes: &mut Vec<u8>) {
         assert!(root < self.size(), "no rank {root} among {}", self.size());
-        let process = self.communicator().process_at_rank(root as i32);
-        let mut len = bytes.len() as u64;
-        process.broadcast_into(&mut len);
-        bytes.resize(len as usize, 0);
+        let mut len = [bytes.len() as u64];
+        self.all().broadcast(root, &mut len);
+        bytes.resize(len[0] as usize, 0);
         for piece in bytes.chunks_mut(self.piece_len::<u8>()) {
-            process.broadcast_into(piece);
+            self.all().broadcast(root, piece);
         }
     }
 
@@ -125,14 +115,6 @@ impl Comm {
     pub fn gather_bytes(&self, bytes: &[u8]) -> Option<Vec<Vec<u8>>> {
         let received = self.sparse_exchange(vec![(0, bytes.to_vec())]);
         (self.rank() == 0).then(|| received.into_iter().map(|(_, bytes)| bytes).collect())
-    }
-
-    fn reduced<T: Equivalence + Copy>(&self, values: &[T], operation: &SystemOperation) -> Vec<T> {
-        let mut result = values.to_vec();
-        if !values.is_empty() {
-            self.communicator().all_reduce_into(values, &mut result[..], operation);
-        }
-        result
     }
 }
 

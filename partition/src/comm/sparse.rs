@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use bytemuck::Pod;
-use mpi::point_to_point::Source;
-use mpi::traits::{Communicator, CommunicatorCollectives};
 
-use super::request::{Incoming, Mode, Outgoing, Patience};
+use super::incoming::{Incoming, Patience};
+use super::library::{Mode, Outgoing};
 use super::{Comm, tag};
 
 impl Comm {
@@ -36,8 +35,8 @@ impl Comm {
         let mut barrier = None;
         let mut patience = Patience::default();
         loop {
-            if let Some(found) = self.communicator().any_process().immediate_matched_probe_with_tag(tag) {
-                let source = found.1.source_rank() as usize;
+            if let Some(found) = self.all().find(None, tag) {
+                let source = found.source();
                 let incoming = arriving.entry(source).or_insert_with(Incoming::new);
                 if let Some(message) = incoming.receive(self, found) {
                     received.push((source, message));
@@ -45,16 +44,17 @@ impl Comm {
                 patience.reset();
                 continue;
             }
-            barrier = match barrier {
+            match &mut barrier {
                 None => {
                     sends.retain_mut(|send| !send.test());
-                    sends.is_empty().then(|| self.communicator().immediate_barrier())
+                    barrier = sends.is_empty().then(|| self.all().start_barrier());
                 }
-                Some(request) => match mpi::request::Request::test(request) {
-                    Ok(_) => break,
-                    Err(request) => Some(request),
-                },
-            };
+                Some(barrier) => {
+                    if barrier.is_over() {
+                        break;
+                    }
+                }
+            }
             patience.wait();
         }
         received.sort_by_key(|&(source, _)| source); // stable

@@ -6,15 +6,7 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use mpi::Threading;
-use mpi::environment::Universe;
-use mpi::topology::SimpleCommunicator;
-use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
-
-use super::environment;
-
-/// MPI's own communicator handle, for libraries that need one (the parallel HDF5 driver).
-pub type RawComm = mpi::ffi::MPI_Comm;
+use super::library::{Group, Library};
 
 /// Exit code of a job that ended by a panic (the one Rust uses for a panic in `main`).
 const PANIC_CODE: i32 = 101;
@@ -40,6 +32,12 @@ pub enum CommError {
     /// The MPI library refuses to run in a process that has threads.
     #[error("the MPI library does not support threads beside the one that calls it (needs FUNNELED)")]
     Threads,
+    /// This build has one rank, and a launcher has started this many.
+    #[error(
+        "found {0} processes started by a launcher; this program is built without MPI and has one rank: start it by \
+         itself, with --threads for several cores, or use a build with MPI"
+    )]
+    WithoutMpi(u32),
 }
 
 /// The running MPI library and all its ranks.
@@ -60,25 +58,17 @@ impl World {
     ///
     /// To be called before the program starts threads: waiting ranks give their cores away only then.
     pub fn init() -> Result<World, CommError> {
-        environment::prepare();
-        let (universe, threading) =
-            mpi::initialize_with_threading(Threading::Funneled).ok_or(CommError::AlreadyStarted)?;
-        if threading < Threading::Funneled {
-            return Err(CommError::Threads);
-        }
-        // Our own copy of the communicator: messages of other libraries cannot be mistaken for ours.
-        let communicator = universe.world().duplicate();
-        let host = communicator.split_shared(0);
-        let (rank, size) = (communicator.rank() as usize, communicator.size() as usize);
+        let library = Library::start()?;
+        let (rank, size) = (library.all().rank(), library.all().size());
         std::panic::set_hook(Box::new(move |panic| end_by_panic(rank, size, panic)));
-        let shared = Shared {
-            communicator,
-            host,
-            sparse_parity: Cell::new(0),
-            largest_message: Cell::new(LARGEST_MESSAGE),
-            _universe: universe,
-        };
+        let shared =
+            Shared { library, sparse_parity: Cell::new(0), largest_message: Cell::new(LARGEST_MESSAGE) };
         Ok(World { comm: Comm { shared: Rc::new(shared), rank, size } })
+    }
+
+    /// Not collective. Name and version of the MPI library, or that this build has none.
+    pub fn library() -> String {
+        Library::name()
     }
 
     /// Not collective. The communicator of all ranks.
@@ -98,15 +88,13 @@ pub struct Comm {
     size: usize,
 }
 
-/// State that clones of a [`Comm`] share. Fields drop in this order: the communicators before MPI.
+/// The state that clones of a [`Comm`] share.
 struct Shared {
-    communicator: SimpleCommunicator,
-    /// Of the ranks that share the memory of this machine.
-    host: SimpleCommunicator,
+    library: Library,
     /// Number of sparse exchanges so far, modulo 2.
     sparse_parity: Cell<usize>,
+    /// Bytes.
     largest_message: Cell<usize>,
-    _universe: Universe,
 }
 
 impl Comm {
@@ -120,14 +108,9 @@ impl Comm {
         self.size
     }
 
-    /// Not collective. MPI's handle; valid as long as this `Comm`.
-    pub fn raw(&self) -> RawComm {
-        self.shared.communicator.as_raw()
-    }
-
     /// Collective. Returns when every rank has called it.
     pub fn barrier(&self) {
-        self.communicator().barrier();
+        self.all().barrier();
     }
 
     /// Not collective. From now on a panic of this process names this step.
@@ -137,7 +120,7 @@ impl Comm {
 
     /// Not collective. Ends all ranks at once with this exit code.
     pub fn abort(&self, code: i32) -> ! {
-        self.communicator().abort(code)
+        Library::abort(code)
     }
 
     /// Collective. Splits messages longer than `bytes` (default 2^30). Every rank must give the
@@ -147,12 +130,12 @@ impl Comm {
         self.shared.largest_message.set(bytes);
     }
 
-    pub(super) fn communicator(&self) -> &SimpleCommunicator {
-        &self.shared.communicator
+    pub(super) fn all(&self) -> &Group {
+        self.shared.library.all()
     }
 
-    pub(super) fn host(&self) -> &SimpleCommunicator {
-        &self.shared.host
+    pub(super) fn host(&self) -> &Group {
+        self.shared.library.host()
     }
 
     /// Items of `T` in the largest single message: the same on all ranks, at least 1.
@@ -183,7 +166,7 @@ fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
             std::thread::park();
         }
     }
-    let running = mpi::environment::is_initialized() && !mpi::environment::is_finalized();
+    let running = Library::is_running();
     if rank > 0 && running {
         std::thread::sleep(RANK_0_FIRST);
     }
@@ -204,6 +187,6 @@ fn end_by_panic(rank: usize, size: usize, panic: &PanicHookInfo<'_>) {
     if size > 1 && running {
         // Possibly not the main thread. The process ends either way, and waiting for the main
         // thread to notice could take forever if that one waits for a message.
-        SimpleCommunicator::world().abort(PANIC_CODE);
+        Library::abort(PANIC_CODE);
     }
 }

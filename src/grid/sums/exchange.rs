@@ -87,14 +87,8 @@ impl<const D: usize> ArenaExchange<D> {
                 push_request(words, piece, plan);
             }
         }
-        let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
-        let answers = comm.sparse_exchange(requests);
-        let mut ranks: Vec<usize> = answers.iter().map(|(rank, _)| *rank).chain(asked).collect();
-        // A rank that gets requests without making any must know of them, so that both list each other.
-        let told = comm.sparse_exchange(ranks.iter().map(|&rank| (rank, vec![0u8])).collect());
-        ranks.extend(told.iter().map(|(rank, _)| *rank));
-        ranks.sort_unstable();
-        ranks.dedup();
+        let (exchange, answers) = NeighbourExchange::by_requests(comm, requests, TAG);
+        let ranks = exchange.neighbours();
         let mut sent: Vec<Vec<SentPiece>> = ranks.iter().map(|_| Vec::new()).collect();
         for (rank, words) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
@@ -108,7 +102,6 @@ impl<const D: usize> ArenaExchange<D> {
                 start..plan.pieces.partition_point(|piece| piece.rank <= rank)
             })
             .collect();
-        let exchange = NeighbourExchange::new(comm, ranks, TAG);
         (Self { exchange, sent, received_from }, ReceivedSums::new(plan))
     }
 

@@ -27,14 +27,8 @@ impl LeafWords {
             let keys = of_rank.iter().map(|(_, leaf)| tree.leaves()[*leaf as usize].key());
             requests.push((of_rank[0].0, keys.collect()));
         }
-        let asked: Vec<usize> = requests.iter().map(|(rank, _)| *rank).collect();
-        let answers = comm.sparse_exchange(requests);
-        let mut ranks: Vec<usize> = answers.iter().map(|(rank, _)| *rank).chain(asked).collect();
-        // A rank that receives a request and sends none must learn of it, so that both list each other.
-        let told = comm.sparse_exchange(ranks.iter().map(|&rank| (rank, vec![0u8])).collect());
-        ranks.extend(told.iter().map(|(rank, _)| *rank));
-        ranks.sort_unstable();
-        ranks.dedup();
+        let (exchange, answers) = NeighbourExchange::by_requests(comm, requests, TAG);
+        let ranks = exchange.neighbours();
         let mut sent: Vec<Vec<u32>> = vec![Vec::new(); ranks.len()];
         for (rank, keys) in &answers {
             if let Ok(neighbour) = ranks.binary_search(rank) {
@@ -48,7 +42,7 @@ impl LeafWords {
             ghosts.map(|(_, leaf)| *leaf).collect()
         };
         let received = ranks.iter().map(of_rank).collect();
-        Self { exchange: NeighbourExchange::new(comm, ranks, TAG), sent, received }
+        Self { exchange, sent, received }
     }
 
     /// Messages and bytes so far.

@@ -7,22 +7,13 @@ use std::os::raw::c_void;
 
 use bytemuck::Pod;
 use mpi::ffi;
-use mpi::point_to_point::{Message, Status};
 use mpi::traits::{AsRaw, Equivalence};
 
-use super::Comm;
-
-/// How a send completes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mode {
-    /// When the buffer may be reused.
-    Standard,
-    /// When the receiver has started to receive.
-    Synchronous,
-}
+use super::super::Comm;
+use super::Mode;
 
 /// A message on its way: owns the buffer until MPI has finished reading it.
-pub(super) struct Outgoing<T: Pod> {
+pub(in super::super) struct Outgoing<T: Pod> {
     requests: Vec<ffi::MPI_Request>,
     /// Only kept alive; nothing touches it while requests are open.
     _buffer: Vec<T>,
@@ -33,7 +24,7 @@ impl<T: Pod> Outgoing<T> {
     ///
     /// Sent in pieces of [`Comm::piece_len`] items; the last piece is shorter than that (maybe
     /// empty), from which the receiver sees that the message is complete.
-    pub(super) fn start(comm: &Comm, to: usize, tag: i32, mode: Mode, buffer: Vec<T>) -> Self {
+    pub(in super::super) fn start(comm: &Comm, to: usize, tag: i32, mode: Mode, buffer: Vec<T>) -> Self {
         assert!(to < comm.size(), "no rank {to} among {}", comm.size());
         let limit = comm.piece_len::<T>();
         let pieces = buffer.len() / limit + 1;
@@ -56,7 +47,7 @@ impl<T: Pod> Outgoing<T> {
                     u8::equivalent_datatype().as_raw(),
                     to as i32,
                     tag,
-                    comm.raw(),
+                    comm.all().communicator().as_raw(),
                     &mut request,
                 );
                 request
@@ -67,7 +58,7 @@ impl<T: Pod> Outgoing<T> {
     }
 
     /// Not collective. Whether the send has completed; lets MPI make progress.
-    pub(super) fn test(&mut self) -> bool {
+    pub(in super::super) fn test(&mut self) -> bool {
         let mut done = 0;
         // SAFETY: the requests are ours; completed ones are set to the null request by MPI.
         unsafe {
@@ -98,55 +89,5 @@ impl<T: Pod> Drop for Outgoing<T> {
                 ffi::RSMPI_STATUSES_IGNORE,
             );
         }
-    }
-}
-
-/// A message that is arriving, piece by piece.
-#[derive(Debug, Default)]
-pub(super) struct Incoming<T> {
-    items: Vec<T>,
-}
-
-impl<T: Pod> Incoming<T> {
-    pub(super) fn new() -> Self {
-        Incoming { items: Vec::new() }
-    }
-
-    /// Not collective. Receives the next piece, which a matched probe has found. Returns the whole
-    /// message after its last piece.
-    pub(super) fn receive(&mut self, comm: &Comm, found: (Message, Status)) -> Option<Vec<T>> {
-        let (message, status) = found;
-        let bytes = status.count(u8::equivalent_datatype()) as usize;
-        let item = size_of::<T>();
-        assert!(bytes.is_multiple_of(item), "a message of {bytes} bytes does not hold items of {item} bytes");
-        let count = bytes / item;
-        let before = self.items.len();
-        self.items.resize(before + count, T::zeroed());
-        let target: &mut [u8] = bytemuck::cast_slice_mut(&mut self.items[before..]);
-        message.matched_receive_into(target);
-        (count < comm.piece_len::<T>()).then(|| std::mem::take(&mut self.items))
-    }
-}
-
-/// Waits politely: polls without pause for a while, then gives the core away between polls.
-#[derive(Debug, Default)]
-pub(super) struct Patience {
-    looks: u32,
-}
-
-impl Patience {
-    /// Not collective. To be called after each poll that found nothing.
-    pub(super) fn wait(&mut self) {
-        self.looks += 1;
-        if self.looks > 100 {
-            std::thread::yield_now();
-        } else {
-            std::hint::spin_loop();
-        }
-    }
-
-    /// Not collective. To be called after a poll that found something.
-    pub(super) fn reset(&mut self) {
-        self.looks = 0;
     }
 }
