@@ -1,17 +1,23 @@
 //! `agimp check`: the size and cost of a job, without running it.
 use super::Failure;
+use super::run::start_threads;
 use super::shared::message::{launched, together, warn_of};
 use super::shared::settings::Changes;
 use super::shared::{ranks, summary};
 use crate::job::{self, AnyProblem, Problem};
+use crate::memory::Limits;
 use crate::particle::chunk::Tag;
 use crate::setup;
+use crate::setup::Size;
+use crate::setup::estimate::pace::Pace;
 use crate::setup::estimate::{Estimate, LevelCount, estimate, tree_memory};
 use crate::setup::seed::check_counts;
 use crate::setup::warnings::warnings;
 use crate::solver::state::bookings::CarriedTotals;
+use crate::text::bytes;
 use partition::MAX_LEVEL;
-use partition::comm::World;
+use partition::comm::{Comm, World};
+use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
@@ -71,37 +77,92 @@ fn report<const D: usize>(
     }
     let needs_particles = problem.adaptivity.is_some() || problem.loads.iter().any(|l| l.carried().is_some());
     let is_moderate = !estimate.is_cut && estimate.memory < MOST_MEMORY;
-    let start = if needs_particles && is_moderate { start(problem, &estimate, world)? } else { None };
-    let (refined, carried) = start.map_or((None, Vec::new()), |(refined, carried)| (Some(refined), carried));
+    // MPI takes a moment to start, and jobs of about a second need no measurement.
+    let is_short = estimate.wall_time(1) + SHORTEST_STEP * estimate.steps < SHORT;
+    let looked = match is_short && !(needs_particles && is_moderate) {
+        true => Start::Unknown(estimate),
+        false => {
+            let world = match world {
+                Some(world) => world,
+                None => world.insert(World::init().map_err(|error| Failure::Run(error.to_string()))?),
+            };
+            start_threads(world.comm(), None)?;
+            match is_moderate {
+                true => start(world.comm(), problem, estimate, is_short)?,
+                false => {
+                    let pace = Pace::of_coarser(world.comm(), problem, &estimate, MOST_MEMORY);
+                    // The step of coarser cells is longer.
+                    let pace = pace.map(|pace| Pace { time_step: estimate.time_step, ..pace });
+                    Start::Unknown(estimate.with_pace(problem.time.end, pace))
+                }
+            }
+        }
+    };
+    let (shown, is_refined, carried) = match looked {
+        Start::Made { estimate, carried } => (estimate, true, carried),
+        Start::Unknown(estimate) => (estimate, false, Vec::new()),
+    };
     if world.as_ref().is_none_or(|world| world.comm().rank() == 0) {
-        let (shown, is_refined) = (refined.as_ref().unwrap_or(&estimate), refined.is_some());
         let start = summary::Start { is_refined, carried: &carried };
-        summary::write(&mut std::io::stdout().lock(), arguments.ranks, problem, shown, &start)?;
-        warn_of(&warnings(problem, shown.steps));
+        summary::write(&mut std::io::stdout().lock(), arguments.ranks, problem, &shown, &start)?;
+        let mut all = warnings(problem, shown.steps);
+        all.extend(lack_of_memory(&shown, arguments.ranks));
+        warn_of(&all);
     }
     Ok(())
 }
 
-/// Memory up to which a job is set up that has criteria or loads which particles carry, bytes: both depend on
-/// the particles themselves.
+/// Memory of this machine that the job exceeds: with one rank, or with each of some that may be on machines of their own.
+fn lack_of_memory(estimate: &Estimate, ranks: u32) -> Option<String> {
+    let (needed, has) = (estimate.memory_per_rank(ranks), Limits::of_machine().per_rank(1));
+    let each = if ranks == 1 { String::new() } else { format!(" on each of {ranks} ranks") };
+    (needed > has).then(|| {
+        format!(
+            "tree: the job takes about {} of memory{each}, and this machine has {}; a run here is refused: use coarser cells, lower levels, or more machines",
+            bytes(needed),
+            bytes(has)
+        )
+    })
+}
+
+/// Memory up to which a job is set up and stepped, bytes.
 const MOST_MEMORY: f64 = 90e6;
 
-/// The estimate for the tree at the start, which criteria have refined, and the totals that particles carry
-/// of each load; if that tree is of moderate size.
+/// Wall time of a run that needs no measurement, s.
+const SHORT: f64 = 1.4;
+
+/// Time that a step takes at least, s, however few particles there are; roughly.
+const SHORTEST_STEP: f64 = 1e-4;
+
+/// The first state of a job, as far as it is known.
+enum Start {
+    /// It was made: the estimate for its tree, and what particles carry of each load.
+    Made { estimate: Estimate, carried: Vec<CarriedTotals> },
+    /// It was not made, or is too large.
+    Unknown(Estimate),
+}
+
+/// Collective. Makes the first state of a job, with the tree that criteria refine, if that is of moderate size, and takes some steps unless the
+/// run is short.
 fn start<const D: usize>(
+    comm: &Comm,
     problem: &Problem<D>,
-    estimate: &Estimate,
-    world: &mut Option<World>,
-) -> Result<Option<(Estimate, Vec<CarriedTotals>)>, Failure> {
-    let world = match world {
-        Some(world) => world,
-        None => world.insert(World::init().map_err(|error| Failure::Run(error.to_string()))?),
+    estimate: Estimate,
+    is_short: bool,
+) -> Result<Start, Failure> {
+    // Memory of the trees on the way, of those that have particles.
+    let memories = RefCell::new(Vec::new());
+    let fits = |size: Size| {
+        if size[0] > 0 {
+            memories.borrow_mut().push(tree_memory::<D>(size));
+        }
+        if tree_memory::<D>(size) < MOST_MEMORY { Ok(()) } else { Err(()) }
     };
-    let comm = world.comm();
-    let fits = |size| if tree_memory::<D>(size) < MOST_MEMORY { Ok(()) } else { Err(()) };
     let solver = setup::solver_within(comm, problem, fits);
     // A fault of the first state is one of the job.
-    let Ok(solver) = solver.map_err(|error| Failure::Usage(error.to_string()))? else { return Ok(None) };
+    let Ok(mut solver) = solver.map_err(|error| Failure::Usage(error.to_string()))? else {
+        return Ok(Start::Unknown(estimate.extrapolated(final_memory(problem, &memories.borrow()))));
+    };
     let mut bodies = vec![0; problem.bodies.len()];
     for &tag in solver.chunks.iter().flat_map(|chunk| chunk.tags()) {
         bodies[usize::from(Tag::unpack(tag).body)] += 1;
@@ -115,5 +176,18 @@ fn start<const D: usize>(
     comm.sum_u64(bytemuck::cast_slice_mut(&mut levels));
     let finest = levels.iter().rposition(|level| level.leaves > 0).unwrap_or(0);
     let carried = solver.carried_totals();
-    Ok(Some((estimate.clone().for_tree(problem, bodies, levels[..=finest].to_vec()), carried)))
+    let estimate = estimate.for_tree(problem, bodies, levels[..=finest].to_vec());
+    let pace = if is_short { None } else { Pace::of(comm, &mut solver) };
+    Ok(Start::Made { estimate: estimate.with_pace(problem.time.end, pace), carried })
+}
+
+/// Memory of the tree that criteria ask for, bytes, by the growth of the last of the trees on the way to it, each a level finer.
+fn final_memory<const D: usize>(problem: &Problem<D>, memories: &[f64]) -> f64 {
+    let [.., before, last] = memories else { return memories.last().copied().unwrap_or(0.0) };
+    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
+    let finest = criteria.map(|criterion| criterion.level).max().unwrap_or(0);
+    let reached = usize::from(problem.finest_level()) + memories.len() - 1;
+    let left = usize::from(finest).saturating_sub(reached);
+    let growth = (last / before).clamp(1.0, f64::from(1_u32 << D));
+    last * growth.powi(left as i32)
 }

@@ -1,6 +1,10 @@
 //! Limits on memory.
 use std::path::Path;
 
+/// Addresses that the program and its libraries take, bytes, and the part of the others that is filled: limits of a process count addresses.
+const LIBRARIES: f64 = 3e8;
+const FILLED: f64 = 0.6;
+
 /// Bytes that a run may use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
@@ -23,7 +27,7 @@ impl Limits {
 
     /// Bytes for each of some ranks of this machine.
     pub fn per_rank(&self, ranks: usize) -> f64 {
-        (self.host / ranks as f64).min(self.process)
+        (self.host / ranks as f64).min(FILLED * (self.process - LIBRARIES).max(0.0))
     }
 }
 
@@ -96,7 +100,7 @@ mod tests {
         assert_eq!(groups("0::/slurm/job_1/step_0\n", root.path()), 4000.0);
         assert_eq!(groups("5:cpu:/\n4:memory:/a\n", root.path()), 3000.0);
         assert_eq!(groups("0::/elsewhere\n", root.path()), f64::INFINITY);
-        let limits = Limits { host: 4000.0, process: 1500.0 };
-        assert_eq!([1, 2, 4].map(|ranks| limits.per_rank(ranks)), [1500.0, 1500.0, 1000.0]);
+        let limits = Limits { host: 4e9, process: 2.3e9 };
+        assert_eq!([1, 2, 4].map(|ranks| limits.per_rank(ranks)), [1.2e9, 1.2e9, 1e9]);
     }
 }

@@ -101,7 +101,7 @@ pub fn solver_within<const D: usize, R>(
     // Criteria depend on particles, and finer leaves have other particles: until the tree stays.
     let mut passes = 0;
     while passes < MAX_LEVEL && solver.regrid_before_start() {
-        let mut forest = solver.forest;
+        let mut forest = forest_of(solver);
         if let Err(refusal) = fits(comm.agree(partition_by_seeds(comm, problem, &mut forest))?) {
             return Ok(Err(refusal));
         }
@@ -118,6 +118,11 @@ pub fn solver_within<const D: usize, R>(
     carried::carry(comm, problem, &solver, &mut chunks, 0)?;
     solver.chunks = chunks;
     Ok(Ok(solver))
+}
+
+/// The tree of a solver, whose particles go: those of the next tree need the room.
+fn forest_of<const D: usize>(solver: Solver<D>) -> Forest<D> {
+    solver.forest
 }
 
 /// Collective. Fills the leaves of a tree with numbered particles.

@@ -242,7 +242,7 @@ fn jobs_of_the_project_have_no_warnings() {
 
 const REFUSED: &str = "job.toml:1:1: tree: found a job that takes ";
 
-/// Trees that cannot be, by their regions or by their criteria: nothing is written.
+/// Trees that cannot be, by their regions or by their criteria: warned of by `check`, refused by `run` before anything is written.
 #[test]
 fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
     let directory = tempfile::tempdir().unwrap();
@@ -263,6 +263,10 @@ fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
         assert!(!here.join("out").exists(), "{name}");
         // Three seconds on an idle machine.
         assert!(start.elapsed().as_secs() < 120, "{name}: {:?}", start.elapsed());
+        let check = confined(here, limit, &["check", "job.toml"]);
+        let message = words(&check);
+        assert_eq!(check.status.code(), Some(0), "{name}: {message}");
+        assert!(message.contains("agimp: warning: tree: the job takes about "), "{name}: {message}");
     }
 }
 
@@ -275,4 +279,25 @@ fn memory_that_is_not_there_ends_the_program_with_a_message() {
     let output = confined(directory.path(), 200_000, &arguments);
     assert_eq!(output.status.code(), Some(1), "{:?} {}", output.status, words(&output));
     assert!(words(&output).starts_with("agimp: no memory left: found no room for "), "{}", words(&output));
+}
+
+/// Few particles and many steps: what a step costs beside its particles counts.
+#[test]
+fn the_wall_time_of_a_job_is_measured() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let slow =
+        [("velocity = [0.1, 0]", "velocity = [1e-3, 0]"), ("velocity = [0, -0.02]", "velocity = [0, -1e-4]")];
+    let job = changed(&[slow[0], slow[1], ("end = 2", "end = 10")]);
+    std::fs::write(here.join("job.toml"), job).unwrap();
+    let out = String::from_utf8(agimp(here, &["check", "job.toml"]).stdout).unwrap();
+    let line = out.lines().find(|line| line.starts_with("wall time")).unwrap();
+    assert!(line.contains("of this machine by a few steps"), "{line}");
+    let told: f64 = line.split_whitespace().filter_map(|word| word.parse().ok()).next().unwrap();
+    let start = Instant::now();
+    let run = agimp(here, &["run", "job.toml", "--quiet"]);
+    assert_eq!(run.status.code(), Some(0), "{}", words(&run));
+    let taken = start.elapsed().as_secs_f64();
+    // Within a factor of two on an idle machine; others may be busy with one of both.
+    assert!(told < 5.0 * taken && taken < 5.0 * told, "{told} s told, {taken} s taken");
 }

@@ -134,12 +134,13 @@ pub(in crate::cli) fn write<const D: usize>(
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;
     writeln!(
         out,
-        "wall time    {} on {} of this type, if counts and time step remain constant",
+        "wall time    {} on {} of this {}if counts and time step remain constant",
         match (wall_time(estimate.wall_time(cores)), estimate.is_cut) {
             (time, false) if time.starts_with("less") => time,
             (time, _) => format!("{about} {time}"),
         },
-        if cores == 1 { "1 core".into() } else { format!("{cores} cores") }
+        if cores == 1 { "1 core".into() } else { format!("{cores} cores") },
+        if estimate.pace.is_some() { "machine by a few steps, " } else { "type, " }
     )?;
     writeln!(
         out,

@@ -1,5 +1,6 @@
 //! Cost of a job, estimated without running it.
 use self::count::Tally;
+use self::pace::Pace;
 use super::seed::{SeedError, check_finite};
 use crate::grid::mask::{offset, offset_count};
 use crate::job::problem::{Field, Problem};
@@ -12,6 +13,7 @@ use rustc_hash::FxHashSet;
 use std::path::PathBuf;
 
 mod count;
+pub mod pace;
 
 /// The size and the cost of a job cannot be estimated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,6 +53,8 @@ pub struct Estimate {
     pub steps: f64,
     /// Particles that one core advances by a step in a second; roughly.
     pub particle_steps_per_second: f64,
+    /// What steps take on this machine, if that was measured.
+    pub pace: Option<Pace>,
     /// Bytes of memory of all ranks together, without the program itself; about.
     pub memory: f64,
     /// Bytes of one output file with its tree; about.
@@ -64,6 +68,11 @@ pub struct Estimate {
 /// Particles that one core advances by a step in a second, in 2D and in 3D: two thirds of what
 /// docs/performance.md has, for machines that are slower and cores that share their memory.
 const PARTICLE_STEPS_PER_SECOND: [f64; 2] = [12e6, 5.5e6];
+
+/// Time of start, picture and report of a run, s; of an output beside that for its bytes, s; and bytes that reach the disk in a second.
+const START_AND_END: f64 = 0.4;
+const OUTPUT: f64 = 0.02;
+const BYTES_PER_SECOND: f64 = 3e8;
 
 /// Bytes that each rank takes with next to no particles: the program itself and its libraries.
 pub const PROGRAM: f64 = 37e6;
@@ -112,11 +121,33 @@ impl Estimate {
         PROGRAM + self.memory / f64::from(ranks)
     }
 
-    /// Seconds of wall time on some cores if particles and time step stay what they are at the start;
-    /// roughly.
+    /// Seconds of wall time if particles and time step stay what they are at the start: by what was measured on all cores of this machine, or
+    /// roughly for some cores.
     pub fn wall_time(&self, cores: u32) -> f64 {
-        let steps = self.total_particles() as f64 * self.steps;
-        steps / (self.particle_steps_per_second * f64::from(cores))
+        let work = self.total_particles() as f64 * self.steps;
+        let steps = match self.pace {
+            Some(pace) => work * pace.seconds_per_particle,
+            None => work / (self.particle_steps_per_second * f64::from(cores)),
+        };
+        START_AND_END + steps + self.outputs as f64 * (OUTPUT + self.output_bytes / BYTES_PER_SECOND)
+    }
+
+    /// Takes over what was measured. Steps get no longer by it, since cells may become finer than they are at the start.
+    pub fn with_pace(mut self, end: f64, pace: Option<Pace>) -> Self {
+        self.pace = pace;
+        if let Some(pace) = pace.filter(|pace| pace.time_step < self.time_step) {
+            self.time_step = pace.time_step;
+            self.steps = (end / pace.time_step).ceil();
+        }
+        self
+    }
+
+    /// Takes over the memory of all ranks (bytes) of a tree that is too large to be made; the work grows like it.
+    pub fn extrapolated(mut self, memory: f64) -> Self {
+        let growth = (memory / self.memory.max(1.0)).max(1.0);
+        self.particle_steps_per_second /= growth;
+        self.memory *= growth;
+        self
     }
 
     /// Particles of all bodies.
@@ -165,6 +196,7 @@ pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, Estima
         time_step,
         steps,
         particle_steps_per_second: 0.0,
+        pace: None,
         memory: 0.0,
         output_bytes: 0.0,
         outputs,
