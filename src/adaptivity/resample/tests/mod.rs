@@ -7,6 +7,7 @@ use crate::simd::{Lanes, Vector};
 use proptest::prelude::*;
 
 mod conservation;
+mod halving;
 mod limits;
 
 /// Cell of level 0, and upper corner of the domain.
