@@ -37,7 +37,7 @@ class Columns:
         single = values.ndim == 1
         columns = [values] if single else list(values.T)
         names: Sequence[str] = (name,) if single else _fields.components(name, len(columns))
-        for column, one in zip(names, columns, strict=True):
+        for column, one in zip(names, columns):
             self.values[column] = np.ascontiguousarray(one)
             self.units[column] = unit
             self.descriptions[column] = description

@@ -59,7 +59,7 @@ class Header:
     @property
     def domain(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Lower and upper corner of the domain, m."""
-        upper = (low + self.root_edge * count for low, count in zip(self.origin, self.roots, strict=True))
+        upper = (low + self.root_edge * count for low, count in zip(self.origin, self.roots))
         return self.origin, tuple(upper)
 
 
@@ -154,7 +154,7 @@ def checksums(path: Path, file: Any) -> list[tuple[str, int]]:
     if "data_sets_crc32" not in attributes:
         raise FileRefused(f"{path}: the header has no checksums; an older program wrote it")
     names = text(attributes["data_sets"]).split("\n")
-    return list(zip(names, np.ravel(attributes["data_sets_crc32"]).tolist(), strict=True))
+    return list(zip(names, np.ravel(attributes["data_sets_crc32"]).tolist()))
 
 
 def _job_text(file: Any) -> str:

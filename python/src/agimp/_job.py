@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import os
 import tempfile
-import tomllib
 from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from . import _program
+from . import _program, _toml
 from ._errors import AgimpError, JobError
 
 
@@ -103,8 +102,8 @@ def job(source: Mapping[str, Any] | str | os.PathLike[str] | None = None, name: 
         return Job({**(source or {}), **keys}, "job" if name is None else name)
     path = Path(source)
     try:
-        read = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+        read = _toml.loads(path.read_text(encoding="utf-8"))
+    except _toml.TOMLDecodeError as error:
         raise JobError(f"{path}: not TOML: {error}") from error
     return Job({**read, **keys}, path.stem if name is None else name)
 

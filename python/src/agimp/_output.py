@@ -129,7 +129,7 @@ class Output:
         """
         chosen = self.fields if fields is None else tuple(fields)
         columns = _frames.Columns()
-        for axis, values in zip(_fields.AXES, self.positions().T, strict=False):
+        for axis, values in zip(_fields.AXES, self.positions().T):
             columns.add(axis, values, "m", f"position along {axis}")
         for name in chosen:
             columns.add(name, self.field(name), self.unit(name), self.description(name))

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from . import _toml
 from ._errors import FileRefused
 
 ENDINGS = ("hdf", "vtkhdf")
@@ -60,8 +60,8 @@ def locate(path: Path, name: str | None) -> Place:
 def output_directory(job: Path) -> Path:
     """The directory that a run of this job file, started here, writes to."""
     try:
-        keys = tomllib.loads(job.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+        keys = _toml.loads(job.read_text(encoding="utf-8"))
+    except _toml.TOMLDecodeError as error:
         raise FileRefused(f"{job}: not TOML: {error}") from error
     output = keys.get("output")
     directory = output.get("directory") if isinstance(output, dict) else None

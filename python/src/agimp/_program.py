@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,13 +30,16 @@ class Called(NamedTuple):
 
 
 def find(binary: str | os.PathLike[str] | None) -> str:
-    """The program: as given, or of the environment variable AGIMP, or on the PATH."""
+    """The program: as given, or of the environment variable AGIMP, or on the PATH, or of this package's own wheel."""
     given, whence = (binary, "binary=") if binary is not None else (os.environ.get(VARIABLE), f"{VARIABLE}=")
     if given:
         if found := shutil.which(given):
             return str(Path(found).absolute())
         raise ProgramNotFound(f"{whence}{os.fspath(given)}: no such program; expected the path of the built 'agimp'")
     if found := shutil.which("agimp"):
+        return found
+    # An environment that is not activated: its scripts are not on the PATH.
+    if found := shutil.which("agimp", path=sysconfig.get_path("scripts")):
         return found
     raise ProgramNotFound(
         f"the program 'agimp' was not found: not on the PATH, and {VARIABLE} is not set. Build it with 'cargo build "
@@ -88,7 +92,7 @@ def call(words: Sequence[str], directory: Path | None = None, *, echo: bool = Fa
     texts: tuple[list[str], list[str]] = ([], [])
     readers = [
         threading.Thread(target=_collect, args=(stream, into, echo))
-        for stream, into in zip((process.stdout, process.stderr), texts, strict=True)
+        for stream, into in zip((process.stdout, process.stderr), texts)
     ]
     for reader in readers:
         reader.start()

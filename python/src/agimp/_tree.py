@@ -62,7 +62,7 @@ class Tree:
 
     def __repr__(self) -> str:
         levels, counts = np.unique(self.fields["level"], return_counts=True)
-        by_level = ", ".join(f"level {level}: {count}" for level, count in zip(levels, counts, strict=True))
+        by_level = ", ".join(f"level {level}: {count}" for level, count in zip(levels, counts))
         return f"Tree: t = {self.header.time:g} s, {len(self)} leaves ({by_level})"
 
     @property
@@ -78,7 +78,7 @@ class Tree:
     def leaves(self) -> pandas.DataFrame:
         """A table with a row for each leaf: lower corner, edge and fields. Needs pandas."""
         columns = _frames.Columns()
-        for axis, values in zip(_fields.AXES, self.lower.T, strict=False):
+        for axis, values in zip(_fields.AXES, self.lower.T):
             columns.add(axis, values, "m", f"lower corner along {axis}")
         for name, array in {"edge": self.edge, **self.fields}.items():
             known = _fields.KNOWN.get(name, _fields.Field("", name.replace("_", " ")))
