@@ -61,12 +61,21 @@ impl<'a, const D: usize> Guard<'a, D> {
             if let Some(again) = meets(collider, &met.place, &place, close) {
                 place = again.place;
             }
-            // The rest of the path takes no particle through a face that its own path has not reached.
-            let mut at = collider.to_space(&place, pose);
-            for axis in 0..D {
-                let edge = 1e-6 * close;
-                let (least, most) = (edge.min(to[axis]), (self.extent[axis] - edge).max(to[axis]));
-                at[axis] = at[axis].max(least).min(most);
+            // The rest of the path ends at a face of the domain that the particle's own path has not reached. It is
+            // shortened: a place moved along an axis could be on the other side of an inclined sheet.
+            let (start, mut at) = (collider.to_space(&met.place, pose), collider.to_space(&place, pose));
+            let edge = 1e-6 * close;
+            let bounds: [_; D] =
+                std::array::from_fn(|a| (edge.min(to[a]), (self.extent[a] - edge).max(to[a])));
+            let inside: [f64; D] = std::array::from_fn(|a| at[a].max(bounds[a].0).min(bounds[a].1));
+            if inside != at {
+                let share = (0..D).filter(|&a| inside[a] != at[a]).fold(1.0_f64, |share, a| {
+                    share.min(((inside[a] - start[a]) / (at[a] - start[a])).max(0.0))
+                });
+                at = std::array::from_fn(|a| {
+                    let place = share.mul_add(at[a] - start[a], start[a]);
+                    place.max(bounds[a].0).min(bounds[a].1)
+                });
             }
             chunk.write(Layout::<D>::POSITION, p, &at);
             let (normal, surface) =
