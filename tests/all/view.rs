@@ -190,6 +190,7 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
     std::fs::write(here.join("not.hdf"), "a file of plain text").expect("written");
     std::fs::write(here.join("empty.hdf.series"), r#"{"file-series-version":"1.0","files":[]}"#)
         .expect("written");
+    std::fs::create_dir(here.join("bare")).expect("made");
     let output = "out/half/half_000000.hdf";
     for (words, message) in [
         (&["none.hdf"][..], "none.hdf"),
@@ -200,7 +201,8 @@ fn what_cannot_be_shown_is_refused_and_writes_nothing() {
             &["out/half/half_000000.tree.hdf"],
             "found the tree of a run, which holds no particles; expected its outputs: out/half/half_000000.hdf",
         ),
-        (&["."], ".: found no outputs of a run"),
+        (&["."], ".: the index of empty lists no outputs"),
+        (&["bare"], "bare: found no outputs of a run"),
         (&[output, "--fields", "stress"], "does not contain stress; it contains "),
         (&[output, "--fields", "presure"], "expected one of velocity, displacement, strain"),
         (&[output, "--bits", "40"], "40 is not in 4..=16"),
