@@ -59,9 +59,15 @@ def test_the_program_checks(needs_program: str) -> None:
     assert "tmp" not in str(error.value), "the place is that in the job, not of a temporary file"
 
 
+def told(checked: str) -> list[str]:
+    """The lines of a check without those that a short measurement gives."""
+    measured = ("time step", "steps", "wall time")
+    return [line for line in checked.splitlines() if not line.startswith(measured)]
+
+
 def test_every_shipped_job_survives_being_read_and_written(needs_program: str) -> None:
     for path in sorted((REPOSITORY / "jobs").glob("column_collapse_2d.toml")) + [REPOSITORY / "jobs" / "cylinder_in_sand.toml"]:
-        assert agimp.job(path).check() == agimp.check(path)
+        assert told(agimp.job(path).check()) == told(agimp.check(path))
 
 
 def test_templates(needs_program: str) -> None:
