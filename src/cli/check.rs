@@ -112,7 +112,8 @@ fn report<const D: usize>(
     Ok(())
 }
 
-/// Memory of this machine that the job exceeds: with one rank, or with each of some that may be on machines of their own.
+/// Memory of this machine that the job exceeds: with one rank, or with each of some that may be on machines
+/// of their own.
 fn lack_of_memory(estimate: &Estimate, ranks: u32) -> Option<String> {
     let (needed, has) = (estimate.memory_per_rank(ranks), Limits::of_machine().per_rank(1));
     let each = if ranks == 1 { String::new() } else { format!(" on each of {ranks} ranks") };
@@ -142,8 +143,8 @@ enum Start {
     Unknown(Estimate),
 }
 
-/// Collective. Makes the first state of a job, with the tree that criteria refine, if that is of moderate size, and takes some steps unless the
-/// run is short.
+/// Collective. Makes the first state of a job, with the tree that criteria refine, if that is of moderate
+/// size, and takes some steps unless the run is short.
 fn start<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
@@ -181,7 +182,8 @@ fn start<const D: usize>(
     Ok(Start::Made { estimate: estimate.with_pace(problem.time.end, pace), carried })
 }
 
-/// Memory of the tree that criteria ask for, bytes, by the growth of the last of the trees on the way to it, each a level finer.
+/// Memory of the tree that criteria ask for, bytes, by the growth of the last of the trees on the way to it,
+/// each a level finer.
 fn final_memory<const D: usize>(problem: &Problem<D>, memories: &[f64]) -> f64 {
     let [.., before, last] = memories else { return memories.last().copied().unwrap_or(0.0) };
     let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);

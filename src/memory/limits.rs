@@ -1,7 +1,8 @@
 //! Limits on memory.
 use std::path::Path;
 
-/// Addresses that the program and its libraries take, bytes, and the part of the others that is filled: limits of a process count addresses.
+/// Addresses that the program and its libraries take, bytes, and the part of the others that is filled:
+/// limits of a process count addresses.
 const LIBRARIES: f64 = 3e8;
 const FILLED: f64 = 0.6;
 

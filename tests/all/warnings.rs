@@ -242,7 +242,8 @@ fn jobs_of_the_project_have_no_warnings() {
 
 const REFUSED: &str = "job.toml:1:1: tree: found a job that takes ";
 
-/// Trees that cannot be, by their regions or by their criteria: warned of by `check`, refused by `run` before anything is written.
+/// Trees that cannot be, by their regions or by their criteria: warned of by `check`, refused by `run` before
+/// anything is written.
 #[test]
 fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,11 +1,9 @@
-//! What the launcher of ranks sets in the environment, and the name of the machine.
+//! Environment variables that launchers of ranks set, and the name of the machine.
 //!
-//! What must be known before `mpirun` itself starts (running as root, more ranks than cores) stands in
-//! `jobs/environment`.
+//! Settings that `mpirun` itself needs (running as root, more ranks than cores) are in `jobs/environment`.
 
 /// Not collective. Whether a launcher has started this process as one of its ranks: `mpirun` of Open MPI or
-/// MPICH, or
-/// `srun` through PMI or PMIx. A process that none has started is alone.
+/// MPICH, or `srun` through PMI or PMIx. A process that none has started is alone.
 pub fn is_launched() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMI_RANK", "PMI_SIZE", "PMIX_RANK"]
         .iter()

@@ -49,8 +49,9 @@ impl NeighbourExchange {
         }
     }
 
-    /// Collective. An exchange with the ranks that get a request from this one and those that send it one; and the
-    /// requests that came, as `(rank, request)` sorted by rank. `requests` has each rank at most once.
+    /// Collective. An exchange with the ranks that get a request from this one and those that send it one;
+    /// and the requests that came, as `(rank, request)` sorted by rank. `requests` has each rank at most
+    /// once.
     pub fn by_requests<T: Pod>(
         comm: &Comm,
         requests: Vec<(usize, Vec<T>)>,

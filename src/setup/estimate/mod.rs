@@ -53,7 +53,7 @@ pub struct Estimate {
     pub steps: f64,
     /// Particles that one core advances by a step in a second; roughly.
     pub particle_steps_per_second: f64,
-    /// What steps take on this machine, if that was measured.
+    /// Cost of steps on this machine, if it was measured.
     pub pace: Option<Pace>,
     /// Bytes of memory of all ranks together, without the program itself; about.
     pub memory: f64,
@@ -69,7 +69,8 @@ pub struct Estimate {
 /// docs/performance.md has, for machines that are slower and cores that share their memory.
 const PARTICLE_STEPS_PER_SECOND: [f64; 2] = [12e6, 5.5e6];
 
-/// Time of start, picture and report of a run, s; of an output beside that for its bytes, s; and bytes that reach the disk in a second.
+/// Time of start, picture and report of a run, s; of an output beside that for its bytes, s; and bytes that
+/// reach the disk in a second.
 const START_AND_END: f64 = 0.4;
 const OUTPUT: f64 = 0.02;
 const BYTES_PER_SECOND: f64 = 3e8;
@@ -121,8 +122,8 @@ impl Estimate {
         PROGRAM + self.memory / f64::from(ranks)
     }
 
-    /// Seconds of wall time if particles and time step stay what they are at the start: by what was measured on all cores of this machine, or
-    /// roughly for some cores.
+    /// Seconds of wall time if particles and time step stay what they are at the start: by what was measured
+    /// on all cores of this machine, or roughly for some cores.
     pub fn wall_time(&self, cores: u32) -> f64 {
         let work = self.total_particles() as f64 * self.steps;
         let steps = match self.pace {
@@ -132,7 +133,8 @@ impl Estimate {
         START_AND_END + steps + self.outputs as f64 * (OUTPUT + self.output_bytes / BYTES_PER_SECOND)
     }
 
-    /// Takes over what was measured. Steps get no longer by it, since cells may become finer than they are at the start.
+    /// Takes over what was measured. Steps get no longer by it, since cells may become finer than they are at
+    /// the start.
     pub fn with_pace(mut self, end: f64, pace: Option<Pace>) -> Self {
         self.pace = pace;
         if let Some(pace) = pace.filter(|pace| pace.time_step < self.time_step) {
@@ -142,7 +144,8 @@ impl Estimate {
         self
     }
 
-    /// Takes over the memory of all ranks (bytes) of a tree that is too large to be made; the work grows like it.
+    /// Takes over the memory of all ranks (bytes) of a tree that is too large to be made; the work grows like
+    /// it.
     pub fn extrapolated(mut self, memory: f64) -> Self {
         let growth = (memory / self.memory.max(1.0)).max(1.0);
         self.particle_steps_per_second /= growth;

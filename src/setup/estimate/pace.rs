@@ -10,7 +10,7 @@ use crate::solver::{Requests, Solver};
 
 /// Time spent on steps.
 const BUDGET: Duration = Duration::from_millis(400);
-/// Coarser jobs that are looked at.
+/// Coarser jobs that are tried.
 const TRIALS: usize = 3;
 /// Most steps that are measured.
 const STEPS: usize = 400;
@@ -25,7 +25,8 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Collective. Does some steps. The first ones, in which memory is touched for the first time, do not count. `None` if a step fails.
+    /// Collective. Does some steps. The first ones, in which memory is touched for the first time, do not
+    /// count. `None` if a step fails.
     pub fn of<const D: usize>(comm: &Comm, solver: &mut Solver<D>) -> Option<Self> {
         let particles = solver.chunks.iter().map(|chunk| chunk.len() as u64).sum();
         let mut particles = [particles];
@@ -46,8 +47,9 @@ impl Pace {
         Some(Self { seconds_per_particle, time_step: solver.clock.dt })
     }
 
-    /// Collective. The same of a job that takes more than `most` bytes: on cells so much coarser that it takes less. The time step is not that of
-    /// the job. `None` if there are no such cells, or the coarser job cannot be made.
+    /// Collective. The same of a job that takes more than `most` bytes: on cells so much coarser that it
+    /// takes less. The time step is not that of the job. `None` if there are no such cells, or the coarser
+    /// job cannot be made.
     pub fn of_coarser<const D: usize>(
         comm: &Comm,
         problem: &Problem<D>,

@@ -3,7 +3,7 @@
 //!
 //! | file | built |
 //! |---|---|
-//! | `with_mpi.rs`, `sends.rs` | with the feature `mpi` (default): MPI through rsmpi; the `unsafe` of this crate |
+//! | `with_mpi.rs`, `sends.rs` | with the feature `mpi` (default): MPI by rsmpi; the `unsafe` of this crate |
 //! | `one_rank.rs` | without it: a single rank, whose messages to itself wait in a queue |
 //!
 //! Both offer the same items: [`Library`] starts and ends the library, a [`Group`] makes collective calls and

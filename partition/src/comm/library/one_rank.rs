@@ -12,8 +12,7 @@ use super::{Mode, Operation};
 /// Set by the first start: as MPI, the library starts once per process.
 static STARTED: AtomicBool = AtomicBool::new(false);
 
-/// What launchers tell a process of the number of ranks that they start: `mpirun` of Open MPI, that of MPICH,
-/// `srun`.
+/// Variables with the number of ranks that a launcher starts: `mpirun` of Open MPI, that of MPICH, `srun`.
 const LAUNCHERS: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
 
 /// The library, started.

@@ -61,8 +61,8 @@ impl<'a, const D: usize> Guard<'a, D> {
             if let Some(again) = meets(collider, &met.place, &place, close) {
                 place = again.place;
             }
-            // The rest of the path ends at a face of the domain that the particle's own path has not reached. It is
-            // shortened: a place moved along an axis could be on the other side of an inclined sheet.
+            // The rest of the path ends at a face of the domain that the particle's own path has not reached.
+            // It is shortened: a place moved along an axis could be on the other side of an inclined sheet.
             let (start, mut at) = (collider.to_space(&met.place, pose), collider.to_space(&place, pose));
             let edge = 1e-6 * close;
             let bounds: [_; D] =
