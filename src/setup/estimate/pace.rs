@@ -14,13 +14,15 @@ const BUDGET: Duration = Duration::from_millis(400);
 const TRIALS: usize = 3;
 /// Most steps that are measured.
 const STEPS: usize = 400;
+/// The step whose length counts, so that it is the same in each measurement.
+const REPRESENTATIVE: usize = 4;
 
 /// Measured cost of steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
     /// Wall time of a step for each particle, s.
     pub seconds_per_particle: f64,
-    /// Length of the last step, s.
+    /// Length of a step after the first ones, s.
     pub time_step: f64,
 }
 
@@ -31,20 +33,23 @@ impl Pace {
         let particles = solver.chunks.iter().map(|chunk| chunk.len() as u64).sum();
         let mut particles = [particles];
         comm.sum_u64(&mut particles);
-        let (start, mut times) = (Instant::now(), Vec::new());
+        let (start, mut times, mut time_step) = (Instant::now(), Vec::new(), 0.0);
         while times.len() < STEPS {
             let step = Instant::now();
             solver.step(f64::INFINITY, Requests::default()).ok()?;
             solver.regrid().ok()?;
             times.push(step.elapsed().as_secs_f64());
-            if comm.any(start.elapsed() > BUDGET) {
+            if times.len() == REPRESENTATIVE {
+                time_step = solver.clock.dt;
+            }
+            if comm.any(times.len() >= REPRESENTATIVE && start.elapsed() > BUDGET) {
                 break;
             }
         }
         let counted = &times[times.len() / 4..];
         let mean = comm.max_f64(counted.iter().sum::<f64>() / counted.len() as f64);
         let seconds_per_particle = mean / particles[0].max(1) as f64;
-        Some(Self { seconds_per_particle, time_step: solver.clock.dt })
+        Some(Self { seconds_per_particle, time_step })
     }
 
     /// Collective. The same of a job that takes more than `most` bytes: on cells so much coarser that it

@@ -117,6 +117,10 @@ impl<const D: usize> Solver<D> {
         let Self { physics, grid, chunks, leaf_data, crossings, ledger, source_sums, fed, clock, .. } = self;
         let (plan, extent) = (&grid.plan, grid.plan.extent());
         for (number, source) in physics.sources.iter().enumerate() {
+            let layers = source.layers_before(clock.time)..source.layers_before(to);
+            if layers.is_empty() {
+                continue;
+            }
             let mut columns = vec![0.0_f64; Layout::<D>::REALS];
             (0..3).for_each(|diagonal| columns[Layout::<D>::LEFT_CAUCHY_GREEN + diagonal] = 1.0);
             columns[Layout::<D>::VELOCITY..][..D].copy_from_slice(&source.velocity);
@@ -125,7 +129,7 @@ impl<const D: usize> Solver<D> {
             let history = physics.materials[usize::from(source.material)].initial_history();
             columns[Layout::<D>::HISTORY..][..history.len()].copy_from_slice(&history);
             let tag = Tag { material: source.material, body: source.body, level: source.level }.pack();
-            for layer in source.layers_before(clock.time)..source.layers_before(to) {
+            for layer in layers {
                 for x in source.layer(layer, to) {
                     let id = ledger.next_root;
                     ledger.next_root += 1;

@@ -6,14 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::Pod;
 
-use super::super::{Comm, CommError};
+use super::super::{Comm, CommError, environment};
 use super::{Mode, Operation};
 
 /// Set by the first start: as MPI, the library starts once per process.
 static STARTED: AtomicBool = AtomicBool::new(false);
-
-/// Variables with the number of ranks that a launcher starts: `mpirun` of Open MPI, that of MPICH, `srun`.
-const LAUNCHERS: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
 
 /// The library, started.
 pub(in super::super) struct Library {
@@ -24,8 +21,7 @@ impl Library {
     /// Starts the library. Refused if a launcher has started several processes: each would do the whole job,
     /// into the same files.
     pub(in super::super) fn start() -> Result<Self, CommError> {
-        let counts = LAUNCHERS.iter().filter_map(|name| std::env::var(name).ok()?.trim().parse().ok());
-        match counts.max() {
+        match environment::launched_ranks() {
             Some(ranks) if ranks > 1 => return Err(CommError::WithoutMpi(ranks)),
             _ if STARTED.swap(true, Ordering::Relaxed) => return Err(CommError::AlreadyStarted),
             _ => {}
