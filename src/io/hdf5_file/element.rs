@@ -1,9 +1,6 @@
 //! Number types of data sets and attributes.
-use hdf5_sys::h5i::hid_t;
-use hdf5_sys::h5t::{
-    H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, H5T_STD_I64LE, H5T_STD_U8LE, H5T_STD_U32LE, H5T_STD_U64LE,
-    H5Tequal,
-};
+use hdf5::Datatype;
+use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 
 /// The number types that a data set or an attribute can hold. All are little-endian in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,22 +34,21 @@ impl Kind {
     }
 
     /// The library's type, in the file and, on a little-endian machine, in memory.
-    pub(super) fn library_type(self) -> hid_t {
-        match self {
-            Self::U8 => *H5T_STD_U8LE,
-            Self::I32 => *H5T_STD_I32LE,
-            Self::U32 => *H5T_STD_U32LE,
-            Self::I64 => *H5T_STD_I64LE,
-            Self::U64 => *H5T_STD_U64LE,
-            Self::F32 => *H5T_IEEE_F32LE,
-            Self::F64 => *H5T_IEEE_F64LE,
-        }
+    pub(super) fn library_type(self) -> hdf5::Result<Datatype> {
+        Datatype::from_descriptor(&match self {
+            Self::U8 => TypeDescriptor::Unsigned(IntSize::U1),
+            Self::I32 => TypeDescriptor::Integer(IntSize::U4),
+            Self::U32 => TypeDescriptor::Unsigned(IntSize::U4),
+            Self::I64 => TypeDescriptor::Integer(IntSize::U8),
+            Self::U64 => TypeDescriptor::Unsigned(IntSize::U8),
+            Self::F32 => TypeDescriptor::Float(FloatSize::U4),
+            Self::F64 => TypeDescriptor::Float(FloatSize::U8),
+        })
     }
 
-    /// The kind of an open type of a file; `None` for any type that this program does not write.
-    pub(super) fn of_type(id: hid_t) -> Option<Self> {
-        // SAFETY: `id` is an open type, as are those of the library.
-        Self::ALL.into_iter().find(|kind| unsafe { H5Tequal(id, kind.library_type()) } > 0)
+    /// The kind of a type of a file; `None` for any type that this program does not write.
+    pub(super) fn of_type(of_file: &Datatype) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.library_type().is_ok_and(|own| own == *of_file))
     }
 }
 
@@ -68,7 +64,7 @@ impl std::fmt::Display for Kind {
 }
 
 /// A number type that a data set or an attribute can hold.
-pub trait Element: bytemuck::Pod {
+pub trait Element: bytemuck::Pod + hdf5::H5Type {
     /// The type.
     const KIND: Kind;
 }

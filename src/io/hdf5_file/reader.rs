@@ -5,21 +5,15 @@ use std::mem::MaybeUninit;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use hdf5_sys::h5::herr_t;
-use hdf5_sys::h5d::{
-    H5D_CONTIGUOUS, H5Dclose, H5Dget_create_plist, H5Dget_offset, H5Dget_space, H5Dget_type, H5Dopen2,
-};
-use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5Fclose, H5Fopen};
-use hdf5_sys::h5i::hid_t;
+use hdf5_sys::h5d::H5D_CONTIGUOUS;
+use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5Fopen};
 #[allow(deprecated)] // In 1.12 and later; the newer call is not in 1.10.
 use hdf5_sys::h5l::H5Lget_info1;
 use hdf5_sys::h5l::{H5L_TYPE_HARD, H5L_info1_t, H5Lexists};
-use hdf5_sys::h5p::{H5P_DEFAULT, H5Pclose, H5Pget_external_count, H5Pget_layout, H5Pget_nfilters};
-use hdf5_sys::h5s::{H5Sclose, H5Sget_simple_extent_dims, H5Sget_simple_extent_ndims};
-use hdf5_sys::h5t::H5Tclose;
+use hdf5_sys::h5p::{H5P_DEFAULT, H5Pget_external_count, H5Pget_layout, H5Pget_nfilters};
 use partition::comm::Comm;
 
-use super::{Complaint, Element, FileError, Handle, Kind, agreed, c_path, c_text, check, library};
+use super::{Element, FileError, Kind, OfFile as _, agreed, c_path, c_text, library, words};
 use crate::memory::may_fail;
 
 /// No data set of this program has more numbers in a row.
@@ -32,7 +26,7 @@ const PIECE: u64 = 1 << 20;
 pub struct Reader {
     path: PathBuf,
     comm: Option<Comm>,
-    layout: Handle,
+    layout: hdf5::File,
     /// The file for plain reads of rows.
     rows: File,
     /// Bytes of the file.
@@ -72,14 +66,18 @@ impl Reader {
         let (rows, size) = look_at(path)?;
         let _turn = library();
         let name = c_path(path);
-        // SAFETY: a terminated name; the identifier is checked.
-        let opened = Handle::new(unsafe { H5Fopen(name.as_ptr(), H5F_ACC_RDONLY, H5P_DEFAULT) }, H5Fclose);
-        let layout = opened.map_err(|words| match words {
-            Complaint { words: reason, .. } if reason.contains("truncated") => {
-                FileError::CutShort { path: path.into(), reason }
+        // SAFETY: a terminated name; the identifier is fresh.
+        let opened = unsafe {
+            hdf5::h5check(H5Fopen(name.as_ptr(), H5F_ACC_RDONLY, H5P_DEFAULT))
+                .and_then(|id| hdf5::from_id(id))
+        };
+        let layout = match opened {
+            Err(error) if words(&error).iter().take(3).any(|text| text.contains("truncated")) => {
+                let reason = words(&error).into_iter().take(3).collect::<Vec<_>>().join("; ");
+                return Err(FileError::CutShort { path: path.into(), reason });
             }
-            words => words.into_error(path, "open", "the file"),
-        })?;
+            opened => opened.of_file(path, "open", "the file")?,
+        };
         Ok(Self { path: path.into(), comm: comm.cloned(), layout, rows, size })
     }
 
@@ -88,8 +86,8 @@ impl Reader {
         &self.path
     }
 
-    pub(super) fn id(&self) -> hid_t {
-        self.layout.id
+    pub(super) fn file(&self) -> &hdf5::File {
+        &self.layout
     }
 
     /// An error of this file that lies in its contents.
@@ -100,19 +98,6 @@ impl Reader {
     /// Collective on a shared file. The same result on all ranks.
     pub fn agree<T>(&self, result: Result<T, FileError>) -> Result<T, FileError> {
         agreed(self.comm.as_ref(), result)
-    }
-
-    pub(super) fn wrap(
-        &self,
-        id: hid_t,
-        close: unsafe extern "C" fn(hid_t) -> herr_t,
-        object: &str,
-    ) -> Result<Handle, FileError> {
-        Handle::new(id, close).map_err(|words| words.into_error(&self.path, "read", object))
-    }
-
-    pub(super) fn check(&self, code: herr_t, object: &str) -> Result<(), FileError> {
-        check(code, &self.path, "read", object)
     }
 
     /// Not collective. Refuses an object of that many elements of so many bytes if the file cannot hold it;
@@ -145,11 +130,13 @@ impl Reader {
             // name.
             #[allow(deprecated)]
             let is_hard = unsafe {
-                if H5Lexists(self.id(), name.as_ptr(), H5P_DEFAULT) <= 0 {
+                let file = self.layout.id();
+                if H5Lexists(file, name.as_ptr(), H5P_DEFAULT) <= 0 {
                     return Ok(false);
                 }
                 let mut info = MaybeUninit::<H5L_info1_t>::zeroed();
-                self.check(H5Lget_info1(self.id(), name.as_ptr(), info.as_mut_ptr(), H5P_DEFAULT), object)?;
+                hdf5::h5check(H5Lget_info1(file, name.as_ptr(), info.as_mut_ptr(), H5P_DEFAULT))
+                    .of_file(&self.path, "read", object)?;
                 let kind = (&raw const (*info.as_ptr()).type_).cast::<std::ffi::c_int>();
                 kind.read() == H5L_TYPE_HARD as std::ffi::c_int
             };
@@ -169,44 +156,42 @@ impl Reader {
         if !self.leads_to(dataset)? {
             return Err(self.refuse(format!("data set {dataset} is missing")));
         }
-        let name = c_text(dataset);
-        // SAFETY: open file, terminated name; identifiers are checked and closed by `wrap`, and `dims` is
-        // only filled when it is long enough.
-        unsafe {
-            let set = self.wrap(H5Dopen2(self.id(), name.as_ptr(), H5P_DEFAULT), H5Dclose, dataset)?;
-            let list = self.wrap(H5Dget_create_plist(set.id), H5Pclose, dataset)?;
-            let plain = H5Pget_layout(list.id) == H5D_CONTIGUOUS
-                && H5Pget_external_count(list.id) == 0
-                && H5Pget_nfilters(list.id) == 0;
-            if !plain {
-                let reason =
-                    "is chunked, compressed or external; expected a contiguous data set, as agimp writes it";
-                return Err(self.refuse(format!("{dataset} {reason}")));
-            }
-            let kind = self.wrap(H5Dget_type(set.id), H5Tclose, dataset)?;
-            let Some(kind) = Kind::of_type(kind.id) else {
-                return Err(self.refuse(format!("{dataset} holds no numbers of a type that agimp writes")));
-            };
-            let space = self.wrap(H5Dget_space(set.id), H5Sclose, dataset)?;
-            let rank = H5Sget_simple_extent_ndims(space.id);
-            if !(1..=2).contains(&rank) {
+        let set = self.layout.dataset(dataset).of_file(&self.path, "read", dataset)?;
+        let list = set.create_plist().of_file(&self.path, "read", dataset)?;
+        // SAFETY: an open property list.
+        let plain = unsafe {
+            H5Pget_layout(list.id()) == H5D_CONTIGUOUS
+                && H5Pget_external_count(list.id()) == 0
+                && H5Pget_nfilters(list.id()) == 0
+        };
+        if !plain {
+            let reason =
+                "is chunked, compressed or external; expected a contiguous data set, as agimp writes it";
+            return Err(self.refuse(format!("{dataset} {reason}")));
+        }
+        let kind = set.dtype().of_file(&self.path, "read", dataset)?;
+        let Some(kind) = Kind::of_type(&kind) else {
+            return Err(self.refuse(format!("{dataset} holds no numbers of a type that agimp writes")));
+        };
+        let (rows, components) = match set.space().of_file(&self.path, "read", dataset)?.shape()[..] {
+            [rows] => (rows as u64, 0),
+            [rows, components] => (rows as u64, components as u64),
+            ref shape => {
+                let rank = shape.len();
                 return Err(self.refuse(format!("{dataset} has {rank} dimensions, not one or two")));
             }
-            let mut dims = [0; 2];
-            let code = H5Sget_simple_extent_dims(space.id, dims.as_mut_ptr(), std::ptr::null_mut());
-            self.check(code, dataset)?;
-            let [rows, components] = dims;
-            if components > MOST_COMPONENTS {
-                return Err(self.refuse(format!("{dataset} has {components} numbers in each row")));
-            }
-            let row = components.max(1) as usize * kind.bytes();
-            let bytes = self.held_bytes(dataset, rows, row)?;
-            let place = if bytes == 0 { 0 } else { H5Dget_offset(set.id) };
-            if place.checked_add(bytes).is_none_or(|end| end > self.size) {
-                return Err(self.refuse(format!("{dataset} does not lie within the file")));
-            }
-            Ok(Stored { rows, components: components as usize, kind, place, bytes })
+        };
+        if components > MOST_COMPONENTS {
+            return Err(self.refuse(format!("{dataset} has {components} numbers in each row")));
         }
+        let row = components.max(1) as usize * kind.bytes();
+        let bytes = self.held_bytes(dataset, rows, row)?;
+        // Without a place, beyond any file.
+        let place = if bytes == 0 { 0 } else { set.offset().unwrap_or(u64::MAX) };
+        if place.checked_add(bytes).is_none_or(|end| end > self.size) {
+            return Err(self.refuse(format!("{dataset} does not lie within the file")));
+        }
+        Ok(Stored { rows, components: components as usize, kind, place, bytes })
     }
 
     /// Collective on a shared file. Reads rows `offset .. offset + rows` of a data set of numbers of type

@@ -1,30 +1,24 @@
 //! Files that only the library's own calls can make.
-use hdf5_sys::h5d::{H5Dclose, H5Dcreate2};
-use hdf5_sys::h5f::{H5F_ACC_TRUNC, H5Fclose, H5Fcreate};
-use hdf5_sys::h5p::{H5P_CLS_DATASET_CREATE, H5P_DEFAULT, H5Pclose, H5Pcreate, H5Pset_chunk};
-use hdf5_sys::h5s::{H5Sclose, H5Screate_simple};
+use hdf5::plist::DatasetCreateBuilder;
+use hdf5_sys::h5d::H5Dcreate2;
 
 use super::*;
 
 /// A file with one data set of that shape, in chunks or not, of which no byte is written.
-fn declaring(path: &Path, shape: [u64; 2], chunk: Option<[u64; 2]>, kind: Kind) {
-    let _turn = library();
-    let (name, set) = (c_path(path), c_text("rows"));
-    // SAFETY: terminated names, two dimensions each; the identifiers are closed.
-    unsafe {
-        let file = H5Fcreate(name.as_ptr(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-        let space = H5Screate_simple(2, shape.as_ptr(), std::ptr::null());
-        let list = H5Pcreate(*H5P_CLS_DATASET_CREATE);
-        if let Some(chunk) = chunk {
-            H5Pset_chunk(list, 2, chunk.as_ptr());
-        }
-        let id = H5Dcreate2(file, set.as_ptr(), kind.library_type(), space, H5P_DEFAULT, list, H5P_DEFAULT);
-        assert!(id >= 0, "{}", Complaint::fetch().words);
-        H5Dclose(id);
-        H5Pclose(list);
-        H5Sclose(space);
-        H5Fclose(file);
+fn declaring(path: &Path, shape: [usize; 2], chunk: Option<[usize; 2]>, kind: Kind) {
+    let file = hdf5::File::create(path).unwrap();
+    let space = hdf5::Dataspace::try_new(shape).unwrap();
+    let mut list = DatasetCreateBuilder::new();
+    if let Some([rows, width]) = chunk {
+        list.chunk((rows, width));
     }
+    let (list, kind, name) = (list.finish().unwrap(), kind.library_type().unwrap(), c_text("rows"));
+    let defaults = H5P_DEFAULT;
+    // SAFETY: open file and lists, terminated name; the identifier is fresh. (The crate multiplies the edges
+    // of the shape, which overflows here.)
+    let set =
+        unsafe { H5Dcreate2(file.id(), name.as_ptr(), kind.id(), space.id(), defaults, list.id(), defaults) };
+    drop(unsafe { hdf5::from_id::<hdf5::Dataset>(hdf5::h5check(set).unwrap()) }.unwrap());
 }
 
 #[test]
@@ -33,7 +27,7 @@ fn rows_times_width_beyond_64_bits_take_no_memory() {
     let path = directory.path().join("wraps.hdf");
     for (rows, width) in [(1 << 61, 8), (1 << 62, 4), (1 << 34, 1)] {
         declaring(&path, [rows, width], Some([64, width]), Kind::U8);
-        let error = Reader::open_alone(&path).unwrap().read_slab::<u8>("rows", 0, rows).unwrap_err();
+        let error = Reader::open_alone(&path).unwrap().read_slab::<u8>("rows", 0, rows as u64).unwrap_err();
         assert!(error.to_string().contains("wraps.hdf: rows is chunked"), "{error}");
     }
 }

@@ -1,31 +1,26 @@
 //! A new file of all ranks.
 use std::fs::{File, OpenOptions};
+use std::mem::ManuallyDrop;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use hdf5_sys::h5d::{H5D_ALLOC_TIME_EARLY, H5D_FILL_TIME_NEVER, H5Dclose, H5Dcreate2, H5Dget_offset};
-use hdf5_sys::h5f::{
-    H5F_ACC_EXCL, H5F_LIBVER_LATEST, H5F_LIBVER_V18, H5F_SCOPE_LOCAL, H5Fclose, H5Fcreate, H5Fflush,
-};
-use hdf5_sys::h5g::{H5Gclose, H5Gcreate2};
-use hdf5_sys::h5i::hid_t;
-use hdf5_sys::h5l::H5Lcreate_hard;
-use hdf5_sys::h5p::{
-    H5P_CLS_DATASET_CREATE, H5P_CLS_FILE_ACCESS, H5P_CLS_FILE_CREATE, H5P_CLS_GROUP_CREATE, H5P_DEFAULT,
-    H5Pclose, H5Pcreate, H5Pset_alignment, H5Pset_alloc_time, H5Pset_attr_phase_change, H5Pset_fill_time,
-    H5Pset_libver_bounds, H5Pset_link_phase_change, H5Pset_obj_track_times, H5Pset_small_data_block_size,
-};
-use hdf5_sys::h5s::{H5Sclose, H5Screate_simple};
+use hdf5::Dataspace;
+use hdf5::plist::dataset_create::{AllocTime, FillTime};
+use hdf5::plist::group_create::LinkPhaseChange;
+use hdf5::plist::{DatasetCreateBuilder, FileAccessBuilder, FileCreateBuilder};
+use hdf5_sys::h5d::H5Dcreate2;
+use hdf5_sys::h5f::{H5F_ACC_EXCL, H5Fcreate};
+use hdf5_sys::h5p::H5P_DEFAULT;
 use partition::comm::Comm;
 
-use super::{Complaint, Element, FileError, Handle, Kind, agreed, c_path, c_text, check, library};
+use super::{Element, FileError, Kind, OfFile as _, agreed, c_path, c_text, library};
 
 /// Data sets of at least this many bytes start at a multiple of [`ALIGNMENT`].
 const ALIGN_FROM: u64 = 4 << 20;
 /// The usual stripe of parallel file systems.
 const ALIGNMENT: u64 = 1 << 20;
 /// Links or attributes of a group that are stored without an index.
-const MOST_COMPACT: std::ffi::c_uint = 255;
+const MOST_COMPACT: u32 = 255;
 
 /// A new file of all ranks. Rank 0 alone keeps names, shapes and attributes; every rank writes its own rows.
 ///
@@ -43,15 +38,7 @@ pub struct Writer {
 /// The library's file. If it is dropped before it is closed, it stays open to the end of the program: closing
 /// writes the library's buffers, and where space has run out the library destroys its record of the file
 /// without releasing it, and crashes at the end.
-struct Layout(hid_t);
-
-impl Layout {
-    fn close(self, path: &Path) -> Result<(), FileError> {
-        let _turn = library();
-        // SAFETY: the file is open, and nobody else has its identifier.
-        check(unsafe { H5Fclose(self.0) }, path, "close", "the file")
-    }
-}
+struct Layout(ManuallyDrop<hdf5::File>);
 
 impl Writer {
     /// Collective. Creates the file. An old one of that name is removed; if it is a symbolic link, its target
@@ -78,47 +65,35 @@ impl Writer {
     /// Collective. Runs `act` with the library's file, on rank 0.
     pub(super) fn on_rank_0<T>(
         &self,
-        act: impl FnOnce(hid_t, &Path) -> Result<T, FileError>,
+        act: impl FnOnce(&hdf5::File, &Path) -> Result<T, FileError>,
     ) -> Result<Option<T>, FileError> {
         let act_alone = |file: &Layout| {
             let _turn = library();
-            act(file.0, &self.path)
+            act(&file.0, &self.path)
         };
         self.agree(self.layout.as_ref().map(act_alone).transpose())
     }
 
     /// Collective. Creates a group. Its parent must exist.
     pub fn create_group(&self, group: &str) -> Result<(), FileError> {
+        // Up to these numbers, links and attributes stay in the group's header: smaller files, and no remains
+        // of outgrown indices in them.
+        let links = LinkPhaseChange { max_compact: MOST_COMPACT, min_dense: 0 };
         let made = self.on_rank_0(|file, path| {
-            let name = c_text(group);
-            // SAFETY: open file, terminated name; the results are checked.
-            let made = unsafe {
-                let list = H5Pcreate(*H5P_CLS_GROUP_CREATE);
-                H5Pset_obj_track_times(list, 0);
-                // Up to these numbers, links and attributes stay in the group's header: smaller files, and no
-                // remains of outgrown indices in them.
-                H5Pset_link_phase_change(list, MOST_COMPACT, 0);
-                H5Pset_attr_phase_change(list, MOST_COMPACT, 0);
-                let id = H5Gcreate2(file, name.as_ptr(), H5P_DEFAULT, list, H5P_DEFAULT);
-                let made = Handle::new(id, H5Gclose);
-                H5Pclose(list);
-                made
-            };
-            made.map(drop).map_err(|words| words.into_error(path, "create", group))
+            file.create_group_builder()
+                .create_intermediate_group(false)
+                .with_gcpl(|list| {
+                    list.obj_track_times(false).link_phase_change(links).attr_phase_change(MOST_COMPACT, 0)
+                })
+                .create(group)
+                .of_file(path, "create", group)
         });
         made.map(drop)
     }
 
     /// Collective. Gives an existing object a second name.
     pub fn hard_link(&self, existing: &str, new: &str) -> Result<(), FileError> {
-        let linked = self.on_rank_0(|file, path| {
-            let (from, to) = (c_text(existing), c_text(new));
-            // SAFETY: open file, terminated names.
-            let code =
-                unsafe { H5Lcreate_hard(file, from.as_ptr(), file, to.as_ptr(), H5P_DEFAULT, H5P_DEFAULT) };
-            check(code, path, "link", new)
-        });
-        linked.map(drop)
+        self.on_rank_0(|file, path| file.link_hard(existing, new).of_file(path, "link", new)).map(drop)
     }
 
     /// Collective. Creates a data set of `global_rows` rows of `components` numbers (`0`: a plain list) and
@@ -145,16 +120,16 @@ impl Writer {
     /// Collective. Passes all data to the operating system and closes the library's file. Returns this rank's
     /// own file, through which it can wait for the disk.
     pub fn close(self) -> Result<File, FileError> {
-        let flushed = self.on_rank_0(|file, path| {
-            // SAFETY: open file.
-            check(unsafe { H5Fflush(file, H5F_SCOPE_LOCAL) }, path, "write", "the file")
-        });
+        let flushed = self.on_rank_0(|file, path| file.flush().of_file(path, "write", "the file"));
         if let Err(error) = flushed {
             self.abandon();
             return Err(error);
         }
         let Self { path, comm, layout, rows } = self;
-        let closed = layout.map_or(Ok(()), |file| file.close(&path));
+        let closed = layout.map_or(Ok(()), |file| {
+            let _turn = library();
+            ManuallyDrop::into_inner(file.0).close().of_file(&path, "close", "the file")
+        });
         agreed(Some(&comm), closed.map(|()| rows))
     }
 
@@ -177,59 +152,65 @@ fn lay_out(path: &Path) -> Result<Layout, FileError> {
         }
         _ => {}
     }
-    let name = c_path(path);
-    // SAFETY: fresh property lists, closed below, and a terminated name. Exclusive creation does not follow
-    // links. The root group keeps no timestamps, like all other objects.
-    let file = unsafe {
-        let access = H5Pcreate(*H5P_CLS_FILE_ACCESS);
-        // The 1.8 format carries checksums of its own metadata, which the older one does not.
-        H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_LATEST);
-        H5Pset_alignment(access, ALIGN_FROM, ALIGNMENT);
-        // No reserve for small data sets, which would be left in the file.
-        H5Pset_small_data_block_size(access, 0);
-        let root = H5Pcreate(*H5P_CLS_FILE_CREATE);
-        H5Pset_obj_track_times(root, 0);
-        let file = H5Fcreate(name.as_ptr(), H5F_ACC_EXCL, root, access);
-        // At once: the next call clears the complaint.
-        let file = if file < 0 { Err(Complaint::fetch()) } else { Ok(Layout(file)) };
-        H5Pclose(root);
-        H5Pclose(access);
-        file
+    let create = || {
+        // The 1.8 format carries checksums of its own metadata, which the older one does not. No reserve for
+        // small data sets, which would be left in the file.
+        let access = FileAccessBuilder::new()
+            .libver_v18()
+            .alignment(ALIGN_FROM, ALIGNMENT)
+            .small_data_block_size(0)
+            .finish()?;
+        // The root group keeps no timestamps, like all other objects.
+        let root = FileCreateBuilder::new().obj_track_times(false).finish()?;
+        let name = c_path(path);
+        // SAFETY: open property lists and a terminated name; the identifier is fresh. Exclusive creation does
+        // not follow links.
+        unsafe {
+            let id = H5Fcreate(name.as_ptr(), H5F_ACC_EXCL, root.id(), access.id());
+            hdf5::from_id(hdf5::h5check(id)?)
+        }
     };
-    file.map_err(|words| words.into_error(path, "create", "the file"))
+    create().map(|file| Layout(ManuallyDrop::new(file))).of_file(path, "create", "the file")
 }
 
 /// Adds a data set, by rank 0. Returns the place of its first byte, 0 if it has no bytes.
 fn add_dataset(
-    file: hid_t,
+    file: &hdf5::File,
     path: &Path,
     dataset: &str,
     kind: Kind,
     rows: u64,
     components: usize,
 ) -> Result<u64, FileError> {
-    let failed = |words: Complaint| words.into_error(path, "create", dataset);
-    let (shape, rank) = ([rows, components as u64], if components == 0 { 1 } else { 2 });
-    let name = c_text(dataset);
-    // SAFETY: open file, terminated name, `rank` dimensions; results are checked.
-    unsafe {
-        let space = H5Screate_simple(rank, shape.as_ptr(), std::ptr::null());
-        let space = Handle::new(space, H5Sclose).map_err(failed)?;
-        let list = Handle::new(H5Pcreate(*H5P_CLS_DATASET_CREATE), H5Pclose).map_err(failed)?;
+    let shape = [rows as usize, components];
+    let create = || -> hdf5::Result<hdf5::Dataset> {
+        let space = Dataspace::try_new(&shape[..if components == 0 { 1 } else { 2 }])?;
         // Allocated at once, for its place. Contents are always written in full, so no fill values; no
         // timestamps, so that equal contents give equal files.
-        H5Pset_alloc_time(list.id, H5D_ALLOC_TIME_EARLY);
-        H5Pset_fill_time(list.id, H5D_FILL_TIME_NEVER);
-        H5Pset_obj_track_times(list.id, 0);
-        let kind = kind.library_type();
-        let set = H5Dcreate2(file, name.as_ptr(), kind, space.id, H5P_DEFAULT, list.id, H5P_DEFAULT);
-        let set = Handle::new(set, H5Dclose).map_err(failed)?;
-        if rows == 0 {
-            return Ok(0);
+        let list = DatasetCreateBuilder::new()
+            .alloc_time(Some(AllocTime::Early))
+            .fill_time(FillTime::Never)
+            .obj_track_times(false)
+            .finish()?;
+        let (kind, name) = (kind.library_type()?, c_text(dataset));
+        // SAFETY: open file and lists, terminated name; the identifier is fresh.
+        unsafe {
+            let id = H5Dcreate2(
+                file.id(),
+                name.as_ptr(),
+                kind.id(),
+                space.id(),
+                H5P_DEFAULT,
+                list.id(),
+                H5P_DEFAULT,
+            );
+            hdf5::from_id(hdf5::h5check(id)?)
         }
-        match H5Dget_offset(set.id) {
-            u64::MAX => Err(failed(Complaint::fetch())),
-            place => Ok(place),
-        }
+    };
+    let set = create().of_file(path, "create", dataset)?;
+    match set.offset() {
+        _ if rows == 0 => Ok(0),
+        Some(place) => Ok(place),
+        None => Err(hdf5::Error::from("no place in the file")).of_file(path, "create", dataset),
     }
 }
