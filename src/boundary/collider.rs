@@ -6,7 +6,7 @@
 use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, Table, length};
 use super::rigid::Meeting;
-use super::rigid::turning::{self, UPRIGHT};
+use super::rigid::turning::{self, Orientation};
 use crate::geometry::mesh::Deforming;
 use crate::geometry::vector::in_space;
 use crate::geometry::{Aabb, Shape};
@@ -66,7 +66,9 @@ impl<const D: usize> Collider<D> {
         };
         let state = self.state(self.motion.place(own), rate);
         match self.free().and_then(|free| free.turning) {
-            Some(inertia) => ColliderState { momentum: inertia.momentum(&rate.turning, &UPRIGHT), ..state },
+            Some(inertia) => {
+                ColliderState { momentum: inertia.momentum(&rate.turning, &Orientation::identity()), ..state }
+            }
             None => state,
         }
     }

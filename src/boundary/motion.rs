@@ -1,6 +1,6 @@
 //! How colliders move: at rest, steadily, by a table, or freely under gravity and the forces on them.
 use super::rigid::Meeting;
-use super::rigid::turning::{Inertia, Quaternion, UPRIGHT, matrix};
+use super::rigid::turning::{Inertia, Orientation, matrix};
 use crate::geometry::rotation;
 use crate::quantity::smooth_step;
 
@@ -12,7 +12,7 @@ pub struct Pose<const D: usize> {
     /// Angle about the collider's axis, rad.
     pub angle: f64,
     /// Orientation of a body that turns about any axis.
-    pub orientation: Quaternion,
+    pub orientation: Orientation,
     /// The rotation by angle or orientation, row by row: turned = R own.
     pub rotation: [[f64; D]; D],
 }
@@ -20,11 +20,11 @@ pub struct Pose<const D: usize> {
 impl<const D: usize> Pose<D> {
     /// The pose after a translation (m) and a rotation by an angle (rad) about a unit axis.
     pub fn new(translation: [f64; D], angle: f64, axis: [f64; 3]) -> Self {
-        Self { translation, angle, orientation: UPRIGHT, rotation: rotation(axis, angle) }
+        Self { translation, angle, orientation: Orientation::identity(), rotation: rotation(axis, angle) }
     }
 
     /// The pose after a translation (m) of a body in this orientation.
-    pub fn oriented(translation: [f64; D], orientation: Quaternion) -> Self {
+    pub fn oriented(translation: [f64; D], orientation: Orientation) -> Self {
         Self { translation, angle: 0.0, orientation, rotation: matrix(&orientation) }
     }
 }

@@ -212,6 +212,8 @@ impl<V: Vector> Pyramid<V> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
     use crate::simd::{LANES, Lanes};
 
@@ -252,17 +254,22 @@ mod tests {
             }
             let active: Vec<usize> = (0..n).filter(|i| set >> i & 1 == 1).collect();
             let m = active.len();
-            let mut a = nalgebra_free::Matrix::new(m);
-            let mut rhs = vec![0.0; m];
-            for (r, &i) in active.iter().enumerate() {
-                rhs[r] = dot(&faces[i].0, &trial) - faces[i].2;
-                for (c, &j) in active.iter().enumerate() {
-                    a.set(r, c, dot(&faces[i].0, &stress_of(&faces[j].1)));
-                }
+            let right = DVector::from_fn(m, |r, _| dot(&faces[active[r]].0, &trial) - faces[active[r]].2);
+            let a = DMatrix::from_fn(m, m, |r, c| dot(&faces[active[r]].0, &stress_of(&faces[active[c]].1)));
+            let largest = a.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let factors = a.full_piv_lu();
+            if factors.u().diagonal().iter().any(|pivot| pivot.abs() <= 1e-6 * largest) {
+                continue;
             }
-            let Some(flow) = a.solve(rhs) else { continue };
+            let flow = match m {
+                0 => right,
+                _ => match factors.solve(&right) {
+                    Some(flow) => flow,
+                    None => continue,
+                },
+            };
             let mut stress = trial;
-            for (&i, flow) in active.iter().zip(&flow) {
+            for (&i, flow) in active.iter().zip(flow.iter()) {
                 let d = stress_of(&faces[i].1);
                 (0..3).for_each(|k| stress[k] -= flow * d[k]);
             }
@@ -274,45 +281,6 @@ mod tests {
             }
         }
         best.filter(|(worst, _)| *worst < 1e-12).map(|(_, stress)| stress)
-    }
-
-    /// Elimination with pivots, for three equations at most.
-    mod nalgebra_free {
-        pub(super) struct Matrix(usize, Vec<f64>);
-
-        impl Matrix {
-            pub(super) fn new(n: usize) -> Self {
-                Self(n, vec![0.0; n * n])
-            }
-
-            pub(super) fn set(&mut self, row: usize, column: usize, value: f64) {
-                self.1[row * self.0 + column] = value;
-            }
-
-            pub(super) fn solve(mut self, mut rhs: Vec<f64>) -> Option<Vec<f64>> {
-                let n = self.0;
-                let largest = self.1.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-                for k in 0..n {
-                    let row = (k..n)
-                        .max_by(|&a, &b| self.1[a * n + k].abs().total_cmp(&self.1[b * n + k].abs()))?;
-                    if self.1[row * n + k].abs() <= 1e-6 * largest {
-                        return None;
-                    }
-                    (0..n).for_each(|c| self.1.swap(row * n + c, k * n + c));
-                    rhs.swap(row, k);
-                    for r in k + 1..n {
-                        let factor = self.1[r * n + k] / self.1[k * n + k];
-                        (k..n).for_each(|c| self.1[r * n + c] -= factor * self.1[k * n + c]);
-                        rhs[r] -= factor * rhs[k];
-                    }
-                }
-                for k in (0..n).rev() {
-                    let rest = (k + 1..n).fold(rhs[k], |rest, c| rest - self.1[k * n + c] * rhs[c]);
-                    rhs[k] = rest / self.1[k * n + k];
-                }
-                Some(rhs)
-            }
-        }
     }
 
     fn random(state: &mut u64) -> f64 {

@@ -1,6 +1,7 @@
 //! Rows of `history.csv`.
 use crate::adaptivity::resample::ledger::LedgerTotals;
 use crate::boundary::motion::Motion;
+use crate::boundary::rigid::turning::quaternion;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::log::history::Column;
@@ -203,7 +204,7 @@ pub fn collider_values<const D: usize>(
         values.extend((0..D).map(|a| origin[a] + centre[a]));
         let (pose, rate) = (&state.pose, &state.rate);
         if collider.turns_freely() {
-            values.extend(pose.orientation.into_iter().chain(rate.velocity).chain(rate.turning));
+            values.extend(quaternion(&pose.orientation).into_iter().chain(rate.velocity).chain(rate.turning));
         } else {
             values.push(pose.angle);
             values.extend(rate.velocity);

@@ -5,10 +5,11 @@
 //! times that across it. Impulses are found one after the other in a fixed order, over and over (Gauss and
 //! Seidel), until none changes. Bodies move with the mean of their velocities at start and end. A second pass
 //! removes part of the overlap that remains at the end: it moves bodies and gives them no velocity.
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
 use super::find::Found;
-use super::{Push, Surroundings, dot};
-use crate::boundary::collider::cross;
-use crate::boundary::motion::{Pose, Rate, length};
+use super::{Push, Surroundings};
+use crate::boundary::motion::{Pose, Rate};
 use crate::geometry::vector::in_space;
 
 /// Most sweeps over all contacts.
@@ -18,28 +19,30 @@ const CONVERGED: f64 = 1e-12;
 /// Share of an overlap that a step removes.
 const TAKEN_BACK: f64 = 0.15;
 
+/// Velocity (m/s) and angular velocity (rad/s), or impulse (kg m/s) and angular impulse (kg m²/s).
+type Pair = [Vector3<f64>; 2];
+
 /// A collider among contacts.
 struct Body {
-    centre: [f64; 3],
+    centre: Vector3<f64>,
     /// 1 / mass along each axis; 0 where it cannot be moved, 1/kg.
-    lightness: [f64; 3],
+    lightness: Vector3<f64>,
     /// Inverse of the inertia in space, 1/(kg m²).
-    inverse: [[f64; 3]; 3],
-    start: [[f64; 3]; 2],
-    end: [[f64; 3]; 2],
-    push: Push,
+    inverse: Matrix3<f64>,
+    start: Pair,
+    end: Pair,
+    push: Pair,
     /// Velocities of the second pass.
-    shift: [[f64; 3]; 2],
+    shift: Pair,
 }
 
 impl Body {
     fn new<const D: usize>(all: &Surroundings<'_, D>, c: usize, pose: &Pose<D>, mean: &Rate<D>) -> Self {
         let (collider, state) = (&all.colliders[c], &all.states[c]);
-        let spin = |rate: &Rate<D>| -> [f64; 3] {
-            std::array::from_fn(|a| rate.spin.mul_add(collider.axis[a], rate.turning[a]))
-        };
-        let mean = [in_space(&mean.velocity), spin(mean)];
-        let (mut lightness, mut inverse, mut start) = ([0.0; 3], [[0.0; 3]; 3], mean);
+        let axis = Vector3::from(collider.axis);
+        let spin = |rate: &Rate<D>| rate.spin * axis + Vector3::from(rate.turning);
+        let mean = [Vector3::from(in_space(&mean.velocity)), spin(mean)];
+        let (mut lightness, mut inverse, mut start) = (Vector3::zeros(), Matrix3::zeros(), mean);
         if let (Some(free), Some(_)) = (collider.free(), collider.meeting()) {
             for a in (0..D).filter(|&a| free.along[a]) {
                 start[0][a] = state.rate.velocity[a];
@@ -49,52 +52,52 @@ impl Body {
                 start[1] = spin(&state.rate);
             }
             if let Some(inertia) = &free.turning {
-                for k in 0..3 {
-                    let unit = std::array::from_fn(|a| if a == k { 1.0 } else { 0.0 });
-                    inverse[k] = inertia.spin(&unit, &pose.orientation);
-                }
+                inverse = inertia.inverse(&pose.orientation);
             } else if let Some(inertia) = free.inertia {
-                let axis = &collider.axis;
-                inverse = std::array::from_fn(|i| std::array::from_fn(|j| axis[i] * axis[j] / inertia));
+                inverse = axis * axis.transpose() / inertia;
             }
         }
-        let end = std::array::from_fn(|k| std::array::from_fn(|a| 2.0 * mean[k][a] - start[k][a]));
-        let (push, shift) = (Push::default(), [[0.0; 3]; 2]);
-        Self { centre: in_space(&collider.centre(pose)), lightness, inverse, start, end, push, shift }
+        let end = std::array::from_fn(|k| 2.0 * mean[k] - start[k]);
+        let none = [Vector3::zeros(); 2];
+        let centre = in_space(&collider.centre(pose)).into();
+        Self { centre, lightness, inverse, start, end, push: none, shift: none }
     }
 
-    /// Change of velocities by an impulse of this arm.
-    fn response(&self, arm: &[f64; 3], impulse: &[f64; 3]) -> [[f64; 3]; 2] {
-        let turn = cross(*arm, *impulse);
-        [
-            std::array::from_fn(|a| self.lightness[a] * impulse[a]),
-            std::array::from_fn(|a| dot(&self.inverse[a], &turn)),
-        ]
+    /// Change of velocities by an impulse and an angular impulse.
+    fn response(&self, push: &Pair) -> Pair {
+        [self.lightness.component_mul(&push[0]), self.inverse * push[1]]
     }
 }
 
+/// Impulse and angular impulse of an impulse (kg m/s) with this arm (m).
+fn with_arm(impulse: &Vector3<f64>, arm: &Vector3<f64>) -> Pair {
+    [*impulse, arm.cross(impulse)]
+}
+
 /// Velocity of a point with this arm, m/s.
-fn at([velocity, spin]: &[[f64; 3]; 2], arm: &[f64; 3]) -> [f64; 3] {
-    let turning = cross(*spin, *arm);
-    std::array::from_fn(|a| velocity[a] + turning[a])
+fn at([velocity, spin]: &Pair, arm: &Vector3<f64>) -> Vector3<f64> {
+    velocity + spin.cross(arm)
 }
 
 /// A contact while impulses are sought.
 struct Touch {
     found: Found,
-    arms: [[f64; 3]; 2],
-    tangents: [[f64; 3]; 2],
+    normal: Vector3<f64>,
+    arms: Pair,
+    tangents: Pair,
     /// Velocity along the normal by an impulse of 1 along it, 1/kg.
     across: f64,
     /// Inverse of the same along the surface, kg.
-    along: [[f64; 2]; 2],
+    along: Matrix2<f64>,
     /// Not above its least eigenvalue, kg.
     least_along: f64,
     /// Whether the gap closes within the step.
     closes: bool,
     least: f64,
-    normal: f64,
-    sliding: [f64; 2],
+    /// Impulse along the normal, kg m/s.
+    pressing: f64,
+    /// Impulse along the tangents, kg m/s.
+    sliding: Vector2<f64>,
     shift: f64,
 }
 
@@ -112,35 +115,29 @@ pub(super) fn solve<const D: usize>(
     let mut touches: Vec<Touch> = found.into_iter().map(|found| Touch::new(found, &bodies, dt)).collect();
     let scale = touches.iter().fold(0.0, |most: f64, touch| {
         let [start, end] = [touch.relative(&bodies, |b| &b.start), touch.relative(&bodies, |b| &b.end)];
-        most.max(length(&start)).max(length(&end))
+        most.max(start.norm()).max(end.norm())
     });
     sweep(&mut touches, CONVERGED * scale, |touch| touch.correct(&mut bodies, dt));
     for touch in &mut touches {
-        let outward = dot(&touch.relative(&bodies, |b| &b.end), &touch.found.normal);
+        let outward = touch.relative(&bodies, |b| &b.end).dot(&touch.normal);
         let left = (0.5 * dt).mul_add(outward, touch.found.gap);
         touch.least = if left < 0.0 { -TAKEN_BACK * left / dt } else { -left / dt };
     }
     sweep(&mut touches, CONVERGED * scale, |touch| touch.separate(&mut bodies));
+    let none = [Vector3::zeros(); 2];
     for (c, body) in bodies.iter().enumerate() {
-        pushes[c] = body.push;
-        if all.colliders[c].meeting().is_none()
-            || (body.push == Push::default() && body.shift == [[0.0; 3]; 2])
-        {
+        pushes[c] = Push { impulse: body.push[0].into(), turn: body.push[1].into() };
+        if all.colliders[c].meeting().is_none() || (body.push == none && body.shift == none) {
             continue;
         }
-        let gained: [[f64; 3]; 2] = {
-            let turn: [f64; 3] = std::array::from_fn(|a| dot(&body.inverse[a], &body.push.turn));
-            let way: [f64; 3] = std::array::from_fn(|a| body.lightness[a] * body.push.impulse[a]);
-            [way, turn]
-        };
-        let more: [[f64; 3]; 2] =
-            std::array::from_fn(|k| std::array::from_fn(|a| 0.5f64.mul_add(gained[k][a], body.shift[k][a])));
+        let gained = body.response(&body.push);
+        let [velocity, spin]: Pair = std::array::from_fn(|k| 0.5 * gained[k] + body.shift[k]);
         let rate = &mut rates[c];
-        (0..D).for_each(|a| rate.velocity[a] += more[0][a]);
+        (0..D).for_each(|a| rate.velocity[a] += velocity[a]);
         if all.colliders[c].turns_freely() {
-            (0..3).for_each(|a| rate.turning[a] += more[1][a]);
+            (0..3).for_each(|a| rate.turning[a] += spin[a]);
         } else {
-            rate.spin += dot(&more[1], &all.colliders[c].axis);
+            rate.spin += spin.dot(&Vector3::from(all.colliders[c].axis));
         }
     }
 }
@@ -161,82 +158,66 @@ fn sweep(touches: &mut [Touch], least: f64, mut correct: impl FnMut(&mut Touch) 
 
 impl Touch {
     fn new(found: Found, bodies: &[Body], dt: f64) -> Self {
-        let n = &found.normal;
-        let arm = |body: &Body| std::array::from_fn(|a| found.point[a] - body.centre[a]);
-        let arms = [arm(&bodies[found.body]), found.other.map_or([0.0; 3], |other| arm(&bodies[other]))];
-        let least = (0..3).fold(0, |best, a| if n[a].abs() < n[best].abs() { a } else { best });
-        let first = cross(*n, std::array::from_fn(|a| if a == least { 1.0 } else { 0.0 }));
-        let long = length(&first);
-        let first = first.map(|c| c / long);
-        let tangents = [first, cross(*n, first)];
+        let (normal, point) = (Vector3::from(found.normal), Vector3::from(found.point));
+        let [own, other] = [Some(found.body), found.other].map(|body| body.map(|body| &bodies[body]));
+        let arms = [own, other].map(|body| body.map_or_else(Vector3::zeros, |body| point - body.centre));
+        let first = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
+        let tangents = [first, normal.cross(&first)];
+        // Change of the velocity between the bodies by an impulse of 1 in this direction.
+        let unit = |direction: &Vector3<f64>| -> Vector3<f64> {
+            let of_each = [own, other].into_iter().zip(&arms).filter_map(|(body, arm)| Some((body?, arm)));
+            of_each.map(|(body, arm)| at(&body.response(&with_arm(direction, arm)), arm)).sum()
+        };
+        let across = unit(&normal).dot(&normal);
+        let both = tangents.map(|tangent| unit(&tangent));
+        let k = Matrix2::from_fn(|i, j| both[j].dot(&tangents[i]));
+        let (size, trace) = (k.m11.max(k.m22), k.trace());
+        let along = if k.determinant() > 1e-12 * size * size { k.try_inverse() } else { None };
+        // In a plane, or where a body cannot move along one of the two.
+        let inverse = |k: f64| if k > 1e-12 * size { 1.0 / k } else { 0.0 };
+        let along = along.unwrap_or(Matrix2::from_diagonal(&k.diagonal().map(inverse)));
         let mut touch = Self {
             found,
+            normal,
             arms,
             tangents,
-            across: 0.0,
-            along: [[0.0; 2]; 2],
-            least_along: 0.0,
+            across,
+            along,
+            least_along: if trace > 0.0 { 1.0 / trace } else { 0.0 },
             closes: false,
             least: 0.0,
-            normal: 0.0,
-            sliding: [0.0; 2],
+            pressing: 0.0,
+            sliding: Vector2::zeros(),
             shift: 0.0,
         };
-        let unit = |direction: &[f64; 3]| {
-            let sum = |body: &Body, arm: &[f64; 3]| at(&body.response(arm, direction), arm);
-            let own = sum(&bodies[found.body], &arms[0]);
-            let theirs = found.other.map_or([0.0; 3], |other| sum(&bodies[other], &arms[1]));
-            let both: [f64; 3] = std::array::from_fn(|a| own[a] + theirs[a]);
-            both
-        };
-        touch.across = dot(&unit(n), n);
-        let [one, two] = [unit(&tangents[0]), unit(&tangents[1])];
-        let k = [
-            [dot(&one, &tangents[0]), dot(&two, &tangents[0])],
-            [dot(&one, &tangents[1]), dot(&two, &tangents[1])],
-        ];
-        let determinant = k[0][0] * k[1][1] - k[0][1] * k[1][0];
-        let size = k[0][0].max(k[1][1]);
-        let trace = k[0][0] + k[1][1];
-        touch.least_along = if trace > 0.0 { 1.0 / trace } else { 0.0 };
-        touch.along = if determinant > 1e-12 * size * size {
-            [[k[1][1] / determinant, -k[0][1] / determinant], [-k[1][0] / determinant, k[0][0] / determinant]]
-        } else {
-            // In a plane, or where a body cannot move along one of the two.
-            let inverse = |k: f64| if k > 1e-12 * size { 1.0 / k } else { 0.0 };
-            [[inverse(k[0][0]), 0.0], [0.0, inverse(k[1][1])]]
-        };
         let [start, end] = [touch.relative(bodies, |b| &b.start), touch.relative(bodies, |b| &b.end)]
-            .map(|velocity| dot(&velocity, n));
-        touch.least = -found.restitution * start.min(0.0);
-        touch.closes = found.gap <= 0.0 || (0.5 * dt).mul_add(end, found.gap) < 0.0;
+            .map(|velocity| velocity.dot(&normal));
+        touch.least = -touch.found.restitution * start.min(0.0);
+        touch.closes = touch.found.gap <= 0.0 || (0.5 * dt).mul_add(end, touch.found.gap) < 0.0;
         touch
     }
 
     /// Velocity of the body relative to the other at the contact, m/s.
-    fn relative(&self, bodies: &[Body], of: impl Fn(&Body) -> &[[f64; 3]; 2]) -> [f64; 3] {
+    fn relative(&self, bodies: &[Body], of: impl Fn(&Body) -> &Pair) -> Vector3<f64> {
         let own = at(of(&bodies[self.found.body]), &self.arms[0]);
-        let theirs = self.found.other.map_or([0.0; 3], |other| at(of(&bodies[other]), &self.arms[1]));
-        std::array::from_fn(|a| own[a] - theirs[a])
+        self.found.other.map_or(own, |other| own - at(of(&bodies[other]), &self.arms[1]))
     }
 
-    /// Impulses on both bodies by an impulse on the first: number of the body, impulse, and its arm.
-    fn both(&self, impulse: &[f64; 3]) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> {
-        let bodies = [(Some(self.found.body), *impulse), (self.found.other, impulse.map(|c| -c))];
-        bodies.into_iter().zip(self.arms).filter_map(|((body, impulse), arm)| Some((body?, impulse, arm)))
+    /// Impulses on both bodies by an impulse on the first: number of the body, impulse and angular impulse.
+    fn both(&self, impulse: &Vector3<f64>) -> impl Iterator<Item = (usize, Pair)> {
+        let bodies = [(Some(self.found.body), *impulse), (self.found.other, -*impulse)];
+        let pushes = bodies.into_iter().zip(self.arms);
+        pushes.filter_map(|((body, impulse), arm)| Some((body?, with_arm(&impulse, &arm))))
     }
 
     /// Gives an impulse to the body and its opposite to the other.
-    fn give(&self, bodies: &mut [Body], impulse: &[f64; 3]) {
-        for (body, impulse, arm) in self.both(impulse) {
+    fn give(&self, bodies: &mut [Body], impulse: &Vector3<f64>) {
+        for (body, push) in self.both(impulse) {
             let body = &mut bodies[body];
-            let (turn, change) = (cross(arm, impulse), body.response(&arm, &impulse));
-            for a in 0..3 {
-                body.push.impulse[a] += impulse[a];
-                body.push.turn[a] += turn[a];
-                for k in 0..2 {
-                    body.end[k][a] += change[k][a];
-                }
+            let change = body.response(&push);
+            for k in 0..2 {
+                body.push[k] += push[k];
+                body.end[k] += change[k];
             }
         }
     }
@@ -246,34 +227,31 @@ impl Touch {
         if self.across <= 0.0 {
             return 0.0;
         }
-        let outward = dot(&self.relative(bodies, |b| &b.end), &self.found.normal);
+        let outward = self.relative(bodies, |b| &b.end).dot(&self.normal);
         self.closes |= (0.5 * dt).mul_add(outward, self.found.gap) < 0.0;
         if !self.closes {
             return 0.0;
         }
-        let wanted = (self.normal + (self.least - outward) / self.across).max(0.0);
-        let more = wanted - self.normal;
-        self.normal = wanted;
-        self.give(bodies, &self.found.normal.map(|n| n * more));
+        let wanted = (self.pressing + (self.least - outward) / self.across).max(0.0);
+        let more = wanted - self.pressing;
+        self.pressing = wanted;
+        self.give(bodies, &(self.normal * more));
         let velocity = self.relative(bodies, |b| &b.end);
-        let slip = self.tangents.each_ref().map(|t| dot(&velocity, t));
-        let mut sliding: [f64; 2] = std::array::from_fn(|k| {
-            self.sliding[k] - self.along[k][0].mul_add(slip[0], self.along[k][1] * slip[1])
-        });
-        let most = self.found.friction * self.normal;
-        if length(&sliding) > most {
+        let slip = Vector2::from(self.tangents.map(|tangent| velocity.dot(&tangent)));
+        let mut sliding = self.sliding - self.along * slip;
+        let most = self.found.friction * self.pressing;
+        if sliding.norm() > most {
             // Sliding: the same factor along both tangents, so that friction opposes the velocity.
-            sliding = std::array::from_fn(|k| (-self.least_along).mul_add(slip[k], self.sliding[k]));
-            let size = length(&sliding);
+            sliding = self.sliding - self.least_along * slip;
+            let size = sliding.norm();
             if size > most {
-                sliding = sliding.map(|s| s * (most / size));
+                sliding *= most / size;
             }
         }
-        let change: [f64; 2] = std::array::from_fn(|k| sliding[k] - self.sliding[k]);
+        let change = sliding - self.sliding;
         self.sliding = sliding;
-        let [t, u] = &self.tangents;
-        self.give(bodies, &std::array::from_fn(|a| change[0].mul_add(t[a], change[1] * u[a])));
-        self.across * (more.abs() + length(&change))
+        self.give(bodies, &(change[0] * self.tangents[0] + change[1] * self.tangents[1]));
+        self.across * (more.abs() + change.norm())
     }
 
     /// Corrects the velocity of the second pass, along the normal alone; returns its change, m/s.
@@ -281,15 +259,13 @@ impl Touch {
         if self.across <= 0.0 {
             return 0.0;
         }
-        let outward = dot(&self.relative(bodies, |b| &b.shift), &self.found.normal);
+        let outward = self.relative(bodies, |b| &b.shift).dot(&self.normal);
         let wanted = (self.shift + (self.least - outward) / self.across).max(0.0);
         let more = wanted - self.shift;
         self.shift = wanted;
-        for (body, impulse, arm) in self.both(&self.found.normal.map(|n| n * more)) {
-            let change = bodies[body].response(&arm, &impulse);
-            for k in 0..2 {
-                (0..3).for_each(|a| bodies[body].shift[k][a] += change[k][a]);
-            }
+        for (body, push) in self.both(&(self.normal * more)) {
+            let change = bodies[body].response(&push);
+            (0..2).for_each(|k| bodies[body].shift[k] += change[k]);
         }
         self.across * more.abs()
     }

@@ -1,5 +1,7 @@
 //! The state of a free body as numbers, as stored in checkpoints.
-use super::turning::Quaternion;
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::turning::quaternion;
 use crate::boundary::motion::{Pose, Rate};
 use crate::boundary::{Collider, ColliderState};
 
@@ -12,7 +14,7 @@ impl<const D: usize> Collider<D> {
         all.extend(rate.velocity);
         all.extend([pose.angle, rate.spin]);
         if self.turns_freely() {
-            all.extend(pose.orientation);
+            all.extend(quaternion(&pose.orientation));
             all.extend(momentum);
         }
         all
@@ -28,10 +30,13 @@ impl<const D: usize> Collider<D> {
         let Some(inertia) = self.free().and_then(|free| free.turning) else {
             return Some(self.state((translation, number(2 * D)?), rate));
         };
-        let (mut orientation, mut momentum): (Quaternion, _) = ([0.0; 4], [0.0; 3]);
-        for (k, part) in orientation.iter_mut().chain(&mut momentum).enumerate() {
+        let mut rest = [0.0; 7];
+        for (k, part) in rest.iter_mut().enumerate() {
             *part = number(2 * D + 2 + k)?;
         }
+        let [w, x, y, z, momentum @ ..] = rest;
+        // As it was: a length of one that is found anew would change the last digits.
+        let orientation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
         let rate = Rate { turning: inertia.spin(&momentum, &orientation), ..rate };
         Some(ColliderState { pose: Pose::oriented(translation, orientation), rate, momentum })
     }

@@ -1,12 +1,8 @@
 //! How rigid bodies turn: inertia, orientation, and motion without torque.
-use crate::boundary::collider::cross;
-use crate::boundary::motion::length;
+use nalgebra::{Matrix3, Unit, UnitQuaternion, Vector3};
 
-/// A unit quaternion: w, then the components along x, y and z.
-pub type Quaternion = [f64; 4];
-
-/// No rotation.
-pub const UPRIGHT: Quaternion = [1.0, 0.0, 0.0, 0.0];
+/// The rotation of a body from its place in the job.
+pub type Orientation = UnitQuaternion<f64>;
 
 /// Greatest angle of a stage of the integration, rad: the relative error of the energy is 1e-8 there, and
 /// grows with the fourth power of the angle.
@@ -16,67 +12,44 @@ const ANGLE: f64 = 0.05;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
     /// Principal moments, kg m².
-    pub moments: [f64; 3],
+    pub moments: Vector3<f64>,
     /// Columns: the principal axes in the body as defined in the job.
-    pub axes: [[f64; 3]; 3],
+    pub axes: Matrix3<f64>,
 }
 
 impl Inertia {
-    /// From a symmetric tensor (kg m²), by Jacobi's rotations.
+    /// From a symmetric tensor (kg m²).
     pub fn new(tensor: [[f64; 3]; 3]) -> Self {
-        let (mut t, mut axes) = (tensor, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let size = t[0][0].abs().max(t[1][1].abs()).max(t[2][2].abs());
-        for _ in 0..30 {
-            let pairs = [(0, 1), (0, 2), (1, 2)];
-            if pairs.iter().all(|&(p, q)| t[p][q].abs() <= 1e-16 * size) {
-                break;
-            }
-            for (p, q) in pairs {
-                if t[p][q] == 0.0 {
-                    continue;
-                }
-                // Golub and Van Loan, Matrix Computations, 8.5.2.
-                let tau = (t[q][q] - t[p][p]) / (2.0 * t[p][q]);
-                let tangent = tau.signum() / (tau.abs() + tau.mul_add(tau, 1.0).sqrt());
-                let c = 1.0 / tangent.mul_add(tangent, 1.0).sqrt();
-                let s = tangent * c;
-                let turn = |m: &mut [[f64; 3]; 3]| {
-                    for row in m.iter_mut() {
-                        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                    }
-                };
-                turn(&mut t);
-                for k in 0..3 {
-                    (t[p][k], t[q][k]) = (c * t[p][k] - s * t[q][k], s * t[p][k] + c * t[q][k]);
-                }
-                turn(&mut axes);
-            }
-        }
-        Self { moments: [t[0][0], t[1][1], t[2][2]], axes }
+        let principal = Matrix3::from(tensor).symmetric_eigen();
+        Self { moments: principal.eigenvalues, axes: principal.eigenvectors }
     }
 
     /// A vector of space along the principal axes of a body in this orientation.
-    fn along_axes(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
-        let own = turned(&conjugate(orientation), v);
-        std::array::from_fn(|k| (0..3).fold(0.0, |sum, i| self.axes[i][k].mul_add(own[i], sum)))
+    fn along_axes(&self, v: &[f64; 3], orientation: &Orientation) -> Vector3<f64> {
+        self.axes.tr_mul(&orientation.inverse_transform_vector(&Vector3::from(*v)))
     }
 
     /// A vector along the principal axes as one of space.
-    fn in_space(&self, v: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
-        let own = std::array::from_fn(|i| (0..3).fold(0.0, |sum, k| self.axes[i][k].mul_add(v[k], sum)));
-        turned(orientation, &own)
+    fn in_space(&self, v: &Vector3<f64>, orientation: &Orientation) -> [f64; 3] {
+        (orientation * (self.axes * v)).into()
     }
 
     /// Angular velocity (rad/s) with an angular momentum (kg m²/s), both in space.
-    pub fn spin(&self, momentum: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
+    pub fn spin(&self, momentum: &[f64; 3], orientation: &Orientation) -> [f64; 3] {
         let m = self.along_axes(momentum, orientation);
-        self.in_space(&std::array::from_fn(|k| m[k] / self.moments[k]), orientation)
+        self.in_space(&m.component_div(&self.moments), orientation)
+    }
+
+    /// The inverse of the inertia in space, 1/(kg m²).
+    pub(super) fn inverse(&self, orientation: &Orientation) -> Matrix3<f64> {
+        let axes = orientation.to_rotation_matrix() * self.axes;
+        axes * Matrix3::from_diagonal(&self.moments.map(|moment| 1.0 / moment)) * axes.transpose()
     }
 
     /// Angular momentum (kg m²/s) with an angular velocity (rad/s), both in space.
-    pub fn momentum(&self, spin: &[f64; 3], orientation: &Quaternion) -> [f64; 3] {
+    pub fn momentum(&self, spin: &[f64; 3], orientation: &Orientation) -> [f64; 3] {
         let w = self.along_axes(spin, orientation);
-        self.in_space(&std::array::from_fn(|k| w[k] * self.moments[k]), orientation)
+        self.in_space(&w.component_mul(&self.moments), orientation)
     }
 
     /// Mean angular velocity (rad/s) over a step of length `dt` (s) in which the angular momentum (kg m²/s)
@@ -85,15 +58,15 @@ impl Inertia {
     /// Euler's equations are split into turning about one principal axis after the other, each exact, so that
     /// the angular momentum in space never changes (McLachlan 1993; Reich 1994); Suzuki's composition (1990)
     /// makes of it a symmetric method of fourth order.
-    pub fn mean_spin(&self, momentum: &[f64; 3], orientation: &Quaternion, dt: f64) -> [f64; 3] {
+    pub fn mean_spin(&self, momentum: &[f64; 3], orientation: &Orientation, dt: f64) -> [f64; 3] {
         let mut m = self.along_axes(momentum, orientation);
-        let spin = length(&std::array::from_fn::<f64, 3, _>(|k| m[k] / self.moments[k]));
+        let spin = m.component_div(&self.moments).norm();
         if spin == 0.0 || dt == 0.0 {
             return self.spin(momentum, orientation);
         }
         let parts = (spin * dt / ANGLE).ceil().clamp(1.0, 1e4);
         let outer = 1.0 / (4.0 - libm::cbrt(4.0));
-        let mut turn = UPRIGHT;
+        let mut turn = Orientation::identity();
         for _ in 0..parts as usize {
             for share in [outer, outer, 1.0 - 4.0 * outer, outer, outer] {
                 let h = share * dt / parts;
@@ -102,71 +75,41 @@ impl Inertia {
                     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
                     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
                     (m[i], m[j]) = (cosine * m[i] + sine * m[j], cosine * m[j] - sine * m[i]);
-                    let mut one = [libm::cos(0.5 * angle), 0.0, 0.0, 0.0];
-                    one[1 + axis] = libm::sin(0.5 * angle);
-                    turn = product(&turn, &one);
+                    let axis = Unit::new_unchecked(Vector3::ith(axis, 1.0));
+                    turn *= UnitQuaternion::from_axis_angle(&axis, angle);
                 }
             }
         }
-        self.in_space(&rotation_vector(&turn).map(|c| c / dt), orientation)
+        self.in_space(&(turn.scaled_axis() / dt), orientation)
     }
-}
-
-/// Rotation vector (rad) of a unit quaternion.
-fn rotation_vector(q: &Quaternion) -> [f64; 3] {
-    let (w, v) = if q[0] < 0.0 { (-q[0], [-q[1], -q[2], -q[3]]) } else { (q[0], [q[1], q[2], q[3]]) };
-    let sine = length(&v);
-    let factor = if sine > 0.0 { 2.0 * libm::atan2(sine, w) / sine } else { 2.0 };
-    v.map(|c| factor * c)
 }
 
 /// An orientation turned by a rotation vector in space (rad).
-pub fn advanced(orientation: &Quaternion, by: &[f64; 3]) -> Quaternion {
-    let angle = length(by);
-    if angle == 0.0 {
+pub fn advanced(orientation: &Orientation, by: &[f64; 3]) -> Orientation {
+    if *by == [0.0; 3] {
         return *orientation;
     }
-    let factor = libm::sin(0.5 * angle) / angle;
-    let turn = [libm::cos(0.5 * angle), factor * by[0], factor * by[1], factor * by[2]];
-    let q = product(&turn, orientation);
-    let size = length(&q);
-    q.map(|c| c / size)
+    let turned = UnitQuaternion::from_scaled_axis(Vector3::from(*by)) * orientation;
+    // Lengths do not drift.
+    UnitQuaternion::new_normalize(turned.into_inner())
+}
+
+/// The unit quaternion of an orientation: w, then the components along x, y and z.
+pub fn quaternion(orientation: &Orientation) -> [f64; 4] {
+    [orientation.w, orientation.i, orientation.j, orientation.k]
 }
 
 /// The rotation matrix of an orientation, row by row.
-pub fn matrix<const D: usize>(q: &Quaternion) -> [[f64; D]; D] {
-    let columns: [[f64; 3]; 3] =
-        std::array::from_fn(|k| turned(q, &std::array::from_fn(|a| if a == k { 1.0 } else { 0.0 })));
-    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
-}
-
-fn conjugate(q: &Quaternion) -> Quaternion {
-    [q[0], -q[1], -q[2], -q[3]]
-}
-
-/// A vector turned: `v + 2 w (u × v) + 2 u × (u × v)`.
-fn turned(q: &Quaternion, v: &[f64; 3]) -> [f64; 3] {
-    let u = [q[1], q[2], q[3]];
-    let once = cross(u, *v);
-    let twice = cross(u, once);
-    std::array::from_fn(|a| v[a] + 2.0 * q[0].mul_add(once[a], twice[a]))
-}
-
-/// The rotation by `b`, then that by `a`.
-fn product(a: &Quaternion, b: &Quaternion) -> Quaternion {
-    let [aw, ax, ay, az] = *a;
-    let [bw, bx, by, bz] = *b;
-    [
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    ]
+pub fn matrix<const D: usize>(orientation: &Orientation) -> [[f64; D]; D] {
+    let rotation = orientation.to_rotation_matrix();
+    std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    type Quaternion = nalgebra::Quaternion<f64>;
 
     /// Principal moments and axes of a turned tensor give it back.
     #[test]
@@ -175,7 +118,7 @@ mod tests {
         let inertia = Inertia::new(tensor);
         for k in 0..3 {
             let spin = std::array::from_fn(|a| if a == k { 1.0 } else { 0.0 });
-            let found = inertia.momentum(&spin, &UPRIGHT);
+            let found = inertia.momentum(&spin, &Orientation::identity());
             assert!((0..3).all(|i| (found[i] - tensor[i][k]).abs() < 1e-14), "{found:?}");
         }
     }
@@ -186,24 +129,25 @@ mod tests {
     #[test]
     fn a_top_without_torque_keeps_what_it_must() {
         let inertia = Inertia::new([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.5]]);
+        let inertia_moments = [1.0, 2.0, 2.5];
         let spin = [0.01, 3.0, 0.02];
-        let momentum = inertia.momentum(&spin, &UPRIGHT);
+        let momentum = inertia.momentum(&spin, &Orientation::identity());
         let energy =
-            |q: &Quaternion| 0.5 * (0..3).map(|k| momentum[k] * inertia.spin(&momentum, q)[k]).sum::<f64>();
-        let (mut q, dt, start) = (UPRIGHT, 0.004, energy(&UPRIGHT));
-        let (mut own, mut other, mut flips, mut side) = (spin, UPRIGHT, 0, 1.0);
+            |q: &Orientation| 0.5 * (0..3).map(|k| momentum[k] * inertia.spin(&momentum, q)[k]).sum::<f64>();
+        let (mut q, dt, start) = (Orientation::identity(), 0.004, energy(&Orientation::identity()));
+        let (mut own, mut other, mut flips, mut side) = (spin, Quaternion::identity(), 0, 1.0);
         for _ in 0..10_000 {
             q = advanced(&q, &inertia.mean_spin(&momentum, &q, dt).map(|w| w * dt));
             assert!((energy(&q) / start - 1.0).abs() < 1e-8);
             for _ in 0..10 {
-                (own, other) = runge_kutta(&inertia.moments, own, other, dt / 10.0);
+                (own, other) = runge_kutta(&inertia_moments, own, other, dt / 10.0);
             }
-            let axis = turned(&q, &[0.0, 1.0, 0.0]);
+            let axis = q * Vector3::y();
             if axis[1] * side < -0.5 {
                 (flips, side) = (flips + 1, -side);
             }
         }
-        let off = (0..4).map(|k| (q[k] - other[k]).abs().min((q[k] + other[k]).abs())).fold(0.0, f64::max);
+        let off = (q.into_inner() - other).norm().min((q.into_inner() + other).norm());
         println!(
             "{flips} somersaults, energy off by {:.1e}, orientation by {off:.1e}",
             energy(&q) / start - 1.0
@@ -215,15 +159,15 @@ mod tests {
     #[test]
     fn a_symmetric_top_precesses_as_the_closed_form_says() {
         let inertia = Inertia::new([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]]);
-        let momentum = inertia.momentum(&[0.4, 0.0, 1.0], &UPRIGHT);
-        let rate = length(&momentum) / 2.0;
+        let momentum = inertia.momentum(&[0.4, 0.0, 1.0], &Orientation::identity());
+        let rate = Vector3::from(momentum).norm() / 2.0;
         let steps = 2000;
         let dt = std::f64::consts::TAU / rate / f64::from(steps);
-        let mut q = UPRIGHT;
+        let mut q = Orientation::identity();
         for _ in 0..steps {
             q = advanced(&q, &inertia.mean_spin(&momentum, &q, dt).map(|w| w * dt));
         }
-        let axis = turned(&q, &[0.0, 0.0, 1.0]);
+        let axis = q * Vector3::z();
         assert!((0..3).all(|k| (axis[k] - [0.0, 0.0, 1.0][k]).abs() < 1e-9), "{axis:?}");
     }
 
@@ -232,10 +176,10 @@ mod tests {
         let slope = |w: [f64; 3], q: Quaternion| {
             let [a, b, c] = *moments;
             let dw = [(b - c) / a * w[1] * w[2], (c - a) / b * w[2] * w[0], (a - b) / c * w[0] * w[1]];
-            (dw, product(&q, &[0.0, w[0], w[1], w[2]]).map(|c| 0.5 * c))
+            (dw, q * Quaternion::new(0.0, w[0], w[1], w[2]) * 0.5)
         };
-        let ahead = |h: f64, (dw, dq): ([f64; 3], Quaternion)| {
-            (std::array::from_fn(|k| w[k] + h * dw[k]), std::array::from_fn(|k| q[k] + h * dq[k]))
+        let ahead = |h: f64, (dw, dq): ([f64; 3], Quaternion)| -> ([f64; 3], Quaternion) {
+            (std::array::from_fn(|k| w[k] + h * dw[k]), q + dq * h)
         };
         let first = slope(w, q);
         let next = |(w, q)| slope(w, q);
@@ -245,9 +189,6 @@ mod tests {
         let w = std::array::from_fn(|k| {
             w[k] + h / 6.0 * (first.0[k] + 2.0 * second.0[k] + 2.0 * third.0[k] + fourth.0[k])
         });
-        let q = std::array::from_fn(|k| {
-            q[k] + h / 6.0 * (first.1[k] + 2.0 * second.1[k] + 2.0 * third.1[k] + fourth.1[k])
-        });
-        (w, q)
+        (w, q + (first.1 + second.1 * 2.0 + third.1 * 2.0 + fourth.1) * (h / 6.0))
     }
 }

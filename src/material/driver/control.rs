@@ -1,6 +1,8 @@
 //! A point of which some strains and some stresses are prescribed.
 use super::super::tensor::strain::tensor_of;
-use super::{Matrix, Point, determinant, full, increment, product};
+use nalgebra::{DMatrix, DVector, Matrix3};
+
+use super::{Matrix, Point, determinant, full, increment, rows};
 use crate::material::Material;
 use crate::simd::{Lanes, Vector};
 
@@ -303,33 +305,14 @@ fn gradient(shear: f64, strain: &[f64; 6]) -> Matrix {
     let deviator: [f64; 6] = std::array::from_fn(|c| if c < 3 { strain[c] - trace / 3.0 } else { strain[c] });
     let half = deviator.map(|component| Lanes::splat(0.5 * component));
     let stretch = tensor_of(Lanes::splat(0.5 * trace), &half, false).map(|lanes| lanes.to_array()[0]);
-    product(&[[1.0, shear, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &full(&stretch))
+    rows(&(Matrix3::new(1.0, shear, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) * full(&stretch)))
 }
 
-/// Solves `Σ columns[k] x[k] = right` by elimination; none if the matrix is singular.
+/// Solves `Σ columns[k] x[k] = right`; none if the matrix is singular.
 fn solution(columns: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
-    let n = right.len();
-    let mut rows: Vec<Vec<f64>> =
-        (0..n).map(|i| columns.iter().map(|column| column[i]).chain([right[i]]).collect()).collect();
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs()))?;
-        rows.swap(k, pivot);
-        if rows[k][k] == 0.0 || !rows[k][k].is_finite() {
-            return None;
-        }
-        for i in k + 1..n {
-            let factor = rows[i][k] / rows[k][k];
-            for j in k..=n {
-                rows[i][j] -= factor * rows[k][j];
-            }
-        }
-    }
-    let mut x = vec![0.0; n];
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| rows[k][j] * x[j]).sum();
-        x[k] = (rows[k][n] - known) / rows[k][k];
-    }
-    x.iter().all(|x| x.is_finite()).then_some(x)
+    let matrix = DMatrix::from_fn(right.len(), right.len(), |i, k| columns[k][i]);
+    let x = matrix.lu().solve(&DVector::from_column_slice(right))?;
+    x.iter().all(|x| x.is_finite()).then(|| x.as_slice().to_vec())
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! A material point driven along a prescribed path: `mod.rs` of deformation, `control.rs` of strains and
 //! stresses.
+use nalgebra::Matrix3;
+
 use super::tensor::strain::Strain;
 use super::{HISTORIES, Material, State, Step};
 use crate::simd::{LANES, Lanes, Vector};
@@ -51,9 +53,8 @@ impl<'a> Point<'a> {
 
     /// Applies an increment of deformation: the deformation gradient becomes `increment · F`.
     pub fn deform(&mut self, increment: &Matrix) {
-        let b = full(&self.elastic);
-        let trial = product(&product(increment, &b), &transposed(increment));
-        self.set_trial([trial[0][0], trial[1][1], trial[2][2], trial[0][1], trial[0][2], trial[1][2]]);
+        let increment = tensor(increment);
+        self.set_trial(components(&(increment * full(&self.elastic) * increment.transpose())));
     }
 
     /// Stretches along the coordinate axes by `exp(strain)`.
@@ -95,24 +96,14 @@ impl<'a> Point<'a> {
 /// The increment that takes the deformation gradient `from` to `to`: `to · from⁻¹`; none if `from` is
 /// singular.
 pub fn increment(from: &Matrix, to: &Matrix) -> Option<Matrix> {
-    let cofactor = |i: usize, j: usize| {
-        let (r, s) = ((i + 1) % 3, (i + 2) % 3);
-        let (p, q) = ((j + 1) % 3, (j + 2) % 3);
-        from[r][p] * from[s][q] - from[r][q] * from[s][p]
-    };
-    let determinant = (0..3).map(|j| from[0][j] * cofactor(0, j)).sum::<f64>();
-    if determinant == 0.0 || !determinant.is_finite() {
-        return None;
-    }
-    let inverse = std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant));
-    Some(product(to, &inverse))
+    let inverse = tensor(from).try_inverse().filter(|inverse| inverse.iter().all(|x| x.is_finite()))?;
+    Some(rows(&(tensor(to) * inverse)))
 }
 
 /// Logarithmic strain `½ ln F Fᵀ` of a deformation gradient.
 pub fn logarithmic_strain(gradient: &Matrix) -> [f64; 6] {
-    let b = product(gradient, &transposed(gradient));
-    let tensor = [b[0][0], b[1][1], b[2][2], b[0][1], b[0][2], b[1][2]];
-    let strain = Strain::of(&tensor.map(Lanes::splat), false);
+    let gradient = tensor(gradient);
+    let strain = Strain::of(&components(&(gradient * gradient.transpose())).map(Lanes::splat), false);
     let scalar = |lanes: Lanes| lanes.to_array()[0];
     let mean = scalar(strain.trace) / 3.0;
     std::array::from_fn(|c| scalar(strain.deviator[c]) + if c < 3 { mean } else { 0.0 })
@@ -120,20 +111,23 @@ pub fn logarithmic_strain(gradient: &Matrix) -> [f64; 6] {
 
 /// Determinant.
 pub fn determinant(a: &Matrix) -> f64 {
-    let minor = |j: usize, k: usize| a[1][j] * a[2][k] - a[1][k] * a[2][j];
-    a[0][0] * minor(1, 2) - a[0][1] * minor(0, 2) + a[0][2] * minor(0, 1)
+    tensor(a).determinant()
 }
 
-fn full(s: &[f64; 6]) -> Matrix {
-    [[s[0], s[3], s[4]], [s[3], s[1], s[5]], [s[4], s[5], s[2]]]
+fn tensor(a: &Matrix) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| a[i][j])
 }
 
-fn transposed(a: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+fn rows(a: &Matrix3<f64>) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[(i, j)]))
 }
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| a[i][0].mul_add(b[0][j], a[i][1].mul_add(b[1][j], a[i][2] * b[2][j])))
-    })
+/// A symmetric tensor from its components xx, yy, zz, xy, xz, yz.
+fn full(s: &[f64; 6]) -> Matrix3<f64> {
+    Matrix3::new(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2])
+}
+
+/// The components of a symmetric tensor.
+fn components(a: &Matrix3<f64>) -> [f64; 6] {
+    [a.m11, a.m22, a.m33, a.m12, a.m13, a.m23]
 }
