@@ -8,6 +8,7 @@ mod common_point;
 mod gradient;
 pub mod mesh;
 pub mod moments;
+mod part;
 mod primitives;
 mod rotation;
 pub mod sampling;
@@ -63,6 +64,23 @@ impl<const D: usize> Aabb<D> {
     /// The box with all its faces farther out by a distance, m.
     pub fn grown(&self, by: f64) -> Self {
         Self { lower: self.lower.map(|c| c - by), upper: self.upper.map(|c| c + by) }
+    }
+
+    /// Its halves along all axes: boxes with a corner of this one and its midpoint.
+    pub fn children(&self) -> impl Iterator<Item = Self> {
+        let (whole, centre) = (*self, self.centre());
+        (0..1_usize << D).map(move |corner| {
+            let is_upper = |a: usize| corner >> a & 1 == 1;
+            Self {
+                lower: std::array::from_fn(|a| if is_upper(a) { centre[a] } else { whole.lower[a] }),
+                upper: std::array::from_fn(|a| if is_upper(a) { whole.upper[a] } else { centre[a] }),
+            }
+        })
+    }
+
+    /// Product of its edges.
+    pub fn volume(&self) -> f64 {
+        (0..D).map(|a| self.upper[a] - self.lower[a]).product()
     }
 
     /// The smallest box that holds both.

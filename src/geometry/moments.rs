@@ -17,21 +17,21 @@ pub struct Moments<const D: usize> {
 }
 
 /// ∫ dV, ∫ x dV and ∫ x xᵀ dV about a point near the shape.
-struct Sums<const D: usize> {
-    origin: [f64; D],
-    volume: f64,
-    first: [f64; D],
-    second: [[f64; D]; D],
+pub(super) struct Sums<const D: usize> {
+    pub(super) origin: [f64; D],
+    pub(super) volume: f64,
+    pub(super) first: [f64; D],
+    pub(super) second: [[f64; D]; D],
 }
 
 impl<const D: usize> Sums<D> {
-    fn new(origin: [f64; D]) -> Self {
+    pub(super) fn new(origin: [f64; D]) -> Self {
         Self { origin, volume: 0.0, first: [0.0; D], second: [[0.0; D]; D] }
     }
 
     /// Adds a simplex with a corner at the origin, of this signed volume: ∫ x = V Σ p / (D + 1), ∫ x xᵀ = V
     /// (Σ p pᵀ + Σp Σpᵀ) / ((D + 1)(D + 2)) (Tonon 2004).
-    fn add_simplex(&mut self, volume: f64, corners: &[[f64; D]]) {
+    pub(super) fn add_simplex(&mut self, volume: f64, corners: &[[f64; D]]) {
         let n = D as f64;
         let sum: [f64; D] = std::array::from_fn(|a| corners.iter().map(|p| p[a]).sum());
         self.volume += volume;
@@ -44,7 +44,23 @@ impl<const D: usize> Sums<D> {
         }
     }
 
-    fn moments(&self) -> Option<Moments<D>> {
+    /// Adds `sign` times integrals about another point, in a frame with these unit vectors.
+    pub(super) fn add(&mut self, sign: f64, own: &Self, axes: &[[f64; D]; D]) {
+        let shift: [f64; D] = std::array::from_fn(|a| own.origin[a] - self.origin[a]);
+        let first: [f64; D] = std::array::from_fn(|i| (0..D).map(|k| axes[k][i] * own.first[k]).sum());
+        self.volume += sign * own.volume;
+        for i in 0..D {
+            self.first[i] += sign * (first[i] + own.volume * shift[i]);
+            for j in 0..D {
+                let all = (0..D).flat_map(|k| (0..D).map(move |l| (k, l)));
+                let turned: f64 = all.map(|(k, l)| axes[k][i] * own.second[k][l] * axes[l][j]).sum();
+                let shifted = first[i] * shift[j] + shift[i] * first[j] + own.volume * shift[i] * shift[j];
+                self.second[i][j] += sign * (turned + shifted);
+            }
+        }
+    }
+
+    pub(super) fn moments(&self) -> Option<Moments<D>> {
         if !(self.volume > 0.0 && self.volume.is_finite()) {
             return None;
         }

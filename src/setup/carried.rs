@@ -1,8 +1,9 @@
 //! Columns that particles carry for loads at the start: the surface that they stand for, and their shares of
 //! point forces.
 //!
-//! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box;
-//! where the box has none, since its centre is not in the body, to the first particle inwards. Bodies against
+//! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box,
+//! or to the one that has taken over the part of the body there; where boxes do not tile leaves and one has no
+//! particle, since its centre is not in the body, to the first particle inwards. Bodies against
 //! each other have no surface between them, nor has a body one on a face of the domain. All follows from job
 //! and tree, so each rank finds what its own particles carry, in the same order on any partition.
 
@@ -10,6 +11,7 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::parts::{is_in_box, tile_leaves};
 use super::seed::{SeedError, lattice_of, lattice_places, spacing};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
@@ -217,17 +219,21 @@ impl<const D: usize> Search<'_, D> {
         let index = x.map(|c| (c / spacing) as u64);
         let centre = index.map(|i| (i as f64 + 0.5) * spacing);
         let leaf = leaf_of(&centre).filter(|&leaf| self.tree.leaves()[leaf].level == level)?;
-        let is_there = bodies[self.body].shape.contains(&centre)
+        let body = &bodies[self.body];
+        if tile_leaves(body) {
+            return is_in_box(&body.shape, &index, spacing).then_some((leaf, index));
+        }
+        let is_there = body.shape.contains(&centre)
             && (self.new.iter().take_while(|&&earlier| earlier < self.body))
                 .all(|&earlier| !bodies[earlier].shape.contains(&centre));
         is_there.then_some((leaf, index))
     }
 }
 
-/// Adds shares to the columns of own particles. The particles are in the order in which they were made, which
-/// is that of the bodies and places in `places`.
+/// Adds shares to the columns of own particles. `places` are those of a leaf with the numbers of its
+/// particles.
 fn hand_out<const D: usize>(
-    places: impl Fn(usize) -> Vec<(u16, [u64; D])>,
+    places: impl Fn(usize) -> Vec<((u16, [u64; D]), usize)>,
     chunks: &mut [Chunk<D>],
     (carried, columns): (&Carried<D>, usize),
     shares: &[Share<D>],
@@ -236,7 +242,7 @@ fn hand_out<const D: usize>(
     for Share { leaf, body, index, numbers } in shares {
         let chunk = &mut chunks[*leaf];
         let of_leaf = of_leaf.entry(*leaf);
-        let places = of_leaf.or_insert_with(|| places(*leaf).into_iter().zip(0..chunk.len()).collect());
+        let places = of_leaf.or_insert_with(|| places(*leaf).into_iter().collect());
         if let Some(&p) = places.get(&(*body, *index)) {
             chunk.carry(columns);
             for (column, number) in (carried.first..).zip(numbers) {

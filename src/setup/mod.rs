@@ -17,6 +17,7 @@ use crate::solver::{Clock, Physics, Solver, StepControl};
 mod carried;
 pub mod estimate;
 pub mod initial_stress;
+mod parts;
 pub mod seed;
 pub mod stages;
 pub mod warnings;

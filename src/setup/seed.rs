@@ -4,6 +4,8 @@
 //! anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its own points,
 //! on whichever rank it is, and no point is made twice. A body from a file has the particles of the file.
 //! Particles lie at these points or, by the sampling of their body, near them, within the same leaf and body.
+//! Where the surface cuts the box of a point, the particle is the part of the body in it (`parts.rs`).
+use super::parts::{Point, likely_of_leaf, of_leaf, tile_leaves};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::material::initial::NoState;
@@ -92,17 +94,20 @@ pub fn fill_leaf<const D: usize>(
     stage: usize,
     chunk: &mut Chunk<D>,
 ) -> Result<(), SeedError> {
-    visit(problem, octant, problem.bodies_of_stage(stage), |index, points| {
+    visit(problem, octant, problem.bodies_of_stage(stage), of_leaf, |index, points| {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
         let given = body.given.as_ref().map(|given| (given, given.in_box(&problem.octant_box(octant))));
-        let volume: f64 = [spacing; D].iter().product();
-        let mass = problem.materials[body.material].density * volume;
+        let whole: f64 = [spacing; D].iter().product();
+        let density = problem.materials[body.material].density;
         let tag = Tag { material: body.material as u16, body: index as u16, level: octant.level };
         let spin = velocity_gradient::<D>(body.angular_velocity);
         chunk.reserve_exact(chunk.len() + points.len());
-        for (number, x) in points.iter().enumerate() {
-            let x = &place_near(problem, octant, index, x, spacing);
+        for (number, point) in points.iter().enumerate() {
+            let x = &match &point.part {
+                Some(part) => part.centre,
+                None => place_near(problem, octant, index, &point.x, spacing),
+            };
             let p = chunk.push_zeroed(0, tag);
             if let Some((given, rows)) = &given {
                 let row = rows[number] as usize;
@@ -130,10 +135,16 @@ pub fn fill_leaf<const D: usize>(
             for diagonal in 0..3 {
                 set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
             }
-            set(Layout::<D>::MASS, mass);
-            set(Layout::<D>::HALF, 0.5 * spacing);
+            let volume = point.part.as_ref().map_or(whole, |part| part.volume);
+            set(Layout::<D>::MASS, density * volume);
+            set(Layout::<D>::HALF, 0.5 * point.part.as_ref().map_or(spacing, |part| edge::<D>(part.volume)));
         }
     })
+}
+
+/// Edge of a cube (square) of this volume, m.
+fn edge<const D: usize>(volume: f64) -> f64 {
+    if D == 2 { volume.sqrt() } else { libm::cbrt(volume) }
 }
 
 /// Place of the particle of a lattice point: that of the sampling of its body, or nearer to the point on the
@@ -161,8 +172,8 @@ fn place_near<const D: usize>(
     places.into_iter().find(fits).unwrap_or(*x)
 }
 
-/// Not collective. Body and place in the lattice of each particle that [`fill_leaf`] makes, in the same
-/// order.
+/// Not collective. Bodies and places in the lattice, each with the number of the particle there among those
+/// that [`fill_leaf`] makes.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -170,17 +181,20 @@ pub(super) fn lattice_places<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
     stage: usize,
-) -> Result<Vec<(u16, [u64; D])>, SeedError> {
-    let mut places = Vec::new();
-    visit(problem, octant, problem.bodies_of_stage(stage), |index, points| {
-        let spacing = spacing(problem, octant.level, &problem.bodies[index]);
-        places.extend(points.iter().map(|x| (index as u16, x.map(|c| (c / spacing) as u64))));
+) -> Result<Vec<((u16, [u64; D]), usize)>, SeedError> {
+    let (mut places, mut number) = (Vec::new(), 0);
+    visit(problem, octant, problem.bodies_of_stage(stage), of_leaf, |body, points| {
+        for point in points {
+            let all = std::iter::once(&point.index).chain(&point.joined);
+            places.extend(all.map(|index| ((body as u16, *index), number)));
+            number += 1;
+        }
     })?;
     Ok(places)
 }
 
 /// Not collective. The number of particles of each body that [`fill_leaf`] makes in the leaf, added to
-/// `counts`.
+/// `counts`: about as many, where surfaces cut boxes of the lattice.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -194,7 +208,7 @@ pub fn count_leaf<const D: usize>(
 }
 
 /// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles
-/// of in the leaf. `bodies` are in the order of the job; the others must lie outside the leaf.
+/// of in the leaf, as [`count_leaf`]. `bodies` are in the order of the job; the others must lie outside the leaf.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -204,7 +218,7 @@ pub fn count_bodies<const D: usize>(
     bodies: impl Iterator<Item = usize>,
     mut take: impl FnMut(usize, u64),
 ) -> Result<(), SeedError> {
-    visit(problem, octant, bodies, |body, points| take(body, points.len() as u64))
+    visit(problem, octant, bodies, likely_of_leaf, |body, points| take(body, points.len() as u64))
 }
 
 /// Not collective. The number of lattice points in a box that a body has in leaves of a level if it fills the
@@ -319,12 +333,14 @@ fn velocity_gradient<const D: usize>(spin: [f64; 3]) -> [[f64; D]; D] {
     std::array::from_fn(|i| std::array::from_fn(|j| skew[i][j]))
 }
 
-/// Calls `take(body, points)` for each of some bodies with points in the leaf.
+/// Calls `take(body, points)` for each of some bodies with points in the leaf. `at_surface` finds them where
+/// the surface of the body may cross the leaf.
 fn visit<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
     bodies: impl Iterator<Item = usize>,
-    mut take: impl FnMut(usize, &[[f64; D]]),
+    at_surface: impl Fn(&Problem<D>, &Body<D>, &Aabb<D>, u8) -> Vec<Point<D>>,
+    mut take: impl FnMut(usize, &[Point<D>]),
 ) -> Result<(), SeedError> {
     let cell = problem.octant_box(octant);
     let near: Vec<(usize, Side)> = bodies
@@ -335,14 +351,20 @@ fn visit<const D: usize>(
     for &(index, side) in &near {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
+        let place = |x: &[f64; D]| x.map(|c| (c / spacing) as u64);
         points.clear();
         if let Some(given) = &body.given {
-            points.extend(given.in_box(&cell).into_iter().map(|p| given.chunk().position(p as usize)));
+            let rows = given.in_box(&cell).into_iter();
+            points.extend(rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(place(&x), x)));
+        } else if side == Side::Crosses && tile_leaves(body) {
+            points = at_surface(problem, body, &cell, octant.level);
         } else {
-            lattice(&cell, spacing, &mut points);
-        }
-        if side == Side::Crosses && body.given.is_none() {
-            points.retain(|x| body.shape.contains(x));
+            for_lattice(&cell, spacing, |index| {
+                let x = index.map(|i| coordinate(i, spacing));
+                if side == Side::Inside || body.shape.contains(&x) {
+                    points.push(Point::at(index, x));
+                }
+            });
         }
         let together = |other: usize| other != index && problem.come_together(index, other);
         for &(other, _) in near.iter().filter(|(other, _)| together(*other)) {
@@ -350,19 +372,22 @@ fn visit<const D: usize>(
             let rounding = -1e-9 * spacing;
             let neighbour = &problem.bodies[other];
             let mut overlap = None;
-            points.retain(|x| {
-                if !neighbour.shape.contains(x) {
+            points.retain(|point| {
+                let x = &point.x;
+                // Both bodies have their parts of a box.
+                let is_part = point.part.is_some();
+                if !neighbour.shape.contains(x) || is_part && !body.shape.contains(x) {
                     return true;
                 }
                 if body.shape.distance(x).max(neighbour.shape.distance(x)) < rounding {
                     overlap.get_or_insert(*x);
                 }
-                index < other
+                is_part || index < other
             });
             if let Some(x) = overlap {
                 let (first, second) = (index.min(other), index.max(other));
                 return Err(SeedError::Overlap {
-                    place: place(problem, second),
+                    place: self::place(problem, second),
                     first: problem.bodies[first].name.clone(),
                     second: problem.bodies[second].name.clone(),
                     point: (0..D).map(|a| x[a] + problem.origin[a]).collect(),
@@ -376,12 +401,7 @@ fn visit<const D: usize>(
     Ok(())
 }
 
-/// The lattice points in a half-open box, lexicographic with the last axis fastest.
-fn lattice<const D: usize>(cell: &Aabb<D>, spacing: f64, points: &mut Vec<[f64; D]>) {
-    for_lattice(cell, spacing, |index| points.push(index.map(|i| coordinate(i, spacing))));
-}
-
-/// The places of [`lattice`] points along each axis.
+/// The places of lattice points in a half-open box along each axis, lexicographic with the last axis fastest.
 pub(super) fn lattice_of<const D: usize>(cell: &Aabb<D>, spacing: f64) -> Vec<[u64; D]> {
     let mut places = Vec::new();
     for_lattice(cell, spacing, |index| places.push(index));

@@ -20,7 +20,10 @@ fn seeded<const D: usize>(problem: &Problem<D>) -> Result<Vec<Chunk<D>>, SeedErr
         assert!(leaf_is_touched(problem, leaf) || chunk.is_empty());
         let mut counts = vec![0; problem.bodies.len()];
         count_leaf(problem, leaf, 0, &mut counts)?;
-        assert_eq!(counts.iter().sum::<u64>(), chunk.len() as u64);
+        // A count, or a good guess where the surface cuts boxes.
+        let (counted, made) = (counts.iter().sum::<u64>() as f64, chunk.len() as f64);
+        assert!((counted - made).abs() <= 0.2 * made + 2.0, "{counted} {made}");
+        assert_eq!(counted > 0.0, made > 0.0);
         let cell = problem.octant_box(leaf);
         assert!((0..chunk.len()).all(|p| cell.contains(&chunk.position(p))));
         Ok(chunk)
@@ -71,8 +74,8 @@ proptest! {
         }
         made.sort_unstable();
         let spacing = 0.25 / f64::from(1 << level) / per_cell;
-        let mut all = Vec::new();
-        lattice(&Aabb::new([0.0; 2], [2.0, 1.0]), spacing, &mut all);
+        let all = lattice_of(&Aabb::new([0.0; 2], [2.0, 1.0]), spacing);
+        let mut all: Vec<[f64; 2]> = all.iter().map(|index| index.map(|i| coordinate(i, spacing))).collect();
         all.retain(|x| problem.bodies[0].shape.contains(x));
         let mut expected: Vec<[u64; 2]> = all.into_iter().map(bits).collect();
         expected.sort_unstable();

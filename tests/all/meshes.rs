@@ -82,20 +82,20 @@ fn job(shape: &str, rest: &str) -> String {
     )
 }
 
-/// A cube of 0.9 m from each format gives the particles, and so the run, of a box of that size.
+/// A cube of 1 m on the lattice from each format gives the particles, and so the run, of a box of that size.
 #[test]
 fn a_cube_from_a_file_is_a_box() {
     let directory = tempfile::tempdir().expect("temporary directory");
     let rest = "[time]\nend = 0.05";
     let reference = outcome(
         directory.path(),
-        &job("{ kind = 'box', min = [0.5, 0.5, -0.1], max = [1.4, 1.4, 0.8] }", rest),
+        &job("{ kind = 'box', min = [0.5, 0.5, -0.125], max = [1.5, 1.5, 0.875] }", rest),
     );
     std::fs::create_dir(directory.path().join("tools")).expect("directory");
     for (name, bytes) in cubes() {
         std::fs::write(directory.path().join("tools").join(name), bytes).expect("mesh");
         let shape =
-            format!("{{ kind = 'mesh', file = 'tools/{name}', scale = 0.9, origin = [0.5, 0.5, -0.1] }}");
+            format!("{{ kind = 'mesh', file = 'tools/{name}', scale = 1, origin = [0.5, 0.5, -0.125] }}");
         let found = outcome(directory.path(), &job(&shape, rest));
         assert!(found.history == reference.history, "{name}: history");
         // The headers differ: they name the job.

@@ -255,6 +255,29 @@ impl Mesh {
             .map(move |corners| corners.map(|index| [place(index).x, place(index).y, place(index).z]))
     }
 
+    /// Whether its triangles close it, so that all face outwards.
+    pub(super) fn is_closed(&self) -> bool {
+        matches!(self.0.surface.inside, Inside::Normals)
+    }
+
+    /// Corners of its triangles that may meet a box, m.
+    pub(super) fn triangles_in(&self, cell: &Aabb<3>) -> impl Iterator<Item = [[f64; 3]; 3]> {
+        let surface = &self.0.surface.surface;
+        let near = cell.grown(1e-9 * Raster::edge(&self.0.bounds));
+        let [lower, upper] = [near.lower, near.upper].map(|x| Vector::new(x[0], x[1], x[2]));
+        let near = parry3d_f64::bounding_volume::Aabb::new(lower, upper);
+        let mut found: Vec<u32> = surface.bvh().intersect_aabb(&near).collect();
+        // The same order in all boxes.
+        found.sort_unstable();
+        let corners = surface.vertices();
+        found.into_iter().map(move |triangle| {
+            surface.indices()[triangle as usize].map(|corner| {
+                let x = &corners[corner as usize];
+                [x.x, x.y, x.z]
+            })
+        })
+    }
+
     /// Its vertices, m.
     pub fn vertices(&self) -> impl Iterator<Item = [f64; 3]> {
         self.0.surface.surface.vertices().iter().map(|x| [x.x, x.y, x.z])
@@ -368,4 +391,4 @@ impl std::fmt::Debug for Mesh {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

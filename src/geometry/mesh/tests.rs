@@ -2,7 +2,7 @@
 use super::*;
 
 /// A ball of radius 1 about the origin by subdivision of an octahedron.
-pub(super) fn ball(depth: u32) -> Triangles {
+pub(in crate::geometry) fn ball(depth: u32) -> Triangles {
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut indices = Vec::new();
     let n = 1_usize << depth;
@@ -32,7 +32,7 @@ pub(super) fn ball(depth: u32) -> Triangles {
     Triangles { vertices, indices }
 }
 
-pub(super) fn cube() -> Triangles {
+pub(in crate::geometry) fn cube() -> Triangles {
     let vertices = (0..8).map(|c| [f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)]).collect();
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let indices = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
@@ -40,7 +40,7 @@ pub(super) fn cube() -> Triangles {
 }
 
 /// Points of a box about a solid, in no order.
-pub(super) fn points(reach: f64) -> impl Iterator<Item = [f64; 3]> {
+pub(in crate::geometry) fn points(reach: f64) -> impl Iterator<Item = [f64; 3]> {
     let part = |i: u32, root: f64| (f64::from(i) * root).fract() * 2.0 - 1.0;
     (1..4000).map(move |i| {
         [part(i, 0.754_877_666), part(i, 0.569_840_291), part(i, 0.819_172_513)].map(|c| reach * c)

@@ -8,7 +8,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
         "## 14 Strip footing and thick cylinder\n\n\
          *Footing* ([job](../jobs/strip_footing.toml)): a rough rigid footing on weightless clay of strength c; limit analysis gives (2 + pi) c. Cells of B/20, F-bar; the limit is the mean over the last tenth \
          ([more](footing.md)). *Cylinder* ([job](../jobs/thick_cylinder.toml)): inner radius 1 m, outer 2 m, Tresca, pressures of 7.5 kPa (first yield), 10, 12 and 13 kPa, each to its equilibrium. Exact: Lame, and the \
-         closed form with a plastic ring. Sixteen cells over the wall, which is stair-cased. Exercises yield, contact, pressure on curved surfaces, and equilibrium.\n",
+         closed form with a plastic ring. Sixteen cells over the wall. Exercises yield, contact, pressure on curved surfaces, and equilibrium.\n",
     );
     let results = runs.run("strip_footing", "footing", &["time.end=1.2".into()]);
     let rows = results.history(["time", "force_footing_y"]);

@@ -1,0 +1,182 @@
+//! Parts of bodies in the boxes of their lattice of particles.
+//!
+//! A box of the lattice that the surface of a body cuts gives a particle with the volume and the centroid of
+//! the part of the body in it. Parts below a tenth of a box join a neighbour in their leaf, volume and
+//! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
+//! its surface. All follows from the body and the leaf alone.
+use super::seed::{lattice_of, spacing};
+use crate::geometry::{Aabb, Shape, Side};
+use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
+
+/// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding of
+/// faces that lie on the lattice.
+const ROUNDING: f64 = 1e-9;
+/// Parts of a box below this share join a neighbour.
+const SMALL: f64 = 0.1;
+/// Greatest volume of a particle that others have joined, in boxes: its box stays less than a tenth wider.
+const MOST: f64 = 1.2;
+
+/// Distance of the centre of a box to the surface up to which more than [`SMALL`] of it is inside, in edges.
+const LIKELY: f64 = 0.4;
+
+/// A particle that a body has in a leaf.
+#[derive(Clone, Debug)]
+pub(super) struct Point<const D: usize> {
+    /// Place in the lattice.
+    pub(super) index: [u64; D],
+    /// Centre of the box there, or place of a given particle, m.
+    pub(super) x: [f64; D],
+    /// Unless the body fills the box.
+    pub(super) part: Option<Part<D>>,
+    /// Places of parts that have joined this one.
+    pub(super) joined: Vec<[u64; D]>,
+}
+
+/// What is in a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part<const D: usize> {
+    /// m³ (m² in the plane).
+    pub(super) volume: f64,
+    /// m.
+    pub(super) centre: [f64; D],
+}
+
+impl<const D: usize> Point<D> {
+    pub(super) fn at(index: [u64; D], x: [f64; D]) -> Self {
+        Self { index, x, part: None, joined: Vec::new() }
+    }
+}
+
+/// Whether boxes of a body's lattice tile leaves, so that each lies in one leaf. Else the body has the points
+/// of the lattice that it contains.
+pub(super) fn tile_leaves<const D: usize>(body: &Body<D>) -> bool {
+    (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0
+}
+
+/// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.
+pub(super) fn is_in_box<const D: usize>(shape: &Shape<D>, index: &[u64; D], spacing: f64) -> bool {
+    of_box(shape, index, spacing).is_some()
+}
+
+/// The particles of a body in a leaf, in the order of the lattice.
+pub(super) fn of_leaf<const D: usize>(
+    problem: &Problem<D>,
+    body: &Body<D>,
+    cell: &Aabb<D>,
+    level: u8,
+) -> Vec<Point<D>> {
+    let spacing = spacing(problem, level, body);
+    if is_speck(&body.shape, spacing) {
+        return Vec::new();
+    }
+    let mut points: Vec<Point<D>> = (lattice_of(cell, spacing).into_iter())
+        .filter_map(|index| {
+            let part = of_box(&body.shape, &index, spacing)?;
+            let x = index.map(|i| (i as f64 + 0.5) * spacing);
+            Some(Point { part, ..Point::at(index, x) })
+        })
+        .collect();
+    join(&mut points, (0..D).fold(1.0, |volume, _| volume * spacing));
+    points
+}
+
+/// About as many particles as [`of_leaf`] makes, without the cost of their volumes: those of boxes of which
+/// the body has more than a tenth, where its surface is plane.
+pub(super) fn likely_of_leaf<const D: usize>(
+    problem: &Problem<D>,
+    body: &Body<D>,
+    cell: &Aabb<D>,
+    level: u8,
+) -> Vec<Point<D>> {
+    let spacing = spacing(problem, level, body);
+    if is_speck(&body.shape, spacing) {
+        return Vec::new();
+    }
+    let likely = lattice_of(cell, spacing).into_iter().filter_map(|index| {
+        let x = index.map(|i| (i as f64 + 0.5) * spacing);
+        let outside = Part { volume: 0.0, centre: x };
+        (body.shape.distance(&x) < LIKELY * spacing)
+            .then(|| Point { part: (!body.shape.contains(&x)).then_some(outside), ..Point::at(index, x) })
+    });
+    let likely: Vec<Point<D>> = likely.collect();
+    if likely.is_empty() { of_leaf(problem, body, cell, level) } else { likely }
+}
+
+/// Whether a shape is no body: it would be a single particle far smaller than its box.
+fn is_speck<const D: usize>(shape: &Shape<D>, spacing: f64) -> bool {
+    let bounds = shape.bounds();
+    (0..D).all(|a| bounds.upper[a] - bounds.lower[a] < 0.5 * spacing)
+}
+
+/// The part of a shape in a box of the lattice: `None` if it has none, no part if it fills the box.
+fn of_box<const D: usize>(shape: &Shape<D>, index: &[u64; D], spacing: f64) -> Option<Option<Part<D>>> {
+    let corner = |offset: u64| index.map(|i| (i + offset) as f64 * spacing);
+    let cell = Aabb::new(corner(0), corner(1));
+    match shape.classify(&cell) {
+        Side::Outside => return None,
+        Side::Inside => return Some(None),
+        Side::Crosses => {}
+    }
+    let found = shape.part_in(&cell)?;
+    let share = found.volume / cell.volume();
+    if share < ROUNDING {
+        return None;
+    }
+    let inside = |a: usize| {
+        let slack = 1e-9 * spacing;
+        found.centre[a].clamp(cell.lower[a] + slack, cell.upper[a] - slack)
+    };
+    let part = Part { volume: found.volume, centre: std::array::from_fn(inside) };
+    Some((share < 1.0 - ROUNDING).then_some(part))
+}
+
+/// Lets small parts join the largest neighbour that is not small: beside a face where there is one, else at
+/// an edge or a corner.
+fn join<const D: usize>(points: &mut Vec<Point<D>>, whole: f64) {
+    let volume = |point: &Point<D>| point.part.map_or(whole, |part| part.volume);
+    let is_small: Vec<bool> = points.iter().map(|point| volume(point) < SMALL * whole).collect();
+    if !is_small.contains(&true) {
+        return;
+    }
+    for small in (0..points.len()).filter(|&p| is_small[p]) {
+        let own = volume(&points[small]);
+        let mut best: Option<(u32, f64, usize)> = None;
+        for offset in (0..3_u64.pow(D as u32)).map(offset::<D>) {
+            let (index, steps) = moved(&points[small].index, &offset);
+            let Ok(p) = points.binary_search_by(|point| point.index.cmp(&index)) else { continue };
+            let volume = volume(&points[p]);
+            let is_better =
+                best.is_none_or(|(least, most, _)| steps < least || steps == least && volume > most);
+            if !is_small[p] && volume + own <= MOST * whole && is_better {
+                best = Some((steps, volume, p));
+            }
+        }
+        let Some((_, volume, p)) = best else { continue };
+        let (index, centre) =
+            (points[small].index, points[small].part.map_or(points[small].x, |part| part.centre));
+        let point = &mut points[p];
+        let old = point.part.map_or(point.x, |part| part.centre);
+        let total = volume + own;
+        let mean = |a: usize| (centre[a] - old[a]).mul_add(own / total, old[a]);
+        point.part = Some(Part { volume: total, centre: std::array::from_fn(mean) });
+        point.joined.push(index);
+    }
+    let gone: Vec<[u64; D]> = points.iter().flat_map(|point| point.joined.iter().copied()).collect();
+    points.retain(|point| !gone.contains(&point.index));
+}
+
+/// One of the ways to a neighbour: 0, 1 or 2 for a step back, none or a step on along each axis.
+fn offset<const D: usize>(number: u64) -> [u64; D] {
+    std::array::from_fn(|a| number / 3_u64.pow(a as u32) % 3)
+}
+
+/// The place there, and the number of axes with a step. That of the box itself, or one beyond the first, is
+/// no neighbour.
+fn moved<const D: usize>(index: &[u64; D], offset: &[u64; D]) -> ([u64; D], u32) {
+    let place = std::array::from_fn(|a| (index[a] + offset[a]).wrapping_sub(1));
+    (place, offset.iter().map(|&step| u32::from(step != 1)).sum())
+}
+
+#[cfg(test)]
+#[path = "parts_tests.rs"]
+mod tests;
