@@ -11,7 +11,7 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::parts::{is_in_box, tile_leaves};
+use super::parts::{has_parts, is_in_box};
 use super::seed::{SeedError, lattice_of, lattice_places, spacing};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
@@ -220,7 +220,7 @@ impl<const D: usize> Search<'_, D> {
         let centre = index.map(|i| (i as f64 + 0.5) * spacing);
         let leaf = leaf_of(&centre).filter(|&leaf| self.tree.leaves()[leaf].level == level)?;
         let body = &bodies[self.body];
-        if tile_leaves(body) {
+        if has_parts(self.problem, body) {
             return is_in_box(&body.shape, &index, spacing).then_some((leaf, index));
         }
         let is_there = body.shape.contains(&centre)

@@ -7,6 +7,7 @@
 use super::seed::{lattice_of, spacing};
 use crate::geometry::{Aabb, Shape, Side};
 use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
+use crate::material;
 
 /// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding of
 /// faces that lie on the lattice.
@@ -47,10 +48,13 @@ impl<const D: usize> Point<D> {
     }
 }
 
-/// Whether boxes of a body's lattice tile leaves, so that each lies in one leaf. Else the body has the points
-/// of the lattice that it contains.
-pub(super) fn tile_leaves<const D: usize>(body: &Body<D>) -> bool {
-    (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0
+/// Whether a body has the parts of its boxes. Else it has the points of the lattice that it contains: where
+/// boxes of the lattice do not lie in one leaf each, and in fluids, whose shift of volume takes the small gaps
+/// and overlaps of cut boxes for void and excess.
+pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
+    let tile_leaves = (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0;
+    let material = &problem.materials[body.material];
+    tile_leaves && !material::build(&material.model, material.density).is_fluid()
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.

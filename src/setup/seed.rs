@@ -5,7 +5,7 @@
 //! on whichever rank it is, and no point is made twice. A body from a file has the particles of the file.
 //! Particles lie at these points or, by the sampling of their body, near them, within the same leaf and body.
 //! Where the surface cuts the box of a point, the particle is the part of the body in it (`parts.rs`).
-use super::parts::{Point, likely_of_leaf, of_leaf, tile_leaves};
+use super::parts::{Point, has_parts, likely_of_leaf, of_leaf};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::material::initial::NoState;
@@ -356,7 +356,7 @@ fn visit<const D: usize>(
         if let Some(given) = &body.given {
             let rows = given.in_box(&cell).into_iter();
             points.extend(rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(place(&x), x)));
-        } else if side == Side::Crosses && tile_leaves(body) {
+        } else if side == Side::Crosses && has_parts(problem, body) {
             points = at_surface(problem, body, &cell, octant.level);
         } else {
             for_lattice(&cell, spacing, |index| {

@@ -24,6 +24,9 @@ const LEVEL: f64 = 0.6;
 /// Most particles of a surface, counted as small ones.
 const MOST: f64 = 3e7;
 
+/// Share of particles of one size that makes it one of whole particles.
+const SHARE: f64 = 0.1;
+
 /// How a mesh is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
@@ -54,6 +57,16 @@ pub struct Surface {
     pub triangles: Vec<[usize; 3]>,
 }
 
+/// The least half width of whole particles, all of which have the same; the surface of a body cuts others
+/// into any size.
+fn least_whole(mut sizes: Vec<f64>) -> f64 {
+    sizes.sort_unstable_by(f64::total_cmp);
+    let most = SHARE * sizes.len() as f64;
+    let mut equal = sizes.chunk_by(|a, b| a == b);
+    let whole = equal.find(|equal| equal.len() as f64 >= most).or(sizes.get(..1));
+    whole.and_then(|equal| equal.first().copied()).unwrap_or(f64::INFINITY)
+}
+
 impl Surface {
     /// The surface of all particles of a frame, or of those of one body, by its name.
     ///
@@ -68,7 +81,7 @@ impl Surface {
         let is_chosen = chosen(frame, body)?;
         let sizes =
             || frame.half_widths.iter().enumerate().filter(|(p, _)| is_chosen(*p)).map(|(_, size)| *size);
-        let least = sizes().fold(f64::INFINITY, f64::min);
+        let least = least_whole(sizes().collect());
         let parts = |size: f64| (size / least).round().max(1.0);
         let count: f64 = sizes().map(|size| parts(size).powi(3)).sum();
         if count > MOST {
@@ -79,6 +92,9 @@ impl Surface {
         let mut points: Vec<Vector3<f64>> = Vec::with_capacity(count as usize);
         let particles = frame.positions.iter().zip(&frame.half_widths).enumerate();
         for (_, (at, size)) in particles.filter(|(p, _)| is_chosen(*p)) {
+            if (size / least).powi(3) < 0.5 {
+                continue;
+            }
             let parts = parts(*size);
             let place = |number: f64| (number + 0.5) * 2.0 * size / parts - size;
             for number in 0..(parts as usize).pow(3) {
