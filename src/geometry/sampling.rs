@@ -36,6 +36,8 @@ pub enum Sampling<const D: usize> {
     /// On the lattice.
     #[default]
     Lattice,
+    /// On the lattice; parts of its boxes at the surface of the body.
+    Fitted,
     /// At random about the points of the lattice.
     Jittered,
     /// As blue noise.
@@ -60,7 +62,7 @@ impl<const D: usize> Sampling<D> {
     /// different levels have lattices of their own.
     pub fn way(&self, index: &[u64; D], level: u8) -> [f64; D] {
         match self {
-            Self::Lattice => [0.0; D],
+            Self::Lattice | Self::Fitted => [0.0; D],
             Self::Jittered => {
                 let seed = index.iter().fold(u64::from(level), |seed, &i| mixed(seed ^ i));
                 std::array::from_fn(|a| JITTER * part(mixed(seed.wrapping_add(a as u64))))

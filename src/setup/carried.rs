@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::parts::{has_parts, is_in_box};
-use super::seed::{SeedError, lattice_of, lattice_places, spacing};
+use super::seed::{NumberedPlace, SeedError, lattice_of, lattice_places, spacing};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
 use crate::geometry::{Aabb, Side};
@@ -233,7 +233,7 @@ impl<const D: usize> Search<'_, D> {
 /// Adds shares to the columns of own particles. `places` are those of a leaf with the numbers of its
 /// particles.
 fn hand_out<const D: usize>(
-    places: impl Fn(usize) -> Vec<((u16, [u64; D]), usize)>,
+    places: impl Fn(usize) -> Vec<NumberedPlace<D>>,
     chunks: &mut [Chunk<D>],
     (carried, columns): (&Carried<D>, usize),
     shares: &[Share<D>],

@@ -3,9 +3,9 @@
 //! A box of the lattice that the surface of a body cuts gives a particle with the volume and the centroid of
 //! the part of the body in it. Parts below a tenth of a box join a neighbour in their leaf, volume and
 //! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
-//! its surface. All follows from the body and the leaf alone.
+//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the leaf alone.
 use super::seed::{lattice_of, spacing};
-use crate::geometry::{Aabb, Shape, Side};
+use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
 use crate::material;
 
@@ -48,13 +48,14 @@ impl<const D: usize> Point<D> {
     }
 }
 
-/// Whether a body has the parts of its boxes. Else it has the points of the lattice that it contains: where
-/// boxes of the lattice do not lie in one leaf each, and in fluids, whose shift of volume takes the small gaps
-/// and overlaps of cut boxes for void and excess.
+/// Whether a body has the parts of its boxes, as its sampling says. Else it has the points of the lattice that
+/// it contains: also where boxes of the lattice do not lie in one leaf each, and in fluids, whose shift of
+/// volume takes the small gaps and overlaps of cut boxes for void and excess.
 pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
     let tile_leaves = (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0;
     let material = &problem.materials[body.material];
-    tile_leaves && !material::build(&material.model, material.density).is_fluid()
+    let is_fitted = matches!(body.sampling, Sampling::Fitted);
+    is_fitted && tile_leaves && !material::build(&material.model, material.density).is_fluid()
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.

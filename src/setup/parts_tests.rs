@@ -11,7 +11,9 @@ where
     Problem<D>: TryFrom<AnyProblem>,
 {
     let bodies: String = (bodies.iter().enumerate())
-        .map(|(i, body)| format!("[[bodies]]\nname = \"{i}\"\nmaterial = \"m\"\n{body}\n"))
+        .map(|(i, body)| {
+            format!("[[bodies]]\nname = \"{i}\"\nmaterial = \"m\"\nsampling = \"fitted\"\n{body}\n")
+        })
         .collect();
     let text = format!(
         "version = 1\ndimension = {D}\ntime = {{ end = 1 }}\ndomain = {domain}\ntree = {tree}\n[[materials]]\n\

@@ -157,7 +157,7 @@ fn place_near<const D: usize>(
     spacing: f64,
 ) -> [f64; D] {
     let body = &problem.bodies[index];
-    if matches!(body.sampling, Sampling::Lattice) || body.given.is_some() {
+    if matches!(body.sampling, Sampling::Lattice | Sampling::Fitted) || body.given.is_some() {
         return *x;
     }
     let cell = problem.octant_box(octant);
@@ -172,6 +172,9 @@ fn place_near<const D: usize>(
     places.into_iter().find(fits).unwrap_or(*x)
 }
 
+/// A body, a place in its lattice, and the number of the particle there.
+pub(super) type NumberedPlace<const D: usize> = ((u16, [u64; D]), usize);
+
 /// Not collective. Bodies and places in the lattice, each with the number of the particle there among those
 /// that [`fill_leaf`] makes.
 ///
@@ -181,7 +184,7 @@ pub(super) fn lattice_places<const D: usize>(
     problem: &Problem<D>,
     octant: &Octant<D>,
     stage: usize,
-) -> Result<Vec<((u16, [u64; D]), usize)>, SeedError> {
+) -> Result<Vec<NumberedPlace<D>>, SeedError> {
     let (mut places, mut number) = (Vec::new(), 0);
     visit(problem, octant, problem.bodies_of_stage(stage), of_leaf, |body, points| {
         for point in points {

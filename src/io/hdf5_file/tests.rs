@@ -16,9 +16,11 @@ fn declaring(path: &Path, shape: [usize; 2], chunk: Option<[usize; 2]>, kind: Ki
     let defaults = H5P_DEFAULT;
     // SAFETY: open file and lists, terminated name; the identifier is fresh. (The crate multiplies the edges
     // of the shape, which overflows here.)
-    let set =
-        unsafe { H5Dcreate2(file.id(), name.as_ptr(), kind.id(), space.id(), defaults, list.id(), defaults) };
-    drop(unsafe { hdf5::from_id::<hdf5::Dataset>(hdf5::h5check(set).unwrap()) }.unwrap());
+    let set: hdf5::Result<hdf5::Dataset> = unsafe {
+        let id = H5Dcreate2(file.id(), name.as_ptr(), kind.id(), space.id(), defaults, list.id(), defaults);
+        hdf5::h5check(id).and_then(|id| hdf5::from_id(id))
+    };
+    set.unwrap();
 }
 
 #[test]

@@ -491,6 +491,7 @@ fn is_outflow(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
 fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
     match body.sampling {
         None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
+        Some(file::Sampling::Fitted) => Some(Sampling::Fitted),
         Some(file::Sampling::Jittered) => Some(Sampling::Jittered),
         Some(file::Sampling::Poisson) => {
             let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;

@@ -315,12 +315,16 @@ pub struct Body {
     pub stress: Option<Stress>,
 }
 
-/// How the particles of a body lie. In each case every point of the lattice in the body has one particle.
+/// How the particles of a body lie. Every point of the lattice in the body has one particle; with `fitted`, every box of it that the body fills to a
+/// tenth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// On the lattice: exact for uniform states, but material that flows shows its planes.
     Lattice,
+    /// On the lattice, and where the surface of the body cuts a box of it, with the volume, the mass and the centroid of the part of the body in
+    /// the box: the masses and the frequencies of curved bodies are right.
+    Fitted,
     /// At random, by at most 0.35 of their distance from the points of the lattice along each axis.
     Jittered,
     /// As blue noise: apart from each other by about their distance, without order. `particles_per_cell` is a multiple of 0.25.

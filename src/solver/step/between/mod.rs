@@ -3,7 +3,7 @@
 //! Where two fields have mass at a real node, the node's law ([`crate::boundary::bodies`]) gives each the
 //! opposite of the impulse of the other. Momentum and angular momentum stay as they are to round-off, since
 //! both act at one place. Each field is prolonged by itself. Where their surfaces are says
-//! [`super::surfaces`].
+//! `step/surfaces.rs`.
 //!
 //! | file | what it holds |
 //! |---|---|
