@@ -4,7 +4,6 @@ pub mod absorbing;
 pub mod bodies;
 pub mod collider;
 pub mod contact;
-pub mod gap;
 pub mod motion;
 pub mod rigid;
 pub mod touching;
@@ -13,7 +12,6 @@ pub use absorbing::Absorbing;
 pub use bodies::BodyContacts;
 pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
-pub use gap::Bounds;
 pub use touching::{Touching, meets};
 
 /// Treatment of particles that leave the domain.

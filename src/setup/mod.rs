@@ -48,7 +48,6 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         leaving: problem.leaving,
         equilibrium: None,
         fill_densities: Vec::new(),
-        fluid_fields: Vec::new(),
         transfer: problem.transfer,
         boxes: problem.boxes,
         cohesion: None,

@@ -44,8 +44,7 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     if physics.has_fluids() {
         let fields = 0..physics.body_contacts.fields();
         physics.fill_densities =
-            fields.clone().map(|field| density_of_field(problem, &physics, field as u8)).collect();
-        physics.fluid_fields = fields.map(|field| has_fluid(problem, &physics, field as u8)).collect();
+            fields.map(|field| density_of_field(problem, &physics, field as u8)).collect();
     }
     physics.cohesion = cohesion(problem, stage);
     physics
@@ -64,18 +63,6 @@ fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesi
     let half_cell = 0.5 * problem.cell_edge(0);
     let nominal = problem.bodies.iter().map(|body| half_cell / body.particles_per_cell).collect();
     Some(Cohesion { nominal, stretch: max_stretch.max(least) })
-}
-
-/// Whether a fluid has moved with a velocity field so far.
-fn has_fluid<const D: usize>(problem: &Problem<D>, physics: &Physics<D>, field: u8) -> bool {
-    let field_of_body = &physics.body_contacts.field_of_body;
-    let there = problem.bodies.iter().enumerate().filter(|(number, body)| {
-        body.stage <= physics.stage() && field_of_body.get(*number).is_none_or(|of| *of == field)
-    });
-    there.into_iter().any(|(number, body)| {
-        let mut stages = body.stage..=physics.stage();
-        stages.any(|stage| physics.materials[material_of(problem, number, stage)].is_fluid())
-    })
 }
 
 /// Density of all undeformed material that has moved with a velocity field so far, kg/m³; `None` where it

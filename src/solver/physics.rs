@@ -53,8 +53,6 @@ pub struct Physics<const D: usize> {
     /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where
     /// materials differ.
     pub fill_densities: Vec<Option<f64>>,
-    /// By velocity field, whether a fluid moves with it; empty without fluids.
-    pub fluid_fields: Vec<bool>,
     /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
@@ -162,12 +160,6 @@ impl<const D: usize> Physics<D> {
     /// Whether any material is a fluid.
     pub(crate) fn has_fluids(&self) -> bool {
         self.materials.iter().any(|material| material.is_fluid())
-    }
-
-    /// Whether the material of a velocity field moves freely over the gap between it and a surface. That of
-    /// fields with fluids does not: water would gather at walls.
-    pub(in crate::solver) fn moves_over_gaps(&self, field: usize) -> bool {
-        !self.fluid_fields.get(field).copied().unwrap_or(false)
     }
 
     /// Whether fluids are kept in their volume: not with mass scaling, since volumes do not follow from the

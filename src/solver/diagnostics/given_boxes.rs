@@ -91,7 +91,6 @@ impl<const D: usize> GivenBoxes<D> {
         let physics = Physics {
             equilibrium: None,
             fill_densities: Vec::new(),
-            fluid_fields: Vec::new(),
             origin: [0.0; D],
             root_edge,
             graded: forest.is_balanced(comm),
