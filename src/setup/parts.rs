@@ -3,7 +3,8 @@
 //! A box of the lattice that the surface of a body cuts gives a particle with the volume and the centroid of
 //! the part of the body in it. Parts below a tenth of a box join a neighbour in their leaf, volume and
 //! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
-//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the leaf alone.
+//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the leaf
+//! alone.
 use super::seed::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
@@ -70,10 +71,7 @@ pub(super) fn of_leaf<const D: usize>(
     cell: &Aabb<D>,
     level: u8,
 ) -> Vec<Point<D>> {
-    let spacing = spacing(problem, level, body);
-    if is_speck(&body.shape, spacing) {
-        return Vec::new();
-    }
+    let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
     let mut points: Vec<Point<D>> = (lattice_of(cell, spacing).into_iter())
         .filter_map(|index| {
             let part = of_box(&body.shape, &index, spacing)?;
@@ -93,10 +91,7 @@ pub(super) fn likely_of_leaf<const D: usize>(
     cell: &Aabb<D>,
     level: u8,
 ) -> Vec<Point<D>> {
-    let spacing = spacing(problem, level, body);
-    if is_speck(&body.shape, spacing) {
-        return Vec::new();
-    }
+    let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
     let likely = lattice_of(cell, spacing).into_iter().filter_map(|index| {
         let x = index.map(|i| (i as f64 + 0.5) * spacing);
         let outside = Part { volume: 0.0, centre: x };
@@ -107,10 +102,11 @@ pub(super) fn likely_of_leaf<const D: usize>(
     if likely.is_empty() { of_leaf(problem, body, cell, level) } else { likely }
 }
 
-/// Whether a shape is no body: it would be a single particle far smaller than its box.
-fn is_speck<const D: usize>(shape: &Shape<D>, spacing: f64) -> bool {
-    let bounds = shape.bounds();
-    (0..D).all(|a| bounds.upper[a] - bounds.lower[a] < 0.5 * spacing)
+/// Edge of the boxes of a body's lattice on a level, m; `None` where the body would be a single particle far
+/// smaller than its box.
+fn spacing_of_body<const D: usize>(problem: &Problem<D>, body: &Body<D>, level: u8) -> Option<f64> {
+    let (spacing, bounds) = (spacing(problem, level, body), body.shape.bounds());
+    (0..D).any(|a| bounds.upper[a] - bounds.lower[a] >= 0.5 * spacing).then_some(spacing)
 }
 
 /// The part of a shape in a box of the lattice: `None` if it has none, no part if it fills the box.

@@ -4,7 +4,8 @@
 //! anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its own points,
 //! on whichever rank it is, and no point is made twice. A body from a file has the particles of the file.
 //! Particles lie at these points or, by the sampling of their body, near them, within the same leaf and body.
-//! Where the surface cuts the box of a point, the particle is the part of the body in it (`parts.rs`).
+//! Where the surface of a fitted body cuts the box of a point, the particle is the part of the body in it
+//! (`parts.rs`).
 use super::parts::{Point, has_parts, likely_of_leaf, of_leaf};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
@@ -197,7 +198,7 @@ pub(super) fn lattice_places<const D: usize>(
 }
 
 /// Not collective. The number of particles of each body that [`fill_leaf`] makes in the leaf, added to
-/// `counts`: about as many, where surfaces cut boxes of the lattice.
+/// `counts`: about as many, where surfaces of fitted bodies cut boxes of the lattice.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -211,7 +212,8 @@ pub fn count_leaf<const D: usize>(
 }
 
 /// Not collective. Calls `take(body, particles)` for each of some bodies that [`fill_leaf`] makes particles
-/// of in the leaf, as [`count_leaf`]. `bodies` are in the order of the job; the others must lie outside the leaf.
+/// of in the leaf, as [`count_leaf`]. `bodies` are in the order of the job; the others must lie outside the
+/// leaf.
 ///
 /// # Errors
 /// A point lies in two bodies.
@@ -354,11 +356,12 @@ fn visit<const D: usize>(
     for &(index, side) in &near {
         let body = &problem.bodies[index];
         let spacing = spacing(problem, octant.level, body);
-        let place = |x: &[f64; D]| x.map(|c| (c / spacing) as u64);
+        let index_at = |x: &[f64; D]| x.map(|c| (c / spacing) as u64);
         points.clear();
         if let Some(given) = &body.given {
             let rows = given.in_box(&cell).into_iter();
-            points.extend(rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(place(&x), x)));
+            points
+                .extend(rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(index_at(&x), x)));
         } else if side == Side::Crosses && has_parts(problem, body) {
             points = at_surface(problem, body, &cell, octant.level);
         } else {
@@ -390,7 +393,7 @@ fn visit<const D: usize>(
             if let Some(x) = overlap {
                 let (first, second) = (index.min(other), index.max(other));
                 return Err(SeedError::Overlap {
-                    place: self::place(problem, second),
+                    place: place(problem, second),
                     first: problem.bodies[first].name.clone(),
                     second: problem.bodies[second].name.clone(),
                     point: (0..D).map(|a| x[a] + problem.origin[a]).collect(),

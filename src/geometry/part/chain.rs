@@ -88,7 +88,7 @@ impl<const D: usize> Chain<D> {
     }
 }
 
-/// What a plane leaves of a facet, and where its boundary passes the plane outwards and back.
+/// Rest of a facet behind a plane, and where its boundary passes the plane outwards and back.
 struct Cut<const D: usize> {
     left: Vec<[f64; D]>,
     out: Option<[f64; D]>,

@@ -36,7 +36,7 @@ const fn depth(d: usize) -> u32 {
 #[derive(Clone)]
 struct Piece<const D: usize> {
     sign: f64,
-    /// What planes leave of the box.
+    /// The rest of the box after cuts by planes.
     chain: Chain<D>,
     /// Whether this is still the box itself.
     is_whole: bool,
@@ -167,7 +167,7 @@ fn negative<const D: usize>(pieces: &[Piece<D>]) -> impl Iterator<Item = Piece<D
     pieces.iter().map(|piece| Piece { sign: -piece.sign, ..piece.clone() })
 }
 
-/// What a half-space `n · x <= offset` leaves of regions.
+/// Cuts regions by the half-space `n · x <= offset`.
 fn clip<const D: usize>(pieces: &mut Vec<Piece<D>>, normal: &[f64; D], offset: f64) -> Option<()> {
     for piece in pieces.iter_mut() {
         let is_cut = piece.chain.clip(normal, offset);
@@ -180,7 +180,7 @@ fn clip<const D: usize>(pieces: &mut Vec<Piece<D>>, normal: &[f64; D], offset: f
     Some(())
 }
 
-/// What a round surface leaves of regions.
+/// Parts of regions within a round surface.
 fn within<const D: usize>(
     shape: &Shape<D>,
     mut pieces: Vec<Piece<D>>,
@@ -199,7 +199,7 @@ fn within<const D: usize>(
     place.is_last.then(|| at_tangent(shape, pieces, place)).flatten()
 }
 
-/// What the plane leaves of regions that touches a shape near the middle of the box.
+/// Parts of regions behind the plane that touches a shape near the middle of the box.
 fn at_tangent<const D: usize>(
     shape: &Shape<D>,
     mut pieces: Vec<Piece<D>>,

@@ -92,6 +92,7 @@ impl Surface {
         let mut points: Vec<Vector3<f64>> = Vec::with_capacity(count as usize);
         let particles = frame.positions.iter().zip(&frame.half_widths).enumerate();
         for (_, (at, size)) in particles.filter(|(p, _)| is_chosen(*p)) {
+            // Each point counts as a whole particle: parts below half of one as none.
             if (size / least).powi(3) < 0.5 {
                 continue;
             }
