@@ -1,8 +1,9 @@
 //! Rigid bodies that act on the nodes inside them, or on the particles that touch them, and are acted on.
 //!
-//! Where they act on nodes: on a real node inside a collider (signed distance at most 0) the condition holds for the velocity relative to the
-//! collider's surface there, with the gradient of the signed distance as normal. The momentum that this takes from
-//! the material is what the material gives to the collider: its force and torque.
+//! Where they act on nodes: at the foot of a node inside a collider (signed distance at most 0) on its
+//! surface the condition holds for the velocity relative to the surface, with the gradient of the signed
+//! distance as normal. The momentum that this takes from the material is what the material gives to the
+//! collider: its force and torque.
 use super::Contact;
 use super::motion::{Free, Motion, Pose, Rate, Table, length};
 use super::rigid::Meeting;
@@ -15,7 +16,7 @@ use crate::text::quantity;
 /// Nodes or particles, on which a collider acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ActsOn {
-    /// On the real nodes inside it.
+    /// On the nodes inside it.
     #[default]
     Nodes,
     /// On the particles that touch its surface (see [`super::touching`]).
@@ -103,6 +104,11 @@ impl<const D: usize> Collider<D> {
     /// Whether it acts on nodes, in this stage.
     pub fn acts_on_nodes(&self) -> bool {
         self.acts_on == ActsOn::Nodes && self.is_present()
+    }
+
+    /// Whether it acts at the feet of the nodes inside it, in this stage.
+    pub fn acts_at_feet(&self) -> bool {
+        self.acts_on_nodes() && self.contact != Contact::Sticky
     }
 
     /// Whether it acts on particles, in this stage.

@@ -1,8 +1,9 @@
 //! Boundary condition for the velocity of material at a surface: a face of the domain, or a collider.
 use std::fmt;
 
+use super::gap::Bounds;
 use super::motion::length;
-use crate::text::number;
+use crate::text::{number, quantity};
 
 /// Boundary condition of material at a surface. A face of the domain is a contact with an axis as normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,10 +12,13 @@ pub enum Contact {
     Sticky,
     /// No motion through the surface, free motion along it.
     Slip,
-    /// No motion into the surface, free motion away from it; Coulomb friction along it while it is pressed.
+    /// No motion into the surface, free motion away from it; along it Coulomb friction while it is pressed,
+    /// and cohesion while it touches.
     Separating {
         /// Coefficient of friction, tan of the friction angle; 0 is frictionless.
         friction: f64,
+        /// Shear stress that holds without pressure, Pa.
+        cohesion: f64,
     },
     /// Mirror plane, of faces only; for velocities the same as `slip`.
     Symmetric,
@@ -28,30 +32,58 @@ pub enum Contact {
 impl Default for Contact {
     /// Separating, without friction.
     fn default() -> Self {
-        Self::Separating { friction: 0.0 }
+        Self::Separating { friction: 0.0, cohesion: 0.0 }
     }
 }
 
 impl Contact {
-    /// Applies the condition to a velocity relative to the surface (m/s). The unit normal points to the material.
+    /// Applies the condition to a velocity relative to the surface (m/s) of material that touches it. The
+    /// unit normal points to the material.
+    pub fn apply<const D: usize>(self, velocity: &mut [f64; D], normal: &[f64; D]) {
+        self.apply_within(Bounds::TOUCHING, velocity, normal);
+    }
+
+    /// Applies the condition to a velocity relative to the surface (m/s), whose component along the unit
+    /// normal, which points to the material, has these bounds. Mirror planes ask for no gap: what lies beyond
+    /// them touches whatever touches them.
     ///
     /// Friction takes away at most the tangential velocity that the normal impulse allows:
-    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step).
-    pub fn apply<const D: usize>(self, velocity: &mut [f64; D], normal: &[f64; D]) {
+    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step), and what cohesion allows.
+    pub fn apply_within<const D: usize>(self, bounds: Bounds, velocity: &mut [f64; D], normal: &[f64; D]) {
+        let Bounds { least, most, sticking } = bounds.under(self);
         let outward = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(normal[a], sum));
         let tangential: [f64; D] = std::array::from_fn(|a| (-outward).mul_add(normal[a], velocity[a]));
+        let with_normal = |along: [f64; D], outward: f64| -> [f64; D] {
+            std::array::from_fn(|a| outward.mul_add(normal[a], along[a]))
+        };
+        // What is held moves within the bounds; what is not is stopped where it arrives.
+        let is_held = most < f64::INFINITY;
         match self {
             Self::Outflow | Self::Absorbing => {}
-            Self::Sticky => *velocity = [0.0; D],
-            Self::Slip | Self::Symmetric => *velocity = tangential,
-            Self::Separating { friction } => {
-                if outward >= 0.0 {
-                    return;
-                }
-                let (speed, lost) = (length(&tangential), -friction * outward);
+            Self::Symmetric => *velocity = tangential,
+            _ if !is_held && outward >= least && sticking <= 0.0 => {}
+            Self::Sticky => *velocity = with_normal([0.0; D], outward.clamp(least, most)),
+            Self::Slip => *velocity = with_normal(tangential, outward.clamp(least, most)),
+            Self::Separating { friction, .. } => {
+                let lost = friction.mul_add((least - outward).max(0.0), sticking);
+                let speed = length(&tangential);
                 let kept = if speed > lost { 1.0 - lost / speed } else { 0.0 };
-                *velocity = tangential.map(|v| v * kept);
+                *velocity = with_normal(tangential.map(|v| v * kept), outward.max(least));
             }
+        }
+    }
+
+    /// Whether material moves freely over a gap to the surface. `sticky` and `slip` surfaces hold all material
+    /// at their nodes: a grip that let the ends of a beam move over a gap would be too soft.
+    pub const fn has_gap(self) -> bool {
+        matches!(self, Self::Separating { .. })
+    }
+
+    /// Shear stress that holds without pressure, Pa.
+    pub const fn cohesion(self) -> f64 {
+        match self {
+            Self::Separating { cohesion, .. } => cohesion,
+            _ => 0.0,
         }
     }
 
@@ -69,11 +101,17 @@ impl Contact {
 }
 
 impl fmt::Display for Contact {
-    /// The name and the coefficient of friction.
+    /// The name, the coefficient of friction, and cohesion if there is any.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())?;
         match self {
-            Self::Separating { friction } => write!(f, " with friction {}", number(*friction, 4)),
+            Self::Separating { friction, cohesion } => {
+                write!(f, " with friction {}", number(*friction, 4))?;
+                match *cohesion > 0.0 {
+                    true => write!(f, ", cohesion {}", quantity(*cohesion, "Pa")),
+                    false => Ok(()),
+                }
+            }
             _ => Ok(()),
         }
     }
@@ -91,7 +129,7 @@ mod tests {
 
     #[test]
     fn separating_surfaces_let_go() {
-        let contact = Contact::Separating { friction: 0.5 };
+        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0 };
         let v = [1.0, 2.0, 0.5];
         assert_eq!(after(contact, v, [0.0, 0.0, 1.0]), v);
         assert_eq!(after(contact, v, [0.0, 0.0, -1.0])[2], 0.0);
@@ -100,7 +138,7 @@ mod tests {
 
     #[test]
     fn friction_is_limited_by_the_normal_impulse() {
-        let contact = Contact::Separating { friction: 0.5 };
+        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0 };
         assert_eq!(after(contact, [3.0, -2.0], [0.0, 1.0]), [2.0, 0.0]);
         assert_eq!(after(contact, [0.5, -2.0], [0.0, 1.0]), [0.0, 0.0]);
         let v = after(contact, [3.0, 4.0, -2.0], [0.0, 0.0, 1.0]);
@@ -111,6 +149,37 @@ mod tests {
         let v = after(contact, [0.6 * 2.0 + 0.8 * 3.0, -0.8 * 2.0 + 0.6 * 3.0], [-0.6, 0.8]);
         approx::assert_relative_eq!(v[0], 0.8 * 2.0, epsilon = 1e-14);
         approx::assert_relative_eq!(v[1], 0.6 * 2.0, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn across_a_gap_material_moves_freely_up_to_the_surface() {
+        let after = |contact: Contact, gap: f64, mut v: [f64; 2]| {
+            contact.apply_within(Bounds::across(gap, 1.0, 0.1), &mut v, &[0.0, 1.0]);
+            v
+        };
+        let friction = Contact::Separating { friction: 0.5, cohesion: 0.0 };
+        assert_eq!(after(friction, 0.25, [3.0, -2.0]), [3.0, -2.0]);
+        assert_eq!(after(friction, 0.25, [3.0, -4.5]), [2.0, -2.5]);
+        // Near the surface `slip` and `sticky` let nothing go.
+        assert_eq!(after(Contact::Slip, 0.25, [3.0, -2.0]), [3.0, -2.0]);
+        assert_eq!(after(Contact::Slip, 0.25, [3.0, 2.0]), [3.0, 0.0]);
+        assert_eq!(after(Contact::Sticky, 0.25, [3.0, -2.0]), [0.0, -2.0]);
+        assert_eq!(after(Contact::Sticky, 0.75, [3.0, 2.0]), [3.0, 2.0]);
+        assert_eq!(after(Contact::Sticky, 0.75, [3.0, -8.0]), [0.0, -7.5]);
+        assert_eq!(after(Contact::Symmetric, 0.75, [3.0, -1.0]), [3.0, 0.0]);
+    }
+
+    #[test]
+    fn cohesion_holds_without_pressure() {
+        let contact = Contact::Separating { friction: 0.5, cohesion: 1e3 };
+        let after = |mut v: [f64; 2]| {
+            contact.apply_within(Bounds { sticking: 1.0, ..Bounds::TOUCHING }, &mut v, &[0.0, 1.0]);
+            v
+        };
+        assert_eq!(after([3.0, 0.0]), [2.0, 0.0]);
+        assert_eq!(after([0.5, 2.0]), [0.0, 2.0]);
+        assert_eq!(after([3.0, -2.0]), [1.0, 0.0]);
+        assert_eq!(contact.to_string(), "separating with friction 0.5, cohesion 1 kPa");
     }
 
     #[test]

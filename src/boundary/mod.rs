@@ -4,6 +4,7 @@ pub mod absorbing;
 pub mod bodies;
 pub mod collider;
 pub mod contact;
+pub mod gap;
 pub mod motion;
 pub mod rigid;
 pub mod touching;
@@ -12,6 +13,7 @@ pub use absorbing::Absorbing;
 pub use bodies::BodyContacts;
 pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
+pub use gap::{Bounds, Meets};
 pub use touching::{Touching, meets};
 
 /// Treatment of particles that leave the domain.

@@ -12,6 +12,7 @@
 //! measure of contact for the step, without a penalty).
 use super::Contact;
 use super::collider::Collider;
+use super::gap::{Bounds, STICKS};
 use super::motion::{Pose, Rate, length};
 
 /// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces keep
@@ -29,14 +30,16 @@ pub struct Touching<const D: usize> {
     pub arm: [f64; D],
     /// Velocity of the collider there, m/s.
     pub surface: [f64; D],
-    /// Least velocity along the normal relative to it, m/s.
-    pub least: f64,
-    /// Whether the surface pulls as well.
-    pub held: bool,
+    /// Bounds on the velocity along the normal relative to it; the greatest is finite where the surface pulls
+    /// as well.
+    pub bounds: Bounds,
     /// What happens to material there.
     pub law: Contact,
-    /// Velocity that an impulse of 1 kg m/s on all particles in contact brings, 1/kg.
-    pub compliance: f64,
+    /// Impulse along the surface that cohesion bears at most, kg m/s.
+    pub sticking: f64,
+    /// Velocity that an impulse of 1 kg m/s on all particles in contact brings, along the normal and along
+    /// the surface, 1/kg.
+    pub compliance: [f64; 2],
     /// Impulse on the particle so far, kg m/s.
     pub impulse: [f64; D],
 }
@@ -73,14 +76,29 @@ impl<const D: usize> Touching<D> {
         // energy.
         let least = -gap.max(0.0) / dt;
         let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
+        let bounds = Bounds { least, most: if held { least } else { f64::INFINITY }, sticking: 0.0 };
         let (law, impulse) = (collider.contact, [0.0; D]);
-        Some(Self { collider: number, normal, arm, surface, least, held, law, compliance: 0.0, impulse })
+        // The part of the surface under a box that is this high over it.
+        let area = (0..D).fold(1.0, |volume, a| volume * 2.0 * half[a]) / (2.0 * touching);
+        let sticking = if gap <= STICKS * touching { law.cohesion() * area * dt } else { 0.0 };
+        Some(Self {
+            collider: number,
+            normal,
+            arm,
+            surface,
+            bounds,
+            law,
+            sticking,
+            compliance: [0.0; 2],
+            impulse,
+        })
     }
 
     /// Corrects the impulse for the velocity of the particle at the point of contact, m/s; returns its
     /// change, kg m/s.
     pub fn correct(&mut self, velocity: &[f64; D]) -> [f64; D] {
-        if self.compliance <= 0.0 {
+        let [of_normal, of_surface] = self.compliance;
+        if of_normal <= 0.0 || of_surface <= 0.0 {
             return [0.0; D];
         }
         let n = &self.normal;
@@ -89,13 +107,14 @@ impl<const D: usize> Touching<D> {
             |v: &[f64; D], along: f64| -> [f64; D] { std::array::from_fn(|a| (-along).mul_add(n[a], v[a])) };
         let relative: [f64; D] = std::array::from_fn(|a| velocity[a] - self.surface[a]);
         let (outward, pressed) = (along(&relative), along(&self.impulse));
-        let wanted = pressed + (self.least - outward) / self.compliance;
-        let normal = if self.held { wanted } else { wanted.max(0.0) };
+        let Bounds { least, most, .. } = self.bounds;
+        let wanted = |bound: f64| pressed + (bound - outward) / of_normal;
+        let normal = wanted(least).max(wanted(most).min(0.0));
         let (sliding, held_back) = (across(&relative, outward), across(&self.impulse, pressed));
-        let mut tangential: [f64; D] = std::array::from_fn(|a| held_back[a] - sliding[a] / self.compliance);
+        let mut tangential: [f64; D] = std::array::from_fn(|a| held_back[a] - sliding[a] / of_surface);
         let most = match self.law {
-            Contact::Sticky if self.held || normal > 0.0 => f64::INFINITY,
-            Contact::Separating { friction } => friction * normal,
+            Contact::Sticky if most < f64::INFINITY || normal > 0.0 => f64::INFINITY,
+            Contact::Separating { friction, .. } => friction.mul_add(normal, self.sticking),
             _ => 0.0,
         };
         let size = length(&tangential);

@@ -48,6 +48,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         leaving: problem.leaving,
         equilibrium: None,
         fill_densities: Vec::new(),
+        meets: Vec::new(),
         transfer: problem.transfer,
         boxes: problem.boxes,
         cohesion: None,

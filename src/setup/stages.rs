@@ -3,8 +3,9 @@ use partition::comm::{Comm, Disagreement};
 
 use super::seed::check_counts;
 use crate::adaptivity::Cohesion;
+use crate::boundary::Meets;
 use crate::job::Problem;
-use crate::job::problem::BoxPolicy;
+use crate::job::problem::{Body, BoxPolicy};
 use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
@@ -46,6 +47,8 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
         physics.fill_densities =
             fields.map(|field| density_of_field(problem, &physics, field as u8)).collect();
     }
+    let fields = 0..physics.body_contacts.fields();
+    physics.meets = fields.map(|field| meets(problem, field as u8, stage)).collect();
     physics.cohesion = cohesion(problem, stage);
     physics
 }
@@ -63,6 +66,28 @@ fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesi
     let half_cell = 0.5 * problem.cell_edge(0);
     let nominal = problem.bodies.iter().map(|body| half_cell / body.particles_per_cell).collect();
     Some(Cohesion { nominal, stretch: max_stretch.max(least) })
+}
+
+/// Where the material of a velocity field meets faces and colliders that act on nodes, by all materials that
+/// have moved with it up to a stage.
+pub fn meets<const D: usize>(problem: &Problem<D>, field: u8, stage: usize) -> Meets {
+    let field_of_body = &problem.body_contacts.field_of_body;
+    let there = problem.bodies.iter().enumerate().filter(|(number, body)| {
+        body.stage <= stage && field_of_body.get(*number).is_none_or(|of| *of == field)
+    });
+    let of_body = |(number, body): (usize, &Body<D>)| {
+        let materials = (body.stage..=stage).map(|stage| {
+            let setup = &problem.materials[material_of(problem, number, stage)];
+            let material = material::build(&setup.model, setup.density);
+            match (material.is_fluid(), material.is_plastic()) {
+                (true, _) => Meets::Feet,
+                (false, true) => Meets::Nodes,
+                (false, false) => Meets::Surface,
+            }
+        });
+        materials.max().unwrap_or_default()
+    };
+    there.map(of_body).max().unwrap_or_default()
 }
 
 /// Density of all undeformed material that has moved with a velocity field so far, kg/m³; `None` where it

@@ -208,12 +208,14 @@ impl<const D: usize> Solver<D> {
             flag(requests.checkpoint),
             -f64::from(reach),
             flag(self.has_wide_boxes()),
+            flag(self.is_near_walls()),
         ];
         self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
-        let [bound, failed, stop, checkpoint, reach, wide] = least;
+        let [bound, failed, stop, checkpoint, reach, wide, near] = least;
         self.has_wide = wide < 0.0;
         let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
         self.clock.bound = bound;
+        self.grid.walls.is_near = near < 0.0;
         self.provide_reach(-reach as u32);
         let granted = Requests { stop: stop < 0.0, checkpoint: checkpoint < 0.0 };
         Ok(StepReport { moved, granted, settled: false })

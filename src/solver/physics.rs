@@ -3,7 +3,7 @@ use std::ops::Range;
 
 use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
-use crate::boundary::{BodyContacts, Collider, Contact, Leaving};
+use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Scheme, Transfer};
 use crate::load::{self, Gravity, Load};
 use crate::material::Material;
@@ -12,6 +12,7 @@ use crate::particle::followed::Followed;
 use crate::particle::group::Group;
 use crate::particle::strain;
 use crate::quantity::{NotFinite, Quantity};
+use crate::solver::state::inside::Asked;
 use crate::source::Source;
 
 /// The problem that the solver solves: the same on every rank, constant over a stage of the run.
@@ -53,6 +54,8 @@ pub struct Physics<const D: usize> {
     /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where
     /// materials differ.
     pub fill_densities: Vec<Option<f64>>,
+    /// By velocity field, where its material meets faces and colliders that act on nodes.
+    pub meets: Vec<Meets>,
     /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
     /// How particle boxes follow the deformation.
@@ -160,6 +163,33 @@ impl<const D: usize> Physics<D> {
     /// Whether any material is a fluid.
     pub(crate) fn has_fluids(&self) -> bool {
         self.materials.iter().any(|material| material.is_fluid())
+    }
+
+    /// Where the material of a velocity field meets surfaces.
+    fn meets(&self, field: usize) -> Meets {
+        self.meets.get(field).copied().unwrap_or_default()
+    }
+
+    /// Whether the material of a velocity field moves freely over the gap between it and a surface.
+    pub(in crate::solver) fn moves_over_gaps(&self, field: usize) -> bool {
+        self.meets(field) == Meets::Surface
+    }
+
+    /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion
+    /// needs the area of the material's surface, which feet know.
+    pub(in crate::solver) fn acts_at_feet(&self, field: usize, collider: &Collider<D>) -> bool {
+        let has_feet = self.meets(field) != Meets::Nodes || collider.contact.cohesion() > 0.0;
+        collider.acts_at_feet() && has_feet
+    }
+
+    /// What velocity fields need to know of the nodes inside a collider.
+    pub(in crate::solver) fn asked_of(&self, collider: &Collider<D>) -> Asked {
+        let at_feet = |field: usize| self.acts_at_feet(field, collider);
+        let fields = 0..self.body_contacts.fields();
+        Asked {
+            planes: fields.clone().any(at_feet),
+            normals: collider.contact != Contact::Sticky && !fields.into_iter().all(at_feet),
+        }
     }
 
     /// Whether fluids are kept in their volume: not with mass scaling, since volumes do not follow from the

@@ -66,9 +66,14 @@ fn blocks_slide_down_a_slope_as_coulomb_says() {
 #[test]
 fn weight_is_the_mean_reaction_and_momentum_balances() {
     let support =
-        "[[colliders]]\nname = 'table'\nshape = { kind = 'box', min = [0, -1], max = [1.6, 0.31] }\n";
-    let history =
-        elastic(4e6, -9.81, "shape = { kind = 'box', min = [0.6, 0.31], max = [0.9, 0.41] }", 0.5, support);
+        "[[colliders]]\nname = 'table'\nshape = { kind = 'box', min = [0, -1], max = [1.6, 0.3125] }\n";
+    let history = elastic(
+        4e6,
+        -9.81,
+        "shape = { kind = 'box', min = [0.6, 0.3125], max = [0.9, 0.4125] }",
+        0.5,
+        support,
+    );
     let (weight, time) = (9.81 * history.last("mass"), history.last("time"));
     let (start, _) = history.at("time", 0.1);
     let mean = history.integral("force_table_y", start) / (time - start);
@@ -145,6 +150,141 @@ fn free_bodies_fall_exactly_and_take_what_they_give() {
     println!("ball gives {taken:.6}, block has {given:.6}");
     assert!(given > 20.0 && (given - taken).abs() < 1e-11 * given, "{given} {taken}");
     assert!((given + history.integral("force_ball_x", 0.0)).abs() < 1e-12 * given);
+}
+
+/// Cohesion bears its shear stress on the area of the surface, and friction its share of the weight, at faces
+/// of the domain and on colliders at any place between the nodes, on which of them they act, whether the
+/// material could yield or not: a block that is pulled along moves with what is left, and stays where nothing
+/// is.
+#[test]
+fn cohesion_holds_its_stress_times_the_area() {
+    let speed = |law: &str, pull: f64, collider: &str, face: &str, surface: f64| {
+        let contact = "{ kind = 'separating', friction = 0.1, cohesion = 500 }";
+        let text = format!(
+            "version = 1\ndimension = 2\ngravity = [{pull}, -10]\n[domain]\nsize = [2, 1]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\n{law}\nyoung = 1e6\npoisson = 0\n[[bodies]]\nname = 'block'\n\
+             material = 'm'\nshape = {{ kind = 'box', min = [0.5, {surface}], max = [1, {}] }}\n{collider}\n{face}\n\
+             [time]\nend = 0.4\n[output]\npicture = false\n",
+            surface + 0.25,
+        );
+        let text = text.replace("CONTACT", contact);
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("held.toml");
+        std::fs::write(&path, text).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "held");
+        history.last("momentum_x") / history.last("mass")
+    };
+    let floor = |height: f64, rest: &str| {
+        format!(
+            "[[colliders]]\nname = 'floor'\nshape = {{ kind = 'box', min = [-1, -1], max = [3, {height}] }}\ncontact = CONTACT\n{rest}"
+        )
+    };
+    let cases = [
+        (String::new(), "[boundaries]\ny_min = CONTACT", 0.0),
+        (floor(0.25, ""), "", 0.25),
+        (floor(0.28125, ""), "", 0.28125),
+        (floor(0.28125, "acts_on = 'particles'"), "", 0.28125),
+    ];
+    let laws = ["model = 'neo_hookean'", "model = 'von_mises'\nyield_stress = 1e5"];
+    for (law, (collider, face, surface)) in
+        laws.iter().flat_map(|law| cases.iter().map(move |case| (law, case)))
+    {
+        // Of 125 kg on 0.5 m²: friction takes 1 m/s², cohesion 2 m/s².
+        let [slides, stays] = [5.0, 2.5].map(|pull| speed(law, pull, collider, face, *surface));
+        println!("{law} at {surface}: {slides:.4} m/s of 0.8, {stays:.1e} m/s of 0");
+        assert!((slides / 0.8 - 1.0).abs() < 0.03, "{law} {collider}{face}: {slides}");
+        assert!(stays.abs() < 0.01, "{law} {collider}{face}: {stays}");
+    }
+}
+
+/// Height over the surface (cells) of the lower face of a block of 8 x 8 cells that has fallen from a cell
+/// above it, once it is at rest, and the mean stress of its two lowest rows of particles over that of their
+/// weight.
+fn rest_on(young: f64, surface: f64, collider: &str) -> [f64; 2] {
+    let (cell, height) = (0.0625, 0.5);
+    let text = format!(
+        "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [2, 2]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+         [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = {young}\npoisson = 0\n\
+         [[bodies]]\nname = 'block'\nmaterial = 'm'\nshape = {{ kind = 'box', min = [0.5, {}], max = [1, {}] }}\n{collider}\n\
+         [equilibrium]\nspeed = 1e-5\nacceleration = 1e-3\n[time]\nend = 3\n[output]\npicture = false\n\
+         [[probes]]\nname = 'a'\nquantities = ['extent']\n[[probes]]\nname = 'b'\nquantities = ['stress']\n\
+         shape = {{ kind = 'box', min = [0.6, {}], max = [0.9, {}] }}\n",
+        surface + cell,
+        surface + cell + height,
+        surface - 0.2 * cell,
+        surface + 1.02 * cell,
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("rest.toml");
+    std::fs::write(&path, text).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let history = History::read(directory.path(), "rest");
+    let gap = (history.last("least_a_y") - 0.25 * cell - surface) / cell;
+    [gap, history.last("stress_b_yy") / (-9810.0 * (height - 0.5 * cell))]
+}
+
+/// On faces and colliders at any height between rows of nodes, with soft and stiff material: the block lies
+/// on the surface, and its lowest rows carry its weight. Without the gap it hovers up to a cell above, and
+/// the lowest row has 6 to 23 times the stress.
+#[test]
+fn blocks_come_to_rest_on_the_surface_with_their_weight() {
+    let floor = |height: f64| {
+        format!(
+            "[[colliders]]\nname = 'floor'\nshape = {{ kind = 'box', min = [-1, -1], max = [3, {height}] }}"
+        )
+    };
+    let mut cases = vec![(1e5, 0.0, String::new()), (1e6, 0.0, String::new())];
+    cases.extend([0.25, 0.265625, 0.28125, 0.31].map(|height| (1e6, height, floor(height))));
+    for (young, surface, collider) in cases {
+        let [gap, stress] = rest_on(young, surface, &collider);
+        println!("E {young:e}, surface at {surface} m: gap {gap:.4} cells, stress {stress:.4} of the weight");
+        assert!(gap.abs() < 0.05, "E {young:e}, {surface} m: gap {gap}");
+        assert!((stress - 1.0).abs() < 0.05, "E {young:e}, {surface} m: stress {stress}");
+    }
+}
+
+/// Water with its hydrostatic stress stays at rest in a tank, whichever way the tank is written and wherever
+/// its floor is between the nodes.
+#[test]
+fn water_rests_in_tanks_however_they_are_written() {
+    let part = |x: [f64; 2], y: [f64; 2]| {
+        format!("{{ kind = 'box', min = [{}, {}], max = [{}, {}] }}", x[0], y[0], x[1], y[1])
+    };
+    let (floor, all) = (part([-0.1, 1.1], [-0.1, 0.0]), part([-0.1, 1.1], [-0.1, 0.8]));
+    let (left, right) = (part([-0.1, 0.0], [0.0, 0.8]), part([1.0, 1.1], [0.0, 0.8]));
+    let union = |parts: &str| format!("{{ kind = 'union', parts = [{parts}] }}");
+    let halves = [part([-0.1, 0.5], [-0.1, 0.0]), part([0.5, 1.1], [-0.1, 0.0])].join(", ");
+    let lapping = [part([-0.1, 0.55], [-0.1, 0.0]), part([0.45, 1.1], [-0.1, 0.0])].join(", ");
+    let hole = part([0.0, 1.0], [0.0, 0.9]);
+    let tanks = [
+        ("difference", format!("{{ kind = 'difference', from = {all}, remove = [{hole}] }}"), 0.0),
+        ("union", union(&[&floor[..], &left, &right].join(", ")), 0.0),
+        ("seam", union(&[&halves[..], &left, &right].join(", ")), 0.0),
+        ("overlap", union(&[&lapping[..], &left, &right].join(", ")), 0.0),
+        ("between nodes", format!("{{ kind = 'difference', from = {all}, remove = [{hole}] }}"), 0.015625),
+    ];
+    for (name, shape, shift) in tanks {
+        let text = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nmin = [{}, {}]\nsize = [1.5, 1]\nroot_edge = 0.25\n\
+             [tree]\nbase_level = 1\n[[materials]]\nname = 'water'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = 2e5\n\
+             viscosity = 1e-3\n[[bodies]]\nname = 'water'\nmaterial = 'water'\nstress = {{ kind = 'hydrostatic' }}\n\
+             shape = {{ kind = 'box', min = [0, 0], max = [1, 0.3125] }}\n\
+             [[colliders]]\nname = 'tank'\nshape = {shape}\ncontact = {{ kind = 'slip' }}\n\
+             [[probes]]\nname = 'water'\nquantities = ['centre', 'extent']\n[time]\nend = 1\n[output]\npicture = false\n",
+            -0.25 + shift,
+            -0.125 + shift,
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("tank.toml");
+        std::fs::write(&path, text).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "tank");
+        let centre = history.column("centre_water_y");
+        let change = history.last("centre_water_y") / centre[0] - 1.0;
+        println!("{name}: centre {:.4} %, least {:.2e} m", 100.0 * change, history.last("least_water_y"));
+        assert!(change.abs() < 2e-3, "{name}: the water sinks by {change}");
+    }
 }
 
 #[test]

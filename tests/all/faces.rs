@@ -6,7 +6,7 @@ use crate::common::launch::{run, succeed};
 use crate::common::relaunch::{ran_if_launched, relaunch};
 use crate::common::{launch, restart};
 use agimp::job::{Problem, parse};
-use agimp::particle::chunk::Layout;
+use agimp::particle::chunk::{Chunk, Layout};
 use agimp::setup;
 use agimp::solver::{Requests, Solver};
 use partition::comm::Comm;
@@ -41,6 +41,43 @@ fn rounding_takes_no_particle_out_of_the_domain() {
     });
     if !is_test {
         relaunch(module_path!(), "rounding_takes_no_particle_out_of_the_domain", 1, 60);
+    }
+}
+
+/// A particle ahead of its body, which is still free to move on, stops at the face. The face gets what the
+/// material loses.
+#[test]
+fn no_particle_passes_a_face_ahead_of_its_body() {
+    let is_test = ran_if_launched(|comm| {
+        let text = "version = 1\ndimension = 2\n[domain]\nsize = [1, 1]\nroot_edge = 1\n[tree]\nbase_level = 2\n\
+                    [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+                    [[bodies]]\nname = 'b'\nmaterial = 'm'\nvelocity = [-4, 1]\n\
+                    shape = { kind = 'box', min = [0.04375, 0.25], max = [0.29375, 0.5] }\n\
+                    [history]\nface_forces = true\n[time]\nend = 1e3\n[output]\nevery = 1e3\n";
+        let problem = parse(text, "faces.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let problem = Problem::<2>::try_from(problem).unwrap_or_else(|_| panic!("another dimension"));
+        let mut solver = setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"));
+        let (mass, velocity) = (Layout::<2>::MASS, Layout::<2>::VELOCITY);
+        let momentum = |solver: &Solver<2>| {
+            let of = |chunk: &Chunk<2>| {
+                (0..chunk.len()).map(|p| chunk.column(mass)[p] * chunk.column(velocity)[p]).sum::<f64>()
+            };
+            solver.chunks.iter().map(of).sum::<f64>()
+        };
+        let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
+        chunk.column_mut(Layout::<2>::POSITION)[0] = 2e-4;
+        let (id, before) = (chunk.ids()[0], momentum(&solver));
+        for _ in 0..40 {
+            solver.step(1e3, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
+        }
+        let given = -solver.face_forces()[0][0] * solver.clock.time;
+        assert!(given > 0.1 * before.abs());
+        assert!((momentum(&solver) - before - given).abs() < 1e-12 * before.abs(), "{given} of {before}");
+        assert!(solver.chunks.iter().any(|chunk| chunk.ids().contains(&id)));
+        assert_eq!(solver.crossings.put_back, 0);
+    });
+    if !is_test {
+        relaunch(module_path!(), "no_particle_passes_a_face_ahead_of_its_body", 1, 60);
     }
 }
 

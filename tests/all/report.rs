@@ -126,7 +126,7 @@ fn a_run_that_was_killed_is_shown_as_far_as_it_came() {
     assert!((numbers(&page, "time")[1] / time - 1.0).abs() < 1e-5, "the last whole row");
 }
 
-/// The block flies up and through a face that nobody has opened.
+/// The block flies up and through a face that nobody has opened, and that holds nodes alone.
 #[test]
 fn a_run_that_fails_has_a_page_that_says_why_and_from_where_to_go_on() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -135,6 +135,7 @@ fn a_run_that_fails_has_a_page_that_says_why_and_from_where_to_go_on() {
         "min = [0.25, 0.0], max = [0.75, 0.25] }",
         "min = [0.25, 0.25], max = [0.75, 0.5] }\nvelocity = [0, 50]",
     );
+    let block = block.replace("[boundaries]\n", "[boundaries]\ny_max = { kind = 'sticky' }\n");
     let job = JOB.replace("min = [0, 0.25], max = [1, 0.4]", "min = [0, 0.05], max = [1, 0.1]");
     std::fs::write(here.join("press.toml"), [job, block].concat()).expect("written");
     let run = |options: &[&str]| {

@@ -2,11 +2,13 @@
 use std::io::Write;
 
 use crate::adaptivity::Adaptivity;
+use crate::boundary::{ActsOn, Contact, Meets};
 use crate::job::Problem;
 use crate::job::problem::InStages;
 use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
+use crate::setup::stages;
 use crate::solver::state::bookings::CarriedTotals;
 use crate::source::Source;
 use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time};
@@ -15,6 +17,8 @@ use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time}
 const NAME: usize = 60;
 /// Bodies that are listed.
 const MOST_BODIES: usize = 100;
+/// Most names in one line.
+const MOST_NAMES: usize = 5;
 
 /// Known properties of the first state of a job.
 pub(in crate::cli) struct Start<'a> {
@@ -52,6 +56,9 @@ pub(in crate::cli) fn write<const D: usize>(
     }
     if problem.bodies.len() > MOST_BODIES {
         writeln!(out, "  and {} more bodies", grouped((problem.bodies.len() - MOST_BODIES) as u64))?;
+    }
+    if let Some(names) = held_at_nodes(problem) {
+        writeln!(out, "at walls     nodes hold, up to a cell ahead, what yields or moves with it: {names}")?;
     }
     if !problem.colliders.is_empty() {
         writeln!(out, "colliders    {}", problem.colliders.len())?;
@@ -179,6 +186,31 @@ fn write_refinement<const D: usize>(
         if is_refined { "at the start, with the criteria" } else { "of the job's tree, before the criteria" }
     )?;
     writeln!(out, "  that the criteria request.")
+}
+
+/// Names of the bodies that faces and colliders hold at nodes in any stage, since they move with material that
+/// yields, if surfaces let go of anything.
+fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
+    let of_colliders = problem.colliders.iter().filter(|collider| collider.acts_on == ActsOn::Nodes);
+    let of_colliders = of_colliders.map(|collider| collider.contact != Contact::Sticky);
+    let of_faces = problem.stages.iter().flat_map(|stage| stage.faces.as_flattened()).flatten();
+    let all_faces = problem.faces.as_flattened().iter().chain(of_faces).map(|face| face.has_gap());
+    if !of_colliders.chain(all_faces).any(|acts| acts) {
+        return None;
+    }
+    let last = problem.stages.len().saturating_sub(1);
+    let fields = 0..problem.body_contacts.fields();
+    let meets: Vec<Meets> = fields.map(|field| stages::meets(problem, field as u8, last)).collect();
+    let field_of_body = &problem.body_contacts.field_of_body;
+    let field = |body: usize| field_of_body.get(body).map_or(0, |&field| usize::from(field));
+    let bodies = problem.bodies.iter().enumerate();
+    let bodies = bodies.filter(|(number, _)| meets[field(*number)] == Meets::Nodes);
+    let names: Vec<String> = bodies.map(|(_, body)| excerpt(&body.name, NAME).into()).collect();
+    match names.len() {
+        0 => None,
+        1..=MOST_NAMES => Some(names.join(", ")),
+        more => Some(format!("{more} bodies")),
+    }
 }
 
 fn plural(ranks: u32) -> String {

@@ -33,7 +33,9 @@ pub(in crate::job) fn faces<const D: usize>(
     let condition = |face: &file::Face| match face {
         file::Face::Slip {} => Contact::Slip,
         file::Face::Sticky {} => Contact::Sticky,
-        file::Face::Separating { friction } => Contact::Separating { friction: *friction },
+        file::Face::Separating { friction, cohesion } => {
+            Contact::Separating { friction: *friction, cohesion: *cohesion }
+        }
         file::Face::Symmetric {} => Contact::Symmetric,
         file::Face::Outflow {} => Contact::Outflow,
         file::Face::Absorbing { .. } => Contact::Absorbing,

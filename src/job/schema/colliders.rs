@@ -53,10 +53,10 @@ pub struct Frames {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ActsOn {
-    /// On the grid nodes inside it: the cheapest way. Material stays a fraction of a cell off its surface, and walls thinner than two cells
-    /// leak.
+    /// On the grid nodes inside it: the cheapest way. Contact of elastic solids is at its surface, that of
+    /// others a fraction of a cell off; walls thinner than two cells leak.
     Nodes,
-    /// On the particles that touch it: contact is at its surface, and walls of any thickness hold. This includes sheets: boxes that are
+    /// On the particles that touch it: walls of any thickness hold. This includes sheets: boxes that are
     /// flat along one axis, and open meshes.
     Particles,
 }
@@ -69,12 +69,16 @@ pub enum Contact {
     Sticky {},
     /// Material slides along the surface without friction and never leaves it.
     Slip {},
-    /// Material may leave the surface; Coulomb friction acts while it presses.
+    /// Material may leave the surface; Coulomb friction acts while it presses, cohesion while it touches.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 100.0))]
         friction: f64,
+        /// Shear stress that holds without pressure where material touches, Pa; 0 by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e15))]
+        cohesion: f64,
     },
 }
 

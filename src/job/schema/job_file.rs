@@ -188,12 +188,16 @@ pub enum Face {
     Sticky {},
     /// No velocity through the face, no friction.
     Slip {},
-    /// Material may leave the face; Coulomb friction acts while it presses.
+    /// Material may leave the face; Coulomb friction acts while it presses, cohesion while it touches.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 100.0))]
         friction: f64,
+        /// Shear stress that holds without pressure where material touches, Pa; 0 by default.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e15))]
+        cohesion: f64,
     },
     /// A plane of symmetry.
     Symmetric {},

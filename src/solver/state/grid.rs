@@ -20,6 +20,7 @@ use crate::solver::sorting::bins::{BinLists, BinMissing, BoxWidths};
 use crate::solver::state::inside::InsideStill;
 use crate::solver::state::node_fill::NodeFill;
 use crate::solver::state::phases::{Phase, Phases};
+use crate::solver::state::walls::Walls;
 
 /// Plan, arenas, fields and exchanges.
 pub struct Grid<const D: usize> {
@@ -37,14 +38,21 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) seam: Seam,
     /// For contact at particles; made when it is first needed.
     pub(in crate::solver) contact: Option<Box<VelocityField<D>>>,
-    /// For contact between bodies; made when it is first needed.
-    pub(in crate::solver) between: Option<Box<BetweenBodies<D>>>,
+    /// Of each velocity field, for surfaces; made when they are first needed.
+    pub(in crate::solver) solids: Vec<Solids<D>>,
+    /// Volumes of the basis functions of real nodes, m³ (in plane strain m²), by node; found when bodies
+    /// first meet.
+    pub(in crate::solver) hats: Vec<f64>,
+    /// Nodes near surfaces that hold material back.
+    pub(in crate::solver) walls: Walls,
     /// How full nodes are; made when it is first needed.
     pub(in crate::solver) fill: Option<Box<NodeFill>>,
     /// Ties of surface nodes, in jobs that have such.
     pub(in crate::solver) ties: Option<Box<Ties<D>>>,
     /// Nodes inside colliders that never move, found block by block at first use.
     pub(in crate::solver) inside_still: InsideStill<D>,
+    /// Nodes inside colliders that move, in this step, by block and collider; empty without such colliders.
+    pub(in crate::solver) inside_moving: InsideStill<D>,
     /// Bytes of the last exchange of sums.
     pub(in crate::solver) sum_bytes: u64,
 }
@@ -82,10 +90,13 @@ impl<const D: usize> Grid<D> {
             others: others.map(|_| VelocityField::new(&plan)).collect(),
             seam: exchange.seam(&plan),
             contact: None,
-            between: None,
+            solids: Vec::new(),
+            hats: Vec::new(),
+            walls: Walls::default(),
             fill: None,
             ties,
             inside_still: Vec::new(),
+            inside_moving: Vec::new(),
             sum_bytes: 0,
             exchange,
             received,
@@ -101,10 +112,13 @@ impl<const D: usize> Grid<D> {
         self.fields.moments = Block::default();
         self.others.clear();
         self.contact = None;
-        self.between = None;
+        self.solids = Vec::new();
+        self.hats = Vec::new();
+        self.walls = Walls::default();
         self.fill = None;
         self.ties = None;
         self.inside_still = Vec::new();
+        self.inside_moving = Vec::new();
     }
 
     /// Exchanges the velocity field that particles scatter into and gather from with another.
@@ -212,13 +226,12 @@ impl<const D: usize> Grid<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let contact = self.contact.as_deref().into_iter();
-        let solids = self.between.iter().flat_map(|between| &between.solids);
         self.plan.heap_bytes()
             + self.arenas.heap_bytes()
             + self.fields.heap_bytes()
             + self.increments.heap_bytes()
             + self.others.iter().chain(contact).map(VelocityField::heap_bytes).sum::<usize>()
-            + solids.map(Solids::heap_bytes).sum::<usize>()
+            + self.solids.iter().map(Solids::heap_bytes).sum::<usize>()
             + self.fill.as_ref().map_or(0, |fill| fill.heap_bytes())
             + self.ties.as_deref().map_or(0, Ties::heap_bytes)
     }
@@ -258,15 +271,7 @@ impl<const D: usize> VelocityField<D> {
     }
 }
 
-/// Nodal data for contact between bodies, for one plan.
-pub(in crate::solver) struct BetweenBodies<const D: usize> {
-    /// Volumes of the basis functions of real nodes, m³ (in plane strain m²), by node.
-    pub(in crate::solver) volumes: Vec<f64>,
-    /// Of each velocity field.
-    pub(in crate::solver) solids: Vec<Solids<D>>,
-}
-
-/// Where the bodies of a velocity field are near those of others.
+/// The material of a velocity field near surfaces: where bodies meet, and at walls.
 pub(in crate::solver) struct Solids<const D: usize> {
     /// By own leaf, copies of the particles there that have volumes for masses. They keep their memory from
     /// step to step.
@@ -278,6 +283,15 @@ pub(in crate::solver) struct Solids<const D: usize> {
 }
 
 impl<const D: usize> Solids<D> {
+    /// For a plan with so many own leaves.
+    pub(in crate::solver) fn new(plan: &GridPlan<D>, leaves: usize) -> Self {
+        Self {
+            copies: vec![Chunk::new(); leaves],
+            members: vec![Vec::new(); leaves],
+            field: VelocityField::new(plan),
+        }
+    }
+
     fn heap_bytes(&self) -> usize {
         self.field.heap_bytes() + self.copies.iter().map(Chunk::heap_bytes).sum::<usize>()
     }

@@ -1,4 +1,4 @@
-//! Nodes inside colliders.
+//! Nodes inside colliders, and the surfaces that they are behind.
 use crate::boundary::Collider;
 use rustc_hash::FxHashMap;
 
@@ -9,13 +9,55 @@ use crate::grid::mask::bits;
 use crate::grid::plan::Block;
 use crate::kernel::BLOCK;
 
+/// Length, in cells, below which places are the same.
+pub(in crate::solver) const SAME: f64 = 1e-6;
+
+/// Depth under a surface, in cells, down to which nodes have a foot on it. No box that touches a surface
+/// reaches deeper.
+const DEEP: f64 = 2.0;
+
+/// Length, in cells, of the way from a surface at which its other side is looked for.
+const WAY: f64 = 1e-3;
+
+/// What is asked of the nodes inside a collider, beside which they are.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct Asked {
+    /// Whether the surfaces that they are behind are: for feet.
+    pub planes: bool,
+    /// Whether normals are: to hold the nodes themselves.
+    pub normals: bool,
+}
+
+impl Asked {
+    /// Nothing.
+    pub(in crate::solver) const NODES: Self = Self { planes: false, normals: false };
+}
+
 /// The nodes of one block that lie inside one collider.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct Inside<const D: usize> {
-    /// Their bits.
+    /// Nodes inside or on the surface.
     pub nodes: u64,
-    /// Outward unit normals there, in their order.
+    /// Nodes that are so deep inside that only what began there can be at them.
+    pub buried: u64,
+    /// Nodes, inside or not, that are corners of a cell that the surface may cross, if planes are asked for.
+    pub near: u64,
+    /// The surfaces that nodes inside are behind, in the order of the nodes, if they are asked for.
+    pub planes: Vec<Plane<D>>,
+    /// Outward unit normals at nodes inside that are not buried, in the order of the nodes, if they are asked
+    /// for.
     pub normals: Vec<[f64; D]>,
+}
+
+/// A surface that a node is behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::solver) struct Plane<const D: usize> {
+    /// Bit of the node in its block.
+    pub bit: u8,
+    /// Foot of the node on the surface, m.
+    pub foot: [f64; D],
+    /// Outward unit normal.
+    pub normal: [f64; D],
 }
 
 /// Nodes inside colliders that never move, by block and collider: found once, on demand, since the distance
@@ -25,11 +67,11 @@ pub(in crate::solver) type InsideStill<const D: usize> = Vec<Vec<Option<Inside<D
 /// Known nodes of blocks by place and real nodes, to carry them from one plan to the next.
 pub(in crate::solver) struct KnownInside<const D: usize>(FxHashMap<Place<D>, Vec<Option<Inside<D>>>>);
 
-/// Level and coordinate of a block, and its real nodes.
-type Place<const D: usize> = (u8, [u32; D], u64);
+/// Level and coordinate of a block.
+type Place<const D: usize> = (u8, [u32; D]);
 
 fn place<const D: usize>(block: &Block<D>) -> Place<D> {
-    (block.level, block.coord, block.real_nodes())
+    (block.level, block.coord)
 }
 
 impl<const D: usize> KnownInside<D> {
@@ -56,20 +98,134 @@ impl<const D: usize> Inside<D> {
         nodes: u64,
         collider: &Collider<D>,
         pose: &Pose<D>,
+        asked: Asked,
     ) -> Self {
         let mut inside = Self::default();
-        if collider.distance_to_box(&nodes_box(block, plan.cell(block.level)), pose) > 0.0 {
+        let cell = plan.cell(block.level);
+        let reach = cell * (D as f64).sqrt() * (1.0 + SAME);
+        if collider.distance_to_box(&nodes_box(block, cell), pose) > reach {
             return inside;
         }
+        let surface = Surface { collider, pose, cell };
         for bit in bits(nodes) {
             let x = plan.node_place(block, bit as usize);
-            if collider.distance(&x, pose) <= 0.0 {
+            let distance = collider.distance(&x, pose);
+            if distance <= SAME * cell {
                 inside.nodes |= 1 << bit;
-                inside.normals.push(collider.normal(&x, pose));
+            }
+            if asked.planes && distance.abs() <= reach {
+                inside.near |= 1 << bit;
+            }
+            if distance < -DEEP * cell {
+                inside.buried |= 1 << bit;
+            } else if distance <= SAME * cell {
+                if asked.normals {
+                    inside.normals.push(collider.normal(&x, pose));
+                }
+                if asked.planes {
+                    surface.planes_of(&x, distance, |foot, normal| {
+                        inside.planes.push(Plane { bit: bit as u8, foot, normal });
+                    });
+                }
             }
         }
         inside
     }
+}
+
+/// The surface of a collider in a pose, among nodes with cells of this edge, m.
+struct Surface<'a, const D: usize> {
+    collider: &'a Collider<D>,
+    pose: &'a Pose<D>,
+    cell: f64,
+}
+
+impl<const D: usize> Surface<'_, D> {
+    /// Calls `each` with foot and normal of the surfaces that a node at `x` (m), at this distance (m) of the
+    /// collider, is behind.
+    ///
+    /// Mostly that is one: the nearest point of the surface, with the gradient of the distance as normal. In
+    /// an inner corner this gradient has only one of the normals of the corner, or a mean of them, and the
+    /// distance of a union knows of faces that two of its parts share and that are no surface. Both show at
+    /// the foot: a cell along the normal is nearer to the collider than a cell. There the surfaces of the
+    /// nodes around that pass through the foot take the place of the gradient.
+    fn planes_of(&self, x: &[f64; D], distance: f64, mut each: impl FnMut([f64; D], [f64; D])) {
+        let normal = self.collider.normal(x, self.pose);
+        let foot = along(x, -distance, &normal);
+        if self.is_free(&foot, &normal, 1.0) {
+            return each(foot, normal);
+        }
+        let own = self.is_free(&foot, &normal, WAY).then_some(normal);
+        let mut normals: Vec<[f64; D]> = own.into_iter().collect();
+        for offset in crate::grid::mask::box_offsets::<D>(1).filter(|offset| *offset != [0; D]) {
+            let beside: [f64; D] = std::array::from_fn(|a| f64::from(offset[a]).mul_add(self.cell, x[a]));
+            let distance = self.collider.distance(&beside, self.pose);
+            if distance > SAME * self.cell || -distance > DEEP * self.cell {
+                continue;
+            }
+            let normal = self.collider.normal(&beside, self.pose);
+            let place = along(&beside, -distance, &normal);
+            let off: [f64; D] = std::array::from_fn(|a| place[a] - foot[a]);
+            let is_through = dot(&off, &normal).abs() <= SAME * self.cell;
+            // Beside an outer corner the other surface lies behind the own one.
+            let is_inner = own.is_none_or(|own| dot(&off, &own) > SAME * self.cell);
+            let is_new = normals.iter().all(|known| dot(known, &normal) < 1.0 - SAME);
+            if is_through && is_inner && is_new && self.is_free(&place, &normal, WAY) {
+                normals.push(normal);
+            }
+        }
+        if normals.is_empty() {
+            let (foot, normal) = self.way_out(x).unwrap_or((foot, normal));
+            return each(foot, normal);
+        }
+        normals.into_iter().for_each(|normal| each(foot, normal));
+    }
+
+    /// Whether a way from a place on the surface along the normal, of so many cells, leads away from all of
+    /// the collider.
+    fn is_free(&self, place: &[f64; D], normal: &[f64; D], cells: f64) -> bool {
+        let way = cells * self.cell;
+        self.collider.distance(&along(place, way, normal), self.pose) >= (1.0 - WAY) * way
+    }
+
+    /// The nearest place of the surface along an axis from a place inside, with its normal: of nodes behind a
+    /// face that two parts share.
+    fn way_out(&self, x: &[f64; D]) -> Option<([f64; D], [f64; D])> {
+        let mut best: Option<(f64, [f64; D])> = None;
+        for axis in 0..D {
+            for side in [1.0, -1.0] {
+                let way: [f64; D] = std::array::from_fn(|a| if a == axis { side } else { 0.0 });
+                let is_out = |t: f64| self.collider.distance(&along(x, t, &way), self.pose) > 0.0;
+                let steps = 8;
+                let step = DEEP * self.cell / f64::from(steps);
+                let Some(first) =
+                    (0..=steps).map(|k| f64::from(k).mul_add(step, WAY * self.cell)).find(|t| is_out(*t))
+                else {
+                    continue;
+                };
+                let (mut within, mut without) = ((first - step).max(0.0), first);
+                for _ in 0..40 {
+                    let middle = 0.5 * (within + without);
+                    if is_out(middle) { without = middle } else { within = middle }
+                }
+                if best.is_none_or(|(least, _)| without < least) {
+                    best = Some((without, way));
+                }
+            }
+        }
+        let (t, way) = best?;
+        let normal = self.collider.normal(&along(x, t + WAY * self.cell, &way), self.pose);
+        Some((along(x, t, &way), normal))
+    }
+}
+
+/// The place that lies so far (m) from `x` along a direction.
+fn along<const D: usize>(x: &[f64; D], far: f64, direction: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|a| far.mul_add(direction[a], x[a]))
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
 }
 
 /// Whether a collider never moves while a grid is in use.
@@ -84,4 +240,76 @@ fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
         block.coord.map(|c| f64::from(edge * c) * cell),
         block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boundary::{ActsOn, Contact};
+    use crate::geometry::Shape;
+
+    /// Feet and normals of a node among cells of 1 m inside a collider of this shape.
+    fn planes<const D: usize>(shape: Shape<D>, x: [f64; D]) -> Vec<([f64; D], [f64; D])> {
+        let collider = Collider {
+            name: "c".into(),
+            shape,
+            deforming: None,
+            reference: [0.0; D],
+            axis: [0.0, 0.0, 1.0],
+            contact: Contact::default(),
+            acts_on: ActsOn::Nodes,
+            motion: Motion::Fixed,
+            start: 0.0,
+        };
+        let pose = collider.state_at(0.0).pose;
+        let surface = Surface { collider: &collider, pose: &pose, cell: 1.0 };
+        let mut planes = Vec::new();
+        let rounded = |x: [f64; D]| x.map(|x| (1e9 * x).round() / 1e9);
+        surface.planes_of(&x, collider.distance(&x, &pose), |foot, normal| {
+            planes.push((rounded(foot), rounded(normal)));
+        });
+        planes.sort_by(|a, b| a.1.partial_cmp(&b.1).expect("numbers"));
+        planes
+    }
+
+    fn part<const D: usize>(lower: [f64; D], upper: [f64; D]) -> Shape<D> {
+        Shape::Box(Aabb::new(lower, upper))
+    }
+
+    fn tank(corner: [f64; 2]) -> Shape<2> {
+        Shape::Difference(Box::new(part([-5.0; 2], [20.0; 2])), vec![part(corner, [10.0, 30.0])])
+    }
+
+    const X: [f64; 2] = [1.0, 0.0];
+    const Y: [f64; 2] = [0.0, 1.0];
+
+    #[test]
+    fn faces_hold_by_their_normal() {
+        assert_eq!(planes(part([0.0, -3.0], [9.0, 0.5]), [4.0, 0.0]), [([4.0, 0.5], Y)]);
+        assert_eq!(planes(tank([0.25, 0.5]), [4.0, -1.0]), [([4.0, 0.5], Y)]);
+        // An outer corner has the normal of one of its faces.
+        assert_eq!(planes(part([-3.0, -3.0], [0.0, 0.5]), [0.0, 0.0]).len(), 1);
+    }
+
+    #[test]
+    fn inner_corners_hold_by_both_normals() {
+        for corner in [[0.0, 0.0], [0.25, 0.5], [0.5, 0.5]] {
+            assert_eq!(planes(tank(corner), [0.0, 0.0]), [(corner, Y), (corner, X)], "{corner:?}");
+        }
+        let (floor, wall) = (part([-3.0, -3.0], [9.0, 0.0]), part([-3.0, 0.0], [0.0, 9.0]));
+        assert_eq!(planes(Shape::Union(vec![floor, wall]), [0.0, 0.0]), [([0.0, 0.0], Y), ([0.0, 0.0], X)]);
+        let room = Shape::Difference(Box::new(part([-5.0; 3], [20.0; 3])), vec![part([0.0; 3], [10.0; 3])]);
+        assert_eq!(planes(room, [0.0; 3]).len(), 3);
+    }
+
+    #[test]
+    fn faces_that_two_parts_share_are_no_surface() {
+        for apart in [0.0, 0.5] {
+            let halves = vec![part([-9.0, -3.0], [apart, 0.0]), part([-apart, -3.0], [9.0, 0.0])];
+            for depth in [0.0, 1.0] {
+                let found = planes(Shape::Union(halves.clone()), [0.0, -depth]);
+                assert_eq!(found, [([0.0, 0.0], Y)]);
+            }
+        }
+    }
 }

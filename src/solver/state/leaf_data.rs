@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::adaptivity::LeafMaxima;
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
+use crate::solver::state::bookings::Struck;
 use crate::solver::state::phases::thread_time;
 
 /// Steps between measurements of time in a leaf; neighbours along the curve have theirs in different steps.
@@ -21,6 +22,8 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) maxima: Vec<LeafMaxima<D>>,
     /// Mass times the shift that keeps fluids in their volume, summed over particles in the last step, kg m.
     pub(in crate::solver) shifts: Vec<[f64; D]>,
+    /// What particles gave to faces of the domain in the last step.
+    pub(in crate::solver) struck: Vec<Vec<Struck<D>>>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,
     /// Processor time of the particles' work.
@@ -34,6 +37,7 @@ impl<const D: usize> LeafData<D> {
         self.signal.resize(leaves, 0.0);
         self.maxima.clear();
         self.shifts.clear();
+        self.struck.clear();
         self.places.clear();
         self.times.reset(leaves);
     }
@@ -53,6 +57,8 @@ impl<const D: usize> LeafData<D> {
         self.signal.resize(chunks.len(), 0.0);
         self.maxima.resize(chunks.len(), LeafMaxima::default());
         self.shifts.resize(chunks.len(), [0.0; D]);
+        self.struck.iter_mut().for_each(Vec::clear);
+        self.struck.resize_with(chunks.len(), Vec::new);
         self.places.clear();
         self.places.extend(chunks.iter().map(Chunk::place));
     }

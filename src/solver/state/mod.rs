@@ -3,7 +3,8 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
-//! | `inside` | nodes inside colliders |
+//! | `inside` | nodes inside colliders, and the surfaces that they are behind |
+//! | `walls` | nodes near surfaces that hold material back |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
 //! | [`leaf_data`] | data of each own leaf beside its particles |
 //! | `node_fill` | how full nodes are |
@@ -46,6 +47,7 @@ pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
 pub mod relaxation;
+pub(super) mod walls;
 
 /// Why a step failed on this rank.
 #[derive(Debug, thiserror::Error)]

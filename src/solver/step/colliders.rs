@@ -1,6 +1,4 @@
-//! Colliders in a step: their condition on nodes, their reactions and their motion.
-use rayon::prelude::*;
-
+//! Colliders in a step: their reactions and their motion.
 use crate::boundary::collider::cross;
 use crate::boundary::motion::Rate;
 use crate::boundary::rigid::{Push, Surroundings};
@@ -8,13 +6,9 @@ use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;
 use crate::geometry::vector::in_space;
-use crate::grid::mask::{bits, block_nodes};
-use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{ExactSums, Reaction, SUMS};
-use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Inside, InsideStill, is_still};
 use crate::solver::state::phases::Phase;
 
 /// Impulse of one node or particle on a collider.
@@ -43,67 +37,6 @@ impl<const D: usize> Touch<D> {
     }
 }
 
-/// Applies the colliders' conditions, in their order, to the real nodes inside them. Returns what the nodes that this
-/// rank counts give to the colliders, in the order of the nodes. `still` has what is known of colliders that never move.
-fn apply_colliders<const D: usize>(
-    fields: &mut NodeFields<D>,
-    still: &mut InsideStill<D>,
-    plan: &GridPlan<D>,
-    colliders: &[Collider<D>],
-    states: &[ColliderState<D>],
-    rates: &[Rate<D>],
-) -> Vec<Touch<D>> {
-    still.resize_with(plan.blocks.len(), Vec::new);
-    let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active).zip(still);
-    let active = blocks.with_min_len(32).filter(|((_, active), _)| **active);
-    let touched = active.map(|(((rows, block), _), still)| {
-        let mut touches = Vec::new();
-        still.resize_with(colliders.len(), || None);
-        for (index, ((collider, state), rate)) in colliders.iter().zip(states).zip(rates).enumerate() {
-            if !collider.acts_on_nodes() {
-                continue;
-            }
-            let real = block.real_nodes();
-            let find = |nodes| Inside::find(plan, block, nodes, collider, &state.pose);
-            let moving;
-            let inside = match is_still(collider) {
-                true => &*still[index].get_or_insert_with(|| find(real)),
-                false => {
-                    moving = find(
-                        bits(real).filter(|&bit| rows[bit as usize].0[3] > 0.0).map(|bit| 1 << bit).sum(),
-                    );
-                    &moving
-                }
-            };
-            for (bit, normal) in bits(inside.nodes).zip(&inside.normals) {
-                let row = &mut rows[bit as usize];
-                let mass = row.0[3];
-                if mass <= 0.0 {
-                    continue;
-                }
-                let x = plan.node_place(block, bit as usize);
-                let surface = collider.velocity_at(&x, &state.pose, rate);
-                let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
-                let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
-                let free = relative;
-                collider.contact.apply(&mut relative, normal);
-                if relative == free {
-                    continue;
-                }
-                for a in 0..D {
-                    row.0[a] = surface[a] + relative[a];
-                }
-                if block.owned >> bit & 1 == 1 {
-                    let impulse = std::array::from_fn(|a| mass * (before[a] - row.0[a]));
-                    touches.push(Touch { collider: index, position: x, impulse });
-                }
-            }
-        }
-        touches
-    });
-    touched.collect::<Vec<_>>().into_iter().flatten().collect()
-}
-
 impl<const D: usize> Solver<D> {
     /// Mean velocities of the colliders over the next step.
     pub(in crate::solver) fn collider_rates(&self, dt: f64) -> Vec<Rate<D>> {
@@ -130,24 +63,8 @@ impl<const D: usize> Solver<D> {
         vec![std::array::from_fn(|_| ExactSum::new()); self.physics.colliders.len()]
     }
 
-    /// Not collective. Holds the nodes inside colliders that act on nodes to their conditions. Adds impulse and angular impulse on each collider
-    /// from the nodes that this rank counts.
-    pub(super) fn collide(&mut self, rates: &[Rate<D>], sums: &mut [[ExactSum; SUMS]]) {
-        let colliders = &self.physics.colliders;
-        if !colliders.iter().any(Collider::acts_on_nodes) {
-            return;
-        }
-        let (grid, states) = (&mut self.grid, &self.contacts.states);
-        self.phases.time(Phase::Nodes, || {
-            let Grid { fields, inside_still, plan, .. } = grid;
-            for touch in apply_colliders(fields, inside_still, plan, colliders, states, rates) {
-                touch.book(colliders, states, sums);
-            }
-        });
-    }
-
-    /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes and other bodies gave to the
-    /// colliders in it. One more reduction if any is free.
+    /// Collective. `V ← V + Δt g + J / M`, `X ← X + Δt V` over the step to the time `to` (s), with what nodes
+    /// and other bodies gave to the colliders in it. One more reduction if any is free.
     pub(in crate::solver) fn move_colliders(
         &mut self,
         rates: &[Rate<D>],

@@ -71,7 +71,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// After the update: what the nodes give to particles, prolonged like velocities.
-    pub(in crate::solver) fn form_increments(&mut self) {
+    pub(in crate::solver) fn form_increments(&mut self, field: usize) {
         if !self.physics.transfer.has_increments() {
             return;
         }
@@ -81,7 +81,8 @@ impl<const D: usize> Solver<D> {
         std::mem::swap(&mut grid.fields.rows, &mut grid.increments.rows);
         if matches!(self.physics.transfer, Transfer::Xpic { .. }) {
             // These are velocities, which the filter may have turned towards a wall.
-            let faces = Faces::without_absorption(&self.physics.faces);
+            let gaps = self.physics.gaps(&grid.walls, &grid.solids, field);
+            let faces = Faces::without_absorption(&self.physics.faces, gaps);
             apply_faces(&mut grid.fields, &grid.plan, &faces, |_, _, _| ());
         }
         self.prolong();

@@ -26,7 +26,7 @@ use crate::solver::sorting::bins::{BinLists, OfLeaf};
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::{Near, ParticlePush, SourcePush};
+use crate::solver::state::bookings::{Near, ParticlePush, SourcePush, Struck};
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
@@ -36,6 +36,7 @@ use crate::solver::step::fill::means::MeanVolumes;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
 use crate::solver::step::sources::{Conveyed, Conveyors, conveyors};
+use crate::solver::step::walls::passing::Barrier;
 
 /// Memory that a thread reuses from leaf to leaf.
 struct Scratch<const D: usize> {
@@ -105,6 +106,8 @@ struct Sweep<'a, const D: usize> {
     following: &'a [&'a Carried<D>],
     /// Colliders that act on particles.
     guard: Option<Guard<'a, D>>,
+    /// Faces of the domain.
+    barrier: Barrier<'a, D>,
     /// First column of the displacements that particles carry, if they do.
     displacement: Option<usize>,
     /// First columns of tensors that follow the deformation.
@@ -150,11 +153,14 @@ struct Notes<'a, const D: usize> {
     conveyed: &'a mut Vec<SourcePush<D>>,
     /// Mass times shift, kg m.
     shift: &'a mut [f64; D],
+    struck: &'a mut Vec<Struck<D>>,
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. `v = Σ w v_j`, `B = Σ w v_j ⊗ (x_j - x)`, `b ← (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, return mapping, `τ(b)`,
-    /// `x ← x + Δt v` in a step to the time `to`, s; no way leads through colliders that act on particles. Returns what has departed from leaves, in their order, for [`Solver::migrate_particles`].
+    /// Not collective. `v = Σ w v_j`, `B = Σ w v_j ⊗ (x_j - x)`, `b ← (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, return
+    /// mapping, `τ(b)`, `x ← x + Δt v` in a step to the time `to`, s; no way leads through colliders that act
+    /// on particles, nor through faces that hold material back. Returns what has departed from leaves, in
+    /// their order, for [`Solver::migrate_particles`].
     pub(in crate::solver) fn nodes_to_particles(
         &mut self,
         rates: &[Rate<D>],
@@ -174,7 +180,7 @@ impl<const D: usize> Solver<D> {
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
-        let LeafData { signal, maxima, shifts, places, times } = &mut self.leaf_data;
+        let LeafData { signal, maxima, shifts, struck, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
         let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
         let sweep = Sweep {
@@ -191,6 +197,7 @@ impl<const D: usize> Solver<D> {
             places,
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
+            barrier: Barrier::new(&self.physics, plan.extent()),
             displacement: self.physics.displacement_column(),
             tensors: self.physics.tensor_columns(),
             conveyors: conveyors(&self.physics, self.clock.time),
@@ -202,17 +209,19 @@ impl<const D: usize> Solver<D> {
         let (near, conveyed) = (&mut self.near, &mut self.conveyed);
         let departed = self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
-            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed);
+            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed).zip(struck);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
-                let (((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed) = notes;
+                let ((((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed), struck) =
+                    notes;
                 // There may be very many empty leaves, and measuring the time costs more than their work.
                 let is_empty = chunk.is_empty();
-                let notes = Notes { maxima, signal, pushes, near, conveyed, shift };
+                let notes = Notes { maxima, signal, pushes, near, conveyed, shift, struck };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
             departed.filter(Departed::is_any).collect()
         });
+        self.book_struck();
         if !self.shift_sums.of.is_empty() {
             let shifts = std::mem::take(&mut self.leaf_data.shifts);
             self.book_shifts(&shifts, to - 0.5 * dt);
@@ -268,12 +277,14 @@ impl<const D: usize> Sweep<'_, D> {
         bins: OfLeaf<'_, D>,
         notes: Notes<'_, D>,
     ) -> Departed {
-        let Notes { maxima, signal, pushes, near, conveyed, shift } = notes;
+        let Notes { maxima, signal, pushes, near, conveyed, shift, struck } = notes;
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
+        let aabb = self.borders.of_leaf(leaf);
         let follows = self.displacement.is_some() || !self.openings.is_empty();
-        let start = follows.then(|| positions(chunk));
-        let in_sources = Conveyed::of_leaf(&self.conveyors, chunk, self.borders.of_leaf(leaf));
+        let is_beside = !is_empty && self.barrier.is_beside(aabb);
+        let start = (follows || is_beside).then(|| positions(chunk));
+        let in_sources = Conveyed::of_leaf(&self.conveyors, chunk, aabb);
         *signal = self.gather(scratch, leaf, chunk, &bins);
         *shift = scratch.shifted.total();
         conveyed.clear();
@@ -284,6 +295,10 @@ impl<const D: usize> Sweep<'_, D> {
         }
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
+            scratch.leavers.look_again(chunk, &held);
+        }
+        if let Some(start) = start.as_ref().filter(|_| is_beside) {
+            let held = self.barrier.hold(chunk, aabb, start, struck);
             scratch.leavers.look_again(chunk, &held);
         }
         let mut passed = Vec::new();

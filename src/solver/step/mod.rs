@@ -11,7 +11,9 @@
 //! | `fill` | fluids keep their volume |
 //! | `exchange` | sums and particles between ranks |
 //! | `flip_xpic` | velocities that FLIP and XPIC need |
-//! | [`colliders`] | colliders |
+//! | [`colliders`] | colliders: reactions and motion |
+//! | `surfaces` | volumes and their gradients at nodes near surfaces |
+//! | `walls` | gaps at faces and colliders; conditions of colliders on nodes |
 //! | `contact` | contact of particles with colliders |
 //! | [`between`] | contact between bodies |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
@@ -34,5 +36,7 @@ pub mod node_update;
 pub mod p2g;
 pub mod relax;
 mod sources;
+mod surfaces;
 mod ties;
 pub mod time_step;
+mod walls;

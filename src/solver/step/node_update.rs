@@ -1,9 +1,9 @@
 //! Velocities of nodes: forces, conditions on domain faces, and interpolation from real to constrained nodes.
 use rayon::prelude::*;
 
-use crate::boundary::Contact;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::motion::Rate;
+use crate::boundary::{Bounds, Contact, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
@@ -13,14 +13,17 @@ use crate::solver::physics::Physics;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::Solids;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::walls::Walls;
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours where colliders act on particles or bodies are in contact. `v_j = p_j / m_j + Δt g` on real nodes, then loads,
-    /// ties of surface nodes, contact between bodies, the conditions of colliders in their order, and those of domain faces, which come last so that nothing is driven
-    /// out of the domain. Returns impulse and
-    /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in contact have bins. With a `dt` of
-    /// 0 it shows the velocities between two steps: bodies and particles are not held, and nothing is booked.
+    /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes, then loads, ties of surface nodes,
+    /// contact between bodies, the conditions of domain faces and those of colliders, with those of faces
+    /// again in each sweep, so that nothing is driven out of the domain. Returns impulse and angular impulse
+    /// on each collider from nodes and particles of this rank, and whether all particles in contact have
+    /// bins. With a `dt` of 0 it shows the velocities between two steps: bodies and particles are not held,
+    /// and nothing is booked.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
         dt: f64,
@@ -39,11 +42,14 @@ impl<const D: usize> Solver<D> {
             pushes.push(solver.apply_loads(dt));
             solver.tie_surface(field);
         });
-        let mut held = self.press_bodies(dt);
+        let meets = self.meeting_nodes(dt);
+        let mut held = self.find_surfaces(&meets, dt);
+        self.press_bodies(&meets, held.is_ok(), dt);
         let mut impulses = self.no_impulses();
         self.for_each_field(|solver, field| {
-            solver.collide(rates, &mut impulses);
-            solver.apply_faces(dt, is_step);
+            solver.hold_at_nodes(field, rates, &mut impulses);
+            solver.apply_faces(field, dt, is_step);
+            solver.hold_at_feet(field, rates, &mut impulses);
             if is_step && solver.has_contact_at_particles() {
                 let of_field = solver.hold_particles(field, dt, rates, &mut impulses);
                 held = held.and(of_field);
@@ -58,13 +64,16 @@ impl<const D: usize> Solver<D> {
         (impulses, held)
     }
 
-    /// Not collective. Applies the conditions of the faces of the domain to the nodes on them. In a step, it
-    /// also sums the impulses on the faces from the nodes that this rank counts, if these are needed.
-    pub(super) fn apply_faces(&mut self, dt: f64, is_step: bool) {
+    /// Not collective. Applies the conditions of the faces of the domain to the nodes on them, for the
+    /// velocity field numbered `field`. In a step, it also sums the impulses on the faces from the nodes that
+    /// this rank counts, if these are needed. Faces that absorb waves take the impulse of a time of `dt`, s.
+    pub(super) fn apply_faces(&mut self, field: usize, dt: f64, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
         let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
-        let start = &grid.increments.start[..];
-        let faces = Faces { contacts: faces, absorbing: Some(absorbing), start, origin: *origin, middle, dt };
+        let solids = std::mem::take(&mut grid.solids);
+        let gaps = self.physics.gaps(&grid.walls, &solids, field);
+        let (contacts, absorbing, start) = (faces, Some(absorbing), &grid.increments.start[..]);
+        let faces = Faces { contacts, gaps, absorbing, start, origin: *origin, middle, dt };
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() || !is_step {
@@ -77,6 +86,7 @@ impl<const D: usize> Solver<D> {
                 }
             });
         });
+        self.grid.solids = solids;
     }
 
     /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and
@@ -89,8 +99,8 @@ impl<const D: usize> Solver<D> {
     /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the
     /// increments alike.
     pub(in crate::solver) fn prolong_velocities(&mut self) {
-        self.for_each_field(|solver, _| {
-            solver.form_increments();
+        self.for_each_field(|solver, field| {
+            solver.form_increments(field);
             solver.prolong();
         });
     }
@@ -131,6 +141,8 @@ pub fn update_velocity<const D: usize>(
 pub struct Faces<'a, const D: usize> {
     /// Contact at each.
     pub contacts: &'a [[Contact; 2]; D],
+    /// Where the material is; without it all touches.
+    pub gaps: Option<Gaps<'a>>,
     /// What is beyond those that absorb waves.
     pub absorbing: Option<&'a AbsorbingFaces<D>>,
     /// Velocities of nodes at the start of the step, m/s, where any face absorbs.
@@ -143,10 +155,51 @@ pub struct Faces<'a, const D: usize> {
     pub dt: f64,
 }
 
+/// Where the material at the nodes of surfaces is.
+#[derive(Clone, Copy)]
+pub struct Gaps<'a> {
+    /// `Σ V ∇w` and `Σ V w`, by node.
+    pub sums: &'a [Row],
+    /// Length of the step in which it may come to the surface, s.
+    pub over: f64,
+    /// Whether it touches the surface wherever it is.
+    pub touches: bool,
+}
+
+impl<const D: usize> Physics<D> {
+    /// Where the material of a velocity field is, if it is known.
+    pub(super) fn gaps<'a>(&self, walls: &Walls, solids: &'a [Solids<D>], field: usize) -> Option<Gaps<'a>> {
+        let touches = !self.moves_over_gaps(field);
+        let over = walls.known_over.filter(|_| !touches || self.has_cohesive_walls())?;
+        Some(Gaps { sums: &solids[field].field.fields.rows, over, touches })
+    }
+
+    /// Whether any face or collider has cohesion.
+    pub(super) fn has_cohesive_walls(&self) -> bool {
+        let of_colliders = self.colliders.iter().map(|collider| collider.contact);
+        self.faces.iter().flatten().copied().chain(of_colliders).any(|law| law.cohesion() > 0.0)
+    }
+}
+
+impl Gaps<'_> {
+    /// Bounds on the velocity of a node on a face with this normal into the domain, of cells of this edge, m.
+    /// `cohesion` is the velocity that cohesion over an area of 1 m² (in plane strain 1 m) takes away at
+    /// most, m/s.
+    fn bounds<const D: usize>(&self, node: usize, normal: &[f64; D], cell: f64, cohesion: f64) -> Bounds {
+        let row = self.sums[node].0;
+        let slope = -(0..D).fold(0.0, |sum, a| row[a].mul_add(normal[a], sum));
+        let gap = cell * gap::height(row[3], slope, cell);
+        // At a face the slope is the area that the material has of it.
+        let sticking = if gap <= gap::STICKS * cell { cohesion * slope.max(0.0) } else { 0.0 };
+        let bounds = if self.touches { Bounds::TOUCHING } else { Bounds::across(gap, cell, self.over) };
+        Bounds { sticking, ..bounds }
+    }
+}
+
 impl<'a, const D: usize> Faces<'a, D> {
     /// Contacts alone, for velocities that no step has changed.
-    pub fn without_absorption(contacts: &'a [[Contact; 2]; D]) -> Self {
-        Self { contacts, absorbing: None, start: &[], origin: [0.0; D], middle: 0.0, dt: 0.0 }
+    pub fn without_absorption(contacts: &'a [[Contact; 2]; D], gaps: Option<Gaps<'a>>) -> Self {
+        Self { contacts, gaps, absorbing: None, start: &[], origin: [0.0; D], middle: 0.0, dt: 0.0 }
     }
 }
 
@@ -168,9 +221,10 @@ pub fn apply_faces<const D: usize>(
                 if on >> (2 * axis + side) & 1 == 1 {
                     let normal = std::array::from_fn(|a| if a == axis { inward } else { 0.0 });
                     let before = velocity;
+                    let block = &plan.blocks[node as usize / block_nodes(D)];
+                    let cell = plan.cell(block.level);
                     match faces.absorbing.and_then(|absorbing| absorbing[axis][side].as_ref()) {
                         Some(face) => {
-                            let block = &plan.blocks[node as usize / block_nodes(D)];
                             let x = plan.node_place(block, node as usize % block_nodes(D));
                             let pressure = face.pressure.at(in_job(&faces.origin, &x), faces.middle);
                             let start = faces.start.get(node as usize).map_or([0.0; 4], |row| row.0);
@@ -180,10 +234,17 @@ pub fn apply_faces<const D: usize>(
                                 (axis, inward),
                                 pressure,
                                 faces.dt,
-                                plan.cell(block.level),
+                                cell,
                             );
                         }
-                        None => faces.contacts[axis][side].apply(&mut velocity, &normal),
+                        None => {
+                            let law = faces.contacts[axis][side];
+                            let cohesion =
+                                if row[3] > 0.0 { law.cohesion() * faces.dt / row[3] } else { 0.0 };
+                            let gaps = faces.gaps.filter(|_| law.has_gap());
+                            let bounds = gaps.map(|gaps| gaps.bounds(node as usize, &normal, cell, cohesion));
+                            law.apply_within(bounds.unwrap_or(Bounds::TOUCHING), &mut velocity, &normal);
+                        }
                     }
                     let impulse = std::array::from_fn(|a| row[3] * (before[a] - velocity[a]));
                     note(2 * axis + side, node as usize, impulse);

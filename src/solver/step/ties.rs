@@ -11,7 +11,7 @@ use crate::particle::group::{Group, Share};
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Inside, is_still};
+use crate::solver::state::inside::{Asked, Inside, is_still};
 use crate::solver::state::phases::Phase;
 
 /// Share of its volume from which a cell is well filled. A little less than one half, so that cells that are
@@ -85,8 +85,8 @@ impl<const D: usize> Solver<D> {
                     match known.filter(|_| is_still(collider)) {
                         Some(inside) => inside.nodes & nodes,
                         None => {
-                            Inside::find(plan, &plan.blocks[block], nodes, collider, &states[index].pose)
-                                .nodes
+                            let (block, pose) = (&plan.blocks[block], &states[index].pose);
+                            Inside::find(plan, block, nodes, collider, pose, Asked::NODES).nodes
                         }
                     }
                 });

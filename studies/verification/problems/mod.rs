@@ -14,6 +14,8 @@ pub(crate) mod drivers;
 pub(crate) mod footing;
 pub(crate) mod incline;
 pub(crate) mod manufactured;
+pub(crate) mod plates;
+pub(crate) mod rest;
 pub(crate) mod taylor;
 pub(crate) mod water;
 pub(crate) mod weights;
@@ -22,7 +24,7 @@ pub(crate) mod weights;
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 17] = [
+pub(crate) const ALL: [(&str, Problem); 19] = [
     ("bar", bar::section),
     ("manufactured", manufactured::square),
     ("manufactured_3d", manufactured::cube),
@@ -36,6 +38,8 @@ pub(crate) const ALL: [(&str, Problem); 17] = [
     ("dam_break", dam_break::section),
     ("water", water::section),
     ("weights", weights::section),
+    ("rest", rest::section),
+    ("plates", plates::section),
     ("incline", incline::section),
     ("contact", contact::section),
     ("footing", footing::section),

@@ -94,7 +94,7 @@ fn collider<const D: usize>(
         None => Contact::default(),
         Some(WrittenContact::Sticky {}) => Contact::Sticky,
         Some(WrittenContact::Slip {}) => Contact::Slip,
-        Some(WrittenContact::Separating { friction }) => Contact::Separating { friction },
+        Some(WrittenContact::Separating { friction, cohesion }) => Contact::Separating { friction, cohesion },
     };
     let deforming = match &written.frames {
         Some(frames) => {

@@ -1,19 +1,11 @@
-//! Shares of volume and their gradients at the nodes where bodies meet.
+//! The nodes where bodies meet, and the volumes of their basis functions.
 use rayon::prelude::*;
 
-use crate::geometry::Aabb;
-use crate::grid::mask::{arena_overlap, bits, block_nodes, offset, offset_count};
-use crate::grid::plan::{GridPlan, NO_BLOCK};
+use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{NodeFields, Window};
-use crate::kernel::{ARENA_EDGE, BLOCK, Row, domain};
-use crate::particle::Chunk;
-use crate::particle::chunk::{Layout, TILE};
-use crate::particle::group::Group;
-use crate::particle::volume::{box_volume, volume_ratios};
-use crate::solver::sorting::bins::BinMissing;
+use crate::kernel::{ARENA_EDGE, BLOCK, Row};
 use crate::solver::state::Solver;
-use crate::solver::state::grid::{BetweenBodies, Grid, Solids, VelocityField};
-use crate::solver::step::p2g::scatter;
+use crate::solver::state::grid::{Grid, VelocityField};
 
 impl<const D: usize> Grid<D> {
     /// Real nodes of each block at which two velocity fields have mass.
@@ -35,146 +27,14 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// Share of a length by which boxes that must hold something are larger.
-const MARGIN: f64 = 1e-9;
-
-/// These nodes, and the constrained nodes of blocks that may hand sums to any of them.
-fn with_children<const D: usize>(plan: &GridPlan<D>, meets: &[u64]) -> Vec<u64> {
-    let mut all = meets.to_vec();
-    for fine in plan.links.iter().flat_map(|links| &links.fine) {
-        let parents = fine.parents.iter().filter_map(|&parent| all.get(parent as usize));
-        if parents.into_iter().any(|&nodes| nodes != 0) {
-            all[fine.block as usize] |= plan.blocks[fine.block as usize].constrained;
-        }
-    }
-    all
-}
-
-/// The box around these nodes of a block.
-fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) -> Aabb<D> {
-    let places = bits(nodes).map(|bit| plan.node_place(&plan.blocks[block], bit as usize));
-    Aabb::of_points(places)
-}
-
-/// Makes `copy` the particles of a group in a box, which scatter volumes in place of masses, and gradients of volumes in place of the impulse of
-/// stress over 1 s. Velocities and affine states of a copy are zero. Returns of which particles these are copies.
-fn copy_solids<const D: usize>(
-    copy: &mut Chunk<D>,
-    chunk: &Chunk<D>,
-    group: &Group<'_>,
-    aabb: &Aabb<D>,
-    columns: &[usize],
-) -> Vec<u32> {
-    let members = members_in(chunk, group, aabb);
-    copy.gather_columns(chunk, &members, columns);
-    let (tiles, _) = copy.tiles_mut_and_tags();
-    for tile in tiles.chunks_exact_mut(Layout::<D>::REALS) {
-        let ratios = volume_ratios::<D>(tile);
-        for (lane, ratio) in ratios.into_iter().enumerate() {
-            tile[Layout::<D>::MASS][lane] = box_volume::<D>(tile[Layout::<D>::HALF][lane]) * ratio;
-            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio);
-        }
-    }
-    members
-}
-
-/// Particles of a group in a box: first whole tiles, if at least half of one is in the box, then the others, each in order.
-fn members_in<const D: usize>(chunk: &Chunk<D>, group: &Group<'_>, aabb: &Aabb<D>) -> Vec<u32> {
-    let (mut whole, mut others) = (Vec::with_capacity(chunk.len()), Vec::new());
-    let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS).zip(chunk.tags().chunks(TILE));
-    for ((tile, tags), first) in tiles.zip((0..).step_by(TILE)) {
-        let mut is_inside = [true; TILE];
-        for axis in 0..D {
-            let x = &tile[Layout::<D>::POSITION + axis];
-            for (is_inside, x) in is_inside.iter_mut().zip(x) {
-                *is_inside &= (aabb.lower[axis] <= *x) & (*x <= aabb.upper[axis]);
-            }
-        }
-        let inside = is_inside.iter().filter(|inside| **inside).count();
-        if inside == 0 {
-            continue;
-        }
-        if 2 * inside >= TILE && tags.len() == TILE && tags.iter().all(|&tag| group.has(tag)) {
-            whole.extend(first..first + TILE as u32);
-            continue;
-        }
-        let members = (first..).zip(tags).zip(is_inside);
-        others.extend(members.filter(|((_, tag), inside)| *inside && group.has(**tag)).map(|((p, _), _)| p));
-    }
-    whole.append(&mut others);
-    whole
-}
-
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at the real nodes where fields meet.
-    pub(super) fn find_geometry(&mut self, meets: &[u64]) -> Result<(), BinMissing> {
-        let mut between = match self.grid.between.take() {
-            Some(between) => between,
-            None => Box::new(self.begin_between()),
-        };
-        let scattering = with_children(&self.grid.plan, meets);
-        let mut sorted = Ok(());
-        self.for_each_field(|solver, field| {
-            let near = solver.near_others(&scattering);
-            let Some(group) = solver.physics.group(field) else { return };
-            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
-            let plan = &solver.grid.plan;
-            let columns: Vec<usize> = domain::columns::<D>().collect();
-            let Solids { copies, members, field: geometry } = &mut between.solids[field];
-            let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
-            leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
-                if near.is_empty() {
-                    (*copy, *members) = (Chunk::new(), Vec::new());
-                    return;
-                }
-                let cell = plan.finest_cell(leaf);
-                let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
-                *members = copy_solids(copy, chunk, &group, &near.grown(half * (1.0 + MARGIN)), &columns);
-            });
-            solver.grid.swap(geometry);
-            let of_field = solver.grid.sort(&mut solver.phases, copies, &widths, None);
-            solver.grid.scatter_and_sum(&mut solver.phases, copies, |scratch, bin, arena| {
-                scatter(scratch, bin, copies, &scheme, 1.0, arena);
-            });
-            solver.grid.swap(geometry);
-            sorted = sorted.and(of_field);
-        });
-        self.grid.between = Some(between);
-        sorted
-    }
-
-    /// Per own leaf, a box of the points whose hats in the bins of the first velocity field reach any of these nodes, which are given block by block; empty
-    /// where there is none.
-    fn near_others(&self, nodes: &[u64]) -> Vec<Aabb<D>> {
-        let plan = &self.grid.plan;
-        let overlaps: Vec<u64> =
-            (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
-        let mut near = vec![Aabb::EMPTY; self.chunks.len()];
-        for bin in self.grid.arenas.bins().map(|bin| &plan.bins[bin]) {
-            let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
-            for (&block, overlap) in around {
-                let reached = nodes[block as usize] & overlap;
-                if reached != 0 {
-                    let box_of_nodes = box_of_nodes(plan, block as usize, reached);
-                    let reach = plan.cell(bin.block.level) * (1.0 + MARGIN);
-                    let all = &mut near[bin.leaf as usize];
-                    *all = all.hull(&box_of_nodes.grown(reach));
-                }
-            }
+    /// Collective over neighbours. Finds the volumes of the basis functions of real nodes: each cell of a
+    /// leaf gives a share of its volume to each of its corners, and constrained nodes hand theirs to their
+    /// parents.
+    pub(super) fn find_hats(&mut self) {
+        if !self.grid.hats.is_empty() {
+            return;
         }
-        near
-    }
-
-    /// Collective over neighbours. Finds the volumes of the basis functions of real nodes: each cell of a leaf gives a share of its volume to each of its
-    /// corners, and constrained nodes hand theirs to their parents.
-    fn begin_between(&mut self) -> BetweenBodies<D> {
-        let fields = self.physics.body_contacts.fields();
-        let solids = || Solids {
-            copies: vec![Chunk::new(); self.chunks.len()],
-            members: vec![Vec::new(); self.chunks.len()],
-            field: VelocityField::new(&self.grid.plan),
-        };
-        let solids = (0..fields).map(|_| solids()).collect();
         let mut of_cells = VelocityField::new(&self.grid.plan);
         self.grid.swap(&mut of_cells);
         let plan = &self.grid.plan;
@@ -190,9 +50,9 @@ impl<const D: usize> Solver<D> {
                 arena.rows[node] = Row([0.0, 0.0, 0.0, share * f64::from(cells)])
             });
         });
-        let volumes = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
+        let hats = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
         self.grid.swap(&mut of_cells);
-        BetweenBodies { volumes, solids }
+        self.grid.hats = hats;
     }
 }
 

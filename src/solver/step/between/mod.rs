@@ -1,13 +1,13 @@
 //! Contact between bodies that deform, where their velocity fields meet.
 //!
-//! Where two fields have mass at a real node, the node's law ([`crate::boundary::bodies`]) gives each the opposite of the impulse of the
-//! other. Momentum and angular momentum stay as they are to round-off, since both act at one place. Each field is prolonged by itself.
-//! Particles near such nodes scatter their volumes and the gradients of these, which take the way of masses through bins, sums over ranks and
-//! constrained nodes; the rest of the grid pays nothing.
+//! Where two fields have mass at a real node, the node's law ([`crate::boundary::bodies`]) gives each the
+//! opposite of the impulse of the other. Momentum and angular momentum stay as they are to round-off, since
+//! both act at one place. Each field is prolonged by itself. Where their surfaces are says
+//! `step/surfaces.rs`.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `geometry` | shares of volume and their gradients at the nodes where bodies meet |
+//! | `geometry` | the nodes where bodies meet, and the volumes of their basis functions |
 //! | `press` | impulses at these nodes |
 //! | `pressure` | the pressure there, as particles carry it |
 mod geometry;
@@ -15,36 +15,45 @@ mod press;
 mod pressure;
 
 use crate::boundary::bodies::PairLaw;
-use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Collective. Gives the nodes where bodies meet the impulses of their contact over `dt`, s.
-    ///
-    /// # Errors
-    /// A box that needs a bin outside the plan, on the rank that has it.
-    pub(super) fn press_bodies(&mut self, dt: f64) -> Result<(), BinMissing> {
+    /// Collective. The real nodes at which bodies press on each other in a step of length `dt` (s), block by
+    /// block; nothing where there is none.
+    pub(super) fn meeting_nodes(&mut self, dt: f64) -> Vec<u64> {
         // What particles have between two steps needs no holding apart.
         if self.grid.others.is_empty() || dt <= 0.0 {
-            return Ok(());
+            return Vec::new();
         }
         self.fade_pressures();
         let meets = self.phases.time(Phase::Nodes, || self.grid.nodes_where_fields_meet());
         let is_any = meets.iter().any(|&nodes| nodes != 0);
-        if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
-            return Ok(());
+        match self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
+            true => meets,
+            false => Vec::new(),
         }
-        let sorted = match self.physics.body_contacts.pairs.iter().all(|pair| pair.law == PairLaw::Sticky) {
-            true => Ok(()),
-            false => self.find_geometry(&meets),
-        };
-        let forces = self.press(&meets, dt);
-        if sorted.is_ok() {
+    }
+
+    /// Whether any law between bodies asks for the places of their surfaces.
+    pub(super) fn has_surfaces_between(&self) -> bool {
+        !self.physics.body_contacts.pairs.iter().all(|pair| pair.law == PairLaw::Sticky)
+    }
+
+    /// Collective over neighbours. Gives the nodes where bodies meet the impulses of their contact over `dt`,
+    /// s. With `found`: the places of surfaces are known there.
+    pub(super) fn press_bodies(&mut self, meets: &[u64], found: bool, dt: f64) {
+        if meets.is_empty() {
+            return;
+        }
+        if self.has_surfaces_between() {
+            self.find_hats();
+        }
+        let forces = self.press(meets, dt);
+        if found {
             self.carry_pressures(&forces);
         }
-        sorted
     }
 
     /// Collective. Mean force of each contact of the job on its first side since the last row of the history,

@@ -6,7 +6,7 @@ use crate::boundary::bodies::{Meeting, Pair, PairLaw};
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{GridPlan, NodeFields};
 use crate::solver::state::Solver;
-use crate::solver::state::grid::BetweenBodies;
+use crate::solver::state::grid::Solids;
 use crate::solver::state::phases::Phase;
 
 /// Sweeps over the pairs of a node where more than two bodies meet; one is exact for two.
@@ -76,7 +76,8 @@ impl<const D: usize> Solver<D> {
         let press = Press {
             plan: &grid.plan,
             fields: grid.all_fields().collect(),
-            between: grid.between.as_deref(),
+            solids: &grid.solids,
+            hats: &grid.hats,
             contacts: &self.physics.body_contacts,
             finds_forces: self.physics.contact_pressure_column().is_some(),
             dt,
@@ -110,8 +111,10 @@ struct Press<'a, const D: usize> {
     plan: &'a GridPlan<D>,
     /// Velocities and masses of each field.
     fields: Vec<&'a NodeFields<D>>,
-    /// Where the surfaces are.
-    between: Option<&'a BetweenBodies<D>>,
+    /// Volumes of each field and their gradients, where the law asks for them.
+    solids: &'a [Solids<D>],
+    /// Volumes of the basis functions of real nodes, m³ (in plane strain m²).
+    hats: &'a [f64],
     contacts: &'a BodyContacts,
     /// Whether normal forces are needed.
     finds_forces: bool,
@@ -206,14 +209,13 @@ impl<const D: usize> Press<'_, D> {
             let impulse = law.impulse(&relative, masses, &anywhere, cell, self.dt);
             return Some(Exchange { impulse, pressed: [0.0; 2] });
         }
-        let between = self.between?;
         let sums = bodies.map(|body| {
-            let row = between.solids[body.field].field.fields.rows[node].0;
+            let row = self.solids[body.field].field.fields.rows[node].0;
             (std::array::from_fn(|a| row[a]), row[3])
         });
         let on = plan.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
         let on_faces = on.map_or(0, |place| plan.face_nodes[place].1);
-        let meeting = Meeting::new(sums, between.volumes[node], cell, on_faces)?;
+        let meeting = Meeting::new(sums, self.hats[node], cell, on_faces)?;
         let impulse = law.impulse(&relative, masses, &meeting, cell, self.dt);
         let along = (0..D).fold(0.0, |sum, a| impulse[a].mul_add(meeting.normal[a], sum));
         Some(Exchange { impulse, pressed: [along / self.dt, meeting.area] })

@@ -22,12 +22,9 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Gives particles near nodes where bodies meet the pressure `Σ w F / Σ w A` of the
     /// normal forces F on areas A there.
     pub(super) fn carry_pressures(&mut self, forces: &[NormalForce]) {
-        let (Some(column), Some(mut between)) =
-            (self.physics.contact_pressure_column(), self.grid.between.take())
-        else {
-            return;
-        };
-        for (field, solids) in between.solids.iter_mut().enumerate() {
+        let Some(column) = self.physics.contact_pressure_column() else { return };
+        let mut all = std::mem::take(&mut self.grid.solids);
+        for (field, solids) in all.iter_mut().enumerate() {
             let at_nodes = self.at_particles(solids, forces.iter().filter(|at| at.field == field));
             let carried = self.physics.carried_columns();
             let leaves = self.chunks.par_iter_mut().zip(&solids.members).zip(at_nodes);
@@ -45,7 +42,7 @@ impl<const D: usize> Solver<D> {
                 );
             });
         }
-        self.grid.between = Some(between);
+        self.grid.solids = all;
     }
 
     /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf.

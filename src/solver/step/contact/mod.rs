@@ -19,7 +19,7 @@
 //! | `guard` | paths of particles that still reach a surface |
 mod find;
 pub(super) mod guard;
-mod sweeps;
+pub(super) mod sweeps;
 
 use rayon::prelude::*;
 
@@ -86,9 +86,9 @@ impl<const D: usize> Solver<D> {
             self.scatter_impulses(&mut chunks, &spreads, &touching, |leaf, p| impulses[leaf][p]);
             self.add_impulses(&mut other);
             self.grid.swap(&mut other);
-            self.collide(rates, sums);
+            self.hold_at_nodes(field, rates, sums);
             // Faces that absorb waves have had their share of the step.
-            self.apply_faces(0.0, true);
+            self.apply_faces(field, 0.0, true);
             self.grid.swap(&mut other);
         }
         self.grid.swap(&mut other);

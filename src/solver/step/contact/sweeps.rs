@@ -62,7 +62,7 @@ impl<const D: usize> Solver<D> {
         });
         let compliances = self.velocities_in_contact(chunks, spreads, touching);
         for (touching, compliances) in touching.iter_mut().zip(&compliances) {
-            touching.iter_mut().zip(compliances).for_each(|(contact, c)| contact.compliance = c[0]);
+            touching.iter_mut().zip(compliances).for_each(|(contact, c)| contact.compliance = [c[0]; 2]);
         }
     }
 
@@ -99,7 +99,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Adds the impulses on real nodes to the velocities of all particles' grid.
-    pub(super) fn add_impulses(&mut self, other: &mut VelocityField<D>) {
+    pub(in crate::solver::step) fn add_impulses(&mut self, other: &mut VelocityField<D>) {
         let (fields, plan) = (&mut self.grid.fields, &self.grid.plan);
         let rows = &mut other.fields.rows;
         self.phases.time(Phase::Nodes, || {
@@ -112,8 +112,9 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Has the real nodes around particles in contact take the velocities of all particles' grid.
-    pub(super) fn take_velocities(&mut self, other: &VelocityField<D>) {
+    /// Not collective. Has the real nodes around particles in contact take the velocities of all particles'
+    /// grid.
+    pub(in crate::solver::step) fn take_velocities(&mut self, other: &VelocityField<D>) {
         let rows = &other.fields.rows;
         for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
             let [x, y, z, _] = rows[node].0;
@@ -160,7 +161,7 @@ impl<const D: usize> Solver<D> {
 }
 
 /// Calls `each` with the numbers and rows of the real nodes that particles in contact reach.
-fn for_real_nodes<const D: usize>(
+pub(in crate::solver::step) fn for_real_nodes<const D: usize>(
     fields: &mut NodeFields<D>,
     plan: &GridPlan<D>,
     mut each: impl FnMut(usize, &mut Row),

@@ -1,0 +1,121 @@
+//! The gap between a rigid surface and the material that lies over it, from two sums at the nodes of the
+//! surface.
+//!
+//! Material that ends at a plane, a height `y h` over a node along the normal n of the surface, gives the
+//! node the volume `Σ V w` and the slope `a = -Σ V ∂w/∂n > 0`. Their ratio `q = Σ V w / (h a)` is `(1 - y) /
+//! 2` where the plane lies in the upper half of the node's hat. Both sums have the same share of what the
+//! material covers of the hat along the surface, so that the height is exact at edges and corners of a body,
+//! where the share of the volume is not. A condition on the velocity of a node is then one that the surface
+//! of the material obeys: without the gap, material would be stopped as soon as it enters the hat, up to a
+//! cell early, and the few particles in the hat would carry the force of all.
+use super::Contact;
+
+/// Width of a gap, in cells, up to which cohesion holds.
+pub const STICKS: f64 = 0.1;
+
+/// Width of a gap, in cells, up to which it is closed: what rounding leaves between a column at rest and its
+/// floor.
+const CLOSED: f64 = 1e-6;
+
+/// Width of a gap, in cells, up to which surfaces that stick or let nothing leave hold what moves away.
+const HELD: f64 = 0.5;
+
+/// Height of the surface of the material over a node along the normal of a rigid surface, in cells of edge
+/// `cell` (m), from `Σ V w` (m³) and `-Σ V ∂w/∂n` (m²). Material that does not end towards the surface is all
+/// round the node.
+pub fn height(volume: f64, slope: f64, cell: f64) -> f64 {
+    if slope <= 0.0 {
+        return -1.0;
+    }
+    let q = volume / (cell * slope);
+    // A plane in the lower half of the hat leaves (1 + s)² / 2 of it behind it, at s = -y: the same ratio,
+    // solved for s.
+    if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
+}
+
+/// Where the material of a velocity field meets faces, and colliders that act on nodes. Later ones go before
+/// earlier ones where materials move together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Meets {
+    /// At its surface, once it has moved over the gap.
+    #[default]
+    Surface,
+    /// Wherever it is, at the feet of the nodes inside colliders: fluids. Over gaps water would gather at
+    /// walls.
+    Feet,
+    /// Wherever it is, at the nodes: material that yields. Over gaps the foot of a plastic rod that strikes a
+    /// face would spread too little.
+    Nodes,
+}
+
+/// What a surface asks of the velocity of material at it in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Least velocity along the normal, relative to the surface, m/s: that which closes the gap in the step.
+    pub least: f64,
+    /// Greatest, m/s; infinite where nothing holds the material.
+    pub most: f64,
+    /// Velocity along the surface that cohesion takes away at most, m/s.
+    pub sticking: f64,
+}
+
+impl Bounds {
+    /// Of material that touches the surface.
+    pub const TOUCHING: Self = Self { least: 0.0, most: 0.0, sticking: 0.0 };
+
+    /// Across a gap (m) between nodes with cells of this edge (m), in a step of length `dt`, s.
+    pub fn across(gap: f64, cell: f64, dt: f64) -> Self {
+        let least = if gap > CLOSED * cell { -gap / dt } else { 0.0 };
+        Self { least, most: if gap <= HELD * cell { 0.0 } else { f64::INFINITY }, sticking: 0.0 }
+    }
+
+    /// The same for a law: surfaces that separate hold nothing.
+    pub fn under(self, law: Contact) -> Self {
+        match law {
+            Contact::Separating { .. } => Self { most: f64::INFINITY, ..self },
+            _ => self,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume and slope of a layer from a height up (cells), in a hat of cells of 1 m that it covers to a
+    /// share.
+    fn sums(from: f64, cover: f64) -> (f64, f64) {
+        let hat = |s: f64| 1.0 - s.abs();
+        let volume = if from > 0.0 { 0.5 * hat(from).powi(2) } else { 1.0 - 0.5 * hat(from).powi(2) };
+        (cover * volume, cover * hat(from))
+    }
+
+    #[test]
+    fn planes_are_found_wherever_they_lie_and_whatever_they_cover() {
+        for from in [0.9, 0.5, 0.1, 0.0, -0.1, -0.5, -0.9] {
+            for cover in [1.0, 0.5, 0.01] {
+                let (volume, slope) = sums(from, cover);
+                approx::assert_relative_eq!(height(volume, slope, 1.0), from, epsilon = 1e-12);
+            }
+        }
+        assert_eq!(height(1.0, 0.0, 1.0), -1.0);
+    }
+
+    #[test]
+    fn heights_are_in_cells() {
+        let (volume, slope) = sums(0.25, 1.0);
+        approx::assert_relative_eq!(height(0.125 * volume, 0.25 * slope, 0.5), 0.25, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn gaps_close_within_the_step_and_no_further() {
+        assert_eq!(Bounds::across(-0.1, 1.0, 0.5), Bounds::TOUCHING);
+        assert_eq!(Bounds::across(0.25, 1.0, 0.5), Bounds { least: -0.5, ..Bounds::TOUCHING });
+        assert_eq!(
+            Bounds::across(0.75, 1.0, 0.5),
+            Bounds { least: -1.5, most: f64::INFINITY, sticking: 0.0 }
+        );
+        let free = Bounds::TOUCHING.under(Contact::default());
+        assert_eq!(free, Bounds { most: f64::INFINITY, ..Bounds::TOUCHING });
+    }
+}

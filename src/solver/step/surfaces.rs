@@ -1,0 +1,149 @@
+//! Volumes and their gradients at nodes near surfaces: where bodies meet, and at walls.
+//!
+//! Copies of the particles near such nodes scatter their volumes and the gradients of these, which take the
+//! way of masses through bins, sums over ranks and constrained nodes; the rest of the grid pays nothing.
+use rayon::prelude::*;
+
+use crate::geometry::Aabb;
+use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
+use crate::grid::plan::{GridPlan, NO_BLOCK};
+use crate::kernel::domain;
+use crate::particle::Chunk;
+use crate::particle::chunk::{Layout, TILE};
+use crate::particle::group::Group;
+use crate::particle::volume::{box_volume, volume_ratios};
+use crate::solver::sorting::bins::BinMissing;
+use crate::solver::state::Solver;
+use crate::solver::state::grid::Solids;
+use crate::solver::step::p2g::scatter;
+
+/// Share of a length by which boxes that must hold something are larger.
+const MARGIN: f64 = 1e-9;
+
+/// The box around these nodes of a block.
+fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) -> Aabb<D> {
+    let places = bits(nodes).map(|bit| plan.node_place(&plan.blocks[block], bit as usize));
+    Aabb::of_points(places)
+}
+
+/// Makes `copy` the particles of a group in a box, which scatter volumes in place of masses, and gradients of
+/// volumes in place of the impulse of stress over 1 s. Velocities and affine states of a copy are zero.
+/// Returns of which particles these are copies.
+fn copy_solids<const D: usize>(
+    copy: &mut Chunk<D>,
+    chunk: &Chunk<D>,
+    group: Option<&Group<'_>>,
+    aabb: &Aabb<D>,
+    columns: &[usize],
+) -> Vec<u32> {
+    let members = members_in(chunk, group, aabb);
+    copy.gather_columns(chunk, &members, columns);
+    let (tiles, _) = copy.tiles_mut_and_tags();
+    for tile in tiles.chunks_exact_mut(Layout::<D>::REALS) {
+        let ratios = volume_ratios::<D>(tile);
+        for (lane, ratio) in ratios.into_iter().enumerate() {
+            tile[Layout::<D>::MASS][lane] = box_volume::<D>(tile[Layout::<D>::HALF][lane]) * ratio;
+            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio);
+        }
+    }
+    members
+}
+
+/// Particles of a group in a box: first whole tiles, if at least half of one is in the box, then the others,
+/// each in order.
+fn members_in<const D: usize>(chunk: &Chunk<D>, group: Option<&Group<'_>>, aabb: &Aabb<D>) -> Vec<u32> {
+    let has = |tag: u64| group.is_none_or(|group| group.has(tag));
+    let (mut whole, mut others) = (Vec::with_capacity(chunk.len()), Vec::new());
+    let tiles = chunk.tiles().chunks_exact(Layout::<D>::REALS).zip(chunk.tags().chunks(TILE));
+    for ((tile, tags), first) in tiles.zip((0..).step_by(TILE)) {
+        let mut is_inside = [true; TILE];
+        for axis in 0..D {
+            let x = &tile[Layout::<D>::POSITION + axis];
+            for (is_inside, x) in is_inside.iter_mut().zip(x) {
+                *is_inside &= (aabb.lower[axis] <= *x) & (*x <= aabb.upper[axis]);
+            }
+        }
+        let inside = is_inside.iter().filter(|inside| **inside).count();
+        if inside == 0 {
+            continue;
+        }
+        if 2 * inside >= TILE && tags.len() == TILE && tags.iter().all(|&tag| has(tag)) {
+            whole.extend(first..first + TILE as u32);
+            continue;
+        }
+        let members = (first..).zip(tags).zip(is_inside);
+        others.extend(members.filter(|((_, tag), inside)| *inside && has(**tag)).map(|((p, _), _)| p));
+    }
+    whole.append(&mut others);
+    whole
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at these nodes, given
+    /// block by block, with the constrained ones that hand sums to real ones among them. Fields that are not
+    /// `is_asked` for are left out.
+    pub(super) fn find_volumes(&mut self, scattering: &[u64], is_asked: &[bool]) -> Result<(), BinMissing> {
+        if !is_asked.contains(&true) {
+            return Ok(());
+        }
+        let mut solids = std::mem::take(&mut self.grid.solids);
+        if solids.is_empty() {
+            let fields = self.physics.body_contacts.fields();
+            solids.extend((0..fields).map(|_| Solids::new(&self.grid.plan, self.chunks.len())));
+        }
+        let mut sorted = Ok(());
+        self.for_each_field(|solver, field| {
+            if !is_asked[field] {
+                return;
+            }
+            let near = solver.near_nodes(scattering);
+            let group = solver.physics.group(field);
+            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
+            let plan = &solver.grid.plan;
+            let columns: Vec<usize> = domain::columns::<D>().collect();
+            let Solids { copies, members, field: geometry } = &mut solids[field];
+            let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
+            leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
+                if near.is_empty() {
+                    (*copy, *members) = (Chunk::new(), Vec::new());
+                    return;
+                }
+                let cell = plan.finest_cell(leaf);
+                let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
+                *members =
+                    copy_solids(copy, chunk, group.as_ref(), &near.grown(half * (1.0 + MARGIN)), &columns);
+            });
+            solver.grid.swap(geometry);
+            let of_field = solver.grid.sort(&mut solver.phases, copies, &widths, None);
+            solver.grid.scatter_and_sum(&mut solver.phases, copies, |scratch, bin, arena| {
+                scatter(scratch, bin, copies, &scheme, 1.0, arena);
+            });
+            solver.grid.swap(geometry);
+            sorted = sorted.and(of_field);
+        });
+        self.grid.solids = solids;
+        sorted
+    }
+
+    /// Per own leaf, a box of the points whose hats in the bins of the first velocity field reach any of
+    /// these nodes, which are given block by block; empty where there is none.
+    fn near_nodes(&self, nodes: &[u64]) -> Vec<Aabb<D>> {
+        let plan = &self.grid.plan;
+        let overlaps: Vec<u64> =
+            (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
+        let mut near = vec![Aabb::EMPTY; self.chunks.len()];
+        for bin in self.grid.arenas.bins().map(|bin| &plan.bins[bin]) {
+            let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
+            for (&block, overlap) in around {
+                let reached = nodes[block as usize] & overlap;
+                if reached != 0 {
+                    let box_of_nodes = box_of_nodes(plan, block as usize, reached);
+                    let reach = plan.cell(bin.block.level) * (1.0 + MARGIN);
+                    let all = &mut near[bin.leaf as usize];
+                    *all = all.hull(&box_of_nodes.grown(reach));
+                }
+            }
+        }
+        near
+    }
+}

@@ -1,0 +1,137 @@
+//! Nodes that colliders hold themselves, not at their feet.
+//!
+//! These are the nodes inside `sticky` colliders, for material that yields those inside all, and those behind a
+//! surface that another collider covers or comes near to. Feet of both surfaces would be in one cell, and if the colliders move against each other,
+//! no velocity of its corners obeys both.
+use rayon::prelude::*;
+
+use crate::boundary::motion::Rate;
+use crate::boundary::{Collider, ColliderState, Contact};
+use crate::exact_sum::ExactSum;
+use crate::grid::mask::{bits, block_nodes};
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::Grid;
+use crate::solver::state::inside::{Plane, SAME};
+use crate::solver::state::phases::Phase;
+use crate::solver::step::colliders::Touch;
+
+/// Cosine of the angle between two surfaces above which they count as parallel.
+const PARALLEL: f64 = 0.5;
+
+/// Whether the surface of collider `number` that a node with cells of this edge (m) is behind faces that of
+/// another within a cell, or is parallel to it inside the other.
+pub(super) fn is_at_another<const D: usize>(
+    colliders: &[Collider<D>],
+    states: &[ColliderState<D>],
+    number: usize,
+    plane: &Plane<D>,
+    cell: f64,
+) -> bool {
+    let mut others = colliders.iter().zip(states).enumerate();
+    others.any(|(other, (collider, state))| {
+        if other == number || !collider.acts_on_nodes() {
+            return false;
+        }
+        let distance = collider.distance(&plane.foot, &state.pose);
+        if distance >= cell {
+            return false;
+        }
+        let normal = collider.normal(&plane.foot, &state.pose);
+        let cosine = (0..D).fold(0.0, |sum, a| normal[a].mul_add(plane.normal[a], sum));
+        cosine < -PARALLEL || (cosine > PARALLEL && distance < -SAME * cell)
+    })
+}
+
+impl<const D: usize> Solver<D> {
+    /// Not collective. Applies the conditions of colliders, in their order, to the real nodes of the first
+    /// velocity field, which has the place of that numbered `field`, that they hold themselves. Adds impulse and angular impulse on each from the nodes that
+    /// this rank counts.
+    pub(in crate::solver::step) fn hold_at_nodes(
+        &mut self,
+        field: usize,
+        rates: &[Rate<D>],
+        sums: &mut [[ExactSum; SUMS]],
+    ) {
+        let (physics, states) = (&self.physics, &self.contacts.states);
+        let colliders = &physics.colliders;
+        let on_nodes = || colliders.iter().filter(|collider| collider.acts_on_nodes());
+        let at_feet = |collider: &Collider<D>| physics.acts_at_feet(field, collider);
+        let is_any = on_nodes().count() > 1 || on_nodes().any(|collider| !at_feet(collider));
+        if self.grid.walls.known_over.is_none() || !is_any {
+            return;
+        }
+        let grid = &mut self.grid;
+        self.phases.time(Phase::Nodes, || {
+            for touch in hold(grid, colliders, states, rates, at_feet) {
+                touch.book(colliders, states, sums);
+            }
+        });
+    }
+}
+
+/// Applies the conditions; returns impulses in the order of the nodes.
+fn hold<const D: usize>(
+    grid: &mut Grid<D>,
+    colliders: &[Collider<D>],
+    states: &[ColliderState<D>],
+    rates: &[Rate<D>],
+    at_feet: impl Fn(&Collider<D>) -> bool + Sync,
+) -> Vec<Touch<D>> {
+    let Grid { fields, inside_still, inside_moving, plan, .. } = grid;
+    let all = [&*inside_still, &*inside_moving];
+    let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);
+    let active = blocks.enumerate().with_min_len(32).filter(|(_, (_, active))| **active);
+    let touched = active.map(|(index, ((rows, block), _))| {
+        let mut touches = Vec::new();
+        for (number, (collider, (state, rate))) in colliders.iter().zip(states.iter().zip(rates)).enumerate()
+        {
+            let inside = all.iter().find_map(|inside| inside.get(index)?.get(number)?.as_ref());
+            let Some(inside) = inside else { continue };
+            let mut hold = |bit: u32, normal: &[f64; D]| {
+                let row = &mut rows[bit as usize];
+                let mass = row.0[3];
+                if mass <= 0.0 || block.real_nodes() >> bit & 1 == 0 {
+                    return;
+                }
+                let x = plan.node_place(block, bit as usize);
+                let surface = collider.velocity_at(&x, &state.pose, rate);
+                let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
+                let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
+                let free = relative;
+                collider.contact.apply(&mut relative, normal);
+                if relative == free {
+                    return;
+                }
+                (0..D).for_each(|a| row.0[a] = surface[a] + relative[a]);
+                if block.owned >> bit & 1 == 1 {
+                    let impulse = std::array::from_fn(|a| mass * (before[a] - row.0[a]));
+                    touches.push(Touch { collider: number, position: x, impulse });
+                }
+            };
+            if collider.contact == Contact::Sticky {
+                // All of the velocity is held, whatever the normal is.
+                bits(inside.nodes).for_each(|bit| hold(bit, &[0.0; D]));
+                continue;
+            }
+            if !at_feet(collider) {
+                let mut normals = inside.normals.iter();
+                for bit in bits(inside.nodes) {
+                    let deep = inside.buried >> bit & 1 == 1;
+                    let known = if deep { None } else { normals.next() };
+                    let x = || plan.node_place(block, bit as usize);
+                    hold(bit, &known.copied().unwrap_or_else(|| collider.normal(&x(), &state.pose)));
+                }
+                continue;
+            }
+            let cell = plan.cell(block.level);
+            for plane in &inside.planes {
+                if is_at_another(colliders, states, number, plane, cell) {
+                    hold(plane.bit.into(), &plane.normal);
+                }
+            }
+        }
+        touches
+    });
+    touched.collect::<Vec<_>>().into_iter().flatten().collect()
+}

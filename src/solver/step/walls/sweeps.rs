@@ -1,0 +1,328 @@
+//! Between the feet and the nodes.
+use rayon::prelude::*;
+
+use super::at_nodes::is_at_another;
+use super::feet::LeafFeet;
+use crate::boundary::motion::Rate;
+use crate::boundary::{Bounds, Collider, ColliderState, Touching};
+use crate::exact_sum::ExactSum;
+use crate::grid::Window;
+use crate::grid::mask::block_nodes;
+use crate::grid::plan::NO_BLOCK;
+use crate::kernel::Row;
+use crate::solver::state::Solver;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::{Grid, VelocityField};
+use crate::solver::state::inside::{Inside, Plane};
+use crate::solver::step::colliders::Touch;
+use crate::solver::step::contact::sweeps::for_real_nodes;
+
+/// By leaf with feet and by foot, the sum of the weights of corners that have mass.
+pub(super) type Covered = Vec<Vec<f64>>;
+
+impl<const D: usize> Grid<D> {
+    /// Feet of nodes that have mass in the first velocity field, by own leaf that has any, on the colliders
+    /// whose number `acts` at feet.
+    pub(super) fn feet(
+        &self,
+        colliders: &[Collider<D>],
+        states: &[ColliderState<D>],
+        acts: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<LeafFeet<D>> {
+        let Self { plan, fields, inside_still, inside_moving, .. } = self;
+        let all = [inside_still, inside_moving];
+        let blocks = (0..plan.blocks.len()).into_par_iter().with_min_len(256);
+        let has_feet = |block: usize| {
+            let mut inside = all.iter().filter_map(|inside| inside.get(block)).flatten().flatten();
+            fields.active[block] && inside.any(|inside| !inside.planes.is_empty() || inside.buried != 0)
+        };
+        let has_feet: Vec<bool> = blocks.map(has_feet).collect();
+        let has_mass = |row: usize| {
+            let (block, bit) = (row / block_nodes(D), row % block_nodes(D));
+            plan.blocks[block].constrained >> bit & 1 == 1 || fields.rows[row].0[3] > 0.0
+        };
+        let acts_at_node = |collider: usize, plane: &Plane<D>, cell: f64| {
+            is_at_another(colliders, states, collider, plane, cell)
+        };
+        let normal = |collider: usize, x: &[f64; D]| colliders[collider].normal(x, &states[collider].pose);
+        let leaves = (0..plan.leaf_start.len() - 1).into_par_iter().with_min_len(64);
+        let found = leaves.filter_map(|leaf| {
+            let bin = &plan.bins[plan.leaf_bins(leaf).start];
+            if !bin.around.iter().any(|&block| block != NO_BLOCK && has_feet[block as usize]) {
+                return None;
+            }
+            let [still, moving] = all.map(|inside| {
+                let of_block = |block: usize| of_block(inside, &has_feet, block);
+                LeafFeet::find(plan, leaf, of_block, has_mass, &acts, acts_at_node, normal)
+            });
+            let mut feet = still;
+            feet.feet.extend(moving.feet);
+            feet.touching.extend(moving.touching);
+            (!feet.feet.is_empty()).then_some(feet)
+        });
+        found.collect()
+    }
+}
+
+/// What is known of colliders at the nodes of a block that has any of them inside.
+fn of_block<'a, const D: usize>(
+    inside: &'a [Vec<Option<Inside<D>>>],
+    has_feet: &[bool],
+    block: usize,
+) -> &'a [Option<Inside<D>>] {
+    inside.get(block).filter(|_| has_feet[block]).map_or(&[], Vec::as_slice)
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective over neighbours. Finds the contact at each foot from the gap there, and how much of the
+    /// foot's cell has mass. `other` has the masses of the nodes.
+    pub(super) fn find_gaps(
+        &mut self,
+        field: usize,
+        dt: f64,
+        rates: &[Rate<D>],
+        all: &mut [LeafFeet<D>],
+        other: &VelocityField<D>,
+    ) -> Covered {
+        // This marks the nodes in reach of feet of any rank.
+        self.scatter_at_feet(all, |_, _| [0.0; 4]);
+        let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
+        let touches = !self.physics.moves_over_gaps(field);
+        let known = !touches || self.physics.has_cohesive_walls();
+        let masses = &other.fields.rows;
+        let sums = |node: usize| match known {
+            true => solids[field].field.fields.rows[node].0,
+            false => [0.0; 4],
+        };
+        let cells: Vec<f64> = plan.blocks.iter().map(|block| plan.cell(block.level)).collect();
+        for_real_nodes(fields, plan, |node, row| {
+            let has_mass = masses[node].0[3] > 0.0;
+            let size = sums(node)[3] / cells[node / block_nodes(D)];
+            *row = if has_mass { Row([size, 1.0, 0.0, 0.0]) } else { Row::default() };
+        });
+        fields.prolong(plan, arenas);
+        let sizes: Vec<Vec<_>> = all
+            .iter()
+            .map(|leaf| leaf.feet.iter().map(|foot| foot.at_corners(&fields.rows)).collect())
+            .collect();
+        let covered: Covered = all
+            .iter()
+            .map(|leaf| leaf.feet.iter().map(|foot| foot.gather(&fields.rows)[1]).collect())
+            .collect();
+        for_real_nodes(fields, plan, |node, row| {
+            let [x, y, z, _] = sums(node);
+            *row = if masses[node].0[3] > 0.0 { Row([x, y, z, 0.0]) } else { Row::default() };
+        });
+        fields.prolong(plan, arenas);
+        let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
+        for (leaf, (sizes, covered)) in all.iter_mut().zip(sizes.iter().zip(&covered)) {
+            let each = leaf.feet.iter().zip(&mut leaf.touching).zip(sizes.iter().zip(covered));
+            for ((foot, touching), (sizes, covered)) in each.filter(|((foot, _), _)| !foot.is_deep) {
+                if *covered <= 0.0 {
+                    continue;
+                }
+                let gap = match known {
+                    true => foot.gap(sizes, &foot.at_corners(&fields.rows)),
+                    false => None,
+                };
+                let collider = &colliders[foot.collider];
+                let touches = touches || !collider.contact.has_gap();
+                let gap = if touches { gap.or(Some(foot.cell)) } else { gap };
+                *touching = gap.map(|gap| {
+                    let surface =
+                        collider.velocity_at(&foot.at, &states[foot.collider].pose, &rates[foot.collider]);
+                    let contact = foot.touching(collider.contact, surface, gap, dt);
+                    let bounds =
+                        if touches { Bounds::TOUCHING.under(collider.contact) } else { contact.bounds };
+                    Touching { bounds, ..contact }
+                });
+            }
+        }
+        covered
+    }
+
+    /// Collective over neighbours. Velocities at each foot that impulses of 1 kg m/s on all feet bring: along
+    /// its normal by those of all feet along their normals, with what friction adds, so that feet of walls at
+    /// right angles leave each other alone; along the surface by any.
+    pub(super) fn find_compliances_at_feet(
+        &mut self,
+        field: usize,
+        all: &mut [LeafFeet<D>],
+        covered: &Covered,
+        other: &VelocityField<D>,
+    ) {
+        self.scatter_at_feet(all, |leaf, foot| {
+            let Some(contact) = &all[leaf].touching[foot] else { return [0.0; 4] };
+            let reach = all[leaf].feet[foot].reach(contact.law);
+            // Ranks send each other the lanes of a velocity and that of the mass.
+            let impulse =
+                std::array::from_fn(
+                    |lane| if lane == 3 { 1.0 } else { reach.get(lane).copied().unwrap_or(0.0) },
+                );
+            impulse.map(|impulse: f64| impulse / covered[leaf][foot])
+        });
+        let masses = &other.fields.rows;
+        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+            let mass = masses[node].0[3];
+            *row = Row(if mass > 0.0 { row.0.map(|sum| sum / mass) } else { [0.0; 4] });
+        });
+        self.prolong();
+        let rows = &self.grid.fields.rows;
+        for (leaf, covered) in all.iter_mut().zip(covered) {
+            for ((foot, touching), covered) in leaf.feet.iter().zip(&mut leaf.touching).zip(covered) {
+                if let Some(contact) = touching {
+                    let [axes @ .., of_surface] = foot.gather(rows).map(|sum| sum / covered);
+                    let of_normal = (0..D).fold(0.0, |sum, a| axes[a].mul_add(foot.normal[a].abs(), sum));
+                    contact.compliance = [of_normal, of_surface];
+                }
+            }
+        }
+        if self.physics.has_cohesive_walls() {
+            self.find_areas(field, all, covered, other);
+        }
+    }
+
+    /// Not collective. Multiplies what cohesion bears by the area of the material's surface that each foot
+    /// holds: a node shares `-Σ V ∇w · n` out to the feet that it is a corner of, by weights. Real nodes have
+    /// the sums of these over their mass.
+    fn find_areas(
+        &mut self,
+        field: usize,
+        all: &mut [LeafFeet<D>],
+        covered: &Covered,
+        other: &VelocityField<D>,
+    ) {
+        let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
+        let (masses, sums) = (&other.fields.rows, &solids[field].field.fields.rows);
+        for_real_nodes(fields, plan, |node, row| {
+            let shares = masses[node].0[3] * row.0[3];
+            let [x, y, z, _] = sums[node].0;
+            *row = Row(if shares > 0.0 { [x, y, z, 0.0].map(|slope| slope / shares) } else { [0.0; 4] });
+        });
+        fields.prolong(plan, arenas);
+        for (leaf, covered) in all.iter_mut().zip(covered) {
+            for ((foot, touching), covered) in leaf.feet.iter().zip(&mut leaf.touching).zip(covered) {
+                if let Some(contact) = touching {
+                    let slopes = foot.gather(&fields.rows);
+                    let area = -(0..D).fold(0.0, |sum, a| slopes[a].mul_add(foot.normal[a], sum)) / covered;
+                    contact.sticking *= area.max(0.0);
+                }
+            }
+        }
+    }
+
+    /// Not collective. Corrects the impulses for the velocities at the feet; returns what the nodes of each
+    /// get of it, by weights.
+    pub(super) fn correct_at_feet(
+        &mut self,
+        all: &mut [LeafFeet<D>],
+        covered: &Covered,
+    ) -> Vec<Vec<[f64; 4]>> {
+        let rows = &self.grid.fields.rows;
+        let leaves = all.iter_mut().zip(covered);
+        let corrected = leaves.map(|(leaf, covered)| {
+            let each = leaf.feet.iter().zip(&mut leaf.touching).zip(covered);
+            let impulses = each.map(|((foot, touching), covered)| {
+                let Some(contact) = touching else { return [0.0; 4] };
+                let velocity = foot.gather(rows);
+                let impulse = contact.correct(&std::array::from_fn(|a| velocity[a] / covered));
+                std::array::from_fn(|lane| if lane < D { impulse[lane] / covered } else { 0.0 })
+            });
+            impulses.collect()
+        });
+        corrected.collect()
+    }
+
+    /// Collective over neighbours. Leaves on real nodes the sums of what each foot gives to the corners of
+    /// its cell, by weights.
+    pub(super) fn scatter_at_feet(
+        &mut self,
+        all: &[LeafFeet<D>],
+        value: impl Fn(usize, usize) -> [f64; 4] + Sync + Send,
+    ) {
+        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+            arena.clear(&Window::FULL);
+            let Ok(leaf) = all.binary_search_by_key(&bin.number, |leaf| leaf.bin) else { return };
+            for (number, foot) in all[leaf].feet.iter().enumerate() {
+                foot.scatter(&value(leaf, number), arena.rows);
+            }
+        });
+    }
+
+    /// Collective over neighbours. Gives deep nodes the velocity of their foot, and books what this takes
+    /// from them.
+    pub(super) fn take_along(
+        &mut self,
+        field: usize,
+        all: &[LeafFeet<D>],
+        covered: &Covered,
+        other: &mut VelocityField<D>,
+        sums: &mut [[ExactSum; SUMS]],
+    ) {
+        self.take_velocities(other);
+        self.prolong();
+        let rows = &self.grid.fields.rows;
+        let of_feet = |(leaf, covered): (&LeafFeet<D>, &Vec<f64>)| -> Vec<[f64; 4]> {
+            let each = leaf.feet.iter().zip(covered);
+            each.map(|(foot, covered)| match foot.is_deep && *covered > 0.0 {
+                true => {
+                    let [x, y, z, _] = foot.gather(rows).map(|sum| sum / covered);
+                    [x, y, z, 1.0]
+                }
+                false => [0.0; 4],
+            })
+            .collect()
+        };
+        let velocities: Vec<Vec<[f64; 4]>> = all.iter().zip(covered).map(of_feet).collect();
+        let plan = &self.grid.plan;
+        let is_real =
+            |row: usize| plan.blocks[row / block_nodes(D)].real_nodes() >> (row % block_nodes(D)) & 1 == 1;
+        let real: Vec<Vec<bool>> =
+            all.iter().map(|leaf| leaf.feet.iter().map(|foot| is_real(foot.node[1])).collect()).collect();
+        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+            arena.clear(&Window::FULL);
+            let Ok(leaf) = all.binary_search_by_key(&bin.number, |leaf| leaf.bin) else { return };
+            for (number, foot) in all[leaf].feet.iter().enumerate().filter(|(number, _)| real[leaf][*number])
+            {
+                let row = &mut arena.rows[foot.node[0]].0;
+                (0..4).for_each(|lane| row[lane] += velocities[leaf][number][lane]);
+            }
+        });
+        let (physics, states) = (&self.physics, &self.contacts.states);
+        let Grid { plan, fields, inside_still, inside_moving, .. } = &mut self.grid;
+        let mut touches = Vec::new();
+        let rows = &mut other.fields.rows;
+        for_real_nodes(fields, plan, |node, sum| {
+            let row = &mut rows[node].0;
+            let [.., count] = sum.0;
+            if count == 0.0 || row[3] <= 0.0 {
+                return;
+            }
+            let before: [f64; D] = std::array::from_fn(|a| row[a]);
+            (0..D).for_each(|a| row[a] = sum.0[a] / count);
+            let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
+            if plan.blocks[block].owned >> bit & 1 == 0 {
+                return;
+            }
+            let known = [&*inside_still, &*inside_moving].into_iter().flat_map(|inside| inside.get(block));
+            let mut planes = known.flat_map(|of_block| {
+                of_block
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(collider, inside)| Some((collider, inside.as_ref()?)))
+            });
+            let plane = planes.find_map(|(collider, inside)| {
+                if !physics.acts_at_feet(field, &physics.colliders[collider]) {
+                    return None;
+                }
+                let plane = inside.planes.iter().find(|plane| usize::from(plane.bit) == bit)?;
+                Some((collider, plane.foot))
+            });
+            if let Some((collider, position)) = plane {
+                let impulse = std::array::from_fn(|a| row[3] * (before[a] - row[a]));
+                touches.push(Touch { collider, position, impulse });
+            }
+        });
+        touches.iter().for_each(|touch| touch.book(&physics.colliders, states, sums));
+    }
+}
