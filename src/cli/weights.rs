@@ -1,4 +1,5 @@
 //! `agimp weights`: the weights of given boxes on given trees, as a run would use them or by definition.
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -10,6 +11,7 @@ use super::Failure;
 use super::shared::message::together;
 use crate::grid::direct;
 use crate::grid::plan::ghost_layer::KnownTree;
+use crate::kernel::Coordinates;
 use crate::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle, RealNode};
 
 /// Arguments of `agimp weights`.
@@ -21,6 +23,10 @@ pub struct Arguments {
     /// Evaluate the definition cell by cell instead of scattering with the kernels of a run.
     #[arg(long)]
     pub direct: bool,
+    /// Boxes are sections of rings: the first coordinate is the radius, 0 on the axis. Prints `s`, `grad` and
+    /// `t`, the means of N, of its gradient and of N / r over the ring.
+    #[arg(long)]
+    pub axisymmetric: bool,
 }
 
 /// Trees and boxes.
@@ -50,19 +56,19 @@ struct Case {
 }
 
 /// The printed result.
-#[derive(Debug, Default, Serialize)]
-pub struct Output {
+#[derive(Debug, Serialize)]
+pub struct Output<N = NodeWeights> {
     /// One entry per case, in the order of the input.
-    pub cases: Vec<CaseWeights>,
+    pub cases: Vec<CaseWeights<N>>,
 }
 
 /// Weights of one box.
 #[derive(Debug, Serialize)]
-pub struct CaseWeights {
+pub struct CaseWeights<N = NodeWeights> {
     /// As in the input.
     pub id: serde_json::Value,
     /// Real nodes with a weight or gradient other than zero, in lexicographic order.
-    pub nodes: Vec<NodeWeights>,
+    pub nodes: Vec<N>,
 }
 
 /// Weight of one node.
@@ -74,6 +80,20 @@ pub struct NodeWeights {
     pub w: f64,
     /// Gradient of the weight with respect to the box's centre.
     pub grad: Vec<f64>,
+}
+
+/// Weight of one node for a box that is the section of a ring of area A around the radius r_p; integrals over
+/// the section.
+#[derive(Debug, Serialize)]
+pub struct RingWeights {
+    /// Position on the lattice of the tree.
+    pub ijk: Vec<u64>,
+    /// Weight, `∫ N r / (A r_p)`.
+    pub s: f64,
+    /// Along radius and height, `∫ ∇N r / (A r_p)`, 1/m.
+    pub grad: Vec<f64>,
+    /// Along the hoop, `∫ N / (A r_p)`, 1/m.
+    pub t: f64,
 }
 
 /// Carries out `agimp weights`.
@@ -90,12 +110,16 @@ fn print(comm: &Comm, arguments: &Arguments) -> Result<(), Failure> {
     let explain = |message: String| Failure::Usage(format!("{}: {message}", arguments.cases.display()));
     let text = comm.agree(std::fs::read_to_string(&arguments.cases));
     let text = text.map_err(|disagreement| explain(disagreement.message))?;
-    let output = evaluate(comm, &text, arguments.direct).map_err(|failure| match failure {
+    let output = match arguments.axisymmetric {
+        true => evaluate_rings(comm, &text, arguments.direct).map(|output| serde_json::to_string(&output)),
+        false => evaluate(comm, &text, arguments.direct).map(|output| serde_json::to_string(&output)),
+    };
+    let output = output.map_err(|failure| match failure {
         Failure::Usage(message) => explain(message),
         other => other,
     })?;
     if comm.rank() == 0 {
-        let text = serde_json::to_string(&output).map_err(|error| Failure::Run(error.to_string()))?;
+        let text = output.map_err(|error| Failure::Run(error.to_string()))?;
         writeln!(std::io::stdout(), "{text}")?;
     }
     Ok(())
@@ -106,12 +130,32 @@ fn print(comm: &Comm, arguments: &Arguments) -> Result<(), Failure> {
 /// # Errors
 /// The same on all ranks.
 pub fn evaluate(comm: &Comm, text: &str, direct: bool) -> Result<Output, Failure> {
+    let input = read(comm, text)?;
+    match input.dim {
+        2 => evaluate_in::<2, _>(comm, &input, direct, planar, Coordinates::Cartesian),
+        _ => evaluate_in::<3, _>(comm, &input, direct, planar, Coordinates::Cartesian),
+    }
+}
+
+/// As [`evaluate`], for boxes that are sections of rings.
+///
+/// # Errors
+/// The same on all ranks.
+pub fn evaluate_rings(comm: &Comm, text: &str, direct: bool) -> Result<Output<RingWeights>, Failure> {
+    let input = read(comm, text)?;
+    if input.dim != 2 {
+        return Err(Failure::Usage("`dim` is 3; sections of rings have `dim` 2, radius and height".into()));
+    }
+    evaluate_in::<2, _>(comm, &input, direct, ring, Coordinates::Axisymmetric)
+}
+
+/// Collective. The same on all ranks.
+fn read(comm: &Comm, text: &str) -> Result<Input, Failure> {
     let input: Result<Input, _> =
         serde_json::from_str(text).map_err(|error| Failure::Usage(error.to_string()));
     let input = agreed(comm, input)?;
     match (input.dim, input.cells_per_octant_edge) {
-        (2, 4) => evaluate_in::<2>(comm, &input, direct),
-        (3, 4) => evaluate_in::<3>(comm, &input, direct),
+        (2 | 3, 4) => Ok(input),
         (2 | 3, cells) => Err(Failure::Usage(format!("octants have 4 cells along an edge, not {cells}"))),
         (dim, _) => Err(Failure::Usage(format!("`dim` is {dim}; it must be 2 or 3"))),
     }
@@ -122,8 +166,15 @@ fn agreed<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
     comm.agree(result).map_err(|disagreement| Failure::Usage(disagreement.message))
 }
 
-fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Result<Output, Failure> {
-    let mut found: Vec<Option<CaseWeights>> = input.cases.iter().map(|_| None).collect();
+/// Weights with nodes as `weigh` makes them from the evaluator of a tree, a box and the level of the lattice.
+fn evaluate_in<const D: usize, N>(
+    comm: &Comm,
+    input: &Input,
+    direct: bool,
+    weigh: fn(&Comm, &mut Evaluator<D>, &GivenParticle<D>, u32) -> Result<Vec<N>, Failure>,
+    coordinates: Coordinates,
+) -> Result<Output<N>, Failure> {
+    let mut found: Vec<Option<CaseWeights<N>>> = input.cases.iter().map(|_| None).collect();
     let mut used = 0;
     for (number, tree) in input.trees.iter().enumerate() {
         let id = tree.id.clone().unwrap_or_else(|| number.into());
@@ -131,7 +182,8 @@ fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Resu
         used += cases.len();
         let leaves = tree.leaves::<D>().map_err(|error| Failure::Usage(format!("tree {id}: {error}")));
         let leaves = agreed(comm, leaves)?;
-        let boxes: Result<Vec<_>, _> = cases.iter().map(|&i| input.cases[i].given::<D>()).collect();
+        let boxes: Result<Vec<_>, _> =
+            cases.iter().map(|&i| input.cases[i].given::<D>(coordinates)).collect();
         let boxes = agreed(comm, boxes.map_err(Failure::Usage))?;
         let forest = spread(comm, &leaves)
             .map_err(|error| Failure::Usage(format!("tree {id} is not a tree: {error}")));
@@ -140,9 +192,10 @@ fn evaluate_in<const D: usize>(comm: &Comm, input: &Input, direct: bool) -> Resu
         let mut evaluator = Evaluator::new(comm, forest, leaves, direct);
         for (i, given) in cases.drain(..).zip(boxes) {
             let case_id = input.cases[i].id.clone();
-            let nodes = agreed(comm, evaluator.nodes(comm, &given))?;
-            let nodes: Result<Vec<_>, _> = nodes.iter().map(|node| on_lattice(node, level)).collect();
-            let nodes = nodes.map_err(|message| Failure::Usage(format!("case {case_id}: {message}")));
+            let nodes = weigh(comm, &mut evaluator, &given, level).map_err(|failure| match failure {
+                Failure::Usage(message) => Failure::Usage(format!("case {case_id}: {message}")),
+                other => other,
+            });
             found[i] = Some(CaseWeights { id: case_id, nodes: agreed(comm, nodes)? });
         }
     }
@@ -178,13 +231,26 @@ impl Tree {
 }
 
 impl Case {
-    fn given<const D: usize>(&self) -> Result<GivenParticle<D>, String> {
+    fn given<const D: usize>(&self, coordinates: Coordinates) -> Result<GivenParticle<D>, String> {
         let numbers = |list: &[f64]| <[f64; D]>::try_from(list).ok();
         let (Some(centre), Some(half)) = (numbers(&self.centre), numbers(&self.half)) else {
             return Err(format!("case {}: `centre` and `half` must have {D} numbers", self.id));
         };
         // Rounding may put the face of a box that touches a wall a little outside.
         let slack = 1e-12;
+        if coordinates == Coordinates::Axisymmetric {
+            let (radius, reach) = (centre[0], centre[0] - half[0]);
+            if radius <= 0.0 {
+                return Err(format!(
+                    "case {}: its centre has the radius {radius}; it must be above 0",
+                    self.id
+                ));
+            }
+            if reach < -slack {
+                let axis = "the box must not cross the axis, r = 0";
+                return Err(format!("case {}: its box reaches r = {reach}; {axis}", self.id));
+            }
+        }
         let is_inside = (0..D).all(|a| {
             half[a] > 0.0
                 && centre[a] > 0.0
@@ -224,10 +290,15 @@ impl<const D: usize> Evaluator<D> {
     }
 
     /// Collective. Real nodes in lexicographic order, on rank 0: mass is the weight, momentum its gradient.
-    fn nodes(&mut self, comm: &Comm, given: &GivenParticle<D>) -> Result<Vec<RealNode<D>>, Failure> {
+    fn nodes(
+        &mut self,
+        comm: &Comm,
+        given: &GivenParticle<D>,
+        coordinates: Coordinates,
+    ) -> Result<Vec<RealNode<D>>, Failure> {
         match self {
             Self::Direct(tree) if comm.rank() == 0 => {
-                let nodes = direct::weights(tree, 1.0, given.position, given.half);
+                let nodes = direct::weights_in(coordinates, tree, 1.0, given.position, given.half);
                 let as_real = |node: direct::DirectNode<D>| RealNode {
                     place: node.place,
                     momentum: node.gradient,
@@ -237,6 +308,7 @@ impl<const D: usize> Evaluator<D> {
             }
             Self::Direct(_) => Ok(Vec::new()),
             Self::Production(boxes) => {
+                boxes.set_coordinates(coordinates);
                 boxes.place(&[*given]);
                 let scattered = boxes.to_nodes(-1.0).map_err(|error| Failure::Run(error.to_string()));
                 agreed(comm, scattered)?;
@@ -246,11 +318,45 @@ impl<const D: usize> Evaluator<D> {
     }
 }
 
-/// The node on the lattice of the input.
-fn on_lattice<const D: usize>(node: &RealNode<D>, level: u32) -> Result<NodeWeights, String> {
+/// Collective. Weights and gradients of a box.
+fn planar<const D: usize>(
+    comm: &Comm,
+    evaluator: &mut Evaluator<D>,
+    given: &GivenParticle<D>,
+    level: u32,
+) -> Result<Vec<NodeWeights>, Failure> {
+    let nodes = evaluator.nodes(comm, given, Coordinates::Cartesian)?;
+    let as_weights = |node: &RealNode<D>| {
+        let ijk = on_lattice(node.place, level)?;
+        Ok(NodeWeights { ijk, w: node.mass, grad: node.momentum.to_vec() })
+    };
+    nodes.iter().map(as_weights).collect()
+}
+
+/// Collective. Weights of the section of a ring; along the hoop they are those of the box over its radius.
+fn ring(
+    comm: &Comm,
+    evaluator: &mut Evaluator<2>,
+    given: &GivenParticle<2>,
+    level: u32,
+) -> Result<Vec<RingWeights>, Failure> {
+    let mut nodes = BTreeMap::new();
+    for node in evaluator.nodes(comm, given, Coordinates::Axisymmetric)? {
+        nodes.insert(node.place, (node.mass, node.momentum, 0.0));
+    }
+    for node in evaluator.nodes(comm, given, Coordinates::Cartesian)? {
+        nodes.entry(node.place).or_insert((0.0, [0.0; 2], 0.0)).2 = node.mass / given.position[0];
+    }
+    let as_weights = |(place, (s, grad, t)): ([u32; 2], (f64, [f64; 2], f64))| {
+        Ok(RingWeights { ijk: on_lattice(place, level)?, s, grad: grad.to_vec(), t })
+    };
+    nodes.into_iter().map(as_weights).collect()
+}
+
+/// A place on the lattice of the input.
+fn on_lattice<const D: usize>(place: [u32; D], level: u32) -> Result<Vec<u64>, Failure> {
     let finest = u32::from(MAX_LEVEL) + 2;
-    let ijk: Option<Vec<u64>> = node
-        .place
+    let ijk: Option<Vec<u64>> = place
         .iter()
         .map(|&x| {
             let (up, down) = (level.saturating_sub(finest), finest.saturating_sub(level));
@@ -258,6 +364,5 @@ fn on_lattice<const D: usize>(node: &RealNode<D>, level: u32) -> Result<NodeWeig
             (x >> down << down == x).then_some(x >> down)
         })
         .collect();
-    let ijk = ijk.ok_or_else(|| format!("a node does not lie on the lattice of level {level}"))?;
-    Ok(NodeWeights { ijk, w: node.mass, grad: node.momentum.to_vec() })
+    ijk.ok_or_else(|| Failure::Usage(format!("a node does not lie on the lattice of level {level}")))
 }

@@ -5,12 +5,15 @@
 //! the corners of the coarse cell on whose surface it lies, with the weights of multilinear interpolation
 //! there, again and again until only real nodes are left (Gao et al. 2017, section 4). Nothing here is shared
 //! with bins, arenas and constraints; it is slow and needs the whole tree.
+//!
+//! In axisymmetry the first axis is the radius, and all integrals carry r / r_p with the radius r_p of the
+//! box's centre: one degree more along that axis, and all else as it is.
 use std::collections::BTreeMap;
 
 use partition::{MAX_LEVEL, Octant};
 
 use super::plan::ghost_layer::KnownTree;
-use crate::kernel::BLOCK;
+use crate::kernel::{BLOCK, Coordinates};
 
 /// Weight of one real node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +37,18 @@ pub fn weights<const D: usize>(
     centre: [f64; D],
     half: [f64; D],
 ) -> Vec<DirectNode<D>> {
-    collected(tree, root_edge, centre, half, hand_to_real)
+    weights_in(Coordinates::Cartesian, tree, root_edge, centre, half)
+}
+
+/// [`weights`] in these coordinates; in those of axisymmetry the domain's lower corner is on the axis.
+pub fn weights_in<const D: usize>(
+    coordinates: Coordinates,
+    tree: &KnownTree<D>,
+    root_edge: f64,
+    centre: [f64; D],
+    half: [f64; D],
+) -> Vec<DirectNode<D>> {
+    collected(coordinates, tree, root_edge, centre, half, hand_to_real)
 }
 
 /// As [`weights`], but hanging nodes keep their sums, so that fields are discontinuous beside finer leaves:
@@ -45,11 +59,13 @@ pub fn unconstrained_weights<const D: usize>(
     centre: [f64; D],
     half: [f64; D],
 ) -> Vec<DirectNode<D>> {
-    collected(tree, root_edge, centre, half, |_, place, share, nodes| add(place, share, nodes))
+    let keep = |_: &KnownTree<D>, place, share, nodes: &mut BTreeMap<_, _>| add(place, share, nodes);
+    collected(Coordinates::Cartesian, tree, root_edge, centre, half, keep)
 }
 
 /// Weights and gradients by node, where `hand` distributes the shares of the corners of all cells.
 fn collected<const D: usize>(
+    coordinates: Coordinates,
     tree: &KnownTree<D>,
     root_edge: f64,
     centre: [f64; D],
@@ -58,7 +74,7 @@ fn collected<const D: usize>(
 ) -> Vec<DirectNode<D>> {
     let mut nodes = BTreeMap::new();
     for leaf in tree.leaves() {
-        for (place, share) in in_leaf(leaf, root_edge, centre, half) {
+        for (place, share) in in_leaf(coordinates, leaf, root_edge, centre, half) {
             hand(tree, place, share, &mut nodes);
         }
     }
@@ -84,23 +100,26 @@ fn add<const D: usize>(
 struct Interval {
     /// Coordinate of its lower corner, in cells of the leaf.
     cell: u32,
-    /// Share of the box's width that lies in the cell.
-    share: f64,
-    /// Distance of the middle of that share from the lower and from the upper corner, in cells. Each is
-    /// computed on its own, so that a small one keeps its digits.
-    middle: [f64; 2],
+    /// Mean of the hat functions of the lower and of the upper corner over the box, as far as it lies in the
+    /// cell.
+    hat: [f64; 2],
+    /// Mean of the upper one's slope, 1/m; the lower one has the opposite.
+    slope: f64,
 }
 
 /// Shares of a leaf's cells for their corners, cell by cell.
 fn in_leaf<const D: usize>(
+    coordinates: Coordinates,
     leaf: &Octant<D>,
     root_edge: f64,
     centre: [f64; D],
     half: [f64; D],
 ) -> Vec<([u32; D], Share<D>)> {
     let cell = root_edge / f64::from((BLOCK as u32) << leaf.level);
-    let along: [Vec<Interval>; D] =
-        std::array::from_fn(|axis| intervals(leaf.coord[axis], cell, centre[axis], half[axis]));
+    let along: [Vec<Interval>; D] = std::array::from_fn(|axis| {
+        let is_radius = axis == 0 && coordinates == Coordinates::Axisymmetric;
+        intervals(leaf.coord[axis], cell, centre[axis], half[axis], is_radius)
+    });
     let size = 1u32 << (MAX_LEVEL - leaf.level);
     let count = along.iter().map(Vec::len).product::<usize>();
     let mut shares = Vec::with_capacity(count << D);
@@ -112,11 +131,8 @@ fn in_leaf<const D: usize>(
         });
         for corner in 0..1u32 << D {
             let upper = |axis: usize| corner >> axis & 1;
-            let hat = |axis: usize| match upper(axis) {
-                0 => cut[axis].share * cut[axis].middle[1],
-                _ => cut[axis].share * cut[axis].middle[0],
-            };
-            let slope = |axis: usize| cut[axis].share / cell * if upper(axis) == 0 { -1.0 } else { 1.0 };
+            let hat = |axis: usize| cut[axis].hat[upper(axis) as usize];
+            let slope = |axis: usize| if upper(axis) == 0 { -cut[axis].slope } else { cut[axis].slope };
             let place = std::array::from_fn(|axis| (cut[axis].cell + upper(axis)) * size);
             let gradient = std::array::from_fn(|k| {
                 (0..D).map(|axis| if axis == k { slope(axis) } else { hat(axis) }).product()
@@ -128,17 +144,28 @@ fn in_leaf<const D: usize>(
 }
 
 /// The cells of a leaf along one axis that a box overlaps. Everything is evaluated relative to the cell, so
-/// that a tiny box far from the origin loses no digits.
-fn intervals(leaf: u32, cell: f64, centre: f64, half: f64) -> Vec<Interval> {
+/// that a tiny box far from the origin loses no digits. Along a radius means carry r over that of the centre.
+fn intervals(leaf: u32, cell: f64, centre: f64, half: f64, is_radius: bool) -> Vec<Interval> {
     let first = BLOCK as u32 * leaf;
     (first..first + BLOCK as u32)
         .filter_map(|at| {
             let middle = centre - f64::from(at) * cell;
             let (low, high) = ((middle - half).max(0.0), (middle + half).min(cell));
-            (high > low).then(|| Interval {
-                cell: at,
-                share: (high - low) / (2.0 * half),
-                middle: [0.5 * (low + high) / cell, 0.5 * ((cell - low) + (cell - high)) / cell],
+            (high > low).then(|| {
+                let share = (high - low) / (2.0 * half);
+                // Distance of the middle of the share from the lower and from the upper corner, in cells. Each
+                // is computed on its own, so that a small one keeps its digits.
+                let middle = [0.5 * (low + high) / cell, 0.5 * ((cell - low) + (cell - high)) / cell];
+                // The radius of the middle, and what the slope of a hat adds to its mean: width² / 12.
+                let (radius, bend) = match is_radius {
+                    true => (
+                        (f64::from(at) * cell + 0.5 * (low + high)) / centre,
+                        (high - low) * (high - low) / (12.0 * cell * centre),
+                    ),
+                    false => (1.0, 0.0),
+                };
+                let hat = [share * (middle[1] * radius - bend), share * (middle[0] * radius + bend)];
+                Interval { cell: at, hat, slope: share / cell * radius }
             })
         })
         .collect()

@@ -122,6 +122,16 @@ impl Transfer {
     }
 }
 
+/// Coordinates of the domain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Coordinates {
+    /// Space, or plane strain.
+    #[default]
+    Cartesian,
+    /// Radius and height, in 2D: bodies of revolution, per radian.
+    Axisymmetric,
+}
+
 /// How the half widths of a particle's box follow its deformation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BoxPolicy {
@@ -164,6 +174,8 @@ pub struct Scheme<'a> {
     pub root_cell: f64,
     /// Transfer of velocities.
     pub transfer: Transfer,
+    /// Coordinates: P2G alone knows those of axisymmetry.
+    pub coordinates: Coordinates,
     /// Materials by index (see [`crate::particle::chunk::Tag`]).
     pub materials: &'a [Box<dyn Material>],
     /// Whether any of them flows. If not, no particle is tested for it.
@@ -204,6 +216,7 @@ impl<'a> Scheme<'a> {
             boxes,
             root_cell,
             transfer,
+            coordinates: Coordinates::Cartesian,
             materials,
             is_plastic,
             is_all_plastic,

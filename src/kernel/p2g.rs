@@ -18,7 +18,7 @@ use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, add_products};
-use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 
@@ -80,7 +80,7 @@ impl<const D: usize> Scatter<'_, D> {
         for parts in parts.chunks(LANES) {
             let batch = Batch::from_indices(parts, |part| part.particle);
             let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
-            prepared.fill_parts(frame, &batch.positions(tile), parts);
+            prepared.fill_parts(frame, &batch.positions(tile), parts, scheme.coordinates);
             let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
             prepared.load::<Lanes>(tile, &batch, *dt, scheme.transfer, &spread);
             prepared.share(parts);
@@ -135,6 +135,10 @@ impl<const D: usize> WholeBoxes<'_, D> {
                 false => domain::away_from_walls(&whole, cell),
             };
             prepared.weights.fill(frame, &position, &position, &half);
+            if scheme.coordinates == Coordinates::Axisymmetric {
+                let [radius, half] = [position[0], half[0]].map(|lanes| Lanes::new(lanes.to_array()));
+                prepared.weights.revolve(frame, radius, radius, half);
+            }
             if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
                 prepared.weights.soften(&factors);
             }
@@ -178,9 +182,18 @@ impl<const D: usize> Prepared<D> {
         Self { weights: Weights::new(), momentum: rows, affine: [rows; D], impulse: [rows; D] }
     }
 
-    fn fill_parts(&mut self, frame: &Frame<D>, position: &[Lanes; D], parts: &[SubBox<D>]) {
+    fn fill_parts(
+        &mut self,
+        frame: &Frame<D>,
+        position: &[Lanes; D],
+        parts: &[SubBox<D>],
+        coordinates: Coordinates,
+    ) {
         let (centre, half) = SubBox::lanes(parts);
         self.weights.fill(frame, position, &centre, &half);
+        if coordinates == Coordinates::Axisymmetric {
+            self.weights.revolve(frame, position[0], centre[0], half[0]);
+        }
         if let Some(factors) = SubBox::softening(parts) {
             self.weights.soften(&factors);
         }

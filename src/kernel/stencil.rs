@@ -14,6 +14,11 @@
 //! squares of their slopes. Rounding must keep that, down to overlaps of one unit of the last place: the
 //! impulse of stress goes with the slope, and a node that gets an impulse without mass takes on any velocity.
 //! So `1 - (lo + m)/2` is evaluated as `((1 - lo) + (1 - m))/2`, whose differences are exact near 1.
+//!
+//! In axisymmetry the first axis is the radius r, and all means carry r over the radius r_p of the particle.
+//! A hat is linear over a part of the box, so with the part's middle m and width a (in cells, from the axis)
+//! and the hat's mean `n` the mean of hat times radius is `n m ± a²/12`, with the sign of its slope. Weights
+//! are sums of such terms and keep the property above: next to an overlap they are its square.
 use super::BLOCK;
 use crate::simd::Vector;
 
@@ -28,12 +33,26 @@ pub struct Axis<V> {
     pub slope: [V; 3],
 }
 
-impl<V: Vector> Axis<V> {
-    /// Weights of boxes centred at `centre` with half width `half`, both in cells and relative to the
-    /// corner of the block. `half` is at most 1/2 and the centre lies in the block. `inverse_cell` is
-    /// 1 / cell edge, 1/m.
+/// The parts of a box in the cell of its lowest node and in the next; lengths in cells from that node.
+#[derive(Clone, Copy)]
+struct Parts<V> {
+    base: V,
+    /// Widths.
+    a: V,
+    b: V,
+    /// Shares of the box.
+    a_share: V,
+    b_share: V,
+    /// Middle of the first part, and its distance from the next node.
+    mean: V,
+    mean_to_one: V,
+    /// Half the width of the second part.
+    half_b: V,
+}
+
+impl<V: Vector> Parts<V> {
     #[inline(always)]
-    pub fn new(centre: V, half: V, inverse_cell: f64) -> Self {
+    fn new(centre: V, half: V) -> Self {
         let zero = V::splat(0.0);
         let one = V::splat(1.0);
         let lower = centre - half;
@@ -45,14 +64,54 @@ impl<V: Vector> Axis<V> {
         let a = (middle - low).max(zero);
         let b = (high - one).max(zero);
         let volume_inverse = one / (a + b);
-        let a_share = a * volume_inverse;
-        let b_share = b * volume_inverse;
-        let mean = (low + middle) * 0.5;
-        let mean_to_one = ((one - low) + (one - middle)) * 0.5;
-        let half_b = b * 0.5;
+        Self {
+            base,
+            a,
+            b,
+            a_share: a * volume_inverse,
+            b_share: b * volume_inverse,
+            mean: (low + middle) * 0.5,
+            mean_to_one: ((one - low) + (one - middle)) * 0.5,
+            half_b: b * 0.5,
+        }
+    }
+}
+
+impl<V: Vector> Axis<V> {
+    /// Weights of boxes centred at `centre` with half width `half`, both in cells and relative to the
+    /// corner of the block. `half` is at most 1/2 and the centre lies in the block. `inverse_cell` is
+    /// 1 / cell edge, 1/m.
+    #[inline(always)]
+    pub fn new(centre: V, half: V, inverse_cell: f64) -> Self {
+        let Parts { base, a_share, b_share, mean, mean_to_one, half_b, .. } = Parts::new(centre, half);
+        let one = V::splat(1.0);
         let weight =
             [a_share * mean_to_one, a_share.mul_add(mean, b_share * (one - half_b)), b_share * half_b];
         let (a_slope, b_slope) = (a_share * inverse_cell, b_share * inverse_cell);
+        Self { base, weight, slope: [-a_slope, a_slope - b_slope, b_slope] }
+    }
+
+    /// As [`Axis::new`] along the radius of an axisymmetric domain, for a particle at `radius`, m: weights
+    /// `∫ N r dr` and slopes `∫ N' r dr`, each over the radius and the width of the box. `corner` is the radius of
+    /// the block's corner, m.
+    #[inline(always)]
+    pub fn revolved(centre: V, half: V, cell: f64, corner: f64, radius: V) -> Self {
+        let parts = Parts::new(centre, half);
+        let Parts { base, a, b, a_share, b_share, mean, mean_to_one, half_b } = parts;
+        let one = V::splat(1.0);
+        let inverse = V::splat(cell) / radius;
+        let first = base + V::splat(corner / cell);
+        let (a_radius, b_radius) = ((first + mean) * inverse, (first + one + half_b) * inverse);
+        let twelfth = inverse * (1.0 / 12.0);
+        let (a_bend, b_bend) = (a * a * twelfth, b * b * twelfth);
+        let weight = [
+            a_share * (mean_to_one * a_radius - a_bend),
+            a_share * (mean * a_radius + a_bend) + b_share * ((one - half_b) * b_radius - b_bend),
+            b_share * (half_b * b_radius + b_bend),
+        ];
+        let inverse_cell = 1.0 / cell;
+        let a_slope = a_share * a_radius * inverse_cell;
+        let b_slope = b_share * b_radius * inverse_cell;
         Self { base, weight, slope: [-a_slope, a_slope - b_slope, b_slope] }
     }
 
@@ -139,6 +198,39 @@ mod tests {
             }
         }
         assert!(reached > 4000, "{reached}");
+    }
+
+    /// Weights of rings add up to 1 and are not negative, linear fields are met at the centre of mass, a uniform
+    /// expansion has the same rate along the radius and along the hoop, and next to an overlap weights are its
+    /// square.
+    #[test]
+    fn rings_are_weighted_by_their_radius() {
+        let cell = 0.125;
+        for chunk in boxes().chunks_exact(LANES) {
+            for corner in [0.0, 4.0 * cell, 4000.0 * cell] {
+                let lanes = |i: usize| chunk[i];
+                let is_ring = |i: usize| corner > 0.0 || lanes(i).0 >= lanes(i).1;
+                let centre = Lanes::new(std::array::from_fn(|i| lanes(i).0));
+                let half = Lanes::new(std::array::from_fn(|i| lanes(i).1));
+                let radius = centre * cell + Lanes::splat(corner);
+                let axis = Axis::revolved(centre, half, cell, corner, radius);
+                let planar = Axis::new(centre, half, 1.0 / cell);
+                for lane in (0..LANES).filter(|&i| is_ring(i)) {
+                    let at = |lanes: &[Lanes; 3]| lanes.map(|v| v.to_array()[lane]);
+                    let (w, dw, hoop) = (at(&axis.weight), at(&axis.slope), at(&planar.weight));
+                    let (r, l) = (radius.to_array()[lane], lanes(lane).1 * cell);
+                    let node = |i: usize| corner + (axis.base.to_array()[lane] + i as f64) * cell;
+                    let sum = |f: &dyn Fn(usize) -> f64| (0..3).map(f).sum::<f64>();
+                    let eps = f64::EPSILON * (r / cell + 1.0) * (1.0 + cell / l);
+                    assert!(w.iter().all(|&w| w >= 0.0), "{w:?} at {r} {l}");
+                    assert!((sum(&|i| w[i]) - 1.0).abs() <= 8.0 * eps);
+                    assert!((sum(&|i| w[i] * node(i)) - r - l * l / (3.0 * r)).abs() <= 16.0 * eps * r);
+                    assert!(sum(&|i| dw[i]).abs() * cell <= 8.0 * eps);
+                    assert!((sum(&|i| dw[i] * node(i)) - 1.0).abs() <= 16.0 * eps * (r / cell).max(1.0));
+                    assert!((sum(&|i| hoop[i] / r * node(i)) - 1.0).abs() <= 16.0 * eps);
+                }
+            }
+        }
     }
 
     #[test]

@@ -89,6 +89,27 @@ impl<const D: usize> Weights<D> {
         (base + V::splat(TWO_52)).store(&mut self.base);
     }
 
+    /// Replaces the factors along the first axis by those of axisymmetry (see [`Axis::revolved`]), for
+    /// particles at `radius` whose boxes, or parts of boxes, are these; arms stay relative to the particles.
+    /// Out of line: planar kernels have one branch for it, and no registers.
+    #[inline(never)]
+    pub(super) fn revolve(&mut self, frame: &Frame<D>, radius: Lanes, centre: Lanes, half: Lanes) {
+        let (corner, inverse) = (frame.corner[0], 1.0 / frame.cell);
+        let local = |x: Lanes| (x - Lanes::splat(corner)) * inverse;
+        let axis = Axis::revolved(local(centre), half * inverse, frame.cell, corner, radius);
+        let offset = axis.offsets(local(radius), frame.cell);
+        let mut spread = Lanes::splat(0.0);
+        let to = &mut self.axis[0];
+        for i in 0..3 {
+            let arm = axis.weight[i] * offset[i];
+            spread = arm.mul_add(offset[i], spread);
+            axis.weight[i].store(&mut to.weight[i]);
+            arm.store(&mut to.arm[i]);
+            axis.slope[i].store(&mut to.slope[i]);
+        }
+        spread.store(&mut self.spread[0]);
+    }
+
     /// Multiplies slopes and arms along each axis by a factor.
     #[inline(always)]
     pub(super) fn soften<V: Vector>(&mut self, factors: &[V; D]) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
-use crate::kernel::{BoxPolicy, Scheme, Transfer};
+use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -51,6 +51,8 @@ pub struct Physics<const D: usize> {
     pub leaving: Leaving,
     /// Transfer of velocities.
     pub transfer: Transfer,
+    /// Coordinates of the domain.
+    pub coordinates: Coordinates,
     /// By velocity field, the density of its undeformed material, kg/m³, in jobs with fluids; `None` where
     /// materials differ.
     pub fill_densities: Vec<Option<f64>>,
@@ -235,6 +237,7 @@ impl<const D: usize> Physics<D> {
         let elastic_stretch =
             self.cohesion.as_ref().map_or(scheme.elastic_stretch, |cohesion| cohesion.stretch);
         let (f_bar, shares, has_halves) = (self.f_bar, self.load_columns(), self.has_halves);
-        Scheme { f_bar, shares, elastic_stretch, has_halves, ..scheme }
+        let coordinates = self.coordinates;
+        Scheme { coordinates, f_bar, shares, elastic_stretch, has_halves, ..scheme }
     }
 }

@@ -44,6 +44,7 @@ mod tutorials;
 mod view;
 mod walls_and_origin;
 mod warnings;
+mod weights_axisymmetric;
 mod weights_exact;
 mod weights_properties;
 
@@ -54,6 +55,7 @@ fn worker() {
     common::scenarios::work(&[
         golden::SCENARIOS,
         walls_and_origin::SCENARIOS,
+        weights_axisymmetric::SCENARIOS,
         weights_exact::SCENARIOS,
         weights_properties::SCENARIOS,
     ]);

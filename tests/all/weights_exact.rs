@@ -23,7 +23,7 @@ fn weights_are_exact_3d() {
 }
 
 /// Kinds of boxes.
-const KINDS: [&str; 14] = [
+pub(crate) const KINDS: [&str; 14] = [
     "quarter",
     "half",
     "narrow",
@@ -40,7 +40,11 @@ const KINDS: [&str; 14] = [
     "a cell and a bit",
 ];
 
-fn random_box<const D: usize>(random: &mut Random, leaves: &[Octant<D>], kind: &str) -> UnitBox<D> {
+pub(crate) fn random_box<const D: usize>(
+    random: &mut Random,
+    leaves: &[Octant<D>],
+    kind: &str,
+) -> UnitBox<D> {
     let leaf = leaves[random.below(leaves.len() as u64) as usize];
     let cell = 1u64 << (UNIT - 2 - u32::from(leaf.level));
     let root = 1u64 << UNIT;

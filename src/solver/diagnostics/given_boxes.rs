@@ -9,7 +9,7 @@ use crate::boundary::{Contact, Leaving};
 use crate::grid::constraints::parents::node_coord;
 use crate::grid::leaf_geometry::position_key;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::{BoxPolicy, Transfer};
+use crate::kernel::{BoxPolicy, Coordinates, Transfer};
 use crate::load::Gravity;
 use crate::material::{self, parameters};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -109,6 +109,7 @@ impl<const D: usize> GivenBoxes<D> {
             adaptivity: None,
             leaving: Leaving::default(),
             transfer: Transfer::Apic,
+            coordinates: Coordinates::Cartesian,
             boxes: BoxPolicy::Fixed,
             cohesion: None,
             has_halves: false,
@@ -146,6 +147,11 @@ impl<const D: usize> GivenBoxes<D> {
         if reach != self.solver.grid.plan.tree.reach() {
             self.solver.rebuild_grid(reach);
         }
+    }
+
+    /// Not collective. Coordinates of the scatters to come.
+    pub fn set_coordinates(&mut self, coordinates: Coordinates) {
+        self.solver.physics.coordinates = coordinates;
     }
 
     /// Collective. P2G with the impulse of stress over `dt`, node sums, and restriction to real nodes.
