@@ -5,6 +5,9 @@ use super::gap::Bounds;
 use super::motion::length;
 use crate::text::{number, quantity};
 
+/// Standard acceleration of gravity g (ISO 80000-3), m/s²: Voellmy's `ξ` is given for the Earth.
+pub const STANDARD_GRAVITY: f64 = 9.80665;
+
 /// Boundary condition of material at a surface. A face of the domain is a contact with an axis as normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
@@ -19,6 +22,9 @@ pub enum Contact {
         friction: f64,
         /// Shear stress that holds without pressure, Pa.
         cohesion: f64,
+        /// Drag coefficient c of turbulent flow along the surface: the shear stress `ρ c v²` of material of
+        /// the density ρ and the velocity v relative to the surface. `c = g/ξ` is Voellmy's (1955).
+        drag: f64,
     },
     /// Mirror plane, of faces only; for velocities the same as `slip`.
     Symmetric,
@@ -32,7 +38,7 @@ pub enum Contact {
 impl Default for Contact {
     /// Separating, without friction.
     fn default() -> Self {
-        Self::Separating { friction: 0.0, cohesion: 0.0 }
+        Self::Separating { friction: 0.0, cohesion: 0.0, drag: 0.0 }
     }
 }
 
@@ -48,9 +54,10 @@ impl Contact {
     /// them touches whatever touches them.
     ///
     /// Friction takes away at most the tangential velocity that the normal impulse allows:
-    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step), and what cohesion allows.
+    /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step), and what cohesion and drag allow.
+    /// Drag is taken at the end of the step, so that it never turns the velocity round.
     pub fn apply_within<const D: usize>(self, bounds: Bounds, velocity: &mut [f64; D], normal: &[f64; D]) {
-        let Bounds { least, most, sticking } = bounds.under(self);
+        let Bounds { least, most, sticking, drag } = bounds.under(self);
         let outward = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(normal[a], sum));
         let tangential: [f64; D] = std::array::from_fn(|a| (-outward).mul_add(normal[a], velocity[a]));
         let with_normal = |along: [f64; D], outward: f64| -> [f64; D] {
@@ -61,12 +68,13 @@ impl Contact {
         match self {
             Self::Outflow | Self::Absorbing => {}
             Self::Symmetric => *velocity = tangential,
-            _ if !is_held && outward >= least && sticking <= 0.0 => {}
+            _ if !is_held && outward >= least && sticking <= 0.0 && drag <= 0.0 => {}
             Self::Sticky => *velocity = with_normal([0.0; D], outward.clamp(least, most)),
             Self::Slip => *velocity = with_normal(tangential, outward.clamp(least, most)),
             Self::Separating { friction, .. } => {
-                let lost = friction.mul_add((least - outward).max(0.0), sticking);
                 let speed = length(&tangential);
+                let dragged = drag * speed * speed / drag.mul_add(speed, 1.0);
+                let lost = friction.mul_add((least - outward).max(0.0), sticking) + dragged;
                 let kept = if speed > lost { 1.0 - lost / speed } else { 0.0 };
                 *velocity = with_normal(tangential.map(|v| v * kept), outward.max(least));
             }
@@ -87,6 +95,24 @@ impl Contact {
         }
     }
 
+    /// Drag coefficient by Voellmy's ξ, m/s².
+    pub fn drag_of(turbulent_friction: Option<f64>) -> f64 {
+        turbulent_friction.map_or(0.0, |xi| STANDARD_GRAVITY / xi)
+    }
+
+    /// Drag coefficient of turbulent flow along the surface.
+    pub const fn drag(self) -> f64 {
+        match self {
+            Self::Separating { drag, .. } => drag,
+            _ => 0.0,
+        }
+    }
+
+    /// Whether the area of the material at the surface counts.
+    pub fn acts_by_area(self) -> bool {
+        self.cohesion() > 0.0 || self.drag() > 0.0
+    }
+
     /// Its name in job files.
     pub const fn name(self) -> &'static str {
         match self {
@@ -101,16 +127,19 @@ impl Contact {
 }
 
 impl fmt::Display for Contact {
-    /// The name, the coefficient of friction, and cohesion if there is any.
+    /// The name, the coefficient of friction, and cohesion and drag if there are any.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())?;
         match self {
-            Self::Separating { friction, cohesion } => {
+            Self::Separating { friction, cohesion, drag } => {
                 write!(f, " with friction {}", number(*friction, 4))?;
-                match *cohesion > 0.0 {
-                    true => write!(f, ", cohesion {}", quantity(*cohesion, "Pa")),
-                    false => Ok(()),
+                if *cohesion > 0.0 {
+                    write!(f, ", cohesion {}", quantity(*cohesion, "Pa"))?;
                 }
+                if *drag > 0.0 {
+                    write!(f, ", turbulent friction {} m/s²", number(STANDARD_GRAVITY / *drag, 4))?;
+                }
+                Ok(())
             }
             _ => Ok(()),
         }
@@ -129,7 +158,7 @@ mod tests {
 
     #[test]
     fn separating_surfaces_let_go() {
-        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0 };
+        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0, drag: 0.0 };
         let v = [1.0, 2.0, 0.5];
         assert_eq!(after(contact, v, [0.0, 0.0, 1.0]), v);
         assert_eq!(after(contact, v, [0.0, 0.0, -1.0])[2], 0.0);
@@ -138,7 +167,7 @@ mod tests {
 
     #[test]
     fn friction_is_limited_by_the_normal_impulse() {
-        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0 };
+        let contact = Contact::Separating { friction: 0.5, cohesion: 0.0, drag: 0.0 };
         assert_eq!(after(contact, [3.0, -2.0], [0.0, 1.0]), [2.0, 0.0]);
         assert_eq!(after(contact, [0.5, -2.0], [0.0, 1.0]), [0.0, 0.0]);
         let v = after(contact, [3.0, 4.0, -2.0], [0.0, 0.0, 1.0]);
@@ -157,7 +186,7 @@ mod tests {
             contact.apply_within(Bounds::across(gap, 1.0, 0.1), &mut v, &[0.0, 1.0]);
             v
         };
-        let friction = Contact::Separating { friction: 0.5, cohesion: 0.0 };
+        let friction = Contact::Separating { friction: 0.5, cohesion: 0.0, drag: 0.0 };
         assert_eq!(after(friction, 0.25, [3.0, -2.0]), [3.0, -2.0]);
         assert_eq!(after(friction, 0.25, [3.0, -4.5]), [2.0, -2.5]);
         // Near the surface `slip` and `sticky` let nothing go.
@@ -171,7 +200,7 @@ mod tests {
 
     #[test]
     fn cohesion_holds_without_pressure() {
-        let contact = Contact::Separating { friction: 0.5, cohesion: 1e3 };
+        let contact = Contact::Separating { friction: 0.5, cohesion: 1e3, drag: 0.0 };
         let after = |mut v: [f64; 2]| {
             contact.apply_within(Bounds { sticking: 1.0, ..Bounds::TOUCHING }, &mut v, &[0.0, 1.0]);
             v
@@ -180,6 +209,20 @@ mod tests {
         assert_eq!(after([0.5, 2.0]), [0.0, 2.0]);
         assert_eq!(after([3.0, -2.0]), [1.0, 0.0]);
         assert_eq!(contact.to_string(), "separating with friction 0.5, cohesion 1 kPa");
+    }
+
+    #[test]
+    fn drag_slows_down_and_never_turns_round() {
+        let contact = Contact::Separating { friction: 0.0, cohesion: 0.0, drag: 0.1 };
+        let after = |drag: f64, mut v: [f64; 2]| {
+            contact.apply_within(Bounds { drag, ..Bounds::TOUCHING }, &mut v, &[0.0, 1.0]);
+            v
+        };
+        // v / (1 + k v): what the end of a step has of dv/dt = -k v².
+        approx::assert_relative_eq!(after(0.5, [4.0, -1.0])[0], 4.0 / 3.0, epsilon = 1e-14);
+        approx::assert_relative_eq!(after(1e9, [4.0, 0.0])[0], 1e-9, epsilon = 1e-15);
+        assert_eq!(after(0.0, [4.0, -1.0]), [4.0, 0.0]);
+        assert_eq!(contact.to_string(), "separating with friction 0, turbulent friction 98.07 m/s²");
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! cell early, and the few particles in the hat would carry the force of all.
 use super::Contact;
 
-/// Width of a gap, in cells, up to which cohesion holds.
+/// Width of a gap, in cells, up to which cohesion and drag act.
 pub const STICKS: f64 = 0.1;
 
 /// Width of a gap, in cells, up to which it is closed: what rounding leaves between a column at rest and its
@@ -57,16 +57,18 @@ pub struct Bounds {
     pub most: f64,
     /// Velocity along the surface that cohesion takes away at most, m/s.
     pub sticking: f64,
+    /// Drag takes `k v² / (1 + k v)` of the velocity v along the surface: k, s/m.
+    pub drag: f64,
 }
 
 impl Bounds {
     /// Of material that touches the surface.
-    pub const TOUCHING: Self = Self { least: 0.0, most: 0.0, sticking: 0.0 };
+    pub const TOUCHING: Self = Self { least: 0.0, most: 0.0, sticking: 0.0, drag: 0.0 };
 
     /// Across a gap (m) between nodes with cells of this edge (m), in a step of length `dt`, s.
     pub fn across(gap: f64, cell: f64, dt: f64) -> Self {
         let least = if gap > CLOSED * cell { -gap / dt } else { 0.0 };
-        Self { least, most: if gap <= HELD * cell { 0.0 } else { f64::INFINITY }, sticking: 0.0 }
+        Self { least, most: if gap <= HELD * cell { 0.0 } else { f64::INFINITY }, sticking: 0.0, drag: 0.0 }
     }
 
     /// The same for a law: surfaces that separate hold nothing.
@@ -113,7 +115,7 @@ mod tests {
         assert_eq!(Bounds::across(0.25, 1.0, 0.5), Bounds { least: -0.5, ..Bounds::TOUCHING });
         assert_eq!(
             Bounds::across(0.75, 1.0, 0.5),
-            Bounds { least: -1.5, most: f64::INFINITY, sticking: 0.0 }
+            Bounds { least: -1.5, most: f64::INFINITY, ..Bounds::TOUCHING }
         );
         let free = Bounds::TOUCHING.under(Contact::default());
         assert_eq!(free, Bounds { most: f64::INFINITY, ..Bounds::TOUCHING });

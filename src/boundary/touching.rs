@@ -37,6 +37,8 @@ pub struct Touching<const D: usize> {
     pub law: Contact,
     /// Impulse along the surface that cohesion bears at most, kg m/s.
     pub sticking: f64,
+    /// Impulse of drag over the square of the velocity along the surface, kg s/m.
+    pub drag: f64,
     /// Velocity that an impulse of 1 kg m/s on all particles in contact brings, along the normal and along
     /// the surface, 1/kg.
     pub compliance: [f64; 2],
@@ -50,7 +52,7 @@ pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> 
 }
 
 impl<const D: usize> Touching<D> {
-    /// A particle with its centre at `x` (m), of these half widths (m), in a step of length `dt` (s). `None`
+    /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³), in a step of length `dt` (s). `None`
     /// if the gap to the surface is wider than `reach`, m, a function of the normal, the velocity of the
     /// surface and the distance at which the particle touches.
     pub fn new(
@@ -58,7 +60,7 @@ impl<const D: usize> Touching<D> {
         collider: &Collider<D>,
         (pose, rate): (&Pose<D>, &Rate<D>),
         x: &[f64; D],
-        half: &[f64; D],
+        (half, density): (&[f64; D], f64),
         dt: f64,
         reach: impl Fn(&[f64; D], &[f64; D], f64) -> f64,
     ) -> Option<Self> {
@@ -76,11 +78,13 @@ impl<const D: usize> Touching<D> {
         // energy.
         let least = -gap.max(0.0) / dt;
         let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
-        let bounds = Bounds { least, most: if held { least } else { f64::INFINITY }, sticking: 0.0 };
+        let bounds =
+            Bounds { least, most: if held { least } else { f64::INFINITY }, sticking: 0.0, drag: 0.0 };
         let (law, impulse) = (collider.contact, [0.0; D]);
         // The part of the surface under a box that is this high over it.
         let area = (0..D).fold(1.0, |volume, a| volume * 2.0 * half[a]) / (2.0 * touching);
-        let sticking = if gap <= STICKS * touching { law.cohesion() * area * dt } else { 0.0 };
+        let over = if gap <= STICKS * touching { area * dt } else { 0.0 };
+        let (sticking, drag) = (law.cohesion() * over, law.drag() * density * over);
         Some(Self {
             collider: number,
             normal,
@@ -89,6 +93,7 @@ impl<const D: usize> Touching<D> {
             bounds,
             law,
             sticking,
+            drag,
             compliance: [0.0; 2],
             impulse,
         })
@@ -112,12 +117,17 @@ impl<const D: usize> Touching<D> {
         let normal = wanted(least).max(wanted(most).min(0.0));
         let (sliding, held_back) = (across(&relative, outward), across(&self.impulse, pressed));
         let mut tangential: [f64; D] = std::array::from_fn(|a| held_back[a] - sliding[a] / of_surface);
+        // The impulse that stops all motion along the surface.
+        let size = length(&tangential);
         let most = match self.law {
             Contact::Sticky if most < f64::INFINITY || normal > 0.0 => f64::INFINITY,
-            Contact::Separating { friction, .. } => friction.mul_add(normal, self.sticking),
+            Contact::Separating { friction, .. } => {
+                let speed = size * of_surface;
+                let dragged = self.drag * speed * speed / (self.drag * speed).mul_add(of_surface, 1.0);
+                friction.mul_add(normal, self.sticking) + dragged
+            }
             _ => 0.0,
         };
-        let size = length(&tangential);
         if size > most {
             tangential = tangential.map(|t| t * (most / size));
         }

@@ -198,6 +198,81 @@ fn cohesion_holds_its_stress_times_the_area() {
     }
 }
 
+/// Viscous oil between a cylinder that turns and a fixed one around it sticks to both: the torque is that of
+/// Couette's flow, `4 π η ω R₁² R₂² / (R₂² - R₁²)`, with ten cells over the gap.
+#[test]
+fn oil_sticks_to_curved_walls() {
+    let text = "version = 1\ndimension = 2\n[domain]\nmin = [-0.12, -0.12]\nsize = [0.24, 0.24]\nroot_edge = 0.02\n\
+        [[materials]]\nname = 'oil'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = 1000\nviscosity = 1\ntension = true\n\
+        [[bodies]]\nname = 'oil'\nmaterial = 'oil'\nshape = { kind = 'difference', from = { kind = 'circle', centre = [0, 0], \
+        radius = 0.1 }, remove = [{ kind = 'circle', centre = [0, 0], radius = 0.05 }] }\n[[colliders]]\nname = 'inner'\n\
+        shape = { kind = 'circle', centre = [0, 0], radius = 0.05 }\ncontact = { kind = 'sticky' }\n\
+        motion = { kind = 'steady', angular_velocity = 1 }\n[[colliders]]\nname = 'outer'\nshape = { kind = 'difference', \
+        from = { kind = 'box', min = [-1, -1], max = [1, 1] }, remove = [{ kind = 'circle', centre = [0, 0], radius = 0.1 }] }\n\
+        contact = { kind = 'sticky' }\n[time]\nend = 1.2\n[output]\npicture = false\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("couette.toml");
+    std::fs::write(&path, text).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+    let history = History::read(directory.path(), "couette");
+    let torque = 4.0 * std::f64::consts::PI * 0.05_f64.powi(2) * 0.1_f64.powi(2)
+        / (0.1_f64.powi(2) - 0.05_f64.powi(2));
+    let (start, _) = history.at("time", 0.9);
+    for (name, sign) in [("inner", -1.0), ("outer", 1.0)] {
+        let time = history.last("time") - start;
+        let mean = sign * history.integral(&format!("torque_{name}"), start) / time;
+        println!("{name}: {mean:.5} N m of {torque:.5}");
+        assert!((mean / torque - 1.0).abs() < 0.03, "{name}: {mean} of {torque}");
+    }
+}
+
+/// Voellmy's law: a block of the height H that is pulled along with an acceleration a, less Coulomb friction,
+/// has the velocity `v = v_e tanh(a t / v_e)`, with `v_e² = a H ξ / g`; at faces of the domain and on colliders
+/// at any place between the nodes, on which of them they act, and whether the material yields.
+#[test]
+fn turbulent_friction_brings_a_sliding_block_to_its_terminal_velocity() {
+    let elastic = "model = 'neo_hookean'\nyoung = 1e6\npoisson = 0";
+    let yields = "model = 'drucker_prager'\nyoung = 1e6\npoisson = 0\nfriction_angle = 30\ncohesion = 1e5";
+    let speed = |model: &str, collider: &str, face: &str, surface: f64| {
+        let contact = "{ kind = 'separating', friction = 0.1, turbulent_friction = 49.03325 }";
+        let text = format!(
+            "version = 1\ndimension = 2\ngravity = [5, -10]\n[domain]\nsize = [2, 1]\nroot_edge = 0.5\n[tree]\nbase_level = 1\n\
+             [[materials]]\nname = 'm'\ndensity = 1000\n{model}\n[[bodies]]\nname = 'block'\nmaterial = 'm'\n\
+             shape = {{ kind = 'box', min = [0.25, {surface}], max = [0.75, {}] }}\n{collider}\n{face}\n\
+             [time]\nend = 0.6\n[output]\npicture = false\n",
+            surface + 0.25,
+        );
+        let text = text.replace("CONTACT", contact);
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("flow.toml");
+        std::fs::write(&path, text).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let history = History::read(directory.path(), "flow");
+        history.last("momentum_x") / history.last("mass")
+    };
+    let floor = |height: f64, rest: &str| {
+        format!(
+            "[[colliders]]\nname = 'floor'\nshape = {{ kind = 'box', min = [-1, -1], max = [3, {height}] }}\ncontact = CONTACT\n{rest}"
+        )
+    };
+    let cases = [
+        (elastic, String::new(), "[boundaries]\ny_min = CONTACT", 0.0),
+        (yields, String::new(), "[boundaries]\ny_min = CONTACT", 0.0),
+        (elastic, floor(0.25, ""), "", 0.25),
+        (elastic, floor(0.28125, ""), "", 0.28125),
+        (yields, floor(0.28125, ""), "", 0.28125),
+        (elastic, floor(0.28125, "acts_on = 'particles'"), "", 0.28125),
+    ];
+    let (pull, height): (f64, f64) = (4.0, 0.25);
+    let terminal = (pull * height / 0.2).sqrt();
+    let expected = terminal * (pull * 0.6 / terminal).tanh();
+    for (model, collider, face, surface) in cases {
+        let speed = speed(model, &collider, face, surface);
+        println!("{model}, at {surface}: {speed:.4} m/s of {expected:.4}");
+        assert!((speed / expected - 1.0).abs() < 0.03, "{model} {collider}{face}: {speed} of {expected}");
+    }
+}
+
 /// Height over the surface (cells) of the lower face of a block of 8 x 8 cells that has fallen from a cell
 /// above it, once it is at rest, and the mean stress of its two lowest rows of particles over that of their
 /// weight.
@@ -263,14 +338,16 @@ fn water_rests_in_tanks_however_they_are_written() {
         ("seam", union(&[&halves[..], &left, &right].join(", ")), 0.0),
         ("overlap", union(&[&lapping[..], &left, &right].join(", ")), 0.0),
         ("between nodes", format!("{{ kind = 'difference', from = {all}, remove = [{hole}] }}"), 0.015625),
+        ("sticky", format!("{{ kind = 'difference', from = {all}, remove = [{hole}] }}"), 0.015625),
     ];
     for (name, shape, shift) in tanks {
+        let contact = if name == "sticky" { name } else { "slip" };
         let text = format!(
             "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nmin = [{}, {}]\nsize = [1.5, 1]\nroot_edge = 0.25\n\
              [tree]\nbase_level = 1\n[[materials]]\nname = 'water'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = 2e5\n\
              viscosity = 1e-3\n[[bodies]]\nname = 'water'\nmaterial = 'water'\nstress = {{ kind = 'hydrostatic' }}\n\
              shape = {{ kind = 'box', min = [0, 0], max = [1, 0.3125] }}\n\
-             [[colliders]]\nname = 'tank'\nshape = {shape}\ncontact = {{ kind = 'slip' }}\n\
+             [[colliders]]\nname = 'tank'\nshape = {shape}\ncontact = {{ kind = '{contact}' }}\n\
              [[probes]]\nname = 'water'\nquantities = ['centre', 'extent']\n[time]\nend = 1\n[output]\npicture = false\n",
             -0.25 + shift,
             -0.125 + shift,

@@ -33,9 +33,11 @@ pub(in crate::job) fn faces<const D: usize>(
     let condition = |face: &file::Face| match face {
         file::Face::Slip {} => Contact::Slip,
         file::Face::Sticky {} => Contact::Sticky,
-        file::Face::Separating { friction, cohesion } => {
-            Contact::Separating { friction: *friction, cohesion: *cohesion }
-        }
+        file::Face::Separating { friction, cohesion, turbulent_friction } => Contact::Separating {
+            friction: *friction,
+            cohesion: *cohesion,
+            drag: Contact::drag_of(*turbulent_friction),
+        },
         file::Face::Symmetric {} => Contact::Symmetric,
         file::Face::Outflow {} => Contact::Outflow,
         file::Face::Absorbing { .. } => Contact::Absorbing,

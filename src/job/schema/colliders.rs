@@ -69,7 +69,7 @@ pub enum Contact {
     Sticky {},
     /// Material slides along the surface without friction and never leaves it.
     Slip {},
-    /// Material may leave the surface; Coulomb friction acts while it presses, cohesion while it touches.
+    /// Material may leave the surface; Coulomb friction acts while it presses, cohesion and turbulent friction while it touches.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
@@ -79,6 +79,10 @@ pub enum Contact {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1e15))]
         cohesion: f64,
+        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with the density ρ and the
+        /// velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400 to 4000; none by default.
+        #[schemars(range(min = 1e-3, max = 1e12))]
+        turbulent_friction: Option<f64>,
     },
 }
 

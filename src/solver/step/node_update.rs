@@ -170,29 +170,37 @@ impl<const D: usize> Physics<D> {
     /// Where the material of a velocity field is, if it is known.
     pub(super) fn gaps<'a>(&self, walls: &Walls, solids: &'a [Solids<D>], field: usize) -> Option<Gaps<'a>> {
         let touches = !self.moves_over_gaps(field);
-        let over = walls.known_over.filter(|_| !touches || self.has_cohesive_walls())?;
+        let over = walls.known_over.filter(|_| !touches || self.has_walls_by_area())?;
         Some(Gaps { sums: &solids[field].field.fields.rows, over, touches })
     }
 
-    /// Whether any face or collider has cohesion.
-    pub(super) fn has_cohesive_walls(&self) -> bool {
+    /// Whether any face or collider has a law by the area of the material at it.
+    pub(super) fn has_walls_by_area(&self) -> bool {
         let of_colliders = self.colliders.iter().map(|collider| collider.contact);
-        self.faces.iter().flatten().copied().chain(of_colliders).any(|law| law.cohesion() > 0.0)
+        self.faces.iter().flatten().copied().chain(of_colliders).any(Contact::acts_by_area)
     }
 }
 
 impl Gaps<'_> {
     /// Bounds on the velocity of a node on a face with this normal into the domain, of cells of this edge, m.
     /// `cohesion` is the velocity that cohesion over an area of 1 m² (in plane strain 1 m) takes away at
-    /// most, m/s.
-    fn bounds<const D: usize>(&self, node: usize, normal: &[f64; D], cell: f64, cohesion: f64) -> Bounds {
+    /// most, m/s; `drag` is the way of the surface in the step by a velocity of 1 m/s, times the coefficient
+    /// of drag, s.
+    fn bounds<const D: usize>(
+        &self,
+        node: usize,
+        normal: &[f64; D],
+        cell: f64,
+        [cohesion, drag]: [f64; 2],
+    ) -> Bounds {
         let row = self.sums[node].0;
         let slope = -(0..D).fold(0.0, |sum, a| row[a].mul_add(normal[a], sum));
         let gap = cell * gap::height(row[3], slope, cell);
         // At a face the slope is the area that the material has of it.
-        let sticking = if gap <= gap::STICKS * cell { cohesion * slope.max(0.0) } else { 0.0 };
+        let area = if self.touches || gap <= gap::STICKS * cell { slope.max(0.0) } else { 0.0 };
+        let (sticking, drag) = (cohesion * area, if row[3] > 0.0 { drag * area / row[3] } else { 0.0 });
         let bounds = if self.touches { Bounds::TOUCHING } else { Bounds::across(gap, cell, self.over) };
-        Bounds { sticking, ..bounds }
+        Bounds { sticking, drag, ..bounds }
     }
 }
 
@@ -242,7 +250,8 @@ pub fn apply_faces<const D: usize>(
                             let cohesion =
                                 if row[3] > 0.0 { law.cohesion() * faces.dt / row[3] } else { 0.0 };
                             let gaps = faces.gaps.filter(|_| law.has_gap());
-                            let bounds = gaps.map(|gaps| gaps.bounds(node as usize, &normal, cell, cohesion));
+                            let by_area = [cohesion, law.drag() * faces.dt];
+                            let bounds = gaps.map(|gaps| gaps.bounds(node as usize, &normal, cell, by_area));
                             law.apply_within(bounds.unwrap_or(Bounds::TOUCHING), &mut velocity, &normal);
                         }
                     }

@@ -94,7 +94,9 @@ fn collider<const D: usize>(
         None => Contact::default(),
         Some(WrittenContact::Sticky {}) => Contact::Sticky,
         Some(WrittenContact::Slip {}) => Contact::Slip,
-        Some(WrittenContact::Separating { friction, cohesion }) => Contact::Separating { friction, cohesion },
+        Some(WrittenContact::Separating { friction, cohesion, turbulent_friction }) => {
+            Contact::Separating { friction, cohesion, drag: Contact::drag_of(turbulent_friction) }
+        }
     };
     let deforming = match &written.frames {
         Some(frames) => {

@@ -8,6 +8,7 @@ use crate::geometry::Aabb;
 use crate::grid::leaf_geometry::leaf_box;
 use crate::kernel::{Select, domain};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::volume::volume;
 use crate::solver::sorting::bins::BoxWidths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::Near;
@@ -81,8 +82,10 @@ impl<const D: usize> Solver<D> {
                                 (0..D).fold(0.0, |sum, a| (surface[a] - v[a]).mul_add(normal[a], sum));
                             (AHEAD * dt).mul_add(inward.max(0.0), REACH * touching)
                         };
+                        let density = chunk.column(Layout::<D>::MASS)[p as usize] / volume(chunk, p as usize);
+                        let of_box = (half, density);
                         if let Some(contact) =
-                            Touching::new(number, collider, (&state.pose, rate), &x, half, dt, reach)
+                            Touching::new(number, collider, (&state.pose, rate), &x, of_box, dt, reach)
                         {
                             found.push(chunk, p as usize, contact);
                         }

@@ -216,7 +216,7 @@ impl<const D: usize> Foot<D> {
     /// kg m/s.
     pub(super) fn reach(&self, law: Contact) -> [f64; D] {
         let along = match law {
-            Contact::Separating { friction, cohesion } if cohesion <= 0.0 => friction.min(1.0),
+            Contact::Separating { friction, .. } if !law.acts_by_area() => friction.min(1.0),
             Contact::Slip => 0.0,
             _ => 1.0,
         };
@@ -225,6 +225,7 @@ impl<const D: usize> Foot<D> {
 
     /// The contact across a gap (m) in a step of length `dt` (s) with a surface that moves so fast, m/s.
     pub(super) fn touching(&self, law: Contact, surface: [f64; D], gap: f64, dt: f64) -> Touching<D> {
+        let over = if gap <= gap::STICKS * self.cell { dt } else { 0.0 };
         Touching {
             collider: self.collider,
             normal: self.normal,
@@ -232,8 +233,9 @@ impl<const D: usize> Foot<D> {
             surface,
             bounds: Bounds::across(gap, self.cell, dt).under(law),
             law,
-            // Of an area of 1 m², until the area is known.
-            sticking: if gap <= gap::STICKS * self.cell { law.cohesion() * dt } else { 0.0 },
+            // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
+            sticking: law.cohesion() * over,
+            drag: law.drag() * over,
             compliance: [0.0; 2],
             impulse: [0.0; D],
         }

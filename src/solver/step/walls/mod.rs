@@ -50,7 +50,7 @@ const SWEEPS: usize = 6;
 impl<const D: usize> Solver<D> {
     /// Whether the material of a velocity field must know how far it is from a wall.
     fn asks_for_gaps(&self, field: usize) -> bool {
-        self.physics.moves_over_gaps(field) || self.physics.has_cohesive_walls()
+        self.physics.moves_over_gaps(field) || self.physics.has_walls_by_area()
     }
 
     /// Whether any collider acts at feet on a velocity field.

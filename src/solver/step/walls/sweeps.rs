@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::at_nodes::is_at_another;
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
-use crate::boundary::{Bounds, Collider, ColliderState, Touching};
+use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::grid::Window;
 use crate::grid::mask::block_nodes;
@@ -88,7 +88,7 @@ impl<const D: usize> Solver<D> {
         self.scatter_at_feet(all, |_, _| [0.0; 4]);
         let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
         let touches = !self.physics.moves_over_gaps(field);
-        let known = !touches || self.physics.has_cohesive_walls();
+        let known = !touches || self.physics.has_walls_by_area();
         let masses = &other.fields.rows;
         let sums = |node: usize| match known {
             true => solids[field].field.fields.rows[node].0,
@@ -121,20 +121,15 @@ impl<const D: usize> Solver<D> {
                 if *covered <= 0.0 {
                     continue;
                 }
-                let gap = match known {
-                    true => foot.gap(sizes, &foot.at_corners(&fields.rows)),
-                    false => None,
-                };
                 let collider = &colliders[foot.collider];
-                let touches = touches || !collider.contact.has_gap();
-                let gap = if touches { gap.or(Some(foot.cell)) } else { gap };
+                let gap = match touches || !collider.contact.has_gap() {
+                    true => Some(0.0),
+                    false => foot.gap(sizes, &foot.at_corners(&fields.rows)),
+                };
                 *touching = gap.map(|gap| {
                     let surface =
                         collider.velocity_at(&foot.at, &states[foot.collider].pose, &rates[foot.collider]);
-                    let contact = foot.touching(collider.contact, surface, gap, dt);
-                    let bounds =
-                        if touches { Bounds::TOUCHING.under(collider.contact) } else { contact.bounds };
-                    Touching { bounds, ..contact }
+                    foot.touching(collider.contact, surface, gap, dt)
                 });
             }
         }
@@ -177,13 +172,13 @@ impl<const D: usize> Solver<D> {
                 }
             }
         }
-        if self.physics.has_cohesive_walls() {
+        if self.physics.has_walls_by_area() {
             self.find_areas(field, all, covered, other);
         }
     }
 
     /// Not collective. Multiplies what cohesion bears by the area of the material's surface that each foot
-    /// holds: a node shares `-Σ V ∇w · n` out to the feet that it is a corner of, by weights. Real nodes have
+    /// holds, and drag by the density there as well: a node shares `-Σ V ∇w · n` out to the feet that it is a corner of, by weights. Real nodes have
     /// the sums of these over their mass.
     fn find_areas(
         &mut self,
@@ -196,8 +191,12 @@ impl<const D: usize> Solver<D> {
         let (masses, sums) = (&other.fields.rows, &solids[field].field.fields.rows);
         for_real_nodes(fields, plan, |node, row| {
             let shares = masses[node].0[3] * row.0[3];
-            let [x, y, z, _] = sums[node].0;
-            *row = Row(if shares > 0.0 { [x, y, z, 0.0].map(|slope| slope / shares) } else { [0.0; 4] });
+            let [x, y, z, volume] = sums[node].0;
+            let density = if volume > 0.0 { masses[node].0[3] / volume } else { 0.0 };
+            *row = Row(match shares > 0.0 {
+                true => [x / shares, y / shares, z / shares, density],
+                false => [0.0; 4],
+            });
         });
         fields.prolong(plan, arenas);
         for (leaf, covered) in all.iter_mut().zip(covered) {
@@ -206,6 +205,7 @@ impl<const D: usize> Solver<D> {
                     let slopes = foot.gather(&fields.rows);
                     let area = -(0..D).fold(0.0, |sum, a| slopes[a].mul_add(foot.normal[a], sum)) / covered;
                     contact.sticking *= area.max(0.0);
+                    contact.drag *= area.max(0.0) * slopes[3] / covered;
                 }
             }
         }
