@@ -106,11 +106,6 @@ impl<const D: usize> Collider<D> {
         self.acts_on == ActsOn::Nodes && self.is_present()
     }
 
-    /// Whether it acts at the feet of the nodes inside it, in this stage.
-    pub fn acts_at_feet(&self) -> bool {
-        self.acts_on_nodes() && self.contact != Contact::Sticky
-    }
-
     /// Whether it acts on particles, in this stage.
     pub fn acts_on_particles(&self) -> bool {
         self.acts_on == ActsOn::Particles && self.is_present()

@@ -178,10 +178,17 @@ impl<const D: usize> Physics<D> {
     }
 
     /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion
-    /// needs the area of the material's surface, which feet know.
+    /// and drag need the area of the material's surface, which feet know. `sticky` colliders hold solids at
+    /// the nodes, since a grip that leaves the rim of a beam some freedom is too soft; fluids held there slip,
+    /// up to a cell before nodes that are up to a cell behind the surface.
     pub(in crate::solver) fn acts_at_feet(&self, field: usize, collider: &Collider<D>) -> bool {
-        let has_feet = self.meets(field) != Meets::Nodes || collider.contact.cohesion() > 0.0;
-        collider.acts_at_feet() && has_feet
+        let has_feet = match (self.meets(field), collider.contact) {
+            (Meets::Feet, _) => true,
+            (_, Contact::Sticky) => false,
+            (Meets::Surface, _) => true,
+            (Meets::Nodes, law) => law.acts_by_area(),
+        };
+        collider.acts_on_nodes() && has_feet
     }
 
     /// What velocity fields need to know of the nodes inside a collider.

@@ -109,7 +109,7 @@ fn hold<const D: usize>(
                     touches.push(Touch { collider: number, position: x, impulse });
                 }
             };
-            if collider.contact == Contact::Sticky {
+            if collider.contact == Contact::Sticky && !at_feet(collider) {
                 // All of the velocity is held, whatever the normal is.
                 bits(inside.nodes).for_each(|bit| hold(bit, &[0.0; D]));
                 continue;
