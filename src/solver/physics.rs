@@ -12,7 +12,6 @@ use crate::particle::followed::Followed;
 use crate::particle::group::Group;
 use crate::particle::strain;
 use crate::quantity::{NotFinite, Quantity};
-use crate::solver::state::inside::Asked;
 use crate::source::Source;
 
 /// The problem that the solver solves: the same on every rank, constant over a stage of the run.
@@ -189,16 +188,6 @@ impl<const D: usize> Physics<D> {
             (Meets::Nodes, law) => law.acts_by_area(),
         };
         collider.acts_on_nodes() && has_feet
-    }
-
-    /// What velocity fields need to know of the nodes inside a collider.
-    pub(in crate::solver) fn asked_of(&self, collider: &Collider<D>) -> Asked {
-        let at_feet = |field: usize| self.acts_at_feet(field, collider);
-        let fields = 0..self.body_contacts.fields();
-        Asked {
-            planes: fields.clone().any(at_feet),
-            normals: collider.contact != Contact::Sticky && !fields.into_iter().all(at_feet),
-        }
     }
 
     /// Whether fluids are kept in their volume: not with mass scaling, since volumes do not follow from the

@@ -1,5 +1,5 @@
 //! Nodes inside colliders, and the surfaces that they are behind.
-use crate::boundary::Collider;
+use crate::boundary::{Collider, Contact};
 use rustc_hash::FxHashMap;
 
 use crate::boundary::motion::{Motion, Pose};
@@ -8,6 +8,7 @@ use crate::grid::GridPlan;
 use crate::grid::mask::bits;
 use crate::grid::plan::Block;
 use crate::kernel::BLOCK;
+use crate::solver::physics::Physics;
 
 /// Length, in cells, below which places are the same.
 pub(in crate::solver) const SAME: f64 = 1e-6;
@@ -31,6 +32,16 @@ pub(in crate::solver) struct Asked {
 impl Asked {
     /// Nothing.
     pub(in crate::solver) const NODES: Self = Self { planes: false, normals: false };
+
+    /// What the velocity fields of a problem ask of the nodes inside a collider.
+    pub(in crate::solver) fn of<const D: usize>(physics: &Physics<D>, collider: &Collider<D>) -> Self {
+        let at_feet = |field: usize| physics.acts_at_feet(field, collider);
+        let fields = 0..physics.body_contacts.fields();
+        Self {
+            planes: fields.clone().any(at_feet),
+            normals: collider.contact != Contact::Sticky && !fields.into_iter().all(at_feet),
+        }
+    }
 }
 
 /// The nodes of one block that lie inside one collider.
@@ -245,7 +256,7 @@ fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boundary::{ActsOn, Contact};
+    use crate::boundary::ActsOn;
     use crate::geometry::Shape;
 
     /// Feet and normals of a node among cells of 1 m inside a collider of this shape.

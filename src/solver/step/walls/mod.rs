@@ -39,7 +39,7 @@ use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::VelocityField;
-use crate::solver::state::inside::{Inside, is_still};
+use crate::solver::state::inside::{Asked, Inside, is_still};
 use crate::solver::state::phases::Phase;
 use crate::solver::state::walls::{StillWalls, with_children};
 use crate::solver::step::colliders::Touch;
@@ -106,7 +106,7 @@ impl<const D: usize> Solver<D> {
         let poses: Vec<_> = states.iter().map(|state| state.pose).collect();
         let (plan, colliders) = (&grid.plan, &physics.colliders);
         let still = grid.walls.still.get_or_insert_with(|| {
-            let asked_of = |collider: &Collider<D>| physics.asked_of(collider);
+            let asked_of = |collider: &Collider<D>| Asked::of(physics, collider);
             StillWalls::find(plan, &physics.faces, colliders, &poses, asked_of, &mut grid.inside_still)
         });
         let known = still.nodes.clone();
@@ -129,7 +129,7 @@ impl<const D: usize> Solver<D> {
             let candidates =
                 real | (block.constrained & nodes_in_domain(&plan.tree, block.level, block.coord));
             let inside = |(collider, pose): (&Collider<D>, _)| {
-                let asked = physics.asked_of(collider);
+                let asked = Asked::of(physics, collider);
                 // Constrained nodes have no velocity of their own.
                 let candidates = if asked.planes { candidates } else { real };
                 let find = || Inside::find(plan, block, candidates, collider, pose, asked);
