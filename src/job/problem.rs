@@ -12,8 +12,10 @@ pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Transfer};
 use crate::load::{Gravity, Load};
+use crate::material::Material;
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
+use crate::material::undrained::{self, Undrained};
 use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
@@ -310,6 +312,15 @@ pub struct MaterialSetup {
     pub density: f64,
     /// Constitutive model.
     pub model: Parameters,
+    /// Water that cannot leave its pores.
+    pub undrained: Option<Undrained>,
+}
+
+impl MaterialSetup {
+    /// The material as the solver calls it.
+    pub fn build(&self) -> Box<dyn Material> {
+        undrained::build(&self.model, self.undrained.as_ref(), self.density)
+    }
 }
 
 /// A body of particles.

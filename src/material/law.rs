@@ -183,8 +183,18 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// more belong to the model.
     fn history_names(&self) -> &'static [&'static str];
 
+    /// As [`Material::history_names`], without that of water in the pores.
+    fn skeleton_history(&self) -> &'static [&'static str] {
+        self.history_names()
+    }
+
     /// History variables of an undeformed particle.
     fn initial_history(&self) -> [f64; HISTORIES];
+
+    /// Stiffness of water that cannot leave the pores, Pa; 0 where there is none (see [`super::undrained`]).
+    fn water_modulus(&self) -> f64 {
+        0.0
+    }
 
     /// Whether it asks for the size of cells ([`Step::size`]).
     fn softens(&self) -> bool;

@@ -14,6 +14,7 @@
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `root.rs` | roots of scalar equations, lane by lane |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
+//! | `undrained.rs` | water that cannot leave the pores of a solid |
 //! | `driver/` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
@@ -29,6 +30,7 @@ mod root;
 pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
+pub mod undrained;
 
 pub use law::{Law, Material, State, Step};
 pub use laws::{HISTORIES, Model};

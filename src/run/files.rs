@@ -13,6 +13,8 @@ use crate::solver::state::phases::Phase;
 /// Names that files carry, in the order of the numbers in tags.
 pub(super) struct Names {
     materials: Vec<String>,
+    /// Stiffness of water that cannot leave the pores, by material, Pa.
+    water_moduli: Vec<f64>,
     bodies: Vec<String>,
     histories: Vec<String>,
     /// The job file, from the root of the file system; empty if it is not there any more.
@@ -23,6 +25,7 @@ impl Names {
     pub(super) fn of<const D: usize>(problem: &Problem<D>, solver: &Solver<D>) -> Self {
         Self {
             materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
+            water_moduli: solver.physics.materials.iter().map(|m| m.water_modulus()).collect(),
             bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
             histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
             job_file: problem.path.canonicalize().unwrap_or_default(),
@@ -135,6 +138,7 @@ fn view<'a, const D: usize>(
         root_edge: problem.root_edge,
         brick: problem.brick,
         materials: &names.materials,
+        water_moduli: &names.water_moduli,
         bodies: &names.bodies,
         histories: &names.histories,
         job_digest: problem.digest,

@@ -9,7 +9,6 @@ use self::initial_stress::put_under_stress;
 use self::seed::{SeedError, check_counts, check_finite, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::kernel::Coordinates;
-use crate::material;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
@@ -35,7 +34,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         origin: problem.origin,
         root_edge: problem.root_edge,
         graded: problem.tree.graded,
-        materials: problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect(),
+        materials: problem.materials.iter().map(|m| m.build()).collect(),
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
         sources: problem.sources.clone(),

@@ -8,7 +8,6 @@
 use super::seed::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
-use crate::material;
 
 /// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding of
 /// faces that lie on the lattice.
@@ -56,7 +55,7 @@ pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) ->
     let tile_leaves = (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0;
     let material = &problem.materials[body.material];
     let is_fitted = matches!(body.sampling, Sampling::Fitted);
-    is_fitted && tile_leaves && !material::build(&material.model, material.density).is_fluid()
+    is_fitted && tile_leaves && !material.build().is_fluid()
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.

@@ -6,7 +6,6 @@ use crate::adaptivity::Cohesion;
 use crate::boundary::Meets;
 use crate::job::Problem;
 use crate::job::problem::{Body, BoxPolicy};
-use crate::material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
@@ -59,7 +58,7 @@ fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesi
     let bodies = problem.bodies.iter().enumerate().filter(|(_, body)| body.stage <= stage);
     let elastic = bodies.filter(|(number, _)| {
         let setup = &problem.materials[material_of(problem, *number, stage)];
-        !material::build(&setup.model, setup.density).is_plastic()
+        !setup.build().is_plastic()
     });
     // Boxes a cell wide are not too wide for any grid.
     let least = elastic.map(|(_, body)| body.particles_per_cell).reduce(f64::min)?;
@@ -78,7 +77,7 @@ pub fn meets<const D: usize>(problem: &Problem<D>, field: u8, stage: usize) -> M
     let of_body = |(number, body): (usize, &Body<D>)| {
         let materials = (body.stage..=stage).map(|stage| {
             let setup = &problem.materials[material_of(problem, number, stage)];
-            let material = material::build(&setup.model, setup.density);
+            let material = setup.build();
             match (material.is_fluid(), material.is_plastic()) {
                 (true, _) => Meets::Feet,
                 (false, true) => Meets::Nodes,

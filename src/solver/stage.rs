@@ -1,6 +1,8 @@
 //! The next stage of a run: other physics, and particles that go, change or come.
+use crate::material::undrained;
+use crate::material::{HISTORIES, Material, PLASTIC_VOLUME};
 use crate::particle::Chunk;
-use crate::particle::chunk::Tag;
+use crate::particle::chunk::{Layout, Tag};
 use crate::particle::halvings;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
@@ -98,8 +100,44 @@ fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[u16], phy
         }
         chunk.tags_mut()[p] = halvings::with(chunk.tags()[p], Tag { material, ..was });
         let [old, new] = [was.material, material].map(|m| &physics.materials[usize::from(m)]);
-        if old.history_names() != new.history_names() {
+        if old.water_modulus() + new.water_modulus() > 0.0 {
+            change_water(chunk, p, &**old, &**new, physics);
+        } else if old.history_names() != new.history_names() {
             physics.begin_history(chunk, p);
         }
     }
+}
+
+/// A change of material in which the old one or the new one has water that cannot leave its pores. The history
+/// of the skeleton stays where both have the same. Excess pressure stays where both have water; else there is
+/// none.
+fn change_water<const D: usize>(
+    chunk: &mut Chunk<D>,
+    p: usize,
+    old: &dyn Material,
+    new: &dyn Material,
+    physics: &Physics<D>,
+) {
+    let kept: [f64; HISTORIES] = chunk.read(Layout::<D>::HISTORY, p);
+    physics.begin_history(chunk, p);
+    let mut history: [f64; HISTORIES] = chunk.read(Layout::<D>::HISTORY, p);
+    // Without that of opened volume, which undrained ground does not book.
+    let of_skeleton = |material: &dyn Material| {
+        let names = material.skeleton_history();
+        &names[..names.len().min(PLASTIC_VOLUME + 1)]
+    };
+    let is_same = of_skeleton(old) == of_skeleton(new);
+    if is_same {
+        history[..=PLASTIC_VOLUME].copy_from_slice(&kept[..=PLASTIC_VOLUME]);
+    }
+    if new.water_modulus() > 0.0 {
+        let first = Layout::<D>::LEFT_CAUCHY_GREEN;
+        let column = |c: usize| chunk.column(first + c)[p];
+        let elastic = std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { column(c) } else { 0.0 });
+        undrained::consolidate(&elastic, &mut history);
+        if is_same && old.water_modulus() > 0.0 {
+            history[PLASTIC_VOLUME + 1..].copy_from_slice(&kept[PLASTIC_VOLUME + 1..]);
+        }
+    }
+    chunk.write(Layout::<D>::HISTORY, p, &history);
 }

@@ -135,6 +135,7 @@ impl<const D: usize> Run<D> {
             root_edge: ROOT_EDGE,
             brick: Brick { roots: [1; D] },
             materials: &self.materials,
+            water_moduli: &[],
             bodies: &self.bodies,
             histories: &self.histories,
             job_digest: 0xfeed_face_dead_beef,

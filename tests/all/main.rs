@@ -41,6 +41,7 @@ mod surface_loads;
 mod sweep;
 mod ties;
 mod tutorials;
+mod undrained;
 mod view;
 mod walls_and_origin;
 mod warnings;

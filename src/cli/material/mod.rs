@@ -19,6 +19,7 @@ use super::Failure;
 use crate::material::driver::control::{Controlled, NoSolution};
 use crate::material::driver::{Point, increment};
 use crate::material::parameters::NotAModel;
+use crate::material::undrained::{self, Undrained};
 use crate::material::{Material, Parameters, build};
 
 mod chart;
@@ -63,6 +64,12 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.0, requires = "test", allow_negative_numbers = true)]
     pub duration: f64,
 
+    /// Fill the pores with water that cannot leave: after the confinement of --test, or from the start of a path.
+    /// Keys as of `undrained` in a job, for example --undrained='bulk_modulus = 2.2e9, porosity = 0.35'
+    /// [default: porosity = 0.4]
+    #[arg(long, value_name = "TOML", num_args = 0..=1, require_equals = true, default_missing_value = "porosity = 0.4")]
+    pub undrained: Option<String>,
+
     /// Draw stress, strain and stress path into this file (SVG)
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
@@ -94,6 +101,9 @@ enum MaterialError {
     /// The density is not above zero.
     #[error("--density {0} is out of range: it must be above 0 (kg/m³)")]
     Density(f64),
+    /// Water that cannot be in the pores of this model.
+    #[error("--undrained: {0}")]
+    Undrained(String),
     /// The path is no valid JSON.
     #[error("{}: {error}", path.display())]
     Json {
@@ -168,11 +178,18 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
         // clap requires one of them.
         (None, None) => (String::new(), Drive::Deformation(Vec::new())),
     };
-    let material = build(&parameters, args.density);
-    let mut table = Table::new(material.history_names());
+    let water = args.undrained.as_deref().map(|text| water(text, &parameters)).transpose()?;
+    let ground = match water {
+        None => Ground { drained: build(&parameters, args.density), closed: None },
+        Some(water) => Ground {
+            drained: undrained::skeleton(&parameters, args.density),
+            closed: Some(undrained::build(&parameters, Some(&water), args.density)),
+        },
+    };
+    let mut table = Table::new(ground.names(), ground.closed.is_some());
     let driven = match drive {
-        Drive::Deformation(rows) => deform(material.as_ref(), &rows, args, &place, &mut table),
-        Drive::Control(rows) => control(material.as_ref(), &rows, args, &place, &mut table),
+        Drive::Deformation(rows) => deform(&ground, &rows, args, &place, &mut table),
+        Drive::Control(rows) => control(&ground, &rows, args, &place, &mut table),
     };
     // Rows before the error are printed as well.
     table.write(out)?;
@@ -185,15 +202,30 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     }
 }
 
+/// A material, and the same with water that cannot leave its pores where the command asks for it.
+struct Ground {
+    drained: Box<dyn Material>,
+    closed: Option<Box<dyn Material>>,
+}
+
+impl Ground {
+    fn names(&self) -> &'static [&'static str] {
+        self.closed.as_ref().unwrap_or(&self.drained).history_names()
+    }
+}
+
 /// Along total deformations.
 fn deform(
-    material: &dyn Material,
+    ground: &Ground,
     rows: &[Deformation],
     args: &Arguments,
     place: &str,
     table: &mut Table,
 ) -> Result<(), MaterialError> {
-    let mut point = Point::new(material);
+    let mut point = Point::new(ground.drained.as_ref());
+    if let Some(closed) = &ground.closed {
+        point.close_drains(closed.as_ref());
+    }
     let mut last = Deformation::Strain([0.0; 3]);
     table.push(&Stage { time: 0.0, gradient: last.gradient(), point: &point });
     for (i, &target) in rows.iter().enumerate() {
@@ -223,13 +255,19 @@ fn deform(
 
 /// Along prescribed strains and stresses. Strains of a test count from its first row, the confined state.
 fn control(
-    material: &dyn Material,
+    ground: &Ground,
     rows: &[Row],
     args: &Arguments,
     place: &str,
     table: &mut Table,
 ) -> Result<(), MaterialError> {
-    let mut body = Controlled::new(material);
+    let mut body = Controlled::new(ground.drained.as_ref());
+    let mut closed = ground.closed.as_deref();
+    if args.test.is_none()
+        && let Some(closed) = closed.take()
+    {
+        body.close_drains(closed);
+    }
     let mut time = 0.0;
     table.push(&Stage { time, gradient: body.gradient(), point: &body.point });
     let mut start = [0.0; 6];
@@ -242,11 +280,28 @@ fn control(
         })?;
         if args.test.is_some() && i == 0 {
             start = body.strain();
+            if let Some(closed) = closed.take() {
+                body.close_drains(closed);
+            }
         }
         time = row.time;
         table.push(&Stage { time, gradient: body.gradient(), point: &body.point });
     }
     Ok(())
+}
+
+/// Water in the pores of a model, from the inside of a TOML table.
+fn water(text: &str, model: &Parameters) -> Result<Undrained, MaterialError> {
+    #[derive(serde::Deserialize)]
+    struct Inline {
+        water: Undrained,
+    }
+    let fail = |reason: &dyn std::fmt::Display| MaterialError::Undrained(reason.to_string());
+    let inline: Result<Inline, _> = toml::from_str(&format!("water = {{ {text} }}"));
+    let water = inline.map_err(|error| fail(&error.message()))?.water;
+    water.check().map_err(|error| fail(&error))?;
+    Undrained::check_model(model).map_err(|reason| fail(&reason))?;
+    Ok(water)
 }
 
 /// Reads a model from TOML text or from the file of that name.
@@ -278,6 +333,7 @@ mod tests {
             range: None,
             rows: 50,
             duration: 0.0,
+            undrained: None,
             plot: None,
             path: Some(file),
         };
@@ -334,6 +390,7 @@ mod tests {
             range: Some(range),
             rows: 40,
             duration: 1.0,
+            undrained: None,
             plot: None,
             path: None,
         };
@@ -415,7 +472,7 @@ mod tests {
     fn states_are_drawn() {
         let directory = tempfile::tempdir().unwrap();
         let picture = directory.path().join("sand.svg");
-        let mut table = Table::new(&[]);
+        let mut table = Table::new(&[], false);
         let material = build(&SAND.parse().unwrap(), 1600.0);
         let args = Arguments {
             model: SAND.to_string(),
@@ -426,11 +483,12 @@ mod tests {
             range: Some(-0.05),
             rows: 20,
             duration: 0.0,
+            undrained: None,
             plot: None,
             path: None,
         };
         let rows = trial::rows(Trial::Triaxial, &args).unwrap();
-        control(material.as_ref(), &rows, &args, "", &mut table).unwrap();
+        control(&Ground { drained: material, closed: None }, &rows, &args, "", &mut table).unwrap();
         chart::draw(&table, &picture).unwrap();
         let text = std::fs::read_to_string(&picture).unwrap();
         assert!(text.starts_with("<svg") && text.contains("polyline"), "{text}");

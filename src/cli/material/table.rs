@@ -29,14 +29,16 @@ pub(super) struct Invariants {
 pub(super) struct Table {
     names: Vec<String>,
     histories: usize,
+    /// Whether there are columns of water in the pores.
+    has_water: bool,
     rows: Vec<Vec<f64>>,
     /// For pictures.
     pub invariants: Vec<Invariants>,
 }
 
 impl Table {
-    /// No states yet, of a material with these history variables.
-    pub(super) fn new(histories: &[&str]) -> Self {
+    /// No states yet, of a material with these history variables, and perhaps with water in its pores.
+    pub(super) fn new(histories: &[&str], has_water: bool) -> Self {
         let mut names = Vec::new();
         let tensor = |name: &'static str| COMPONENTS.iter().map(move |c| format!("{name}_{c}"));
         names.extend(tensor("tau").chain(tensor("b")));
@@ -44,7 +46,10 @@ impl Table {
         names.extend(["plastic_work", "elastic_energy", "wave_speed", "time"].map(str::to_owned));
         names.extend(tensor("strain").chain(tensor("stress")));
         names.extend(["p", "q", "lode_angle"].map(str::to_owned));
-        Self { names, histories: histories.len(), rows: Vec::new(), invariants: Vec::new() }
+        if has_water {
+            names.extend(["excess_pore_pressure", "effective_p"].map(str::to_owned));
+        }
+        Self { names, histories: histories.len(), has_water, rows: Vec::new(), invariants: Vec::new() }
     }
 
     /// Appends a state.
@@ -61,6 +66,10 @@ impl Table {
         row.extend([point.work, point.energy(), point.wave_speed, *time]);
         row.extend(strain.iter().chain(&stress));
         row.extend([p, q, lode]);
+        if self.has_water {
+            let excess = point.excess_pore_pressure();
+            row.extend([excess, p - excess]);
+        }
         // No negative zeros.
         self.rows.push(row.into_iter().map(|number| number + 0.0).collect());
         let strain = [volumetric, (2.0_f64 / 3.0).sqrt() * shear];

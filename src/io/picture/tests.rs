@@ -42,6 +42,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         origin: [0.0; 3],
         root_edge: 1.0,
         brick: Brick { roots: [1; 3] },
+        water_moduli: &[],
         materials: &[],
         bodies: &[],
         histories: &[],

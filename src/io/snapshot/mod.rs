@@ -66,6 +66,8 @@ pub struct View<'a, const D: usize> {
     pub brick: Brick<D>,
     /// Names of the materials.
     pub materials: &'a [String],
+    /// Stiffness of water that cannot leave the pores, by material, Pa; 0 where there is none.
+    pub water_moduli: &'a [f64],
     /// Names of the bodies.
     pub bodies: &'a [String],
     /// Names of the history variables.

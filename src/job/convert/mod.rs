@@ -29,7 +29,8 @@ use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::{Gravity, Load};
-use crate::material::parameters::OutOfRange;
+use crate::material::parameters::{OutOfRange, Parameters};
+use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
 use crate::quantity::Quantity;
 use crate::text::{excerpt, number, written};
@@ -338,13 +339,30 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
         if let Err(OutOfRange { key, value, range }) = material.model.check() {
             let own = key.split('.').fold(path.index(i), |path, key| path.key(key.to_owned()));
             checks.fault(&own, format!("found {value}; expected a number {range}"));
+        } else if let Some(water) = &material.undrained {
+            undrained(checks, water, &material.model, &path.index(i));
         }
     }
     materials.iter().map(material_setup).collect()
 }
 
+/// Faults of water in the pores of a material.
+fn undrained(checks: &mut Checks, water: &Undrained, model: &Parameters, path: &Path) {
+    if let Err(OutOfRange { key, value, range }) = water.check() {
+        let own = key.split('.').fold(path.clone(), |path, key| path.key(key.to_owned()));
+        checks.fault(&own, format!("found {value}; expected a number {range}"));
+    } else if let Err(reason) = Undrained::check_model(model) {
+        checks.fault(&path.key("undrained"), reason.to_owned());
+    }
+}
+
 fn material_setup(material: &file::Material) -> MaterialSetup {
-    MaterialSetup { name: material.name.clone(), density: material.density, model: material.model.clone() }
+    MaterialSetup {
+        name: material.name.clone(),
+        density: material.density,
+        model: material.model.clone(),
+        undrained: material.undrained,
+    }
 }
 
 fn bodies<const D: usize>(

@@ -15,6 +15,7 @@ pub use super::stress::Stress;
 use crate::geometry::written::Shape;
 pub use crate::geometry::written::Vector;
 use crate::material::parameters::Parameters;
+use crate::material::undrained::Undrained;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -280,6 +281,11 @@ pub struct Material {
     /// Density of the undeformed material, kg/m³.
     #[schemars(range(min = 1e-6, max = 1e5))]
     pub density: f64,
+    /// Water in the pores that cannot leave, for solid models: the model sees the effective stress, and the water has the excess
+    /// pressure `-(bulk_modulus / porosity) ln J` with the volume ratio J since the start, or since the stress that the body starts
+    /// with. `density` is that of skeleton and water. By default there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undrained: Option<Undrained>,
     /// Constitutive model and its parameters.
     #[serde(flatten)]
     pub model: Parameters,

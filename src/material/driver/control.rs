@@ -76,6 +76,12 @@ impl<'a> Controlled<'a> {
         Self { point: Point::new(material), shear: 0.0, strain: [0.0; 6], modulus }
     }
 
+    /// As [`Point::close_drains`].
+    pub fn close_drains(&mut self, material: &'a dyn Material) {
+        self.point.close_drains(material);
+        self.modulus = material.density() * material.wave_speed() * material.wave_speed();
+    }
+
     /// The deformation gradient.
     pub fn gradient(&self) -> Matrix {
         gradient(self.shear, &self.strain)

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::tensor::strain::Strain;
-use super::{HISTORIES, Material, State, Step};
+use super::{HISTORIES, Material, State, Step, undrained};
 use crate::simd::{LANES, Lanes, Vector};
 
 pub mod control;
@@ -51,6 +51,12 @@ impl<'a> Point<'a> {
         point
     }
 
+    /// From now on the point is of this material, the same with water that cannot leave its pores.
+    pub fn close_drains(&mut self, material: &'a dyn Material) {
+        undrained::consolidate(&self.elastic, &mut self.history);
+        self.material = material;
+    }
+
     /// Applies an increment of deformation: the deformation gradient becomes `increment · F`.
     pub fn deform(&mut self, increment: &Matrix) {
         let increment = tensor(increment);
@@ -71,6 +77,12 @@ impl<'a> Point<'a> {
         let mut state = State::new(self.elastic.map(Lanes::splat));
         state.history = self.history.map(Lanes::splat);
         self.material.energy(&state, self.is_plane()).to_array()[0]
+    }
+
+    /// Excess pressure of water that cannot leave the pores, Pa; 0 where there is none.
+    pub fn excess_pore_pressure(&self) -> f64 {
+        let modulus = self.material.water_modulus();
+        if modulus > 0.0 { undrained::excess_pressure(modulus, &self.elastic, &self.history) } else { 0.0 }
     }
 
     fn is_plane(&self) -> bool {

@@ -1,6 +1,8 @@
 //! Ranges of parameters, as the schema of the job file states them.
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::Value;
 
 use super::{OutOfRange, Parameters};
@@ -12,6 +14,13 @@ pub(crate) fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
     // JSON has no form for numbers that are not finite; they come as null.
     let value = serde_json::to_value(parameters).unwrap_or_default();
     Ranges { root: &SCHEMA }.look(&SCHEMA, &value, "")
+}
+
+/// The first key of a table that is outside the range that its type states; `name` is that of the table.
+pub(crate) fn check_table<T: JsonSchema + Serialize>(table: &T, name: &str) -> Result<(), OutOfRange> {
+    let schema = schemars::schema_for!(T).to_value();
+    let value = serde_json::to_value(table).unwrap_or_default();
+    Ranges { root: &schema }.look(&schema, &value, name)
 }
 
 struct Ranges<'a> {

@@ -3,8 +3,7 @@ use self::count::Tally;
 use self::pace::Pace;
 use super::seed::{SeedError, check_finite};
 use crate::grid::mask::{offset, offset_count};
-use crate::job::problem::{Field, Problem};
-use crate::material;
+use crate::job::problem::{Field, MaterialSetup, Problem};
 use crate::particle::Layout;
 use crate::setup::Size;
 use bytemuck::{Pod, Zeroable};
@@ -183,7 +182,7 @@ impl Estimate {
 /// Two bodies share a lattice point, or the steps cannot be counted.
 pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, EstimateError> {
     let counted = steps(problem);
-    let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
+    let materials: Vec<_> = problem.materials.iter().map(|m| m.build()).collect();
     let probed = super::initial_stress::probe(problem, &materials);
     // First, since such numbers invalidate the other checks.
     check_finite(problem)?;
@@ -233,7 +232,7 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
         .bodies
         .iter()
         .map(|body| &problem.materials[body.material])
-        .map(|material| material::build(&material.model, material.density))
+        .map(MaterialSetup::build)
         .map(|material| material.wave_speed() + material.viscous_speed(problem.cell_edge(finest)))
         .fold(0.0, f64::max);
     let norm = |v: &[f64]| v.iter().map(|c| c * c).sum::<f64>().sqrt();

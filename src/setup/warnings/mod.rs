@@ -9,7 +9,7 @@
 use crate::job::Problem;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
-use crate::text::{count, excerpt};
+use crate::text::{count, excerpt, number};
 
 mod colliders;
 mod stretch;
@@ -26,6 +26,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     let mut all = Vec::new();
     faces(problem, &mut all);
     materials(problem, &mut all);
+    undrained(problem, &mut all);
     colliders::look(problem, &mut all);
     stretch::look(problem, &mut all);
     units::look(problem, steps, &mut all);
@@ -68,6 +69,36 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             all.push(format!(
                 "materials[{index}].match: \"{}\" has its friction angle in triaxial compression and a greater one in plane strain, as in this 2D job; use match = \"plane_strain\" for the friction angle in plane strain",
                 excerpt(&material.name, NAME)
+            ));
+        }
+    }
+}
+
+/// Stiffness of water over that of the skeleton up to which nothing is to be gained by softer water.
+const STIFF_WATER: f64 = 50.0;
+
+/// Stiff water in the pores: many steps, and locking without F-bar.
+fn undrained<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
+    for (index, setup) in problem.materials.iter().enumerate() {
+        let Some(water) = &setup.undrained else { continue };
+        let (material, name) = (setup.build(), excerpt(&setup.name, NAME));
+        let wave = material.wave_speed();
+        let stiffness = setup.density * wave * wave - water.modulus();
+        let steps = |ratio: f64| (1.0 + ratio).sqrt();
+        let ratio = water.modulus() / stiffness;
+        if ratio > STIFF_WATER {
+            all.push(format!(
+                "materials[{index}].undrained: the water in \"{name}\" is {} times as stiff as its skeleton, and takes {} times as many steps as without; with bulk_modulus = {} it is {STIFF_WATER} times as stiff, takes {} times as many steps, and bears {} % less of a load on confined ground",
+                number(ratio, 2),
+                number(steps(ratio), 2),
+                number(STIFF_WATER * stiffness * water.porosity, 2),
+                number(steps(STIFF_WATER), 2),
+                number(100.0 * (ratio / (1.0 + ratio) - STIFF_WATER / (1.0 + STIFF_WATER)), 2),
+            ));
+        }
+        if !problem.f_bar {
+            all.push(format!(
+                "materials[{index}].undrained: \"{name}\" with its water hardly changes volume, and numerics.f_bar is false: such material locks, and its pressures alternate from particle to particle; set numerics.f_bar = true"
             ));
         }
     }

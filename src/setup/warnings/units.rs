@@ -5,7 +5,7 @@ use super::NAME;
 use crate::geometry::Aabb;
 use crate::job::Problem;
 use crate::job::problem::{Body, MaterialSetup};
-use crate::material::{self, Material};
+use crate::material::Material;
 use crate::setup::seed::{greatest_speed, raster};
 use crate::text::{count, excerpt, number, quantity};
 
@@ -30,7 +30,7 @@ const BODIES: usize = 1000;
 
 /// Warns of properties that no material has, and of loads that no material bears.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut Vec<String>) {
-    let materials: Vec<_> = problem.materials.iter().map(|m| material::build(&m.model, m.density)).collect();
+    let materials: Vec<_> = problem.materials.iter().map(|m| m.build()).collect();
     for (index, (setup, material)) in problem.materials.iter().zip(&materials).enumerate() {
         of_material(index, setup, material.wave_speed(), all);
     }

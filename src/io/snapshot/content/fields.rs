@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::averages::{self, principal};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::io::snapshot::View;
+use crate::material::undrained::excess_pressure;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::strain;
-use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
+use crate::particle::volume::{cauchy_stress, symmetric, volume, volume_ratio};
 
 /// Names of the components of vectors and tensors, by their number, in the order of the files.
 pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
@@ -107,6 +108,14 @@ fields! {
     /// Pressure of contact with other bodies, Pa, at particles within reach of the surface: a mean over the
     /// last steps, in which a step counts a twentieth less than the next; found only where a job asks for it.
     ContactPressure, "contact_pressure", "Pa", |view| scalars(view, |chunk, p| contact_pressure(view, chunk, p));
+    /// Excess pore pressure of undrained material, Pa; compression is positive, 0 elsewhere.
+    ExcessPorePressure, "excess_pore_pressure", "Pa", |view| scalars(view, |chunk, p| excess_pore_pressure(view, chunk, p));
+    /// Mean of the effective stress with the sign changed, Pa: the pressure less the excess pore pressure.
+    EffectivePressure, "effective_pressure", "Pa",
+        |view| scalars(view, |chunk, p| -mean(&effective_stress(view, chunk, p)));
+    /// Effective Cauchy stress, Pa: the stress without the excess pore pressure; components as those of
+    /// `stress`.
+    EffectiveStress, "effective_stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(effective_stress(view, chunk, p)));
     /// Volume over reference volume, det F.
     VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
 }
@@ -223,6 +232,27 @@ fn carried<const D: usize>(chunk: &Chunk<D>, column: Option<usize>, p: usize) ->
 fn contact_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
     let [pressure, ..] = followed(view, chunk);
     carried(chunk, pressure, p)
+}
+
+/// Pressure of water that cannot leave the pores, since consolidation, Pa.
+fn excess_pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
+    let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+    match view.water_moduli.get(material) {
+        Some(&modulus) if modulus > 0.0 => {
+            let [xx, yy, zz, xy, yz, xz] = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+            let history = chunk.read(Layout::<D>::HISTORY, p);
+            excess_pressure(modulus, &[xx, yy, zz, xy, xz, yz], &history)
+        }
+        _ => 0.0,
+    }
+}
+
+/// Effective Cauchy stress, Pa.
+fn effective_stress<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let mut stress = cauchy_stress(chunk, p);
+    let pressure = excess_pore_pressure(view, chunk, p);
+    stress[..3].iter_mut().for_each(|normal| *normal += pressure);
+    stress
 }
 
 /// Displacement with three components.

@@ -10,7 +10,7 @@ use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::MaterialSetup;
 use crate::material::initial::{Stressed, under_strain, under_stress_after};
-use crate::material::{HISTORIES, Material, build};
+use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::given::Given;
 use crate::text::{excerpt, nearest, number};
@@ -78,7 +78,7 @@ fn from_table<const D: usize>(
     space: &Space<D>,
 ) -> Result<(Chunk<D>, bool), String> {
     let table = table(from).map_err(|error| error.to_string())?;
-    let material = build(&setup.model, setup.density);
+    let material = setup.build();
     let columns = Columns::find::<D>(&table, &*material)?;
     let rows = table.columns.first().map_or(0, |(_, values)| values.len());
     let mut chunk = Chunk::with_capacity(rows);
