@@ -166,12 +166,16 @@ fn agreed<T>(comm: &Comm, result: Result<T, Failure>) -> Result<T, Failure> {
     comm.agree(result).map_err(|disagreement| Failure::Usage(disagreement.message))
 }
 
+/// Nodes of a box from the evaluator of its tree; the last argument is the level of the lattice.
+type Weigh<const D: usize, N> =
+    fn(&Comm, &mut Evaluator<D>, &GivenParticle<D>, u32) -> Result<Vec<N>, Failure>;
+
 /// Weights with nodes as `weigh` makes them from the evaluator of a tree, a box and the level of the lattice.
 fn evaluate_in<const D: usize, N>(
     comm: &Comm,
     input: &Input,
     direct: bool,
-    weigh: fn(&Comm, &mut Evaluator<D>, &GivenParticle<D>, u32) -> Result<Vec<N>, Failure>,
+    weigh: Weigh<D, N>,
     coordinates: Coordinates,
 ) -> Result<Output<N>, Failure> {
     let mut found: Vec<Option<CaseWeights<N>>> = input.cases.iter().map(|_| None).collect();

@@ -82,7 +82,10 @@ impl<const D: usize> Solver<D> {
                                 (0..D).fold(0.0, |sum, a| (surface[a] - v[a]).mul_add(normal[a], sum));
                             (AHEAD * dt).mul_add(inward.max(0.0), REACH * touching)
                         };
-                        let density = chunk.column(Layout::<D>::MASS)[p as usize] / volume(chunk, p as usize);
+                        let density = match collider.contact.drag() > 0.0 {
+                            true => chunk.column(Layout::<D>::MASS)[p as usize] / volume(chunk, p as usize),
+                            false => 0.0,
+                        };
                         let of_box = (half, density);
                         if let Some(contact) =
                             Touching::new(number, collider, (&state.pose, rate), &x, of_box, dt, reach)
