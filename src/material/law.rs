@@ -157,6 +157,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     fn consolidates(&self) -> bool {
         false
     }
+
+    /// See [`Material::alike`].
+    fn alike(&self, _a: &[f64; HISTORIES], _b: &[f64; HISTORIES]) -> bool {
+        true
+    }
 }
 
 /// A constitutive model with its parameters, called once for each batch of particles.
@@ -219,6 +224,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// Whether it has a preconsolidation pressure that a job may give.
     fn consolidates(&self) -> bool;
 
+    /// Whether particles with these histories may become one, beside the limits of a job for plastic strain
+    /// and volume: unlike damage does not mix.
+    fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool;
+
     /// True for models that flow: they have history, do plastic work, and their stretch since the
     /// start is unbounded.
     fn is_plastic(&self) -> bool {
@@ -278,6 +287,10 @@ impl<L: Law> Material for L {
 
     fn consolidates(&self) -> bool {
         Law::consolidates(self)
+    }
+
+    fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
+        Law::alike(self, a, b)
     }
 }
 

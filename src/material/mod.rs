@@ -11,6 +11,7 @@
 //! | `parameters/` | parameters that models share: elastic constants, checks, reading from text |
 //! | `angle.rs` | angles of friction and dilation that may soften |
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
+//! | `damage/` | stiffness and strength that are lost for good |
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `root.rs` | roots of scalar equations, lane by lane |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
@@ -20,6 +21,7 @@ use crate::simd::{LANES, Mask, VectorMask};
 
 mod angle;
 mod coulomb;
+pub mod damage;
 pub mod driver;
 mod hardening;
 pub mod initial;

@@ -213,6 +213,10 @@ impl Material for Saturated {
         self.skeleton.consolidates()
     }
 
+    fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
+        self.skeleton.alike(a, b)
+    }
+
     fn water_modulus(&self) -> f64 {
         self.modulus
     }

@@ -40,8 +40,14 @@ impl<const D: usize> Run<'_, D> {
         if !problem.output.picture {
             return Ok(None);
         }
+        let has =
+            |name: &str| self.names.histories.iter().any(|names| names.split(' ').any(|own| own == name));
         let plastic = self.solver.physics.materials.iter().any(|material| material.is_plastic());
-        let usual = if plastic { PointField::PlasticStrain } else { PointField::Speed };
+        let usual = match plastic {
+            _ if has("damage") => PointField::Damage,
+            true => PointField::PlasticStrain,
+            false => PointField::Speed,
+        };
         let field = problem.output.picture_field.unwrap_or(usual);
         let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
         let path = problem.output.directory.join(format!("{}.png", problem.name));

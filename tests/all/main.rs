@@ -10,6 +10,7 @@ mod colliders;
 mod command_line;
 mod contact;
 mod contact_bodies;
+mod damage;
 mod displacement;
 mod documentation;
 mod equilibrium;

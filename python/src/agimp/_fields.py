@@ -26,6 +26,7 @@ KNOWN: dict[str, Field] = {
     "particle_level": Field("", "tree level that the particle was made for"),
     "leaf_level": Field("", "level of the leaf that holds the particle"),
     "plastic_strain": Field("", "first history variable of the material, as a rule the accumulated plastic strain"),
+    "damage": Field("", "stiffness that cracks have taken; of metals plastic strain over failure strain"),
     "pressure": Field("Pa", "mean Cauchy stress with the sign changed; positive in compression"),
     "von_mises": Field("Pa", "von Mises equivalent of the Cauchy stress"),
     "stress": Field("Pa", "Cauchy stress"),

@@ -55,7 +55,9 @@ pub(super) fn mixtures<const D: usize>(
     refused: &mut FxHashSet<u64>,
 ) -> Mixtures<D> {
     // The quickest test comes first.
-    keep(&mut groups, chunk, refused, |_, group| is_alike(chunk, group, limits));
+    keep(&mut groups, chunk, refused, |_, group| {
+        is_alike(chunk, group, limits) && has_like_histories(chunk, group, setting)
+    });
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
     let mut out = chunk.gathered(&groups.iter().map(|group| group.members[0]).collect::<Vec<u32>>());
@@ -162,6 +164,16 @@ fn is_alike<const D: usize>(chunk: &Chunk<D>, group: &Group, limits: &Limits) ->
     within(Layout::<D>::PLASTIC_STRAIN, limits.history)
         && within(Layout::<D>::PLASTIC_VOLUME, limits.volume)
         && strains_may_be()
+}
+
+/// Whether the material lets particles with the histories of a group become one.
+fn has_like_histories<const D: usize>(chunk: &Chunk<D>, group: &Group, setting: &Setting<D>) -> bool {
+    let history = |p: u32| -> [f64; HISTORIES] { chunk.read(Layout::<D>::HISTORY, p as usize) };
+    let [first, others @ ..] = group.members.as_slice() else { return true };
+    let material = Tag::unpack(chunk.tags()[*first as usize]).material;
+    let material = &setting.scheme.materials[usize::from(material)];
+    let own = history(*first);
+    others.iter().all(|&p| material.alike(&own, &history(p)))
 }
 
 /// Squared Frobenius norm of a symmetric tensor.

@@ -70,6 +70,10 @@ pub struct Arguments {
     #[arg(long, value_name = "TOML", num_args = 0..=1, require_equals = true, default_missing_value = "porosity = 0.4")]
     pub undrained: Option<String>,
 
+    /// Edge of the cells on which softening and damage depend, m; 0: none, so that cracks do not open
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub size: f64,
+
     /// Draw stress, strain and stress path into this file (SVG)
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
@@ -172,6 +176,9 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     if !(args.density > 0.0 && args.density.is_finite()) {
         return Err(MaterialError::Density(args.density));
     }
+    if !(args.size >= 0.0 && args.size.is_finite()) {
+        return Err(MaterialError::Option { option: "size", value: args.size, range: "at least 0 (m)" });
+    }
     let (place, drive) = match (&args.path, args.test) {
         (_, Some(test)) => ("--test".to_owned(), Drive::Control(trial::rows(test, args)?)),
         (Some(path), None) => (path.display().to_string(), path::read_path(path)?),
@@ -223,6 +230,7 @@ fn deform(
     table: &mut Table,
 ) -> Result<(), MaterialError> {
     let mut point = Point::new(ground.drained.as_ref());
+    point.size = args.size;
     if let Some(closed) = &ground.closed {
         point.close_drains(closed.as_ref());
     }
@@ -262,6 +270,7 @@ fn control(
     table: &mut Table,
 ) -> Result<(), MaterialError> {
     let mut body = Controlled::new(ground.drained.as_ref());
+    body.point.size = args.size;
     let mut closed = ground.closed.as_deref();
     if args.test.is_none()
         && let Some(closed) = closed.take()
@@ -334,6 +343,7 @@ mod tests {
             rows: 50,
             duration: 0.0,
             undrained: None,
+            size: 0.0,
             plot: None,
             path: Some(file),
         };
@@ -391,6 +401,7 @@ mod tests {
             rows: 40,
             duration: 1.0,
             undrained: None,
+            size: 0.0,
             plot: None,
             path: None,
         };
@@ -484,6 +495,7 @@ mod tests {
             rows: 20,
             duration: 0.0,
             undrained: None,
+            size: 0.0,
             plot: None,
             path: None,
         };

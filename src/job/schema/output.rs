@@ -25,7 +25,8 @@ pub struct Output {
     /// Whether the run draws a picture of its final state.
     #[serde(default = "yes")]
     pub picture: bool,
-    /// Field that colours the picture; by default the plastic strain if a material has it, else the speed.
+    /// Field that colours the picture; by default the damage if a material has it, else the
+    /// plastic strain, else the speed.
     #[serde(default)]
     pub picture_field: Option<Field>,
     /// Whether the run writes the HTML page `JOB.report.html` when it ends, fails or is stopped, as `agimp report` does.

@@ -247,6 +247,22 @@ impl Hardening {
         Ok(())
     }
 
+    /// Homologous temperature of the undeformed material, and the part of the plastic work that becomes heat,
+    /// of laws with temperatures.
+    pub(super) fn homologous(&self) -> Option<(f64, f64)> {
+        let Self::Law(HardeningLaw::JohnsonCook {
+            reference_temperature: reference,
+            melting_temperature: melting,
+            temperature,
+            heat_fraction,
+            ..
+        }) = self
+        else {
+            return None;
+        };
+        Some((((temperature - reference) / (melting - reference)).max(0.0), *heat_fraction))
+    }
+
     /// Whether it needs the history variable of the temperature.
     fn heats(&self) -> bool {
         matches!(self, Self::Law(HardeningLaw::JohnsonCook { .. }))

@@ -1,12 +1,31 @@
 //! Hencky elasticity: `W = μ Σ ε² + λ/2 (Σ ε)²`, `τ = 2μ ε + λ tr(ε) I` with the logarithmic strain
 //! `ε = ½ ln b`. Also the elastic part of the plastic models.
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::Model;
+use crate::material::damage::{Brittle, Damage};
 use crate::material::eigen::greatest_bound;
 use crate::material::initial::{Consolidation, increasing_root};
-use crate::material::parameters::{Elastic, Lame};
+use crate::material::parameters::Lame;
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, State, Step, Symmetric};
+use crate::material::{self, HISTORIES, Law, State, Step, Symmetric};
 use crate::simd::{Vector, each};
+
+/// Hencky elasticity, with or without damage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Young's modulus, Pa; above 0.
+    #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
+    pub young: f64,
+    /// Poisson's ratio; above -1 and below 0.5.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    pub poisson: f64,
+    /// Cracks that open beyond a strength; by default there are none.
+    #[serde(default)]
+    pub damage: Option<Damage>,
+}
 
 /// Hencky solid.
 #[derive(Clone, Copy, Debug)]
@@ -18,14 +37,28 @@ pub struct Hencky {
 }
 
 impl Model for Hencky {
-    type Parameters = Elastic;
+    type Parameters = Parameters;
 
-    fn new(p: &Elastic, density: f64) -> Self {
+    fn new(p: &Parameters, density: f64) -> Self {
         Self::of(p.young, p.poisson, density)
     }
 
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+        let solid = Self::new(p, density);
+        match &p.damage {
+            Some(damage) => Box::new(Brittle::new(solid, p.young, damage)),
+            None => Box::new(solid),
+        }
+    }
+
     fn examples() -> &'static [&'static str] {
-        &["model = 'hencky', young = 1e6, poisson = 0.3"]
+        &[
+            "model = 'hencky', young = 1e6, poisson = 0.3",
+            "model = 'hencky', young = 1e6, poisson = 0.3, \
+             damage = {kind = 'rankine', strength = 2e4, fracture_energy = 1e3}",
+            "model = 'hencky', young = 1e6, poisson = 0.3, damage = {kind = 'strain', onset = 0.02, \
+             fracture_energy = 1e3, softening = 'exponential_crack_opening', tension_only = false}",
+        ]
     }
 }
 
@@ -36,8 +69,13 @@ impl Hencky {
     }
 
     /// Shear modulus, Pa.
-    pub(super) fn shear_modulus(&self) -> f64 {
+    pub(in crate::material) fn shear_modulus(&self) -> f64 {
         self.lame.mu
+    }
+
+    /// Bulk modulus, Pa.
+    pub(in crate::material) fn bulk_modulus(&self) -> f64 {
+        self.lame.lambda + 2.0 / 3.0 * self.lame.mu
     }
 
     /// Writes Kirchhoff stress and wave speed of a strain with this trace and this deviator.

@@ -10,11 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
+use crate::material::damage::{Ductile, Failure};
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::OutOfRange;
 use crate::material::root::Function;
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
+use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};
 
@@ -47,6 +48,9 @@ pub struct Parameters {
     #[serde(default = "one")]
     #[schemars(range(min = 0.05, max = 10.0))]
     pub rate_exponent: f64,
+    /// Failure by plastic strain; by default there is none.
+    #[serde(default)]
+    pub damage: Option<Failure>,
 }
 
 fn one() -> f64 {
@@ -89,10 +93,48 @@ impl Overstress {
     }
 }
 
+/// The part of its strength that a metal has left.
+pub(in crate::material) trait Left<V>: Copy {
+    /// This part of a strength.
+    fn of(self, strength: V) -> V;
+}
+
+/// All of it.
+#[derive(Clone, Copy)]
+pub(in crate::material) struct Whole;
+
+/// A part from 0 to 1.
+#[derive(Clone, Copy)]
+pub(in crate::material) struct Part<V>(pub V);
+
+impl<V> Left<V> for Whole {
+    #[inline(always)]
+    fn of(self, strength: V) -> V {
+        strength
+    }
+}
+
+impl<V: Vector> Left<V> for Part<V> {
+    #[inline(always)]
+    fn of(self, strength: V) -> V {
+        strength * self.0
+    }
+}
+
 impl VonMises {
     /// With these elastic constants, strength and overstress.
     pub(super) fn of(solid: Hencky, curve: Curve, overstress: Option<Overstress>) -> Self {
         Self { solid, curve, overstress }
+    }
+
+    /// The elastic part.
+    pub(in crate::material) fn elastic(&self) -> &Hencky {
+        &self.solid
+    }
+
+    /// Temperature of the undeformed material, K, for laws with one.
+    pub(in crate::material) fn temperature(&self) -> Option<f64> {
+        self.curve.temperature()
     }
 }
 
@@ -105,8 +147,17 @@ impl Model for VonMises {
         Self::of(solid, curve, Overstress::new(p.viscosity, p.rate_exponent))
     }
 
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+        let metal = Self::new(p, density);
+        match &p.damage {
+            Some(failure) => Box::new(Ductile::new(metal, failure, &p.hardening)),
+            None => Box::new(metal),
+        }
+    }
+
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
-        p.hardening.check(p.yield_stress)
+        p.hardening.check(p.yield_stress)?;
+        p.damage.map_or(Ok(()), |failure| failure.check(&p.hardening))
     }
 
     fn examples() -> &'static [&'static str] {
@@ -130,6 +181,9 @@ impl Model for VonMises {
             "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3, \
              hardening = {kind = 'johnson_cook', modulus = 3e4, exponent = 0.31, rate_factor = 0.025, \
              thermal_exponent = 1.09, melting_temperature = 1356.0, specific_heat = 383.0}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e4, \
+             hardening = {kind = 'ludwik', modulus = 2e4, exponent = 0.3}, \
+             damage = {kind = 'johnson_cook', d1 = 0.05, d2 = 0.2, d3 = -2.0, d4 = 0.01}",
         ]
     }
 }
@@ -141,7 +195,7 @@ impl Law for VonMises {
     fn respond<V: Vector>(&self, state: &mut State<V>, step: &Step) {
         match (self.curve.linear(), self.overstress) {
             (Some(modulus), None) => self.return_linear(state, modulus, step.plane),
-            _ => self.return_curved(state, step),
+            _ => self.return_curved(state, step, Whole),
         }
     }
 
@@ -179,7 +233,7 @@ impl Law for VonMises {
 }
 
 /// Excess of a trial stress over the strength after an increment of the plastic strain, Pa.
-struct Excess<'a, V> {
+struct Excess<'a, V, L> {
     law: &'a VonMises,
     step: &'a Step,
     /// Trial `q`, Pa.
@@ -188,9 +242,10 @@ struct Excess<'a, V> {
     strain: V,
     temperature: V,
     three_mu: f64,
+    part: L,
 }
 
-impl<V: Vector> Function<V, [V; 2]> for Excess<'_, V> {
+impl<V: Vector, L: Left<V>> Function<V, [V; 2]> for Excess<'_, V, L> {
     #[inline(always)]
     fn at(&self, increment: V) -> [V; 2] {
         let (root, heat) = (1.5_f64.sqrt(), self.law.curve.heat());
@@ -204,7 +259,7 @@ impl<V: Vector> Function<V, [V; 2]> for Excess<'_, V> {
             strength = value.mul_add(V::splat(root), strength);
             slope = change.mul_add(V::splat(1.5), slope);
         }
-        [left - strength, -(slope + V::splat(self.three_mu))]
+        [left - self.part.of(strength), -(self.part.of(slope) + V::splat(self.three_mu))]
     }
 }
 
@@ -233,9 +288,14 @@ impl VonMises {
         trial.finish(&self.solid, state, [trial.trace, kept], flows, V::Mask::from_bits(0), plane);
     }
 
-    /// Any hardening and overstress.
+    /// Any hardening and overstress, with a part of the strength.
     #[inline(always)]
-    fn return_curved<V: Vector>(&self, state: &mut State<V>, step: &Step) {
+    pub(in crate::material) fn return_curved<V: Vector>(
+        &self,
+        state: &mut State<V>,
+        step: &Step,
+        part: impl Left<V>,
+    ) {
         let zero = V::splat(0.0);
         let one = V::splat(1.0);
         let three_mu = 3.0 * self.solid.shear_modulus();
@@ -244,6 +304,7 @@ impl VonMises {
         let (strain, temperature) = (state.history[PLASTIC_STRAIN], state.history[TEMPERATURE]);
         let still = Flow { increment: zero, temperature: [temperature, zero] };
         let [strength, _] = self.curve.strength(strain, &still, step);
+        let strength = part.of(strength);
         // Without a step there is no rate-dependent flow.
         let mut flows = strength.lt(stress);
         if self.overstress.is_some() && step.dt <= 0.0 {
@@ -253,7 +314,7 @@ impl VonMises {
         state.work = zero;
         if flows.any() {
             let heat = self.curve.heat();
-            let excess = Excess { law: self, step, stress, strain, temperature, three_mu };
+            let excess = Excess { law: self, step, stress, strain, temperature, three_mu, part };
             let high = stress * (1.0 / three_mu);
             let guess = flows.select((stress - strength) * (1.0 / three_mu), high);
             let increment = root::newton(excess, guess, high, stress * f64::EPSILON, flows);

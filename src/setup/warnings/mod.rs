@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
+//! | `damage.rs` | crack bands that are too wide |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
 use crate::job::Problem;
@@ -12,6 +13,7 @@ use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
 
 mod colliders;
+mod damage;
 mod stretch;
 mod units;
 
@@ -28,6 +30,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     materials(problem, &mut all);
     undrained(problem, &mut all);
     colliders::look(problem, &mut all);
+    damage::look(problem, &mut all);
     stretch::look(problem, &mut all);
     units::look(problem, steps, &mut all);
     if steps >= MANY_STEPS {

@@ -52,9 +52,8 @@ pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) 
 /// Young's modulus of a material that is elastic at all strains, Pa.
 fn young(model: &Parameters) -> Option<f64> {
     match model {
-        Parameters::NeoHookean(elastic)
-        | Parameters::FixedCorotated(elastic)
-        | Parameters::Hencky(elastic) => Some(elastic.young),
+        Parameters::NeoHookean(elastic) | Parameters::FixedCorotated(elastic) => Some(elastic.young),
+        Parameters::Hencky(elastic) if elastic.damage.is_none() => Some(elastic.young),
         _ => None,
     }
 }

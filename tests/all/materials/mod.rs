@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use serde_json::Value;
 
 mod cap;
+mod damage;
 mod flow;
 mod friction;
 mod metal;

@@ -134,6 +134,10 @@ fn elastic_stress_of_every_model_is_the_derivative_of_the_energy() {
             let size = 10.0_f64.powf(-2.0 * random.next()) * 0.1;
             point.deform(&random.stretch(size));
             point.deform(&random.stretch(1e-3));
+            // Cracks that close have no energy whose derivative is the stress (docs/known-limits.md).
+            if text.contains("rankine") && point.history[0] > 0.0 {
+                continue;
+            }
             let scale = super::size(&full(&point.stress)).max(material.wave_speed().powi(2) * 1000.0);
             let is_elastic = |near: &Point| near.history == point.history && near.work == point.work;
             let mut slopes = Vec::new();

@@ -80,6 +80,9 @@ fields! {
     };
     /// First history variable of the material, as a rule the accumulated plastic strain.
     PlasticStrain, "plastic_strain", "", |view| scalars(view, plastic_strain);
+    /// Damage, 0 for materials without: of elastic ones the part of the stiffness that cracks have taken, 1 where
+    /// it is broken; of metals plastic strain over failure strain, which fail from 1 on.
+    Damage, "damage", "", |view| damages(view);
     /// Mean of the Cauchy stress with the sign changed, Pa; compression is positive.
     Pressure, "pressure", "Pa", |view| scalars(view, |chunk, p| -mean(&cauchy_stress(chunk, p)));
     /// Von Mises equivalent of the Cauchy stress, Pa.
@@ -276,6 +279,17 @@ pub(crate) fn speed<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
 /// First history variable.
 pub(crate) fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     chunk.column(Layout::<D>::PLASTIC_STRAIN)[p]
+}
+
+/// The history variable of that name of each particle.
+fn damages<const D: usize>(view: &View<'_, D>) -> Values {
+    let slot = |names: &String| names.split(' ').position(|name| name == "damage");
+    let slots: Vec<Option<usize>> = view.histories.iter().map(slot).collect();
+    scalars(view, |chunk, p| {
+        let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+        let slot = slots.get(material).copied().flatten();
+        slot.map_or(0.0, |slot| chunk.column(Layout::<D>::HISTORY + slot)[p])
+    })
 }
 
 /// Mass over current volume, kg/m³.
