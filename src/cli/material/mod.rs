@@ -307,7 +307,8 @@ fn water(text: &str, model: &Parameters) -> Result<Undrained, MaterialError> {
     }
     let fail = |reason: &dyn std::fmt::Display| MaterialError::Undrained(reason.to_string());
     let inline: Result<Inline, _> = toml::from_str(&format!("water = {{ {text} }}"));
-    let water = inline.map_err(|error| fail(&error.message()))?.water;
+    let keys = "expected keys as in 'bulk_modulus = 2.2e9, porosity = 0.4'";
+    let water = inline.map_err(|error| fail(&format!("{}; {keys}", error.message().trim_end())))?.water;
     water.check().map_err(|error| fail(&error))?;
     Undrained::check_model(model).map_err(|reason| fail(&reason))?;
     Ok(water)
