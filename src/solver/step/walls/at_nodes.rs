@@ -9,6 +9,7 @@ use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState, Contact};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
+use crate::kernel::Row;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Grid;
@@ -70,6 +71,26 @@ impl<const D: usize> Solver<D> {
     }
 }
 
+/// Has the velocity of the node at `x` (m) obey a collider at a surface with this normal. Returns the impulse
+/// on the collider, kg m/s, if there is any.
+pub(super) fn obey<const D: usize>(
+    row: &mut Row,
+    x: &[f64; D],
+    (collider, state, rate): (&Collider<D>, &ColliderState<D>, &Rate<D>),
+    normal: &[f64; D],
+) -> Option<[f64; D]> {
+    let surface = collider.velocity_at(x, &state.pose, rate);
+    let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
+    let free: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
+    let mut relative = free;
+    collider.contact.apply(&mut relative, normal);
+    if relative == free {
+        return None;
+    }
+    (0..D).for_each(|a| row.0[a] = surface[a] + relative[a]);
+    Some(std::array::from_fn(|a| row.0[3] * (before[a] - row.0[a])))
+}
+
 /// Applies the conditions; returns impulses in the order of the nodes.
 fn hold<const D: usize>(
     grid: &mut Grid<D>,
@@ -90,22 +111,12 @@ fn hold<const D: usize>(
             let Some(inside) = inside else { continue };
             let mut hold = |bit: u32, normal: &[f64; D]| {
                 let row = &mut rows[bit as usize];
-                let mass = row.0[3];
-                if mass <= 0.0 || block.real_nodes() >> bit & 1 == 0 {
+                if row.0[3] <= 0.0 || block.real_nodes() >> bit & 1 == 0 {
                     return;
                 }
                 let x = plan.node_place(block, bit as usize);
-                let surface = collider.velocity_at(&x, &state.pose, rate);
-                let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
-                let mut relative: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
-                let free = relative;
-                collider.contact.apply(&mut relative, normal);
-                if relative == free {
-                    return;
-                }
-                (0..D).for_each(|a| row.0[a] = surface[a] + relative[a]);
-                if block.owned >> bit & 1 == 1 {
-                    let impulse = std::array::from_fn(|a| mass * (before[a] - row.0[a]));
+                let given = obey(row, &x, (collider, state, rate), normal);
+                if let Some(impulse) = given.filter(|_| block.owned >> bit & 1 == 1) {
                     touches.push(Touch { collider: number, position: x, impulse });
                 }
             };

@@ -10,8 +10,9 @@
 //! of the corners of the foot's cell that have mass. The impulse J goes to them by the same weights, so that
 //! momentum, angular momentum and work are those of J at the foot. Feet that share corners are solved
 //! together by Jacobi's sweeps, as particles in contact are ([`super::contact`]). Nodes so deep that their
-//! hats do not reach their foot have slivers of mass and no freedom of their own: they move with the foot. On
-//! a row of nodes foot and node are one.
+//! hats do not reach their foot have slivers of mass and no freedom of their own: they move with the foot.
+//! Where they have more mass than the foot's cell, material has strayed into the collider, and they obey its
+//! condition themselves. On a row of nodes foot and node are one.
 //!
 //! Feet belong to the leaf that they are in and take the way of its particles: arenas, sums over ranks,
 //! constrained nodes. No bit depends on ranks.
@@ -181,7 +182,7 @@ impl<const D: usize> Solver<D> {
             self.apply_faces(field, 0.0, true);
             self.grid.swap(&mut other);
         }
-        self.take_along(field, &all, &covered, &mut other, sums);
+        self.take_along(field, &all, &covered, &mut other, rates, sums);
         self.grid.swap(&mut other);
         self.grid.contact = Some(other);
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);

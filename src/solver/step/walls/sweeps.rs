@@ -1,7 +1,7 @@
 //! Between the feet and the nodes.
 use rayon::prelude::*;
 
-use super::at_nodes::is_at_another;
+use super::at_nodes::{is_at_another, obey};
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
 use crate::boundary::{Collider, ColliderState};
@@ -16,6 +16,9 @@ use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::inside::{Inside, Plane};
 use crate::solver::step::colliders::Touch;
 use crate::solver::step::contact::sweeps::for_real_nodes;
+
+/// What a deep node counts for a foot that is lighter than it: more than a node has feet.
+const HEAVY: f64 = 64.0;
 
 /// By leaf with feet and by foot, the sum of the weights of corners that have mass.
 pub(super) type Covered = Vec<Vec<f64>>;
@@ -250,26 +253,32 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. Gives deep nodes the velocity of their foot, and books what this takes
-    /// from them.
+    /// from them. A node that is heavier than what is at a foot is no sliver but what has strayed into the
+    /// collider: it obeys the conditions of its surfaces itself. The velocity of the few at the foot is
+    /// extrapolated from its own, and to take it would add energy without bounds.
     pub(super) fn take_along(
         &mut self,
         field: usize,
         all: &[LeafFeet<D>],
         covered: &Covered,
         other: &mut VelocityField<D>,
+        rates: &[Rate<D>],
         sums: &mut [[ExactSum; SUMS]],
     ) {
-        self.take_velocities(other);
+        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| *row = other.fields.rows[node]);
         self.prolong();
         let rows = &self.grid.fields.rows;
         let of_feet = |(leaf, covered): (&LeafFeet<D>, &Vec<f64>)| -> Vec<[f64; 4]> {
             let each = leaf.feet.iter().zip(covered);
-            each.map(|(foot, covered)| match foot.is_deep && *covered > 0.0 {
-                true => {
-                    let [x, y, z, _] = foot.gather(rows).map(|sum| sum / covered);
-                    [x, y, z, 1.0]
+            each.map(|(foot, covered)| {
+                if !foot.is_deep || *covered <= 0.0 {
+                    return [0.0; 4];
                 }
-                false => [0.0; 4],
+                let [x, y, z, mass] = foot.gather(rows).map(|sum| sum / covered);
+                match other.fields.rows[foot.node[1]].0[3] <= mass {
+                    true => [x, y, z, 1.0],
+                    false => [0.0, 0.0, 0.0, HEAVY],
+                }
             })
             .collect()
         };
@@ -293,34 +302,36 @@ impl<const D: usize> Solver<D> {
         let mut touches = Vec::new();
         let rows = &mut other.fields.rows;
         for_real_nodes(fields, plan, |node, sum| {
-            let row = &mut rows[node].0;
+            let row = &mut rows[node];
             let [.., count] = sum.0;
-            if count == 0.0 || row[3] <= 0.0 {
+            if count == 0.0 || row.0[3] <= 0.0 {
                 return;
             }
-            let before: [f64; D] = std::array::from_fn(|a| row[a]);
-            (0..D).for_each(|a| row[a] = sum.0[a] / count);
             let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
-            if plan.blocks[block].owned >> bit & 1 == 0 {
+            let is_counted = plan.blocks[block].owned >> bit & 1 == 1;
+            let known = [&*inside_still, &*inside_moving].into_iter().flat_map(|inside| inside.get(block));
+            let colliders = known.flat_map(|of_block| of_block.iter().enumerate());
+            let acting = colliders
+                .filter(|(collider, _)| physics.acts_at_feet(field, &physics.colliders[*collider]))
+                .filter_map(|(collider, inside)| Some((collider, inside.as_ref()?)));
+            let mut planes = acting.flat_map(|(collider, inside)| {
+                let own = inside.planes.iter().filter(|plane| usize::from(plane.bit) == bit);
+                own.map(move |plane| (collider, plane))
+            });
+            if count >= HEAVY {
+                let position = plan.node_place(&plan.blocks[block], bit);
+                for (collider, plane) in planes {
+                    let of = (&physics.colliders[collider], &states[collider], &rates[collider]);
+                    let given = obey(row, &position, of, &plane.normal).filter(|_| is_counted);
+                    touches.extend(given.map(|impulse| Touch { collider, position, impulse }));
+                }
                 return;
             }
-            let known = [&*inside_still, &*inside_moving].into_iter().flat_map(|inside| inside.get(block));
-            let mut planes = known.flat_map(|of_block| {
-                of_block
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(collider, inside)| Some((collider, inside.as_ref()?)))
-            });
-            let plane = planes.find_map(|(collider, inside)| {
-                if !physics.acts_at_feet(field, &physics.colliders[collider]) {
-                    return None;
-                }
-                let plane = inside.planes.iter().find(|plane| usize::from(plane.bit) == bit)?;
-                Some((collider, plane.foot))
-            });
-            if let Some((collider, position)) = plane {
-                let impulse = std::array::from_fn(|a| row[3] * (before[a] - row[a]));
-                touches.push(Touch { collider, position, impulse });
+            let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
+            (0..D).for_each(|a| row.0[a] = sum.0[a] / count);
+            if let Some((collider, plane)) = planes.next().filter(|_| is_counted) {
+                let impulse = std::array::from_fn(|a| row.0[3] * (before[a] - row.0[a]));
+                touches.push(Touch { collider, position: plane.foot, impulse });
             }
         });
         touches.iter().for_each(|touch| touch.book(&physics.colliders, states, sums));
