@@ -159,7 +159,8 @@ impl<const D: usize> Surface<'_, D> {
     /// an inner corner this gradient has only one of the normals of the corner, or a mean of them, and the
     /// distance of a union knows of faces that two of its parts share and that are no surface. Both show at
     /// the foot: a cell along the normal is nearer to the collider than a cell. There the surfaces of the
-    /// nodes around that pass through the foot take the place of the gradient.
+    /// nodes around that pass through the foot take the place of the gradient; where the foot is on none of
+    /// them, the nearest place that is takes its place.
     fn planes_of(&self, x: &[f64; D], distance: f64, mut each: impl FnMut([f64; D], [f64; D])) {
         let normal = self.collider.normal(x, self.pose);
         let foot = along(x, -distance, &normal);
@@ -168,28 +169,68 @@ impl<const D: usize> Surface<'_, D> {
         }
         let own = self.is_free(&foot, &normal, WAY).then_some(normal);
         let mut normals: Vec<[f64; D]> = own.into_iter().collect();
-        for offset in crate::grid::mask::box_offsets::<D>(1).filter(|offset| *offset != [0; D]) {
-            let beside: [f64; D] = std::array::from_fn(|a| f64::from(offset[a]).mul_add(self.cell, x[a]));
-            let distance = self.collider.distance(&beside, self.pose);
-            if distance > SAME * self.cell || -distance > DEEP * self.cell {
-                continue;
-            }
-            let normal = self.collider.normal(&beside, self.pose);
-            let place = along(&beside, -distance, &normal);
+        for (place, normal) in self.around(x) {
             let off: [f64; D] = std::array::from_fn(|a| place[a] - foot[a]);
             let is_through = dot(&off, &normal).abs() <= SAME * self.cell;
             // Beside an outer corner the other surface lies behind the own one.
             let is_inner = own.is_none_or(|own| dot(&off, &own) > SAME * self.cell);
             let is_new = normals.iter().all(|known| dot(known, &normal) < 1.0 - SAME);
-            if is_through && is_inner && is_new && self.is_free(&place, &normal, WAY) {
+            if is_through && is_inner && is_new {
                 normals.push(normal);
             }
         }
-        if normals.is_empty() {
-            let (foot, normal) = self.way_out(x).unwrap_or((foot, normal));
+        // Between two parts of a union, a surface beside may pass through what is no foot.
+        let out = normals.iter().fold([0.0; D], |sum, normal| along(&sum, 1.0, normal));
+        let is_out = self.collider.distance(&along(&foot, WAY * self.cell, &out), self.pose);
+        if own.is_none() && (normals.is_empty() || is_out < -SAME * self.cell) {
+            let found = self.nearest(x).or_else(|| self.way_out(x));
+            let (foot, normal) = found.unwrap_or((foot, normal));
             return each(foot, normal);
         }
         normals.into_iter().for_each(|normal| each(foot, normal));
+    }
+
+    /// The surfaces of the nodes around one at `x`: a place and the normal of each.
+    fn around(&self, x: &[f64; D]) -> impl Iterator<Item = ([f64; D], [f64; D])> {
+        let offsets = crate::grid::mask::box_offsets::<D>(1).filter(|offset| *offset != [0; D]);
+        offsets.filter_map(move |offset| {
+            let beside: [f64; D] = std::array::from_fn(|a| f64::from(offset[a]).mul_add(self.cell, x[a]));
+            let distance = self.collider.distance(&beside, self.pose);
+            if distance > SAME * self.cell || -distance > DEEP * self.cell {
+                return None;
+            }
+            let normal = self.collider.normal(&beside, self.pose);
+            let place = along(&beside, -distance, &normal);
+            self.is_free(&place, &normal, WAY).then_some((place, normal))
+        })
+    }
+
+    /// Of the surfaces around, the place that is nearest to one inside, with the way there as normal: of nodes
+    /// behind a corner in which two parts of a union meet.
+    fn nearest(&self, x: &[f64; D]) -> Option<([f64; D], [f64; D])> {
+        let mut best: Option<(f64, [f64; D])> = None;
+        for (place, normal) in self.around(x) {
+            // Along the surface, as far as it is one.
+            let depth = (0..D).fold(0.0, |sum, a| (place[a] - x[a]).mul_add(normal[a], sum));
+            let end = along(x, depth, &normal);
+            let at = |share: f64| std::array::from_fn(|a| share.mul_add(end[a] - place[a], place[a]));
+            let is_surface = |share: f64| self.is_free(&at(share), &normal, SAME);
+            let (mut on, mut beyond) = (0.0, 1.0);
+            if is_surface(beyond) {
+                on = beyond;
+            }
+            for _ in 0..40 {
+                let middle = 0.5 * (on + beyond);
+                if is_surface(middle) { on = middle } else { beyond = middle }
+            }
+            let foot: [f64; D] = at(on);
+            let far = (0..D).fold(0.0, |sum, a| (foot[a] - x[a]).mul_add(foot[a] - x[a], sum)).sqrt();
+            if best.is_none_or(|(least, _)| far < least) {
+                best = Some((far, foot));
+            }
+        }
+        let (far, foot) = best.filter(|(far, _)| *far > SAME * self.cell)?;
+        Some((foot, std::array::from_fn(|a| (foot[a] - x[a]) / far)))
     }
 
     /// Whether a way from a place on the surface along the normal, of so many cells, leads away from all of
@@ -311,6 +352,18 @@ mod tests {
         assert_eq!(planes(Shape::Union(vec![floor, wall]), [0.0, 0.0]), [([0.0, 0.0], Y), ([0.0, 0.0], X)]);
         let room = Shape::Difference(Box::new(part([-5.0; 3], [20.0; 3])), vec![part([0.0; 3], [10.0; 3])]);
         assert_eq!(planes(room, [0.0; 3]).len(), 3);
+    }
+
+    #[test]
+    fn nodes_behind_the_corner_of_a_union_have_their_foot_on_its_surface() {
+        let (floor, wall) = (part([-3.0, -3.0], [9.0, 0.0]), part([-3.0, 0.0], [0.0, 9.0]));
+        let union = Shape::Union(vec![floor, wall]);
+        for (x, expected, along) in [([-1.0, 0.0], [0.0, 0.0], X), ([-1.0, 1.0], [0.0, 1.0], X)] {
+            let found = planes(union.clone(), x);
+            let [(foot, normal)] = found[..] else { panic!("{found:?}") };
+            let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            assert!(off(foot, expected) < 1e-5 && off(normal, along) < 1e-5, "{found:?}");
+        }
     }
 
     #[test]
