@@ -52,9 +52,9 @@ pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> 
 }
 
 impl<const D: usize> Touching<D> {
-    /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³, for drag), in a step of length `dt` (s). `None`
-    /// if the gap to the surface is wider than `reach`, m, a function of the normal, the velocity of the
-    /// surface and the distance at which the particle touches.
+    /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³, for drag), in a
+    /// step of length `dt` (s). `None` if the gap to the surface is wider than `reach`, m, a function of the
+    /// normal, the velocity of the surface and the distance at which the particle touches.
     pub fn new(
         number: usize,
         collider: &Collider<D>,

@@ -1,8 +1,8 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
-//! These are the nodes inside `sticky` colliders, for material that yields those inside all, and those behind a
-//! surface that another collider covers or comes near to. Feet of both surfaces would be in one cell, and if the colliders move against each other,
-//! no velocity of its corners obeys both.
+//! These are the nodes inside `sticky` colliders for solids, those inside all colliders for material that
+//! yields, and those behind a surface that another collider covers or comes near to. Feet of both surfaces
+//! would be in one cell, and if the colliders move against each other, no velocity of its corners obeys both.
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
@@ -45,9 +45,9 @@ pub(super) fn is_at_another<const D: usize>(
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Applies the conditions of colliders, in their order, to the real nodes of the first
-    /// velocity field, which has the place of that numbered `field`, that they hold themselves. Adds impulse and angular impulse on each from the nodes that
-    /// this rank counts.
+    /// Not collective. Applies the conditions of colliders, in their order, to the real nodes that they hold
+    /// themselves, of the velocity field numbered `field`, which is in the place of the first. Adds impulse
+    /// and angular impulse on each from the nodes that this rank counts.
     pub(in crate::solver::step) fn hold_at_nodes(
         &mut self,
         field: usize,

@@ -181,8 +181,8 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Not collective. Multiplies what cohesion bears by the area of the material's surface that each foot
-    /// holds, and drag by the density there as well: a node shares `-Σ V ∇w · n` out to the feet that it is a corner of, by weights. Real nodes have
-    /// the sums of these over their mass.
+    /// holds, and drag by the density there as well: a node shares `-Σ V ∇w · n` out to the feet that it is a
+    /// corner of, by weights. Real nodes have the sums of these over their mass.
     fn find_areas(
         &mut self,
         field: usize,
