@@ -10,7 +10,7 @@ pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
 use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
-pub use crate::kernel::{BoxPolicy, Transfer};
+pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
 use crate::load::{Gravity, Load};
 use crate::material::Material;
 use crate::material::initial::Consolidation;
@@ -155,6 +155,8 @@ pub struct Problem<const D: usize> {
     pub time: TimeSetup,
     /// Transfer of velocity between particles and grid.
     pub transfer: Transfer,
+    /// Coordinates of the domain.
+    pub coordinates: Coordinates,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).

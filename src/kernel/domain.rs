@@ -3,7 +3,7 @@
 //! A pure function of particle state, cell size and domain size: scatter, gather and the search for
 //! the block of a particle call the same code and get the same bits.
 use super::batch::{Batch, Batches, Tile};
-use super::{BoxPolicy, Scheme, Select};
+use super::{BoxPolicy, Coordinates, Scheme, Select};
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::particle::halvings;
@@ -247,7 +247,9 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
         BoxPolicy::Volume { min_stretch, max_stretch } => {
             let original: V = batch.load(tile, Layout::<D>::HALF);
             let mut half: [V; D] = stretches(tile, tags, batch, scheme);
-            if scheme.has_halves || is_far(&half, scheme, max_stretch) {
+            if scheme.coordinates == Coordinates::Axisymmetric {
+                half = of_rings(tile, tags, batch, scheme).map(V::new);
+            } else if scheme.has_halves || is_far(&half, scheme, max_stretch) {
                 let mut arrays = half.map(V::to_array);
                 far_stretched(&original.to_array(), &mut arrays, tags, batch, scheme);
                 half = arrays.map(V::new);
@@ -263,6 +265,36 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
         *half = half.min(V::splat(greatest));
     }
     half
+}
+
+/// Half widths of sections of rings: of a square section with the undeformed volume at the present radius, times
+/// the stretches that keep the volume. As the stretch along the hoop is the ratio of the radii, the half width
+/// along the radius of an elastic particle is `√(V₀ / (2π r)) / 2 · √λ_θ λ_r`, and the section of any has the
+/// area `J V₀ / (2π r)`. At most half a cell of the particle's level: towards the axis sections grow without
+/// bound.
+#[inline(never)]
+fn of_rings<const D: usize>(
+    tile: &[[f64; LANES]],
+    tags: &[u64],
+    batch: &Batch,
+    scheme: &Scheme,
+) -> [[f64; LANES]; D] {
+    let BoxPolicy::Volume { min_stretch, max_stretch } = scheme.boxes else { return [[0.0; LANES]; D] };
+    let plastic = plastic_lanes(|| batch.materials(tags), scheme);
+    let widest = scheme.sizes(tags, batch).map(|cell| 0.5 * cell);
+    let stretches = stretches::<Lanes, D>(tile, tags, batch, scheme).map(Lanes::to_array);
+    stretches.map(|stretches| {
+        std::array::from_fn(|lane| {
+            let at = |column: usize| tile[column][lane];
+            let section = scheme.coordinates.half_width(at(Layout::<D>::HALF), at(Layout::<D>::POSITION));
+            let hoop = match plastic >> lane & 1 {
+                1 => 1.0,
+                _ => at(Layout::<D>::LEFT_CAUCHY_GREEN + 2).sqrt().sqrt(),
+            };
+            let stretch = (hoop * stretches[lane]).max(min_stretch).min(max_stretch);
+            (section * stretch).min(widest[lane])
+        })
+    })
 }
 
 /// Whether any box of a batch is stretched beyond what boxes of materials that flow may be, and others may.

@@ -7,6 +7,11 @@
 //! where V and S are the first and second moments that constrained nodes inherit (see [`super::hanging`];
 //! zero on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
+//!
+//! In axisymmetry velocity and B belong to the centre of mass of the box, and `∇v` has the rate along the hoop,
+//! `L_θθ = Σ v_r T` (see [`super::p2g`]). The position is the centre of the box, which moves with the plain mean
+//! of the velocity over the box. So the radius grows at the rate `r L_θθ`: the stretch along the hoop is the
+//! ratio of the radii, whatever the motion.
 use super::batch::{Batch, Batches, Tile};
 use super::domain::AtWall;
 use super::fill::{Filling, Shifted};
@@ -14,7 +19,7 @@ pub use super::gathered::{FILL_MORE, Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
 use super::weights::{NodeWeights, Weights};
-use super::{Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::eigen::determinant;
 use crate::material::{self, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
@@ -109,7 +114,7 @@ impl<const D: usize> WholeBoxes<'_, D> {
             } else {
                 (domain::away_from_walls(&whole, cell), None)
             };
-            weights.fill(frame, &position, &position, &half);
+            weights.fill_whole(scheme, frame, &position, &half);
             if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
                 weights.soften(&factors);
             }
@@ -130,6 +135,7 @@ pub fn gather_sub_boxes<const D: usize>(
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
+    coordinates: Coordinates,
     fields: &Fields,
     gathered: &mut [Gathered<D>],
 ) {
@@ -141,11 +147,7 @@ pub fn gather_sub_boxes<const D: usize>(
             Layout::<D>::POSITION..Layout::<D>::POSITION + D,
             spare,
         ));
-        let (centre, half) = SubBox::lanes(parts);
-        weights.fill(frame, &position, &centre, &half);
-        if let Some(factors) = SubBox::softening(parts) {
-            weights.soften(&factors);
-        }
+        weights.fill_parts(coordinates, frame, &position, parts);
         sums.gather::<Lanes>(weights, nodes, &batch, frame.cell, fields);
         for (lane, part) in parts.iter().enumerate() {
             gathered[part.slot as usize].add(&sums.row(lane), part.fraction);
@@ -202,7 +204,7 @@ pub fn interpolate<const D: usize>(
         let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
         let position: [Lanes; D] = batch.positions(tile);
         let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
-        weights.fill(frame, &position, &position, &half);
+        weights.fill_whole(scheme, frame, &position, &half);
         for lane in batch.members() {
             let first = weights.first(lane);
             let row = mean(weights, lane, &velocity[first..]).to_array();
@@ -229,7 +231,7 @@ pub fn look<const D: usize>(
         let position: [Lanes; D] = batch.positions(tile);
         let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
         let half = domain::cut_at_walls(&whole, &position, cell, extent);
-        weights.fill(frame, &position, &position, &half);
+        weights.fill_whole(scheme, frame, &position, &half);
         if let Some(factors) = domain::softening(&whole, &half, cell) {
             weights.soften(&factors);
         }
@@ -285,8 +287,10 @@ impl Advance<'_> {
         let increment =
             if scheme.transfer.has_increments() { V::columns(&sums.increment) } else { [zero; 4] };
         let mut moved = *position;
+        let is_ring = scheme.coordinates == Coordinates::Axisymmetric;
+        let plain = if is_ring { V::columns(&sums.plain) } else { velocity };
         for i in 0..D {
-            moved[i] = velocity[i].mul_add(step, position[i]);
+            moved[i] = plain[i].mul_add(step, position[i]);
             let new = match scheme.transfer {
                 Transfer::Apic | Transfer::Tpic => velocity[i],
                 Transfer::Flip { blend } => {
@@ -339,6 +343,14 @@ impl Advance<'_> {
             (0..D).for_each(|i| gradient[i][i] += added);
         }
         let mut trial = strained(&elastic, &gradient, step);
+        if is_ring {
+            let mut rate = plain[2];
+            if !dilation.is_empty() {
+                rate = rate + batch.values(dilation);
+            }
+            let stretch = rate.mul_add(step, V::splat(1.0));
+            trial[2] = stretch * stretch * elastic[2];
+        }
         if let Some(filled) = &filled {
             filled.settle(&mut trial);
         }

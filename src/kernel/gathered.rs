@@ -46,16 +46,25 @@ pub struct Gathered<const D: usize> {
     increment: F64x4,
     /// `Σ e_j ∂w/∂x_k`, then `Σ w φ_j`.
     fill: F64x4,
+    /// In axisymmetry the plain mean of the velocity over the box, then the rate of strain along the hoop.
+    plain: F64x4,
 }
 
 impl<const D: usize> Default for Gathered<D> {
     fn default() -> Self {
         let zero = F64x4::splat(0.0);
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero, fill: zero }
+        let all = [zero; D];
+        Self { velocity: zero, gradient: all, affine: all, increment: zero, fill: zero, plain: zero }
     }
 }
 
 impl<const D: usize> Gathered<D> {
+    /// Rate of strain along the hoop, 1/s; 0 but in axisymmetry.
+    pub fn hoop(&self) -> f64 {
+        let [.., hoop, _] = self.plain.to_array();
+        hoop
+    }
+
     /// Velocity, m/s.
     pub fn velocity(&self) -> [f64; D] {
         let row = self.velocity.to_array();
@@ -81,6 +90,7 @@ impl<const D: usize> Gathered<D> {
         add(&mut self.velocity, other.velocity);
         add(&mut self.increment, other.increment);
         add(&mut self.fill, other.fill);
+        add(&mut self.plain, other.plain);
         for k in 0..D {
             add(&mut self.gradient[k], other.gradient[k]);
             add(&mut self.affine[k], other.affine[k]);
@@ -97,12 +107,14 @@ pub(super) struct Sums<const D: usize> {
     pub affine: [[F64x4; LANES]; D],
     pub increment: [F64x4; LANES],
     pub fill: [F64x4; LANES],
+    pub plain: [F64x4; LANES],
 }
 
 impl<const D: usize> Sums<D> {
     pub(super) fn new() -> Self {
         let zero = [F64x4::splat(0.0); LANES];
-        Self { velocity: zero, gradient: [zero; D], affine: [zero; D], increment: zero, fill: zero }
+        let all = [zero; D];
+        Self { velocity: zero, gradient: all, affine: all, increment: zero, fill: zero, plain: zero }
     }
 
     pub(super) fn row(&self, lane: usize) -> Gathered<D> {
@@ -112,6 +124,7 @@ impl<const D: usize> Sums<D> {
             affine: std::array::from_fn(|k| self.affine[k][lane]),
             increment: self.increment[lane],
             fill: self.fill[lane],
+            plain: self.plain[lane],
         }
     }
 
@@ -119,6 +132,7 @@ impl<const D: usize> Sums<D> {
         self.velocity[lane] = row.velocity;
         self.increment[lane] = row.increment;
         self.fill[lane] = row.fill;
+        self.plain[lane] = row.plain;
         for k in 0..D {
             self.gradient[k][lane] = row.gradient[k];
             self.affine[k][lane] = row.affine[k];
@@ -141,6 +155,9 @@ impl<const D: usize> Sums<D> {
             let first = weights.first(lane);
             self.contract::<V>(weights, lane, &fields.velocity[first..first + span]);
         }
+        if weights.is_ring {
+            self.add_plain(weights, batch, fields.velocity);
+        }
         if let Some(increment) = fields.increment {
             for lane in batch.members() {
                 self.increment[lane] = mean(weights, lane, &increment[weights.first(lane)..]);
@@ -162,6 +179,24 @@ impl<const D: usize> Sums<D> {
             if touched != 0 {
                 self.add_moments(weights, nodes, touched, moments);
             }
+        }
+    }
+
+    /// Plain means of the velocity over sections of rings, and from them the rates along the hoop,
+    /// `L_θθ = Σ v_r T`.
+    #[inline(never)]
+    fn add_plain(&mut self, weights: &Weights<D>, batch: &Batch, velocity: &[Row]) {
+        for lane in batch.members() {
+            let nodes = &velocity[weights.first(lane)..];
+            let mut sum = F64x4::splat(0.0);
+            for (b, weight) in weights.axis[1].weight.iter().enumerate() {
+                for (a, plain) in weights.ring.plain.iter().enumerate() {
+                    let row = F64x4::new(nodes[a + ARENA_EDGE * b].0);
+                    sum = F64x4::splat(plain[lane] * weight[lane]).mul_add(row, sum);
+                }
+            }
+            let [radial, axial, ..] = sum.to_array();
+            self.plain[lane] = F64x4::new([radial, axial, radial * weights.ring.hoop[lane], 0.0]);
         }
     }
 

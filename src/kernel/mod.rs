@@ -128,8 +128,37 @@ pub enum Coordinates {
     /// Space, or plane strain.
     #[default]
     Cartesian,
-    /// Radius and height, in 2D: bodies of revolution, per radian.
+    /// Radius and height, in 2D: bodies of revolution. Masses and volumes are those of whole rings.
     Axisymmetric,
+}
+
+impl Coordinates {
+    /// Length over which a point with this first coordinate (m) stands: the circumference of its circle, m, in
+    /// axisymmetry; else 1.
+    pub fn around(self, x: f64) -> f64 {
+        match self {
+            Self::Cartesian => 1.0,
+            Self::Axisymmetric => std::f64::consts::TAU * x,
+        }
+    }
+
+    /// Half width of the box of a particle, m, from the value in [`crate::particle::Layout::HALF`] and the
+    /// first coordinate of its centre, m.
+    pub fn half_width(self, half: f64, x: f64) -> f64 {
+        match self {
+            Self::Cartesian => half,
+            Self::Axisymmetric => half / self.around(x.max(0.0)).sqrt(),
+        }
+    }
+
+    /// Distance (m) along the first axis from the centre of a box with this half width (m) at `x` to its
+    /// centre of mass: `∫ r² dr / ∫ r dr - x`.
+    pub fn to_mass_centre(self, half: f64, x: f64) -> f64 {
+        match self {
+            Self::Cartesian => 0.0,
+            Self::Axisymmetric => half * half / (3.0 * x),
+        }
+    }
 }
 
 /// How the half widths of a particle's box follow its deformation.
@@ -174,7 +203,7 @@ pub struct Scheme<'a> {
     pub root_cell: f64,
     /// Transfer of velocities.
     pub transfer: Transfer,
-    /// Coordinates: P2G alone knows those of axisymmetry.
+    /// Coordinates.
     pub coordinates: Coordinates,
     /// Materials by index (see [`crate::particle::chunk::Tag`]).
     pub materials: &'a [Box<dyn Material>],
@@ -258,6 +287,8 @@ pub struct SubBox<const D: usize> {
     pub centre: [f64; D],
     /// Half widths of the part, m; at most half a cell of the block.
     pub half: [f64; D],
+    /// Half width of the whole box along the first axis, m.
+    pub whole: f64,
     /// Factor of the slopes along each axis: below 1 for boxes that a near wall cuts (see
     /// [`domain::softening_at`]).
     pub softening: [f64; D],
@@ -268,6 +299,11 @@ pub struct SubBox<const D: usize> {
 }
 
 impl<const D: usize> SubBox<D> {
+    /// Half widths of the whole boxes along the first axis, m.
+    fn wholes(parts: &[Self]) -> Lanes {
+        Self::lane(parts, |part| part.whole)
+    }
+
     /// Centres and half widths of up to a batch of parts; lanes beyond repeat the last.
     fn lanes(parts: &[Self]) -> ([Lanes; D], [Lanes; D]) {
         (

@@ -14,12 +14,15 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
+//! In axisymmetry the hoop stress adds `-Δt V₀ τ_θθ T` to the momentum along the radius, with T the plain mean
+//! of the hat over the box, over the radius; it has a pass of its own.
 use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, add_products};
-use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
+use crate::particle::volume::box_volume;
 use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
 
 /// Constrained nodes of an arena, and first moments `A = Σ w m C` of those that have them.
@@ -80,11 +83,14 @@ impl<const D: usize> Scatter<'_, D> {
         for parts in parts.chunks(LANES) {
             let batch = Batch::from_indices(parts, |part| part.particle);
             let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
-            prepared.fill_parts(frame, &batch.positions(tile), parts, scheme.coordinates);
+            prepared.weights.fill_parts(scheme.coordinates, frame, &batch.positions(tile), parts);
             let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
             prepared.load::<Lanes>(tile, &batch, *dt, scheme.transfer, &spread);
             prepared.share(parts);
             prepared.add::<Lanes>(&batch, arena);
+            if prepared.weights.is_ring {
+                prepared.add_hoop(tile, &batch, *dt, |lane| parts[lane].fraction, arena);
+            }
             if let Some(moments) = moments {
                 let hanging = &moments.nodes.hanging;
                 prepared.add_hanging(hanging, hanging.touched(&prepared.weights, &batch), frame.cell, arena);
@@ -134,11 +140,7 @@ impl<const D: usize> WholeBoxes<'_, D> {
                 true => domain::cut_at_walls(&whole, &position, cell, &frame.extent),
                 false => domain::away_from_walls(&whole, cell),
             };
-            prepared.weights.fill(frame, &position, &position, &half);
-            if scheme.coordinates == Coordinates::Axisymmetric {
-                let [radius, half] = [position[0], half[0]].map(|lanes| Lanes::new(lanes.to_array()));
-                prepared.weights.revolve(frame, radius, radius, half);
-            }
+            prepared.weights.fill_whole(scheme, frame, &position, &half);
             if AT_WALL && let Some(factors) = domain::softening(&whole, &half, cell) {
                 prepared.weights.soften(&factors);
             }
@@ -156,6 +158,9 @@ impl<const D: usize> WholeBoxes<'_, D> {
             }
             prepared.load::<V>(tile, &batch, dt, scheme.transfer, &spread);
             prepared.add::<V>(&batch, arena);
+            if prepared.weights.is_ring {
+                prepared.add_hoop(tile, &batch, dt, |_| 1.0, arena);
+            }
             if let Some(moments) = &mut moments {
                 prepared.add_hanging(&moments.nodes.hanging, hanging, cell, arena);
                 prepared.add_moments(nodes, touched, moments);
@@ -180,23 +185,6 @@ impl<const D: usize> Prepared<D> {
     fn new() -> Self {
         let rows = [F64x4::splat(0.0); LANES];
         Self { weights: Weights::new(), momentum: rows, affine: [rows; D], impulse: [rows; D] }
-    }
-
-    fn fill_parts(
-        &mut self,
-        frame: &Frame<D>,
-        position: &[Lanes; D],
-        parts: &[SubBox<D>],
-        coordinates: Coordinates,
-    ) {
-        let (centre, half) = SubBox::lanes(parts);
-        self.weights.fill(frame, position, &centre, &half);
-        if coordinates == Coordinates::Axisymmetric {
-            self.weights.revolve(frame, position[0], centre[0], half[0]);
-        }
-        if let Some(factors) = SubBox::softening(parts) {
-            self.weights.soften(&factors);
-        }
     }
 
     /// Reads the particles' state; `spread` is D of [`Transfer::Apic`].
@@ -286,6 +274,30 @@ impl<const D: usize> Prepared<D> {
         let (y, z) = (&self.weights.axis[1].weight, &self.weights.axis[D - 1].weight);
         let product = |b: usize, c: usize| of(&self.weights.product[b][c]);
         add_products::<V, D>(nodes, &weight_x, |b| of(&y[b]), |c| of(&z[c]), product, &along);
+    }
+
+    /// Adds the impulse of the hoop stress, `-Δt V₀ τ_θθ T` along the radius; of each lane its share.
+    #[inline(never)]
+    fn add_hoop(
+        &self,
+        tile: &[[f64; LANES]],
+        batch: &Batch,
+        dt: f64,
+        share: impl Fn(usize) -> f64,
+        arena: &mut [Row],
+    ) {
+        let Weights { ring, axis, .. } = &self.weights;
+        for lane in batch.members() {
+            let volume = box_volume::<D>(tile[Layout::<D>::HALF][lane]);
+            let impulse = -dt * volume * tile[Layout::<D>::STRESS + 2][lane] * ring.hoop[lane] * share(lane);
+            let first = self.weights.first(lane);
+            for (b, weight) in axis[1].weight.iter().enumerate() {
+                for (a, plain) in ring.plain.iter().enumerate() {
+                    let radial = &mut arena[first + a + ARENA_EDGE * b].0[0];
+                    *radial = impulse.mul_add(plain[lane] * weight[lane], *radial);
+                }
+            }
+        }
     }
 
     /// Adds the contributions of hanging nodes of the lanes in `touched`, which have no first moments.

@@ -6,7 +6,7 @@
 use super::batch::{Batch, Batches, Tile};
 use super::constrained_nodes::ConstrainedNodes;
 use super::weights::{NodeWeights, Weights};
-use super::{Frame, Scheme, Select, SubBox, domain};
+use super::{Coordinates, Frame, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{LANES, Lanes};
 
@@ -25,7 +25,7 @@ pub fn of_particles<const D: usize>(
         let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, &mut spare);
         let position: [Lanes; D] = batch.positions(tile);
         let half = domain::of_batch(tile, tags, &batch, &position, cell, 0.5 * cell, &frame.extent, scheme);
-        weights.fill(frame, &position, &position, &half);
+        weights.fill_whole(scheme, frame, &position, &half);
         let spread = complete(&mut weights, &batch, frame.cell, constraints);
         for lane in batch.members() {
             each(batch.particle(lane), spread.map(|axis| axis[lane]));
@@ -38,6 +38,7 @@ pub fn of_parts<const D: usize>(
     chunk: &Chunk<D>,
     parts: &[SubBox<D>],
     frame: &Frame<D>,
+    coordinates: Coordinates,
     constraints: Option<&ConstrainedNodes>,
     mut each: impl FnMut(usize, [f64; D]),
 ) {
@@ -49,8 +50,7 @@ pub fn of_parts<const D: usize>(
             Layout::<D>::POSITION..Layout::<D>::POSITION + D,
             &mut spare,
         ));
-        let (centre, half) = SubBox::lanes(parts);
-        weights.fill(frame, &position, &centre, &half);
+        weights.fill_parts(coordinates, frame, &position, parts);
         let spread = complete(&mut weights, &batch, frame.cell, constraints);
         for lane in batch.members() {
             each(first + lane, spread.map(|axis| axis[lane]));

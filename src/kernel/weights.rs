@@ -1,6 +1,6 @@
 //! Tensor-product stencils of a batch of boxes.
 use super::stencil::Axis;
-use super::{ARENA_EDGE, BASES, Frame, Row};
+use super::{ARENA_EDGE, BASES, Coordinates, Frame, Row, Scheme, SubBox};
 use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 /// Factors of one axis, node by node and lane by lane.
@@ -26,6 +26,17 @@ pub(super) struct Weights<const D: usize> {
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
     pub spread: [[f64; LANES]; D],
+    /// What axisymmetry needs more, if `is_ring`.
+    pub ring: Ring,
+    pub is_ring: bool,
+}
+
+/// Sections of rings: means without the radius.
+pub(super) struct Ring {
+    /// Weights along the radius of plain means over the box, `∫ N dr / ∫ dr`.
+    pub plain: [[f64; LANES]; 3],
+    /// What makes plain means of the radial velocity rates of the hoop: 1 / radius, 1/m.
+    pub hoop: [f64; LANES],
 }
 
 /// Weights of a batch node by node, `a + 3 b (+ 9 c)`, which only batches with constrained nodes need.
@@ -44,18 +55,49 @@ impl<const D: usize> Weights<D> {
             axis: [Factors { weight: none, arm: none, slope: none }; D],
             product: [none; 3],
             spread: [[0.0; LANES]; D],
+            ring: Ring { plain: none, hoop: [0.0; LANES] },
+            is_ring: false,
+        }
+    }
+
+    /// Whole boxes around `position`.
+    #[inline(always)]
+    pub(super) fn fill_whole<V: Vector>(
+        &mut self,
+        scheme: &Scheme,
+        frame: &Frame<D>,
+        position: &[V; D],
+        half: &[V; D],
+    ) {
+        self.fill(frame, position, position, half);
+        if scheme.coordinates == Coordinates::Axisymmetric {
+            let [radius, half] = [position[0], half[0]].map(|lanes| Lanes::new(lanes.to_array()));
+            self.revolve(frame, radius, radius, half, half);
+        }
+    }
+
+    /// Parts of boxes around `position`.
+    pub(super) fn fill_parts(
+        &mut self,
+        coordinates: Coordinates,
+        frame: &Frame<D>,
+        position: &[Lanes; D],
+        parts: &[SubBox<D>],
+    ) {
+        let (centre, half) = SubBox::lanes(parts);
+        self.fill(frame, position, &centre, &half);
+        if coordinates == Coordinates::Axisymmetric {
+            self.revolve(frame, position[0], centre[0], half[0], SubBox::wholes(parts));
+        }
+        if let Some(factors) = SubBox::softening(parts) {
+            self.soften(&factors);
         }
     }
 
     /// Boxes around `centre`, arms relative to `position`.
     #[inline(always)]
-    pub(super) fn fill<V: Vector>(
-        &mut self,
-        frame: &Frame<D>,
-        position: &[V; D],
-        centre: &[V; D],
-        half: &[V; D],
-    ) {
+    fn fill<V: Vector>(&mut self, frame: &Frame<D>, position: &[V; D], centre: &[V; D], half: &[V; D]) {
+        self.is_ring = false;
         let inverse = 1.0 / frame.cell;
         let mut first = V::splat(0.0);
         let mut base = first;
@@ -90,15 +132,22 @@ impl<const D: usize> Weights<D> {
     }
 
     /// Replaces the factors along the first axis by those of axisymmetry (see [`Axis::revolved`]), for
-    /// particles at `radius` whose boxes, or parts of boxes, are these; arms stay relative to the particles.
+    /// particles at `radius` whose boxes, or parts of boxes, are these; `whole` is the half width of the whole
+    /// box. Arms are relative to the centre of mass of the whole box, to which the velocity belongs.
     /// Out of line: planar kernels have one branch for it, and no registers.
     #[inline(never)]
-    pub(super) fn revolve(&mut self, frame: &Frame<D>, radius: Lanes, centre: Lanes, half: Lanes) {
+    fn revolve(&mut self, frame: &Frame<D>, radius: Lanes, centre: Lanes, half: Lanes, whole: Lanes) {
         let (corner, inverse) = (frame.corner[0], 1.0 / frame.cell);
         let local = |x: Lanes| (x - Lanes::splat(corner)) * inverse;
+        // No box is narrower than round-off, so one at the axis may reach beyond it by as much.
+        let radius = radius.max(whole);
+        let mass_centre = radius + whole * whole / (radius * 3.0);
         let axis = Axis::revolved(local(centre), half * inverse, frame.cell, corner, radius);
-        let offset = axis.offsets(local(radius), frame.cell);
+        let offset = axis.offsets(local(mass_centre), frame.cell);
         let mut spread = Lanes::splat(0.0);
+        self.ring.plain = self.axis[0].weight;
+        (Lanes::splat(1.0) / radius).store(&mut self.ring.hoop);
+        self.is_ring = true;
         let to = &mut self.axis[0];
         for i in 0..3 {
             let arm = axis.weight[i] * offset[i];
@@ -117,6 +166,9 @@ impl<const D: usize> Weights<D> {
             for lanes in axis.slope.iter_mut().chain(&mut axis.arm) {
                 (V::load(lanes) * *factor).store(lanes);
             }
+        }
+        if self.is_ring {
+            (V::load(&self.ring.hoop) * factors[0]).store(&mut self.ring.hoop);
         }
     }
 

@@ -396,7 +396,14 @@ impl<'a, const D: usize> Run<'a, D> {
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {
             let mass = self.solver.particle_totals().mass;
-            collapse::evaluate(self.comm, setup, self.problem.size(), &self.solver.chunks, mass)
+            let coordinates = self.problem.coordinates;
+            collapse::evaluate(
+                self.comm,
+                setup,
+                (self.problem.size(), coordinates),
+                &self.solver.chunks,
+                mass,
+            )
         });
         let summary = Summary {
             effort: self.recorder.effort(&self.solver),

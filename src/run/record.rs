@@ -12,10 +12,11 @@ use crate::io::log::history::{Column, Gap, History, Kept};
 use crate::io::log::progress::Progress;
 use crate::io::log::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
+use crate::job::problem::Coordinates;
 use crate::probe;
 use crate::probe::line::Sample;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
-use crate::solver::state::bookings::FACE_SUMS;
+use crate::solver::state::bookings::{FACE_SUMS, Reaction};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 use crate::text::quantity;
@@ -262,7 +263,13 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if self.history.is_none() {
             return (Vec::new(), samples);
         }
-        let mut values = history::row(clock.time, clock.dt, particles, grid, &crossings);
+        let mut grid = *grid;
+        let is_ring = self.problem.coordinates == Coordinates::Axisymmetric;
+        if is_ring {
+            // Rings do not spin, and the moments of their momenta along the radius cancel.
+            grid.angular_momentum = [0.0; 3];
+        }
+        let mut values = history::row(clock.time, clock.dt, particles, &grid, &crossings);
         if let Some(ledger) = &ledger {
             values.extend(history::ledger_values(ledger));
         }
@@ -287,6 +294,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         faces.iter().for_each(|force| values.extend(&force[..D]));
         let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
         for ((collider, state), reaction) in all {
+            let reaction = if is_ring { &Reaction { torque: [0.0; 3], ..*reaction } } else { reaction };
             values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
         }
         (values, samples)

@@ -13,7 +13,8 @@ use crate::exact_sum::ExactSum;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::log::progress::warn;
 use crate::io::snapshot::directory::{self, Candidates};
-use crate::io::snapshot::{self, Header, Scalars, compare};
+use crate::io::snapshot::{self, AXISYMMETRIC, Header, Scalars, compare};
+use crate::job::problem::Coordinates;
 use crate::job::{self, Problem};
 use crate::load;
 use crate::particle::Chunk;
@@ -66,6 +67,9 @@ pub fn scalars<const D: usize>(
 ) -> Scalars {
     let mut crossings = solver.crossings.gather(comm);
     let mut counts = vec![(NEXT_OUTPUT.into(), next_output)];
+    if problem.coordinates == Coordinates::Axisymmetric {
+        counts.push((AXISYMMETRIC.into(), 1));
+    }
     let numbers = [crossings.put_back, crossings.deleted, crossings.left];
     counts.extend(CROSSINGS.iter().map(|name| String::from(*name)).zip(numbers));
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));

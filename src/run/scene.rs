@@ -72,7 +72,7 @@ fn own_triangles<const D: usize>(shape: &Shape<D>) -> Vec<[[f64; 3]; 3]> {
 /// How the solver has the boxes of particles.
 pub fn boxes<const D: usize>(physics: &Physics<D>) -> Boxes {
     let is_plastic = physics.materials.iter().map(|material| material.is_plastic()).collect();
-    Boxes { policy: physics.boxes, is_plastic }
+    Boxes { policy: physics.boxes, coordinates: physics.coordinates, is_plastic }
 }
 
 /// Not collective. The scene of a job at the time of an output of it.

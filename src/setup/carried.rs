@@ -189,7 +189,8 @@ impl<const D: usize> Search<'_, D> {
             if let Some((leaf, index)) = self.particle_of(patch, cell)
                 && let Some(leaf) = self.tree.local(leaf)
             {
-                let numbers = carried.of_surface(&patch.area);
+                let around = problem.coordinates.around(patch.centre[0]);
+                let numbers = carried.of_surface(&patch.area.map(|component| around * component));
                 shares.push(Share { leaf, body: self.body as u16, index, numbers });
             }
         }

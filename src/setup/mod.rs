@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use self::initial_stress::put_under_stress;
 use self::seed::{SeedError, check_counts, check_finite, count_leaf, fill_leaf};
 use crate::job::Problem;
-use crate::kernel::Coordinates;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
@@ -50,7 +49,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         fill_densities: Vec::new(),
         meets: Vec::new(),
         transfer: problem.transfer,
-        coordinates: Coordinates::Cartesian,
+        coordinates: problem.coordinates,
         boxes: problem.boxes,
         cohesion: None,
         has_halves: false,

@@ -120,10 +120,15 @@ pub fn fill_leaf<const D: usize>(
                 }
             }
             let mut set = |column: usize, value: f64| chunk.column_mut(column)[p] = value;
+            let volume = point.part.as_ref().map_or(whole, |part| part.volume);
+            // The velocity is that of the centre of mass.
+            let mut inner = *x;
+            let half = 0.5 * point.part.as_ref().map_or(spacing, |part| edge::<D>(part.volume));
+            inner[0] += problem.coordinates.to_mass_centre(half.min(x[0]), x[0]);
             for i in 0..D {
                 let turning: f64 = (0..D).map(|j| spin[i][j] * (x[j] - body.centre[j])).sum();
                 set(Layout::<D>::POSITION + i, x[i]);
-                set(Layout::<D>::VELOCITY + i, body.velocity[i].at(problem.place(x), 0.0) + turning);
+                set(Layout::<D>::VELOCITY + i, body.velocity[i].at(problem.place(&inner), 0.0) + turning);
                 for j in 0..D {
                     let slope = slope(problem, &body.velocity[i], x, j, spacing);
                     set(Layout::<D>::AFFINE + D * i + j, spin[i][j] + slope);
@@ -136,9 +141,9 @@ pub fn fill_leaf<const D: usize>(
             for diagonal in 0..3 {
                 set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
             }
-            let volume = point.part.as_ref().map_or(whole, |part| part.volume);
-            set(Layout::<D>::MASS, density * volume);
-            set(Layout::<D>::HALF, 0.5 * point.part.as_ref().map_or(spacing, |part| edge::<D>(part.volume)));
+            let around = problem.coordinates.around(x[0]);
+            set(Layout::<D>::MASS, density * (volume * around));
+            set(Layout::<D>::HALF, half * around.sqrt());
         }
     })
 }

@@ -5,7 +5,7 @@ use super::seed::check_counts;
 use crate::adaptivity::Cohesion;
 use crate::boundary::Meets;
 use crate::job::Problem;
-use crate::job::problem::{Body, BoxPolicy};
+use crate::job::problem::{Body, BoxPolicy, Coordinates};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
@@ -52,9 +52,13 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     physics
 }
 
-/// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation.
+/// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation. Sections of
+/// rings are not halved.
 fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesion> {
     let BoxPolicy::Volume { max_stretch, .. } = problem.boxes else { return None };
+    if problem.coordinates == Coordinates::Axisymmetric {
+        return None;
+    }
     let bodies = problem.bodies.iter().enumerate().filter(|(_, body)| body.stage <= stage);
     let elastic = bodies.filter(|(number, _)| {
         let setup = &problem.materials[material_of(problem, *number, stage)];
@@ -139,7 +143,8 @@ pub fn enter_next<const D: usize>(
     let is_removed = |body| problem.stages[stage].removed.contains(&body);
     let bodies = 0..problem.bodies.len();
     let is_removed: Vec<bool> = bodies.clone().map(is_removed).collect();
-    let met = solver.chunks.iter().zip(&added).map(|(chunk, added)| occupied(chunk, added, &is_removed));
+    let met = solver.chunks.iter().zip(&added);
+    let met = met.map(|(chunk, added)| occupied(problem.coordinates, chunk, added, &is_removed));
     let mut come = [added.iter().map(|chunk| chunk.len() as u64).sum(), met.sum()];
     comm.sum_u64(&mut come);
     let change = Change {
@@ -155,8 +160,14 @@ pub fn enter_next<const D: usize>(
 
 /// Number of the added particles of a leaf whose box overlaps that of a particle that stays by half along
 /// each axis.
-fn occupied<const D: usize>(chunk: &Chunk<D>, added: &Chunk<D>, is_removed: &[bool]) -> u64 {
-    let half = |of: &Chunk<D>, p: usize| of.column(Layout::<D>::HALF)[p];
+fn occupied<const D: usize>(
+    coordinates: Coordinates,
+    chunk: &Chunk<D>,
+    added: &Chunk<D>,
+    is_removed: &[bool],
+) -> u64 {
+    let half =
+        |of: &Chunk<D>, p: usize| coordinates.half_width(of.column(Layout::<D>::HALF)[p], of.position(p)[0]);
     let stays = |p: &usize| !is_removed[usize::from(Tag::unpack(chunk.tags()[*p]).body)];
     let is_taken = |p: &usize| {
         let (x, reach) = (added.position(*p), half(added, *p));

@@ -4,6 +4,7 @@
 mod common;
 
 mod adaptivity;
+mod axisymmetry;
 mod bad_jobs;
 mod cohesion;
 mod colliders;
@@ -55,6 +56,7 @@ mod weights_properties;
 #[ignore = "started by other tests"]
 fn worker() {
     common::scenarios::work(&[
+        axisymmetry::SCENARIOS,
         golden::SCENARIOS,
         walls_and_origin::SCENARIOS,
         weights_axisymmetric::SCENARIOS,

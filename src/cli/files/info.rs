@@ -3,6 +3,7 @@ use super::given::Given;
 use crate::cli::Failure;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::{Header, PointField, compare};
+use crate::kernel::Coordinates;
 use crate::text::{bytes, count as grouped, number, printable, quantity_to};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -89,6 +90,9 @@ fn write(out: &mut impl Write, contents: &Contents) -> std::io::Result<()> {
     let edges = header.origin.iter().zip(&header.roots);
     let high = point(&mut edges.map(|(low, &roots)| low + header.root_edge * roots as f64));
     writeln!(out, "domain           {}D, [{low}] to [{high}] m", header.dimension)?;
+    if header.scalars.coordinates() == Coordinates::Axisymmetric {
+        writeln!(out, "geometry         bodies of revolution about x = 0")?;
+    }
     writeln!(out, "step             {}", header.step)?;
     let (time, dt) = (quantity_to(header.time, "s", 7), quantity_to(header.dt, "s", 4));
     writeln!(out, "time             {time} (last step {dt})")?;

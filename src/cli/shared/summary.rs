@@ -4,7 +4,7 @@ use std::io::Write;
 use crate::adaptivity::Adaptivity;
 use crate::boundary::{ActsOn, Contact, Meets};
 use crate::job::Problem;
-use crate::job::problem::InStages;
+use crate::job::problem::{Coordinates, InStages};
 use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
@@ -42,6 +42,12 @@ pub(in crate::cli) fn write<const D: usize>(
     let size: Vec<String> = problem.size().iter().map(|edge| number(*edge, 7)).collect();
     let roots: Vec<String> = problem.brick.roots.iter().map(u32::to_string).collect();
     writeln!(out, "domain       {} m, {} root octants", size.join(" x "), roots.join(" x "))?;
+    if problem.coordinates == Coordinates::Axisymmetric {
+        writeln!(
+            out,
+            "geometry     bodies of revolution; masses, forces and energies of the whole circumference"
+        )?;
+    }
     let least = if estimate.is_cut { "at least " } else { "" };
     writeln!(out, "particles    {least}{}", grouped(estimate.total_particles()))?;
     for (body, count) in problem.bodies.iter().zip(&estimate.particles).take(MOST_BODIES) {

@@ -1,10 +1,10 @@
 //! Widths of particles in pictures: those of their boxes in the solver.
-use super::source::numbers;
+use super::source::{numbers, points};
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::io::snapshot::Header;
 use crate::io::snapshot::intact::checked::Checked;
-use crate::kernel::BoxPolicy;
 use crate::kernel::domain::stretches_of_one;
+use crate::kernel::{BoxPolicy, Coordinates};
 use crate::material::PLASTIC_VOLUME;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::halvings;
@@ -18,13 +18,15 @@ const CELLS: f64 = 4.0;
 pub struct Boxes {
     /// How boxes follow the deformation.
     pub policy: BoxPolicy,
+    /// Coordinates of the domain.
+    pub coordinates: Coordinates,
     /// Whether each material flows, by its number.
     pub is_plastic: Vec<bool>,
 }
 
 /// The data of a particle from which its box follows.
 struct Particle {
-    /// Half of the edge of the undeformed box, m.
+    /// Half of the edge of the undeformed box, m; of the section of a ring at its radius.
     half: f64,
     /// Left Cauchy-Green tensor: xx, yy, zz, xy, yz, xz.
     elastic: [f64; 6],
@@ -45,7 +47,11 @@ impl Boxes {
                 let is_plastic = self.is_plastic.get(usize::from(tag.material)).copied().unwrap_or(true);
                 // Those that do not flow are halved before their boxes reach a bound.
                 let limits = [min_stretch, if is_plastic { max_stretch } else { f64::INFINITY }];
-                let stretch = stretches_of_one(elastic, *plastic_volume, dimension, is_plastic, limits);
+                let mut stretch = stretches_of_one(elastic, *plastic_volume, dimension, is_plastic, limits);
+                if self.coordinates == Coordinates::Axisymmetric && !is_plastic {
+                    // See `kernel::domain`.
+                    stretch = stretch.map(|stretch| stretch * elastic[2].sqrt().sqrt());
+                }
                 let shape = match (dimension, halvings::shape::<2>(*packed)) {
                     (2, [x, y]) => [x, y, 1.0],
                     _ => halvings::shape::<3>(*packed),
@@ -58,7 +64,7 @@ impl Boxes {
     /// Half widths of a particle of a run, m.
     pub(super) fn of_chunk<const D: usize>(&self, chunk: &Chunk<D>, p: usize, root_edge: f64) -> [f64; 3] {
         let particle = Particle {
-            half: chunk.column(Layout::<D>::HALF)[p],
+            half: self.coordinates.half_width(chunk.column(Layout::<D>::HALF)[p], chunk.position(p)[0]),
             elastic: symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p),
             plastic_volume: chunk.column(Layout::<D>::PLASTIC_VOLUME)[p],
             tag: chunk.tags()[p],
@@ -75,15 +81,18 @@ impl Boxes {
         }
         let [half, elastic, history, tags] = needed;
         let (half, _) = numbers(file, header, &half)?;
+        let points = points(file, header)?;
         let (elastic, components) = numbers(file, header, &elastic)?;
         let (history, histories) = numbers(file, header, &history)?;
         let tags: Vec<u64> = Checked::new(None, file, header).read_all(&tags, header.particles, 0)?;
-        let rows = half.iter().zip(elastic.chunks_exact(components)).zip(history.chunks_exact(histories));
+        let radii = points.iter().step_by(3);
+        let half = half.iter().zip(radii).map(|(half, x)| self.coordinates.half_width(*half, *x));
+        let rows = half.zip(elastic.chunks_exact(components)).zip(history.chunks_exact(histories));
         let widths = rows.zip(tags).map(|(((half, elastic), history), tag)| {
             // Of the state: xx, yy, zz, xy and in 3D xz, yz.
             let at = |component: usize| elastic.get(component).copied().unwrap_or(0.0);
             let particle = Particle {
-                half: *half,
+                half,
                 elastic: [at(0), at(1), at(2), at(3), at(5), at(4)],
                 plastic_volume: history.get(PLASTIC_VOLUME).copied().unwrap_or(0.0),
                 tag,

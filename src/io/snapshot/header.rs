@@ -4,6 +4,7 @@ use partition::{MAX_LEVEL, Octant};
 
 use super::View;
 use crate::io::hdf5_file::{FileError, Reader, Writer};
+use crate::kernel::Coordinates;
 
 /// Version of the layout of the state. A file of another one is refused.
 pub const FORMAT: u64 = 2;
@@ -11,6 +12,8 @@ pub const FORMAT: u64 = 2;
 const MAGIC: &str = "agimp state";
 /// Steps are counted in real numbers too, which hold whole numbers up to this.
 const MOST_STEPS: u64 = 1 << 53;
+/// Counter among the scalars of files of axisymmetric jobs.
+pub const AXISYMMETRIC: &str = "axisymmetric";
 /// The group with the header and, in files that a run can restart from, the state.
 pub(super) const GROUP: &str = "state";
 
@@ -34,6 +37,11 @@ impl Scalars {
     /// The counter of that name.
     pub fn count(&self, name: &str) -> Option<u64> {
         find(&self.counts, name).copied()
+    }
+
+    /// Coordinates of the domain.
+    pub fn coordinates(&self) -> Coordinates {
+        if self.count(AXISYMMETRIC).is_some() { Coordinates::Axisymmetric } else { Coordinates::Cartesian }
     }
 
     /// The words of the exact sum of that name.

@@ -36,7 +36,7 @@ mod place;
 pub use content::fields::PointField;
 use content::{state, vtkhdf};
 pub use given::particles;
-pub use header::{Header, Scalars};
+pub use header::{AXISYMMETRIC, Header, Scalars};
 use intact::checked::{Checked, Recorded, Rows};
 use intact::commit::Unnamed;
 pub use intact::sane::Limits;

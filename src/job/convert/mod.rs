@@ -7,6 +7,7 @@
 //! | `settings` | faces, numerics, output, report |
 //! | `shapes` | shapes, among them terrain, and particles from a file |
 //! | `adaptivity` | dynamic refinement |
+//! | `axisymmetry` | what axisymmetric jobs cannot have |
 //! | `colliders` | colliders and their motion |
 //! | `contact` | contact between bodies |
 //! | `loads` | loads and quantities |
@@ -38,6 +39,7 @@ use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
 
 mod adaptivity;
+mod axisymmetry;
 mod checks;
 mod colliders;
 mod contact;
@@ -86,6 +88,10 @@ fn problem<const D: usize>(
 ) -> Option<Problem<D>> {
     let name = path.file_stem().map_or_else(|| "job".into(), |stem| stem.to_string_lossy().into_owned());
     let root = Path::default();
+    let coordinates = axisymmetry::coordinates(checks, file);
+    let is_ring = coordinates == Coordinates::Axisymmetric;
+    let with_axis = is_ring.then(|| axisymmetry::with_axis(file));
+    let file = with_axis.as_ref().unwrap_or(file);
     let (origin, brick) = domain::<D>(checks, &file.domain, &root.key("domain"))?;
     let root_edge = file.domain.root_edge;
     let space = Space { origin, size: brick.roots.map(|n| f64::from(n) * root_edge) };
@@ -138,9 +144,12 @@ fn problem<const D: usize>(
         output.followed.motion = Motion::Displacement;
     }
     let report = match &file.report {
-        Some(written) => Some(report(checks, written, &space, &root.key("report"))?),
+        Some(written) => Some(report(checks, written, (&space, coordinates), &root.key("report"))?),
         None => None,
     };
+    if is_ring && checks.faults.is_empty() {
+        axisymmetry::check(checks, file, &materials, colliders.as_deref().unwrap_or(&[]));
+    }
     let problem = Problem {
         name,
         path: path.to_path_buf(),
@@ -175,6 +184,7 @@ fn problem<const D: usize>(
             growth: file.time.growth,
         },
         transfer,
+        coordinates,
         boxes,
         f_bar: file.numerics.f_bar,
         tied_surfaces: file.numerics.tied_surfaces,

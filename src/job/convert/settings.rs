@@ -190,7 +190,7 @@ pub(super) fn followed(output: &Output) -> Followed {
 pub(in crate::job) fn report<const D: usize>(
     checks: &mut Checks,
     report: &file::Report,
-    space: &Space<D>,
+    (space, coordinates): (&Space<D>, Coordinates),
     path: &Path,
 ) -> Option<ReportSetup<D>> {
     let file::Report::ColumnCollapse { base, up, radius, height, law } = report;
@@ -209,8 +209,11 @@ pub(in crate::job) fn report<const D: usize>(
         checks.fault(&path.key("up"), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
         return None;
     }
-    if D == 2 && *law == CollapseLaw::Axisymmetric {
-        checks.fault(&path.key("law"), "found \"axisymmetric\"; expected \"planar\" in a 2D job".into());
+    if D == 2 && coordinates == Coordinates::Cartesian && *law == CollapseLaw::Axisymmetric {
+        checks.fault(
+            &path.key("law"),
+            "found \"axisymmetric\"; expected \"planar\" in a job of plane strain".into(),
+        );
     }
     Some(ReportSetup::ColumnCollapse { base, up, radius: *radius, height: *height, law: *law })
 }

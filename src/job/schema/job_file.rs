@@ -38,9 +38,14 @@ pub struct JobFile {
     /// Title, shown in pictures and reports.
     #[serde(default)]
     pub title: String,
-    /// Dimension: 2 for plane strain (one metre thick), 3 for space.
+    /// Dimension: 2 for plane strain (one metre thick) or, with `geometry`, bodies of revolution; 3 for space.
     #[schemars(range(min = 2, max = 3))]
     pub dimension: u32,
+    /// Geometry of a job with `dimension = 2`; plane strain by default. With "axisymmetric" bodies are those of revolution about x = 0: x is the
+    /// radius, y the height, and component zz that along the hoop. Masses, volumes, forces, energies and fluxes are then those of the whole
+    /// circumference, on input and output; a force or momentum along x is the sum of the radial components.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<Geometry>,
     /// Components of the acceleration of gravity, m/s², as many as the job has dimensions; each a number, an expression in t,
     /// or a table over time. None by default.
     #[serde(default)]
@@ -133,6 +138,16 @@ impl JobFile {
         let bodies = self.bodies.iter().map(|body| body.name.as_str());
         bodies.chain(self.sources.iter().map(|source| source.name.as_str())).collect()
     }
+}
+
+/// Geometry of a job with `dimension = 2`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Geometry {
+    /// Plane strain, one metre thick.
+    PlaneStrain,
+    /// Bodies of revolution: x is the radius, y the height.
+    Axisymmetric,
 }
 
 /// The computational domain: a box of cubic root octants.

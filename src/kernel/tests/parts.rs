@@ -25,6 +25,7 @@ fn parts_equal_the_whole<const D: usize>() {
                 slot: p as u32,
                 centre: std::array::from_fn(|k| whole.position(p)[k] + side(k) * half[p][k]),
                 half: half[p].map(|h| 0.5 * h),
+                whole: half[p][0],
                 softening: [1.0; D],
                 fraction: 1.0 / (1 << D) as f64,
                 spread,
@@ -35,7 +36,7 @@ fn parts_equal_the_whole<const D: usize>() {
     let mut other = arena.clone();
     scatter(&whole, Select::All, &frame, &scheme, DT, &mut arena, None, Place::default());
     let mut sums = vec![[0.0; D]; parted.len()];
-    spread::of_parts(&parted, &parts, &frame, None, |part, own| {
+    spread::of_parts(&parted, &parts, &frame, Coordinates::Cartesian, None, |part, own| {
         let part = &parts[part];
         for k in 0..D {
             sums[part.slot as usize][k] += part.fraction * own[k];
@@ -65,7 +66,8 @@ fn parts_equal_the_whole<const D: usize>() {
     let fields = Fields { velocity: &arena, increment: None, fill: None, moments: None };
     gather(&mut whole, Select::All, &frame, &scheme, DT, &fields, Place::default());
     let mut gathered = vec![Gathered::default(); parted.len()];
-    g2p::gather_sub_boxes(&mut Default::default(), &parted, &parts, &frame, &fields, &mut gathered);
+    let kernel = &mut Default::default();
+    g2p::gather_sub_boxes(kernel, &parted, &parts, &frame, Coordinates::Cartesian, &fields, &mut gathered);
     let list: Vec<u32> = (0..parted.len() as u32).collect();
     g2p::advance_gathered(
         &mut Default::default(),

@@ -1,8 +1,8 @@
 //! Evaluation of the granular column collapse at the end of a run.
 use partition::comm::Comm;
 
-use crate::job::problem::{CollapseLaw, ReportSetup};
-use crate::particle::Chunk;
+use crate::job::problem::{CollapseLaw, Coordinates, ReportSetup};
+use crate::particle::chunk::{Chunk, Layout};
 use crate::text::{number, quantity};
 
 /// Bins of the deposit's profile over the initial radius.
@@ -40,7 +40,7 @@ pub struct Published {
 pub fn evaluate<const D: usize>(
     comm: &Comm,
     setup: &ReportSetup<D>,
-    size: [f64; D],
+    (size, coordinates): ([f64; D], Coordinates),
     chunks: &[Chunk<D>],
     total_mass: f64,
 ) -> Collapse {
@@ -60,8 +60,8 @@ pub fn evaluate<const D: usize>(
                 .fold(0.0, |sum: f64, axis| (x[axis] - base[axis]).mul_add(x[axis] - base[axis], sum))
                 .sqrt();
             let bin = ((distance / width) as usize).min(bins - 1);
-            let half = chunk.column(crate::particle::Layout::<D>::HALF)[p];
-            let particle = chunk.column(crate::particle::Layout::<D>::MASS)[p];
+            let half = coordinates.half_width(chunk.column(Layout::<D>::HALF)[p], x[0]);
+            let particle = chunk.column(Layout::<D>::MASS)[p];
             // Integers add exactly in any order.
             mass[bin] += (particle / total_mass * (1u64 << 50) as f64) as u64;
             top[bin] = top[bin].max(x[up] - base[up] + half);

@@ -8,6 +8,7 @@
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
 use crate::job::Problem;
+use crate::job::problem::Coordinates;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
@@ -64,7 +65,8 @@ fn faces<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
 
 /// Drucker-Prager in plane strain with a cone for triaxial compression.
 fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    for (index, material) in problem.materials.iter().enumerate().filter(|_| D == 2) {
+    let is_plane = D == 2 && problem.coordinates == Coordinates::Cartesian;
+    for (index, material) in problem.materials.iter().enumerate().filter(|_| is_plane) {
         if let Parameters::DruckerPrager(parameters) = &material.model
             && parameters.matching == FrictionMatch::TriaxialCompression
             && parameters.friction_angle > 0.0

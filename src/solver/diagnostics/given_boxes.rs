@@ -160,7 +160,8 @@ impl<const D: usize> GivenBoxes<D> {
     /// On the rank that has a box which fits no bin; all ranks complete the exchange.
     pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
         let solver = &mut self.solver;
-        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, &self.halves, None);
+        let widths = (&self.halves, solver.physics.coordinates);
+        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, widths, None);
         solver.nodes_from_particles(dt);
         sorted
     }
@@ -257,6 +258,9 @@ impl<const D: usize> GivenParticle<D> {
         }
         for normal in 0..3 {
             chunk.column_mut(Layout::<D>::LEFT_CAUCHY_GREEN + normal)[p] = 1.0;
+        }
+        // Without a stress along the hoop.
+        for normal in 0..D {
             chunk.column_mut(Layout::<D>::STRESS + normal)[p] = self.energy / volume;
         }
     }

@@ -1,7 +1,7 @@
 //! Bounds on the widths of boxes, for sorting.
 use super::bins::BoxWidths;
 use crate::grid::GridPlan;
-use crate::kernel::{BoxPolicy, Scheme, domain};
+use crate::kernel::{BoxPolicy, Coordinates, Scheme, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
 use crate::particle::halvings;
@@ -24,6 +24,14 @@ impl<const D: usize> Physics<D> {
 }
 
 impl<const D: usize> Widths<'_, D> {
+    /// The policy that bounds the boxes: in axisymmetry none is wider than a cell of its level.
+    fn policy(&self) -> BoxPolicy {
+        match (self.scheme.boxes, self.scheme.coordinates) {
+            (BoxPolicy::Volume { .. }, Coordinates::Axisymmetric) => BoxPolicy::Cell,
+            (policy, _) => policy,
+        }
+    }
+
     /// The greatest half width among boxes that may become wider than `cell`, m; 0 if none may.
     pub(crate) fn greatest_of_wide(&self, chunk: &Chunk<D>, cell: f64) -> f64 {
         let limit = Lanes::splat(0.5 * cell);
@@ -51,7 +59,7 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
 
     fn bounds(&self, chunk: &Chunk<D>, first: usize) -> Lanes {
         let half = || values(chunk, Layout::<D>::HALF, first);
-        match self.scheme.boxes {
+        match self.policy() {
             BoxPolicy::Fixed => half(),
             BoxPolicy::Volume { .. } if self.scheme.has_halves => {
                 let whole = |lane| chunk.tags().get(first + lane).map_or(1.0, |&tag| edge_of_whole::<D>(tag));
@@ -70,7 +78,7 @@ impl<const D: usize> BoxWidths<D> for Widths<'_, D> {
     }
 
     fn bound(&self, chunk: &Chunk<D>) -> f64 {
-        match self.scheme.boxes {
+        match self.policy() {
             BoxPolicy::Fixed => chunk.greatest_half(),
             BoxPolicy::Volume { .. } if self.scheme.has_halves => {
                 let halves = chunk.column(Layout::<D>::HALF).iter().zip(chunk.tags());

@@ -303,7 +303,7 @@ impl<const D: usize> LeafBins<D> {
             false => softening_at(&centre, &half, plan.cell(level), &extent),
         };
         let (fraction, spread) = (1.0, [0.0; D]);
-        let whole = SubBox { particle, slot, centre, half, softening, fraction, spread };
+        let whole = SubBox { particle, slot, centre, half, whole: half[0], softening, fraction, spread };
         self.cut_box(plan, leaf, own, faces, whole)?;
         Ok(CUT)
     }

@@ -8,7 +8,7 @@ use crate::grid::plan::ghost_layer::Allowance;
 use crate::grid::sums::exchange::ReceivedSums;
 use crate::grid::ties::{HALO, Ties};
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
-use crate::kernel::{Row, spread};
+use crate::kernel::{Coordinates, Row, spread};
 use crate::memory::Block;
 use crate::particle::Chunk;
 use crate::particle::group::Group;
@@ -149,7 +149,7 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// Not collective. Lists the members of each bin, and makes room for the arenas of those that have any.
+    /// Not collective. Lists the members of each bin, by the widths of boxes in these coordinates, and makes room for the arenas of those that have any.
     /// With `group`: those of its particles alone.
     ///
     /// # Errors
@@ -158,14 +158,15 @@ impl<const D: usize> Grid<D> {
         &mut self,
         phases: &mut Phases,
         chunks: &[Chunk<D>],
-        widths: &impl BoxWidths<D>,
+        (widths, coordinates): (&impl BoxWidths<D>, Coordinates),
         group: Option<&Group<'_>>,
     ) -> Result<(), BinMissing> {
         let Self { plan, lists, arenas, seam, .. } = self;
         phases.time(Phase::Sort, || {
             let sorted = lists.sort(plan, chunks, widths, group);
             lists.spread_parts(plan, chunks, |bin, chunk, parts, each| {
-                spread::of_parts(chunk, parts, &plan.frame(bin), plan.constrained(bin), each);
+                let (frame, constrained) = (plan.frame(bin), plan.constrained(bin));
+                spread::of_parts(chunk, parts, &frame, coordinates, constrained, each);
             });
             arenas.occupy(plan, seam, lists.occupied(plan, chunks));
             sorted

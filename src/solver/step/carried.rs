@@ -272,15 +272,16 @@ pub(super) fn has_followers<const D: usize>(chunk: &Chunk<D>, following: &[&Carr
     !following.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
 }
 
-/// Updates the areas that a particle carries, by a step with this velocity gradient (1/s): `da ← J f⁻ᵀ da`,
-/// `f = 1 + Δt ∇v`.
+/// Updates the areas that a particle carries, by a step with this velocity gradient and rate along the hoop
+/// (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
 pub(super) fn follow<const D: usize>(
     chunk: &mut Chunk<D>,
     following: &[&Carried<D>],
     p: usize,
-    gradient: &[[f64; D]; D],
+    (gradient, hoop): (&[[f64; D]; D], f64),
     dt: f64,
 ) {
+    let around = dt.mul_add(hoop, 1.0);
     let f = std::array::from_fn(|i| {
         std::array::from_fn(|j| dt.mul_add(gradient[i][j], if i == j { 1.0 } else { 0.0 }))
     });
@@ -289,7 +290,7 @@ pub(super) fn follow<const D: usize>(
         let Some(area) = numbers(chunk, carried, p) else { continue };
         for i in 0..D {
             let turned = (0..D).fold(0.0, |sum, j| turn[i][j].mul_add(area[j], sum));
-            chunk.carried_mut(carried.first + i)[p] = turned;
+            chunk.carried_mut(carried.first + i)[p] = around * turned;
         }
     }
 }

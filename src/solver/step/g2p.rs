@@ -47,8 +47,9 @@ struct Scratch<const D: usize> {
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
     sort: leaf_bins::Scratch,
-    /// Velocity gradients of particles, 1/s, where they are needed ahead of or after the advance.
-    gradients: Vec<(u32, [[f64; D]; D])>,
+    /// Velocity gradients of particles and their rates along the hoop, 1/s, where they are needed ahead of or
+    /// after the advance.
+    gradients: Vec<(u32, [[f64; D]; D], f64)>,
     mean_dilation: MeanDilation,
     mean_volumes: MeanVolumes,
     shifted: Shifted<D>,
@@ -249,7 +250,15 @@ impl<const D: usize> Solver<D> {
                 for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
                     load_rows(plan, bin.number, &bin.window, rows, arena);
                     let nodes = Fields { velocity: arena, increment: None, fill: None, moments: None };
-                    g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+                    g2p::gather_sub_boxes(
+                        kernel,
+                        chunk,
+                        bin.parts,
+                        &bin.frame,
+                        scheme.coordinates,
+                        &nodes,
+                        gathered,
+                    );
                     if let Some(whole) = bin.whole {
                         g2p::interpolate(kernel, chunk, whole, &bin.frame, &scheme, arena, |p, v| {
                             velocities[p] = v;
@@ -291,7 +300,7 @@ impl<const D: usize> Sweep<'_, D> {
         if !in_sources.is_empty() {
             in_sources.convey(&self.conveyors, chunk, self.dt, conveyed);
             scratch.leavers.look_again(chunk, &in_sources.indices());
-            scratch.gradients.retain(|(p, _)| !in_sources.has(*p));
+            scratch.gradients.retain(|(p, ..)| !in_sources.has(*p));
         }
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
@@ -307,9 +316,9 @@ impl<const D: usize> Sweep<'_, D> {
             self.displacement.into_iter().for_each(|first| add_ways(chunk, first, &start));
         }
         note_ways(chunk, pushes);
-        for (p, mut gradient) in scratch.gradients.drain(..) {
+        for (p, mut gradient, hoop) in scratch.gradients.drain(..) {
             let p = p as usize;
-            follow(chunk, self.following, p, &gradient, self.dt);
+            follow(chunk, self.following, p, (&gradient, hoop), self.dt);
             let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
             (0..D).for_each(|i| gradient[i][i] += added);
             self.tensors.iter().for_each(|&first| strain(chunk, first, p, &gradient, self.dt));
@@ -414,7 +423,15 @@ impl<const D: usize> Sweep<'_, D> {
         let increment = source.increments.map(|_| &increments[..]);
         let fill = self.fill.map(|_| &fill[..]);
         let nodes = Fields { velocity: &arena.rows, increment, fill, moments };
-        g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+        g2p::gather_sub_boxes(
+            kernel,
+            chunk,
+            bin.parts,
+            &bin.frame,
+            self.scheme.coordinates,
+            &nodes,
+            gathered,
+        );
         let Some(whole) = bin.whole else { return 0.0 };
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
@@ -438,12 +455,13 @@ impl<const D: usize> Sweep<'_, D> {
         for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {
             let look = Look { plan: self.plan, fields, arenas, scheme: self.scheme };
             look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
-                gradients.push((p as u32, gathered.gradient()));
+                gradients.push((p as u32, gathered.gradient(), gathered.hoop()));
             });
         }
         if self.scheme.f_bar {
-            mean_dilation.begin(chunk, &LeafCells::new(self.borders.of_leaf(leaf)));
-            gradients.iter().for_each(|(p, gradient)| mean_dilation.note(*p as usize, gradient));
+            let cells = LeafCells::new(self.borders.of_leaf(leaf));
+            mean_dilation.begin(chunk, &cells, self.scheme.coordinates);
+            gradients.iter().for_each(|(p, gradient, hoop)| mean_dilation.note(*p as usize, gradient, *hoop));
             mean_dilation.average(chunk);
         }
     }

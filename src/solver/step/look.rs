@@ -35,7 +35,15 @@ impl<const D: usize> Look<'_, D> {
             self.fields.load(self.plan, self.arenas, bin.number, &bin.window, arena);
             let moments = bin.constrained.map(|nodes| Moments { nodes, first: &arena.moments });
             let nodes = Fields { velocity: &arena.rows, increment: None, fill: None, moments };
-            g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, &nodes, gathered);
+            g2p::gather_sub_boxes(
+                kernel,
+                chunk,
+                bin.parts,
+                &bin.frame,
+                self.scheme.coordinates,
+                &nodes,
+                gathered,
+            );
             if let Some(whole) = bin.whole {
                 g2p::look(kernel, chunk, whole, &bin.frame, self.scheme, &nodes, |p, gathered| {
                     each(p, &gathered);

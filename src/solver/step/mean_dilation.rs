@@ -2,14 +2,14 @@
 //!
 //! Where plastic flow conserves volume, every particle requires zero dilation, which is more constraints than
 //! the nodes of a cell can satisfy: the material is too stiff and its pressure alternates. With F-bar the
-//! particles of a cell strain with `∇v + (θ̄ - tr ∇v) 1 / D`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the
+//! particles of a cell strain with `∇v + (θ̄ - tr ∇v) 1 / n`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the
 //! particles of the same material in the cell (de Souza Neto et al. 1996; for the material point method
 //! Coombs et al. 2018), and their stress acts with the same mean of their pressures, `τ + (p̄ - p) 1`,
-//! `p = Σ τ_ii / D`. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that
+//! `p = Σ τ_ii / n`. Here n is the number of rates of normal strain: D, and 3 in axisymmetry. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that
 //! of the strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of
 //! the leaf, so no messages are needed.
 use crate::grid::leaf_geometry::LeafCells;
-use crate::kernel::BLOCK;
+use crate::kernel::{BLOCK, Coordinates};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// F-bar in a leaf. A thread reuses its memory.
@@ -22,11 +22,19 @@ pub(in crate::solver) struct MeanDilation {
     places: Vec<u32>,
     /// Of each material and cell: value times volume, and volume.
     sums: Vec<[f64; 2]>,
+    /// Whether there is a rate along the hoop.
+    has_hoop: bool,
 }
 
 impl MeanDilation {
     /// Starts with the particles of a leaf, at their places before the advance.
-    pub(in crate::solver) fn begin<const D: usize>(&mut self, chunk: &Chunk<D>, cells: &LeafCells<D>) {
+    pub(in crate::solver) fn begin<const D: usize>(
+        &mut self,
+        chunk: &Chunk<D>,
+        cells: &LeafCells<D>,
+        coordinates: Coordinates,
+    ) {
+        self.has_hoop = coordinates == Coordinates::Axisymmetric;
         self.added.clear();
         self.added.resize(chunk.len(), 0.0);
         self.places.clear();
@@ -36,9 +44,14 @@ impl MeanDilation {
         }));
     }
 
-    /// Records the velocity gradient of a particle, 1/s.
-    pub(in crate::solver) fn note<const D: usize>(&mut self, p: usize, gradient: &[[f64; D]; D]) {
-        self.added[p] = (0..D).map(|i| gradient[i][i]).sum();
+    /// Records the velocity gradient of a particle and its rate along the hoop, 1/s.
+    pub(in crate::solver) fn note<const D: usize>(&mut self, p: usize, gradient: &[[f64; D]; D], hoop: f64) {
+        self.added[p] = (0..D).map(|i| gradient[i][i]).sum::<f64>() + hoop;
+    }
+
+    /// Number of rates of normal strain.
+    fn normals(&self, dimension: usize) -> usize {
+        if self.has_hoop { 3 } else { dimension }
     }
 
     /// Sums a value of each particle in each cell, weighted by volume.
@@ -68,19 +81,21 @@ impl MeanDilation {
         self.sum(chunk, |p| rates[p]);
         self.added = rates;
         for p in 0..self.added.len() {
-            self.added[p] = (self.mean(p) - self.added[p]) / D as f64;
+            self.added[p] = (self.mean(p) - self.added[p]) / self.normals(D) as f64;
         }
     }
 
     /// Once all particles have advanced: gives each the mean pressure of the cell in which it was.
     pub(in crate::solver) fn average_pressure<const D: usize>(&mut self, chunk: &mut Chunk<D>) {
-        let diagonal = |chunk: &Chunk<D>, p: usize| chunk.read::<D>(Layout::<D>::STRESS, p);
-        let mean = |stress: [f64; D]| stress.iter().sum::<f64>() / D as f64;
+        // xx, yy and zz come first in either dimension.
+        let normals = self.normals(D);
+        let diagonal = |chunk: &Chunk<D>, p: usize| chunk.read::<3>(Layout::<D>::STRESS, p);
+        let mean = |stress: [f64; 3]| stress[..normals].iter().sum::<f64>() / normals as f64;
         self.sum(chunk, |p| mean(diagonal(chunk, p)));
         for p in 0..chunk.len() {
             let stress = diagonal(chunk, p);
             let change = self.mean(p) - mean(stress);
-            chunk.write(Layout::<D>::STRESS, p, &stress.map(|s| s + change));
+            chunk.write(Layout::<D>::STRESS, p, &stress.map(|s| s + change)[..normals]);
         }
     }
 }
@@ -111,9 +126,9 @@ mod tests {
             ([13.9, 23.9], 0.5, 0),
         ]);
         let mut mean = MeanDilation::default();
-        mean.begin(&chunk, &LeafCells::new(&([10.0, 20.0], [14.0, 24.0])));
+        mean.begin(&chunk, &LeafCells::new(&([10.0, 20.0], [14.0, 24.0])), Coordinates::Cartesian);
         for (p, rate) in [3.0, -2.0, 7.0, 5.0].into_iter().enumerate() {
-            mean.note(p, &[[rate, 9.0], [-4.0, 0.0]]);
+            mean.note(p, &[[rate, 9.0], [-4.0, 0.0]], 0.0);
         }
         mean.average(&chunk);
         // (0.25 · 3 - 0.0625 · 2) / 0.3125 = 2

@@ -21,7 +21,8 @@ impl<const D: usize> Solver<D> {
         self.for_each_field(|solver, field| {
             let group = solver.physics.group(field);
             let widths = solver.physics.widths(&solver.grid.plan);
-            let of_field = solver.grid.sort(&mut solver.phases, &solver.chunks, &widths, group.as_ref());
+            let widths = (&widths, solver.physics.coordinates);
+            let of_field = solver.grid.sort(&mut solver.phases, &solver.chunks, widths, group.as_ref());
             sorted = sorted.and(of_field);
         });
         sorted

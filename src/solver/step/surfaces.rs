@@ -114,7 +114,7 @@ impl<const D: usize> Solver<D> {
                     copy_solids(copy, chunk, group.as_ref(), &near.grown(half * (1.0 + MARGIN)), &columns);
             });
             solver.grid.swap(geometry);
-            let of_field = solver.grid.sort(&mut solver.phases, copies, &widths, None);
+            let of_field = solver.grid.sort(&mut solver.phases, copies, (&widths, scheme.coordinates), None);
             solver.grid.scatter_and_sum(&mut solver.phases, copies, |scratch, bin, arena| {
                 scatter(scratch, bin, copies, &scheme, 1.0, arena);
             });

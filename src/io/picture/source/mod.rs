@@ -9,6 +9,7 @@ pub(super) mod derived;
 use crate::io::hdf5_file::{FileError, Kind, Reader};
 use crate::io::snapshot::Header;
 use crate::io::snapshot::intact::checked::Checked;
+use crate::kernel::Coordinates;
 
 /// Message for a file of the tree where particles are required.
 pub(in crate::io) const NO_PARTICLES: &str = "found no particles: a file of the tree (NAME_000001.tree.hdf); expected the output beside it (NAME_000001.hdf)";
@@ -74,6 +75,11 @@ pub(in crate::io) fn radii(file: &Reader, header: &Header) -> Result<Vec<f64>, F
     };
     match radii.iter().find(|radius| !(radius.is_finite() && **radius > 0.0)) {
         Some(radius) => Err(file.refuse(format!("a particle has a half width of {radius:?} m"))),
-        None => Ok(radii),
+        None if header.scalars.coordinates() == Coordinates::Cartesian || !file.exists(state) => Ok(radii),
+        None => {
+            let points = points(file, header)?;
+            let sections = radii.into_iter().zip(points.iter().step_by(3));
+            Ok(sections.map(|(half, x)| header.scalars.coordinates().half_width(half, *x)).collect())
+        }
     }
 }

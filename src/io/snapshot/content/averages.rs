@@ -49,11 +49,16 @@ pub(in crate::io::snapshot) struct LeafAverage {
     pub stress: [f64; 6],
 }
 
-/// The average over a leaf of the edge `edge`, m.
-pub(in crate::io::snapshot) fn over_leaf<const D: usize>(edge: f64, chunk: &Chunk<D>) -> LeafAverage {
+/// The average over a leaf of the edge `edge`, m. `around` is the length over which its section stands, m; 1 but
+/// in axisymmetry.
+pub(in crate::io::snapshot) fn over_leaf<const D: usize>(
+    edge: f64,
+    around: f64,
+    chunk: &Chunk<D>,
+) -> LeafAverage {
     let mut sum = Sum::default();
     (0..chunk.len()).for_each(|p| sum.add(chunk, p));
-    LeafAverage { volume_fraction: sum.volume / edge.powi(D as i32), stress: sum.mean() }
+    LeafAverage { volume_fraction: sum.volume / (edge.powi(D as i32) * around), stress: sum.mean() }
 }
 
 /// Principal values of a stress, the greatest first, by the Lode angle θ: `m + 2 √(J2/3) cos(θ - 2πk/3)` with
@@ -105,9 +110,9 @@ mod tests {
             let pressure = if p < 4 { 10.0 } else { 20.0 };
             assert_eq!(*stress, [-pressure, -pressure, -pressure, 3.0, 0.0, 0.0], "{p}");
         }
-        let leaf = over_leaf(2.0, &chunk);
+        let leaf = over_leaf(2.0, 1.0, &chunk);
         assert_eq!((leaf.volume_fraction, mean(&leaf.stress)), (0.125, -15.0));
-        assert_eq!(over_leaf::<2>(2.0, &Chunk::new()).stress, [0.0; 6]);
+        assert_eq!(over_leaf::<2>(2.0, 1.0, &Chunk::new()).stress, [0.0; 6]);
     }
 
     /// Uniaxial tension and pure shear.

@@ -51,8 +51,8 @@ pub(in crate::io::snapshot) fn columns<const D: usize>() -> [Columns; 9] {
             "Elastic left Cauchy-Green tensor b: xx, yy, zz, xy (and xz, yz).",
         ),
         ("stress", symmetric, "Pa", "Kirchhoff stress: xx, yy, zz, xy (and xz, yz)."),
-        ("mass", 1, "kg", "Mass (per metre of thickness in plane strain)."),
-        ("half_width", 1, "m", "Half of the edge of the undeformed box."),
+        ("mass", 1, "kg", "Mass (per metre of thickness in plane strain; of the whole ring in axisymmetry)."),
+        ("half_width", 1, "m", "Half of the edge of the undeformed box (in axisymmetry half of the root of the undeformed volume)."),
         ("history", Layout::<D>::HISTORIES, "", "History variables of the material."),
         ("plastic_work", 1, "J/m³", "Plastic work dissipated since the start, per reference volume."),
     ]

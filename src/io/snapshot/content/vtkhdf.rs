@@ -188,7 +188,10 @@ fn write_averages<const D: usize>(
     leaves: Rows,
 ) -> Result<(), FileError> {
     let edge = |leaf: &Octant<D>| view.root_edge / f64::from(1_u32 << leaf.level);
-    let all = view.leaves.iter().zip(view.chunks).map(|(leaf, chunk)| over_leaf(edge(leaf), chunk));
+    let coordinates = view.scalars.coordinates();
+    let around = |leaf: &Octant<D>| coordinates.around((f64::from(leaf.coord[0]) + 0.5) * edge(leaf));
+    let all = view.leaves.iter().zip(view.chunks);
+    let all = all.map(|(leaf, chunk)| over_leaf(edge(leaf), around(leaf), chunk));
     let all: Vec<LeafAverage> = all.collect();
     let scalar = |value: fn(&LeafAverage) -> f64| Values::Real(all.iter().map(value).collect(), 0);
     let stress = Values::Real(all.iter().flat_map(|leaf| leaf.stress).collect(), 6);

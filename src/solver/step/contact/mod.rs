@@ -75,7 +75,8 @@ impl<const D: usize> Solver<D> {
             self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
         let widths = self.physics.widths(&self.grid.plan);
         self.grid.swap(&mut other);
-        let sorted = self.grid.sort(&mut self.phases, &chunks, &widths, None);
+        let coordinates = self.physics.coordinates;
+        let sorted = self.grid.sort(&mut self.phases, &chunks, (&widths, coordinates), None);
         let spreads = self.spreads_in_contact(&chunks);
         self.find_compliances(&mut other, &mut chunks, &spreads, &mut touching);
         for _ in 0..SWEEPS {

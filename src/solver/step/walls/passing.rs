@@ -4,6 +4,7 @@
 //! may be let through. So the way of a particle ends at the face, and the law of the face holds for its
 //! velocity. What this takes is booked as an impulse on the face.
 use crate::boundary::{Contact, Meets};
+use crate::kernel::Coordinates;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
@@ -23,6 +24,7 @@ pub(in crate::solver) struct Barrier<'a, const D: usize> {
     meets: &'a [Meets],
     /// Velocity field of each body; empty where all move with one.
     field_of_body: &'a [u8],
+    coordinates: Coordinates,
     /// Size of the domain, m.
     extent: [f64; D],
 }
@@ -31,7 +33,8 @@ impl<'a, const D: usize> Barrier<'a, D> {
     /// Of a domain of this size, m.
     pub(in crate::solver) fn new(physics: &'a Physics<D>, extent: [f64; D]) -> Self {
         let Physics { faces, meets, body_contacts, .. } = physics;
-        Self { faces, meets, field_of_body: &body_contacts.field_of_body, extent }
+        let (field_of_body, coordinates) = (&body_contacts.field_of_body[..], physics.coordinates);
+        Self { faces, meets, field_of_body, coordinates, extent }
     }
 
     /// Whether it holds a particle with this tag.
@@ -76,7 +79,8 @@ impl<'a, const D: usize> Barrier<'a, D> {
             });
             for (p, start) in start.iter().enumerate() {
                 let mut x = chunk.position(p);
-                let close = CLOSE * chunk.column(Layout::<D>::HALF)[p];
+                let half = chunk.column(Layout::<D>::HALF)[p];
+                let close = CLOSE * self.coordinates.half_width(half, start[0]);
                 let least = close.min(above(start[axis]).max(LEAST * close));
                 // One that was outside already, or is not a number, is for others to find.
                 let has_passed = above(x[axis]) < least && above(start[axis]) >= 0.0;

@@ -1,0 +1,208 @@
+//! Axisymmetric jobs: what they cannot have.
+//!
+//! Some settings have no meaning for bodies of revolution, such as gravity across the axis; the others act on
+//! planar sections only so far. Each is refused by name, all in one list.
+use super::checks::Checks;
+use crate::boundary::Collider as Solid;
+use crate::geometry::written::Shape;
+use crate::job::parse::source::Path;
+use crate::job::problem::{CollapseLaw, Coordinates, Field, MaterialSetup};
+use crate::job::schema::colliders::{ActsOn, Collider, Motion, Row};
+use crate::job::schema::common::Spin;
+use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
+
+/// Coordinates of a job.
+pub(super) fn coordinates(checks: &mut Checks, file: &JobFile) -> Coordinates {
+    if file.geometry.is_some() && file.dimension != 2 {
+        let message = "found a geometry in a 3D job; expected `geometry` only with dimension = 2";
+        checks.fault(&Path::default().key("geometry"), message.into());
+    }
+    match file.geometry {
+        Some(Geometry::Axisymmetric) => Coordinates::Axisymmetric,
+        Some(Geometry::PlaneStrain) | None => Coordinates::Cartesian,
+    }
+}
+
+/// The job with the axis as a plane of symmetry, which it is without a key.
+pub(super) fn with_axis(file: &JobFile) -> JobFile {
+    let mut file = file.clone();
+    file.boundaries.x_min.get_or_insert(Face::Symmetric {});
+    file
+}
+
+/// Something that an axisymmetric job has: where, what, and what is possible in its place.
+type Found = (Path, &'static str, &'static str);
+
+/// Adds faults for all that an axisymmetric job cannot have.
+pub(super) fn check<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    materials: &[MaterialSetup],
+    colliders: &[Solid<D>],
+) {
+    let root = Path::default();
+    let mut all: Vec<Found> = Vec::new();
+    let mut refuse = |is_there: bool, path: Path, found: &'static str, expected: &'static str| {
+        if is_there {
+            all.push((path, found, expected));
+        }
+    };
+    let starts = file.domain.min.as_ref().and_then(|min| min.0.first()).is_some_and(|&x| x != 0.0);
+    refuse(
+        starts,
+        root.key("domain").key("min").index(0),
+        "a lower end off the axis",
+        "0: the axis is x = 0",
+    );
+    let gravities =
+        file.stages.iter().enumerate().map(|(i, stage)| (root.key("stages").index(i), &stage.gravity));
+    for (path, gravity) in std::iter::once((root.clone(), &file.gravity)).chain(gravities) {
+        let radial = gravity.as_ref().and_then(|gravity| gravity.first()).is_some_and(|x| !is_zero(x));
+        refuse(
+            radial,
+            path.key("gravity").index(0),
+            "gravity across the axis",
+            "0: gravity acts along the axis, y",
+        );
+    }
+    let changed = file.stages.iter().enumerate().filter_map(|(i, stage)| {
+        Some((root.key("stages").index(i).key("boundaries"), stage.boundaries.as_ref()?))
+    });
+    for (path, boundaries) in std::iter::once((root.key("boundaries"), &file.boundaries)).chain(changed) {
+        faces(boundaries, &path, &mut refuse);
+    }
+    for (i, material) in materials.iter().enumerate() {
+        let is_fluid = material.build().is_fluid();
+        refuse(
+            is_fluid,
+            root.key("materials").index(i).key("model"),
+            "a fluid",
+            "a solid or granular material",
+        );
+    }
+    for (i, body) in file.bodies.iter().enumerate() {
+        let here = root.key("bodies").index(i);
+        refuse(
+            body.angular_velocity.is_some(),
+            here.key("angular_velocity"),
+            "a rotation",
+            "none: material moves along the radius and the axis only",
+        );
+        refuse(
+            matches!(body.shape, Shape::Particles { .. }),
+            here.key("shape").key("kind"),
+            "particles from a file",
+            "a shape",
+        );
+        refuse(
+            body.particles_per_cell < 1.0,
+            here.key("particles_per_cell"),
+            "less than one particle per cell",
+            "at least 1",
+        );
+    }
+    for (i, collider) in file.colliders.iter().enumerate() {
+        self::collider(collider, &root.key("colliders").index(i), &mut refuse);
+    }
+    for (i, collider) in colliders.iter().enumerate() {
+        // Its surface there would hold material back.
+        refuse(
+            collider.shape.bounds().lower[0].abs() < 1e-9 * file.domain.root_edge,
+            root.key("colliders").index(i).key("shape"),
+            "a collider that ends on the axis",
+            "one that continues beyond it, to x < 0, as its mirror image",
+        );
+    }
+    let numerics = root.key("numerics");
+    refuse(
+        file.numerics.boxes == file::Boxes::Fixed,
+        numerics.key("boxes"),
+        "\"fixed\"",
+        "\"volume\" or \"cell\"",
+    );
+    refuse(file.numerics.tied_surfaces, numerics.key("tied_surfaces"), "tied surfaces", "none");
+    refuse(
+        file.adaptivity.is_some(),
+        root.key("adaptivity"),
+        "dynamic refinement",
+        "regions of [[tree.regions]]",
+    );
+    refuse(!file.contact.is_empty(), root.key("contact"), "contact between bodies", "bodies that stick");
+    refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
+    refuse(!file.maps.is_empty(), root.key("maps"), "maps", "lines or probes");
+    for (i, field) in file.output.fields.iter().enumerate() {
+        refuse(
+            matches!(field, Field::Strain | Field::EquivalentStrain),
+            root.key("output").key("fields").index(i),
+            "total strains",
+            "other fields, such as \"displacement\" or \"plastic_strain\"",
+        );
+    }
+    if let Some(file::Report::ColumnCollapse { law, .. }) = &file.report {
+        refuse(*law == CollapseLaw::Planar, root.key("report").key("law"), "\"planar\"", "\"axisymmetric\"");
+    }
+    for (path, found, expected) in all {
+        checks.fault(&path, format!("found {found} in an axisymmetric job; expected {expected}"));
+    }
+}
+
+fn is_zero(quantity: &Quantity) -> bool {
+    *quantity == Quantity::Number(0.0)
+}
+
+/// Conditions on faces.
+fn faces(
+    boundaries: &Boundaries,
+    path: &Path,
+    refuse: &mut impl FnMut(bool, Path, &'static str, &'static str),
+) {
+    let Boundaries { x_min, x_max, y_min, y_max, .. } = boundaries;
+    refuse(
+        x_min.as_ref().is_some_and(|face| !matches!(face, Face::Symmetric {})),
+        path.key("x_min"),
+        "a condition on the axis",
+        "none: the radial velocity is 0 there without a key",
+    );
+    for (key, face) in [("x_max", x_max), ("y_min", y_min), ("y_max", y_max)] {
+        let absorbs = matches!(face, Some(Face::Absorbing { .. }));
+        refuse(absorbs, path.key(key).key("kind"), "an absorbing face", "another kind");
+    }
+}
+
+/// Colliders are bodies of revolution, which move along the axis.
+fn collider(
+    collider: &Collider,
+    path: &Path,
+    refuse: &mut impl FnMut(bool, Path, &'static str, &'static str),
+) {
+    let along = "a motion along the axis, y, without rotation";
+    let on_particles = collider.acts_on == Some(ActsOn::Particles);
+    refuse(on_particles, path.key("acts_on"), "a collider that acts on particles", "\"nodes\"");
+    let here = path.key("motion");
+    match &collider.motion {
+        None | Some(Motion::Fixed {}) => {}
+        Some(Motion::Steady { velocity, angular_velocity, .. }) => {
+            let turns = !matches!(angular_velocity, None | Some(Spin::Plane(0.0)));
+            let across = velocity.as_ref().and_then(|v| v.0.first()).is_some_and(|&x| x != 0.0);
+            refuse(across, here.key("velocity").index(0), "a motion across the axis", along);
+            refuse(turns, here.key("angular_velocity"), "a rotation", along);
+        }
+        Some(Motion::Table { rows, record, .. }) => {
+            let is_along = |row: &Row| {
+                let across = row.translation.as_ref().and_then(|x| x.0.first()).is_some_and(|&x| x != 0.0);
+                !across && row.rotation == 0.0
+            };
+            let row = rows.iter().flatten().position(|row| !is_along(row));
+            refuse(
+                row.is_some(),
+                here.key("rows").index(row.unwrap_or(0)),
+                "a motion across the axis",
+                along,
+            );
+            let across =
+                record.as_ref().is_some_and(|record| record.x.is_some() || record.rotation.is_some());
+            refuse(across, here.key("record"), "a motion across the axis", along);
+        }
+        Some(Motion::Free { .. }) => refuse(true, here.key("kind"), "a free body", "a prescribed motion"),
+    }
+}
