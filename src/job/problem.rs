@@ -11,7 +11,7 @@ use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
-use crate::load::{Gravity, Load};
+use crate::load::{Gravity, Load, Water};
 use crate::material::Material;
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
@@ -127,7 +127,7 @@ pub struct Problem<const D: usize> {
     pub sources: Vec<Source<D>>,
     /// Acceleration of gravity.
     pub gravity: Gravity<D>,
-    /// Loads, in the order in which they act.
+    /// Loads, in the order in which they act; last the water in the pores.
     pub loads: Vec<Load<D>>,
     /// Place of each load in the files of the job, for messages.
     pub load_places: Vec<Position>,
@@ -212,6 +212,11 @@ impl<const D: usize> Problem<D> {
     /// A point in the coordinates of the job, m, with z = 0 in plane strain: the argument of quantities.
     pub fn place(&self, x: &[f64; D]) -> [f64; 3] {
         in_job(&self.origin, x)
+    }
+
+    /// The water in the pores, if the job has any.
+    pub fn water(&self) -> Option<&Water> {
+        self.loads.iter().find_map(Load::water)
     }
 
     /// Whether stages or the run end at an equilibrium.
@@ -312,6 +317,8 @@ pub struct MaterialSetup {
     pub name: String,
     /// Density of the undeformed material, kg/m³.
     pub density: f64,
+    /// Density of the undeformed material with full pores, kg/m³.
+    pub saturated_density: f64,
     /// Constitutive model.
     pub model: Parameters,
     /// Water that cannot leave its pores.

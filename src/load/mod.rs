@@ -2,15 +2,19 @@
 //!
 //! A load acts between two times. Most kinds act on real nodes inside their region: each is a variant of
 //! [`Kind`] with its effect on the velocity of a node in [`Load::apply`]. Forces on surfaces and points are
-//! carried by particles ([`Kind::Carried`]). The solver sums impulse and work of each load from that alone.
+//! carried by particles ([`Kind::Carried`]), and water in the pores acts on particles ([`Kind::Water`]). The
+//! solver sums impulse and work of each load from that alone.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `mod.rs` | gravity, loads, and their effect on nodes |
 //! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
+//! | `water.rs` | pressure of the water in the pores |
 mod carried;
+pub mod water;
 
 pub use carried::{Carried, CarriedForce, cofactor};
+pub use water::Water;
 
 use crate::geometry::Shape;
 use crate::quantity::{Place, Quantity, in_job};
@@ -33,6 +37,24 @@ impl<const D: usize> Gravity<D> {
     /// Acceleration at a time (s), m/s².
     pub fn at(&self, time: f64) -> [f64; D] {
         std::array::from_fn(|axis| self.acceleration[axis].at([0.0; 3], time - self.start))
+    }
+}
+
+/// Which way is up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Up {
+    /// The vertical axis.
+    pub axis: usize,
+    /// 1 along the axis, -1 against it.
+    pub sign: f64,
+}
+
+impl Up {
+    /// Against gravity, which lies along an axis.
+    pub fn new(gravity: &[f64]) -> Self {
+        let greatest = |&a: &usize, &b: &usize| gravity[a].abs().total_cmp(&gravity[b].abs());
+        let axis = (0..gravity.len()).max_by(greatest).unwrap_or(0);
+        Self { axis, sign: if gravity[axis] > 0.0 { -1.0 } else { 1.0 } }
     }
 }
 
@@ -74,6 +96,8 @@ pub enum Kind<const D: usize> {
     LocalDamping(f64),
     /// A force that particles carry; nothing at nodes.
     Carried(Carried<D>),
+    /// Pressure of the water in the pores, a force on particles; nothing at nodes.
+    Water(Water),
 }
 
 impl<const D: usize> Load<D> {
@@ -82,11 +106,16 @@ impl<const D: usize> Load<D> {
         if let Kind::Carried(carried) = &self.kind { Some(carried) } else { None }
     }
 
-    /// Whether it acts on particles and not on nodes: forces that they carry, forces that depend on places of
-    /// the undeformed body, and with scaled masses all forces.
+    /// The water in the pores, if it is that.
+    pub fn water(&self) -> Option<&Water> {
+        if let Kind::Water(water) = &self.kind { Some(water) } else { None }
+    }
+
+    /// Whether it acts on particles and not on nodes: forces that they carry, the pressure of water in their
+    /// pores, forces that depend on places of the undeformed body, and with scaled masses all forces.
     pub fn acts_on_particles(&self, are_masses_scaled: bool) -> bool {
         match &self.kind {
-            Kind::Carried(_) => true,
+            Kind::Carried(_) | Kind::Water(_) => true,
             Kind::BodyForce(acceleration) => {
                 are_masses_scaled || acceleration.iter().any(Quantity::names_undeformed)
             }
@@ -99,7 +128,7 @@ impl<const D: usize> Load<D> {
         match &self.kind {
             Kind::BodyForce(acceleration) => acceleration.iter().any(Quantity::names_undeformed),
             Kind::Carried(carried) => carried.force.names_undeformed(),
-            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) => false,
+            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) | Kind::Water(_) => false,
         }
     }
 
@@ -111,6 +140,7 @@ impl<const D: usize> Load<D> {
             Kind::Damping(rate) => vec![rate],
             Kind::LocalDamping(_) => Vec::new(),
             Kind::Carried(carried) => carried.force.quantities(),
+            Kind::Water(water) => vec![water.quantity()],
         }
     }
 
@@ -163,7 +193,7 @@ impl<const D: usize> Load<D> {
     pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
         let (place, middle) = (in_job(&self.origin, x), middle - self.start);
         match &self.kind {
-            Kind::Carried(_) | Kind::LocalDamping(_) => {}
+            Kind::Carried(_) | Kind::LocalDamping(_) | Kind::Water(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
                     velocity[axis] = dt.mul_add(acceleration[axis].at(place, middle), velocity[axis]);

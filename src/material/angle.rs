@@ -1,6 +1,14 @@
 //! Angles of friction and dilation that may soften.
 use crate::simd::Vector;
 
+/// The angle (degrees) whose tangent is that of another over `factor`.
+pub(super) fn weakened(degrees: f64, factor: f64) -> f64 {
+    if factor == 1.0 {
+        return degrees;
+    }
+    libm::atan(libm::tan(degrees.to_radians()) / factor).to_degrees()
+}
+
 /// An angle that may soften.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angle {

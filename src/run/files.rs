@@ -145,6 +145,7 @@ fn view<'a, const D: usize>(
         brick: problem.brick,
         materials: &names.materials,
         water_moduli: &names.water_moduli,
+        water: problem.water().map(|water| (water, solver.physics.gravity.at(solver.clock.time))),
         bodies: &names.bodies,
         histories: &names.histories,
         job_digest: problem.digest,

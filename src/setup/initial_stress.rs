@@ -2,14 +2,16 @@
 //!
 //! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along
 //! the vertical, this is its mean over each box, and the sums at the nodes are those of the exact integrals:
-//! level ground is at rest to round-off.
+//! level ground is at rest to round-off. Stress is effective: water in the pores bears its part of the weight.
 use partition::Octant;
 
 use super::seed::{SeedError, raster};
 use crate::job::problem::{Body, InitialStress, Problem, StressKind};
+use crate::load::Up;
 use crate::material::initial::{NoState, Stressed, under_stress, yielded};
 use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::quantity::Quantity;
 
 /// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and their
 /// volume is the one under stress: the reference volume differs from it by the deformation under the stress.
@@ -25,21 +27,20 @@ pub fn put_under_stress<const D: usize>(
     if problem.bodies.iter().all(|body| body.stress.is_none()) {
         return Ok(());
     }
-    let mut columns = Columns::default();
-    let interval = 0.25 * problem.cell_edge(octant.level);
+    let mut columns = Columns::new(0.25 * problem.cell_edge(octant.level));
     for p in 0..chunk.len() {
         let Tag { body: index, material, .. } = Tag::unpack(chunk.tags()[p]);
         let body = &problem.bodies[usize::from(index)];
         let Some(initial) = &body.stress else { continue };
         let x = chunk.position(p);
         let material = &*materials[usize::from(material)];
-        let stressed = at(problem, body, initial, material, &x, interval, &mut columns)
+        let [half] = chunk.read::<1>(Layout::<D>::HALF, p);
+        let stressed = at(problem, body, initial, material, &x, half, &mut columns)
             .map_err(|reason| fault(problem, usize::from(index), initial, &x, reason))?;
         let symmetric = |tensor: &[f64; 6]| tensor[..Layout::<D>::SYMMETRIC].to_vec();
         chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &symmetric(&stressed.elastic));
         chunk.write(Layout::<D>::STRESS, p, &symmetric(&stressed.stress));
         chunk.write(Layout::<D>::HISTORY, p, &stressed.history[..HISTORIES]);
-        let [half] = chunk.read::<1>(Layout::<D>::HALF, p);
         let reference = half * libm::pow(stressed.volume_ratio, -1.0 / D as f64);
         chunk.write(Layout::<D>::HALF, p, &[reference]);
     }
@@ -57,7 +58,7 @@ pub fn probe<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material
         let Some(initial) = &body.stress else { continue };
         for x in raster(problem, body) {
             let material = &*materials[body.material];
-            at(problem, body, initial, material, &x, interval, &mut Columns::default())
+            at(problem, body, initial, material, &x, 0.0, &mut Columns::new(interval))
                 .map_err(|reason| fault(problem, index, initial, &x, reason))?;
         }
     }
@@ -79,14 +80,14 @@ fn fault<const D: usize>(
     }
 }
 
-/// State of a particle of a body at a point.
+/// State of a particle of a body at a point, with a box of this half width, m.
 fn at<const D: usize>(
     problem: &Problem<D>,
     body: &Body<D>,
     initial: &InitialStress,
     material: &dyn Material,
     x: &[f64; D],
-    interval: f64,
+    half: f64,
     columns: &mut Columns<D>,
 ) -> Result<Stressed, NoState> {
     let place = problem.place(x);
@@ -98,21 +99,26 @@ fn at<const D: usize>(
             return under(material, &stress, initial, D == 2);
         }
         StressKind::Weight { ratio, surface, surcharge } => {
-            let weight = gravity[up.axis].abs()
-                * match surface {
-                    Some(surface) => {
-                        let depth = (surface.at(place, 0.0) - place[up.axis]) * up.sign;
-                        problem.materials[body.material].density * depth.max(0.0)
-                    }
-                    None => columns.at(problem, body.stage, up, x, interval).mass_above(x[up.axis] * up.sign),
-                };
-            let vertical = weight + surcharge.at(place, 0.0);
+            let surface = surface.as_ref();
+            let mut weight = |x: &[f64; D]| weight(problem, body, surface, x, columns);
+            let faces = [-half, half].map(|way| {
+                let mut face = *x;
+                face[up.axis] += way;
+                face
+            });
+            let is_below = |x: &[f64; D]| problem.water().is_some_and(|w| w.is_below(problem.place(x), 0.0));
+            // Where the water table passes through a box, the particle has the mean density of both parts, and
+            // the stress at its centre is the mean of those at its faces.
+            let vertical = match is_below(&faces[0]) == is_below(&faces[1]) {
+                true => weight(x),
+                false => 0.5 * (weight(&faces[0]) + weight(&faces[1])),
+            } + surcharge.at(place, 0.0);
             [vertical, vertical * ratio.at(place, 0.0)]
         }
         StressKind::Depth { rows, surface } => {
             let depth = match surface {
                 Some(surface) => (surface.at(place, 0.0) - place[up.axis]) * up.sign,
-                None => columns.at(problem, body.stage, up, x, interval).top() - x[up.axis] * up.sign,
+                None => columns.at(problem, body.stage, up, x).top() - x[up.axis] * up.sign,
             };
             interpolate(rows, depth)
         }
@@ -120,6 +126,39 @@ fn at<const D: usize>(
     let mut stress = [-pressures[1], -pressures[1], -pressures[1], 0.0, 0.0, 0.0];
     stress[up.axis] = -pressures[0];
     under(material, &stress, initial, D == 2)
+}
+
+/// Weight per area (Pa) of the material above a point of a body, and of free water on its surface, less the
+/// pressure of the water in the pores.
+fn weight<const D: usize>(
+    problem: &Problem<D>,
+    body: &Body<D>,
+    surface: Option<&Quantity>,
+    x: &[f64; D],
+    columns: &mut Columns<D>,
+) -> f64 {
+    let place = problem.place(x);
+    let gravity = problem.gravity_of_stage(body.stage).at(0.0);
+    let up = Up::new(&gravity);
+    let (mass, depth) = match surface {
+        Some(surface) => {
+            let depth = ((surface.at(place, 0.0) - place[up.axis]) * up.sign).max(0.0);
+            let mut above = Standing::default();
+            above.put(problem, body.material, up, place, [0.0, depth]);
+            (above.mass_above(0.0), depth)
+        }
+        None => {
+            let standing = columns.at(problem, body.stage, up, x);
+            let height = x[up.axis] * up.sign;
+            (standing.mass_above(height), (standing.top() - height).max(0.0))
+        }
+    };
+    let water = problem.water().map_or(0.0, |water| {
+        let mut surface = place;
+        surface[up.axis] = up.sign.mul_add(depth, place[up.axis]);
+        water.pressure(surface, 0.0, &gravity).max(0.0) - water.pressure(place, 0.0, &gravity)
+    });
+    gravity[up.axis].abs() * mass + water
 }
 
 /// The state under a stress, or on the yield surface if the job lets it return there.
@@ -145,28 +184,33 @@ fn interpolate(rows: &[[f64; 3]], depth: f64) -> [f64; 2] {
     [1, 2].map(|value| share.mul_add(high[value] - low[value], low[value]))
 }
 
-/// Which way is up.
-#[derive(Clone, Copy)]
-struct Up {
-    axis: usize,
-    /// 1 along the axis, -1 against it.
-    sign: f64,
-}
-
-impl Up {
-    /// Against gravity, which lies along an axis.
-    fn new<const D: usize>(gravity: &[f64; D]) -> Self {
-        let axis = (0..D).max_by(|&a, &b| gravity[a].abs().total_cmp(&gravity[b].abs())).unwrap_or(0);
-        Self { axis, sign: if gravity[axis] > 0.0 { -1.0 } else { 1.0 } }
-    }
-}
-
 /// Material on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density,
 /// kg/m³.
 #[derive(Clone, Debug, Default)]
 struct Standing(Vec<[f64; 3]>);
 
 impl Standing {
+    /// Adds a piece of a material between two heights (m, up) above a place, saturated below the water table.
+    fn put<const D: usize>(
+        &mut self,
+        problem: &Problem<D>,
+        material: usize,
+        up: Up,
+        place: [f64; 3],
+        [low, high]: [f64; 2],
+    ) {
+        let setup = &problem.materials[material];
+        match problem.water() {
+            None => self.0.push([low, high, setup.density]),
+            Some(water) => {
+                let zero = place[up.axis] * up.sign;
+                let table = water.table(place, 0.0, [low + zero, high + zero]) - zero;
+                self.0.push([low, table, setup.saturated_density]);
+                self.0.push([table, high, setup.density]);
+            }
+        }
+    }
+
     /// Mass per area above a height, kg/m².
     fn mass_above(&self, height: f64) -> f64 {
         self.0.iter().map(|[low, high, density]| density * (high - low.max(height)).max(0.0)).sum()
@@ -179,24 +223,26 @@ impl Standing {
 }
 
 /// Vertical lines of a leaf that have been followed: those of its lattice.
-struct Columns<const D: usize>(Vec<([f64; D], Standing)>);
-
-impl<const D: usize> Default for Columns<D> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
+struct Columns<const D: usize> {
+    lines: Vec<([f64; D], Standing)>,
+    /// Layers thinner than this may be missed, m.
+    interval: f64,
 }
 
 impl<const D: usize> Columns<D> {
-    /// Material on the vertical line through a point. Layers thinner than `interval` (m) may be missed.
-    fn at(&mut self, problem: &Problem<D>, stage: usize, up: Up, x: &[f64; D], interval: f64) -> &Standing {
+    fn new(interval: f64) -> Self {
+        Self { lines: Vec::new(), interval }
+    }
+
+    /// Material on the vertical line through a point.
+    fn at(&mut self, problem: &Problem<D>, stage: usize, up: Up, x: &[f64; D]) -> &Standing {
         let mut foot = *x;
         foot[up.axis] = 0.0;
-        let found = self.0.iter().position(|(other, _)| *other == foot).unwrap_or_else(|| {
-            self.0.push((foot, standing(problem, stage, up, &foot, interval)));
-            self.0.len() - 1
+        let found = self.lines.iter().position(|(other, _)| *other == foot).unwrap_or_else(|| {
+            self.lines.push((foot, standing(problem, stage, up, &foot, self.interval)));
+            self.lines.len() - 1
         });
-        &self.0[found].1
+        &self.lines[found].1
     }
 }
 
@@ -207,7 +253,7 @@ fn standing<const D: usize>(
     foot: &[f64; D],
     interval: f64,
 ) -> Standing {
-    let mut pieces = Vec::new();
+    let mut all = Standing::default();
     let extent = problem.size()[up.axis];
     for body in problem.bodies_of_stage(stage).map(|body| &problem.bodies[body]) {
         let bounds = body.shape.bounds();
@@ -217,10 +263,9 @@ fn standing<const D: usize>(
             x[up.axis] = height;
             x
         };
-        let density = problem.materials[body.material].density;
         let mut push = |from: f64, to: f64| {
             let [a, b] = [from * up.sign, to * up.sign];
-            pieces.push([a.min(b), a.max(b), density]);
+            all.put(problem, body.material, up, problem.place(foot), [a.min(b), a.max(b)]);
         };
         // Each step is as long as the distance to the surface, and no shorter than the interval.
         let (mut height, mut inside_from) = (low, None);
@@ -246,7 +291,7 @@ fn standing<const D: usize>(
             push(from, high);
         }
     }
-    Standing(pieces)
+    all
 }
 
 /// Where a property that holds at `low` and not at `high` ends.

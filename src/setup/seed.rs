@@ -9,6 +9,7 @@
 use super::parts::{Point, has_parts, likely_of_leaf, of_leaf};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
+use crate::load::Water;
 use crate::material::initial::NoState;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::quantity::{NotFinite, Quantity};
@@ -100,7 +101,7 @@ pub fn fill_leaf<const D: usize>(
         let spacing = spacing(problem, octant.level, body);
         let given = body.given.as_ref().map(|given| (given, given.in_box(&problem.octant_box(octant))));
         let whole: f64 = [spacing; D].iter().product();
-        let density = problem.materials[body.material].density;
+        let setup = &problem.materials[body.material];
         let tag = Tag { material: body.material as u16, body: index as u16, level: octant.level };
         let spin = velocity_gradient::<D>(body.angular_velocity);
         chunk.reserve_exact(chunk.len() + points.len());
@@ -142,6 +143,8 @@ pub fn fill_leaf<const D: usize>(
                 set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
             }
             let around = problem.coordinates.around(x[0]);
+            let share = problem.water().map_or(0.0, |water| water.share_below(problem.place(x), half, 0.0));
+            let density = share.mul_add(setup.saturated_density - setup.density, setup.density);
             set(Layout::<D>::MASS, density * (volume * around));
             set(Layout::<D>::HALF, half * around.sqrt());
         }
@@ -275,7 +278,8 @@ pub fn check_finite<const D: usize>(problem: &Problem<D>) -> Result<(), SeedErro
         let stress = body.stress.iter().flat_map(|stress| stress.kind.quantities());
         body.velocity.iter().chain(stress)
     });
-    let fault = of_bodies.chain(&gravity.acceleration).find_map(Quantity::not_finite);
+    let water = problem.water().map(Water::quantity);
+    let fault = of_bodies.chain(&gravity.acceleration).chain(water).find_map(Quantity::not_finite);
     fault.map_or(Ok(()), |fault| Err(fault.into()))
 }
 

@@ -136,6 +136,7 @@ impl<const D: usize> Run<D> {
             brick: Brick { roots: [1; D] },
             materials: &self.materials,
             water_moduli: &[],
+            water: None,
             bodies: &self.bodies,
             histories: &self.histories,
             job_digest: 0xfeed_face_dead_beef,

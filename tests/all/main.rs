@@ -47,6 +47,7 @@ mod undrained;
 mod view;
 mod walls_and_origin;
 mod warnings;
+mod water;
 mod weights_axisymmetric;
 mod weights_exact;
 mod weights_properties;

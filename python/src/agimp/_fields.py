@@ -33,6 +33,7 @@ KNOWN: dict[str, Field] = {
     "mass": Field("kg", "mass; per metre of thickness in plane strain"),
     "density": Field("kg/m³", "density"),
     "volume_ratio": Field("", "volume over reference volume, det F"),
+    "pore_pressure": Field("Pa", "pressure of the water in the pores"),
     "excess_pore_pressure": Field("Pa", "excess pore pressure of undrained material"),
     "effective_pressure": Field("Pa", "pressure less the excess pore pressure"),
     "effective_stress": Field("Pa", "Cauchy stress without the excess pore pressure"),

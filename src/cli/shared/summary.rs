@@ -5,6 +5,7 @@ use crate::adaptivity::Adaptivity;
 use crate::boundary::{ActsOn, Contact, Meets};
 use crate::job::Problem;
 use crate::job::problem::{Coordinates, InStages};
+use crate::load::water::Given;
 use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
@@ -280,6 +281,10 @@ fn load_in_words<const D: usize>(load: &Load<D>) -> String {
             let given: Vec<String> = given.map(|(c, axis)| format!("{axis}: {}", value(c, "m/s"))).collect();
             format!("velocity {}", given.join(", "))
         }
+        LoadKind::Water(water) => match &water.given {
+            Given::Level(level) => format!("water table at {}", value(level, "m")),
+            Given::Pressure(pressure) => format!("pore pressure {}", value(pressure, "Pa")),
+        },
         LoadKind::LocalDamping(factor) => format!("local damping {factor}"),
         LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),
         LoadKind::Carried(carried) => {

@@ -43,6 +43,7 @@ fn compose(chunk: &Chunk<3>, field: PointField) -> Canvas {
         root_edge: 1.0,
         brick: Brick { roots: [1; 3] },
         water_moduli: &[],
+        water: None,
         materials: &[],
         bodies: &[],
         histories: &[],

@@ -20,6 +20,7 @@ use partition::comm::Comm;
 use partition::{Brick, Octant};
 
 use super::hdf5_file::{FileError, Reader, Writer};
+use crate::load::Water;
 use crate::particle::chunk::Chunk;
 use crate::particle::followed::Followed;
 use crate::probe::{Map, Maxima};
@@ -68,6 +69,8 @@ pub struct View<'a, const D: usize> {
     pub materials: &'a [String],
     /// Stiffness of water that cannot leave the pores, by material, Pa; 0 where there is none.
     pub water_moduli: &'a [f64],
+    /// Water in the pores with a given pressure, and gravity (m/s²) for it.
+    pub water: Option<(&'a Water, [f64; D])>,
     /// Names of the bodies.
     pub bodies: &'a [String],
     /// Names of the history variables.

@@ -128,6 +128,7 @@ pub(super) fn check<const D: usize>(
         "regions of [[tree.regions]]",
     );
     refuse(!file.contact.is_empty(), root.key("contact"), "contact between bodies", "bodies that stick");
+    refuse(file.water.is_some(), root.key("water"), "water in the pores", "none");
     refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
     refuse(!file.maps.is_empty(), root.key("maps"), "maps", "lines or probes");
     for (i, field) in file.output.fields.iter().enumerate() {

@@ -16,6 +16,7 @@
 //! | `stages` | stages of the run |
 //! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
+//! | `water` | water in the pores |
 use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
 use self::colliders::colliders;
@@ -51,6 +52,7 @@ mod shapes;
 mod sources;
 mod stages;
 mod stress;
+mod water;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;
@@ -110,10 +112,12 @@ fn problem<const D: usize>(
         + D * faces_with_sums
         + file.fluxes.len()
         + 4 * file.contact.len()
-        + 5 * file.sources.len();
+        + 5 * file.sources.len()
+        + if file.water.is_some() { 4 } else { 0 };
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
+    let water = water::water(checks, file, &space, &root);
     let stages = stages::stages(checks, file, &root);
-    let load_stages =
+    let mut load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
     let collider_stages = stages::of_each(
         checks,
@@ -127,6 +131,14 @@ fn problem<const D: usize>(
     let absorbing = settings::absorbing(checks, &file.boundaries, &root.key("boundaries"));
     let (transfer, boxes) = numerics(checks, &file.numerics, &root.key("numerics"));
     let (tree, mut bodies, faces) = (tree?, bodies?, faces?);
+    let mut load_places: Vec<_> =
+        (0..file.loads.len()).map(|i| checks.place(&root.key("loads").index(i))).collect();
+    let (mut loads, water) = (loads?, water?);
+    if let Some(water) = water {
+        loads.push(water);
+        load_stages.push(InStages::default());
+        load_places.push(checks.place(&root.key("water")));
+    }
     let context = sources::Context { file, space: &space, tree: &tree, root_edge };
     let (sources, fed): (Vec<_>, Vec<_>) =
         sources::sources(checks, &context, &root.key("sources"))?.into_iter().unzip();
@@ -139,7 +151,7 @@ fn problem<const D: usize>(
     let lines = probes::lines(checks, file, &space, &root.key("lines"));
     let maps = probes::maps(checks, file, &space, &root.key("maps"));
     let mut output = output(checks, file, &name, &root.key("output"));
-    let needs_places = loads.as_ref().is_some_and(|loads| loads.iter().any(Load::names_undeformed));
+    let needs_places = loads.iter().any(Load::names_undeformed);
     if needs_places && output.followed.motion == Motion::Nothing {
         output.followed.motion = Motion::Displacement;
     }
@@ -165,8 +177,8 @@ fn problem<const D: usize>(
         bodies,
         sources,
         gravity: gravity?,
-        load_places: (0..file.loads.len()).map(|i| checks.place(&root.key("loads").index(i))).collect(),
-        loads: loads?,
+        load_places,
+        loads,
         faces: faces.map(|pair| pair.map(Option::unwrap_or_default)),
         absorbing: absorbing?,
         named_faces: faces.map(|pair| pair.map(|face| face.is_some())),
@@ -351,6 +363,11 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             checks.fault(&own, format!("found {value}; expected a number {range}"));
         } else if let Some(water) = &material.undrained {
             undrained(checks, water, &material.model, &path.index(i));
+        } else if let Some(factor) = material.strength_factor
+            && material.model.weakened(factor).is_none()
+        {
+            let message = "found it for a model without cohesion, yield stress or friction; expected mohr_coulomb, drucker_prager, tresca or von_mises";
+            checks.fault(&path.index(i).key("strength_factor"), message.into());
         }
     }
     materials.iter().map(material_setup).collect()
@@ -367,10 +384,12 @@ fn undrained(checks: &mut Checks, water: &Undrained, model: &Parameters, path: &
 }
 
 fn material_setup(material: &file::Material) -> MaterialSetup {
+    let weakened = material.strength_factor.and_then(|factor| material.model.weakened(factor));
     MaterialSetup {
         name: material.name.clone(),
         density: material.density,
-        model: material.model.clone(),
+        saturated_density: material.saturated_density.unwrap_or(material.density),
+        model: weakened.unwrap_or_else(|| material.model.clone()),
         undrained: material.undrained,
     }
 }

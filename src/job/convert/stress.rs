@@ -63,7 +63,7 @@ pub(super) fn stress<const D: usize>(
 ) -> Option<InitialStress> {
     let consolidation = consolidation(checks, written, material, path)?;
     if !matches!(written.kind, WrittenKind::Components { .. }) {
-        needs_vertical_gravity(checks, file, path)?;
+        needs_vertical_gravity(checks, file, &path.key("kind"), ", or a stress of kind \"components\"")?;
     }
     let surface_of = |checks: &mut Checks, surface: &Option<Written>| match surface {
         Some(written) => Some(Some(field::<D>(checks, written, &path.key("surface"))?)),
@@ -160,8 +160,13 @@ fn consolidation(
     Some(Some(asked))
 }
 
-/// A fault unless gravity has one component that is not 0 at the start.
-fn needs_vertical_gravity(checks: &mut Checks, file: &JobFile, path: &Path) -> Option<()> {
+/// A fault unless gravity has one component that is not 0 at the start; `instead` is another remedy.
+pub(super) fn needs_vertical_gravity(
+    checks: &mut Checks,
+    file: &JobFile,
+    path: &Path,
+    instead: &str,
+) -> Option<()> {
     let components = file.gravity.as_deref().unwrap_or_default();
     let is_zero = |written: &Written| matches!(written, Written::Number(0.0));
     let present = components.iter().filter(|component| !is_zero(component)).count();
@@ -170,8 +175,8 @@ fn needs_vertical_gravity(checks: &mut Checks, file: &JobFile, path: &Path) -> O
     }
     let found = if present == 0 { "no gravity" } else { "gravity along several axes" };
     let message = format!(
-        "found {found}; expected one component of gravity that is not 0, which defines the vertical direction, or a stress of kind \"components\""
+        "found {found}; expected one component of gravity that is not 0, which defines the vertical direction{instead}"
     );
-    checks.fault(&path.key("kind"), message);
+    checks.fault(path, message);
     None
 }

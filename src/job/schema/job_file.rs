@@ -12,6 +12,7 @@ pub use super::probes::{Flux, Line, Map, Probe, Track};
 pub use super::sources::Source;
 pub use super::stages::Stage;
 pub use super::stress::Stress;
+pub use super::water::Water;
 use crate::geometry::written::Shape;
 pub use crate::geometry::written::Vector;
 use crate::material::parameters::Parameters;
@@ -76,6 +77,9 @@ pub struct JobFile {
     /// Loads, in the order in which they act.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
+    /// Water in the pores of all material, with a given pressure; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub water: Option<Water>,
     /// Rigid bodies that act on the material, in the order in which they act; the faces of the domain act last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub colliders: Vec<Collider>,
@@ -296,6 +300,16 @@ pub struct Material {
     /// Density of the undeformed material, kg/m³.
     #[schemars(range(min = 1e-6, max = 1e5))]
     pub density: f64,
+    /// Density of the undeformed material with full pores, kg/m³, for what lies below the table of `[water]` at the start; it keeps that
+    /// density as the table moves. `density` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-6, max = 1e5))]
+    pub saturated_density: Option<f64>,
+    /// Divides the strength, to find a factor of safety: cohesion, yield stress and their hardening, and the tangents of friction angles, of
+    /// `mohr_coulomb`, `drucker_prager`, `tresca` and `von_mises`; the dilation angle is at most the new friction angle. 1 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.01, max = 100.0))]
+    pub strength_factor: Option<f64>,
     /// Water in the pores that cannot leave, for solid models: the model sees the effective stress, and the water has the excess
     /// pressure `-(bulk_modulus / porosity) ln J` with the volume ratio J since the start, or since the stress that the body starts
     /// with. `density` is that of skeleton and water. By default there is none.

@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`sources`], [`stages`], [`stress`] | tables of a part of the file |
+//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`sources`], [`stages`], [`stress`], [`water`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
@@ -20,6 +20,7 @@ pub mod reference;
 pub mod sources;
 pub mod stages;
 pub mod stress;
+pub mod water;
 
 /// Keys that files of earlier versions may have: path, and why the key is gone with what to do.
 pub(super) const GONE: [(&str, &str); 1] = [(

@@ -247,6 +247,28 @@ impl Hardening {
         Ok(())
     }
 
+    /// The same curve with all strengths over `factor`.
+    pub(super) fn weakened(&self, factor: f64) -> Self {
+        let mut law = match self {
+            Self::Modulus(modulus) => return Self::Modulus(modulus / factor),
+            Self::Law(law) => law.clone(),
+        };
+        match &mut law {
+            HardeningLaw::None {} | HardeningLaw::Swift { .. } => {}
+            HardeningLaw::Linear { modulus }
+            | HardeningLaw::Ludwik { modulus, .. }
+            | HardeningLaw::JohnsonCook { modulus, .. } => *modulus /= factor,
+            HardeningLaw::Voce { saturation, modulus, .. } => {
+                *saturation /= factor;
+                *modulus /= factor;
+            }
+            HardeningLaw::Table { points } => points.iter_mut().for_each(|point| point[1] /= factor),
+            HardeningLaw::LinearSoftening { residual, .. }
+            | HardeningLaw::ExponentialSoftening { residual, .. } => *residual /= factor,
+        }
+        Self::Law(law)
+    }
+
     /// Homologous temperature of the undeformed material, and the part of the plastic work that becomes heat,
     /// of laws with temperatures.
     pub(super) fn homologous(&self) -> Option<(f64, f64)> {

@@ -19,7 +19,7 @@ use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::root::Function;
 use crate::material::tensor::strain::Strain;
-use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, angle, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.
@@ -169,6 +169,18 @@ impl Model for DruckerPrager {
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
         let angles = [p.friction_angle, p.dilation_angle];
         p.hardening.check_frictional(p.cohesion, angles, p.volume_correction)
+    }
+
+    fn weakened(p: &Parameters, factor: f64) -> Option<Parameters> {
+        let friction_angle = angle::weakened(p.friction_angle, factor);
+        Some(Parameters {
+            friction_angle,
+            cohesion: p.cohesion / factor,
+            dilation_angle: p.dilation_angle.min(friction_angle),
+            tension_cutoff: p.tension_cutoff.map(|tension| tension / factor),
+            hardening: p.hardening.weakened(factor),
+            ..p.clone()
+        })
     }
 
     fn examples() -> &'static [&'static str] {

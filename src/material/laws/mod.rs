@@ -54,6 +54,13 @@ pub trait Model: Law {
         Ok(())
     }
 
+    /// The parameters with the strength over `factor`, for factors of safety: cohesion, yield stress and the
+    /// tangents of the angles of friction; dilation at most that of the new friction. `None` for models
+    /// without strength.
+    fn weakened(_parameters: &Self::Parameters, _factor: f64) -> Option<Self::Parameters> {
+        None
+    }
+
     /// Sets of parameters, in the form of a job file, that together cover every branch of the law: for tests
     /// and benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
     fn examples() -> &'static [&'static str];
@@ -91,6 +98,13 @@ macro_rules! materials {
                 ranges::check(self)?;
                 match self {
                     $(Self::$name(parameters) => <$law as Model>::check(parameters),)*
+                }
+            }
+
+            /// The same model with its strength over `factor`; `None` for models without strength.
+            pub fn weakened(&self, factor: f64) -> Option<Self> {
+                match self {
+                    $(Self::$name(own) => <$law as Model>::weakened(own, factor).map(Self::$name),)*
                 }
             }
 
@@ -144,4 +158,28 @@ materials! {
     MuI(flow::mu_i::MuI),
     /// Weakly compressible Newtonian fluid.
     Fluid(flow::fluid::Fluid),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A strength factor divides c and tan φ; the model stays valid, and 1 changes nothing.
+    #[test]
+    fn weakened_models_are_valid_and_have_less_strength() {
+        let mut weakened = 0;
+        for text in Parameters::examples() {
+            let model: Parameters = text.parse().expect("an example");
+            let Some(weaker) = model.weakened(1.5) else { continue };
+            assert!(weaker.check().is_ok(), "{text}");
+            assert_eq!(model.weakened(1.0), Some(model.clone()), "{text}");
+            if let (Parameters::MohrCoulomb(before), Parameters::MohrCoulomb(after)) = (&model, &weaker) {
+                let [before_tan, after_tan] = [before, after].map(|p| p.friction_angle.to_radians().tan());
+                assert!((1.5 * after_tan / before_tan - 1.0).abs() < 1e-14, "{text}");
+                assert_eq!(after.cohesion, before.cohesion / 1.5);
+            }
+            weakened += 1;
+        }
+        assert!(weakened >= 15, "{weakened} models with strength");
+    }
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::hencky::Hencky;
-use crate::material::angle::Angle;
+use crate::material::angle::{self, Angle};
 use crate::material::coulomb::{Pyramid, Returned, Slopes};
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
@@ -158,6 +158,22 @@ impl Model for MohrCoulomb {
             }
         }
         Ok(())
+    }
+
+    fn weakened(p: &Parameters, factor: f64) -> Option<Parameters> {
+        let friction_angle = angle::weakened(p.friction_angle, factor);
+        let residual_friction_angle = p.residual_friction_angle.map(|angle| angle::weakened(angle, factor));
+        let least = residual_friction_angle.unwrap_or(friction_angle);
+        Some(Parameters {
+            friction_angle,
+            residual_friction_angle,
+            cohesion: p.cohesion / factor,
+            dilation_angle: p.dilation_angle.min(friction_angle),
+            residual_dilation_angle: p.residual_dilation_angle.map(|angle| angle.min(least)),
+            tension_cutoff: p.tension_cutoff.map(|tension| tension / factor),
+            hardening: p.hardening.weakened(factor),
+            ..p.clone()
+        })
     }
 
     fn examples() -> &'static [&'static str] {

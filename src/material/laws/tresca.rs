@@ -50,6 +50,11 @@ impl Model for Tresca {
         p.hardening.check(p.yield_stress)
     }
 
+    fn weakened(p: &Parameters, factor: f64) -> Option<Parameters> {
+        let hardening = p.hardening.weakened(factor);
+        Some(Parameters { yield_stress: p.yield_stress / factor, hardening, ..p.clone() })
+    }
+
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'tresca', young = 1e6, poisson = 0.3, yield_stress = 1e3",

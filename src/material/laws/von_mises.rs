@@ -160,6 +160,11 @@ impl Model for VonMises {
         p.damage.map_or(Ok(()), |failure| failure.check(&p.hardening))
     }
 
+    fn weakened(p: &Parameters, factor: f64) -> Option<Parameters> {
+        let hardening = p.hardening.weakened(factor);
+        Some(Parameters { yield_stress: p.yield_stress / factor, hardening, ..p.clone() })
+    }
+
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e3",

@@ -8,7 +8,7 @@
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
 use crate::job::Problem;
-use crate::job::problem::Coordinates;
+use crate::job::problem::{Body, Coordinates};
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
@@ -30,6 +30,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     faces(problem, &mut all);
     materials(problem, &mut all);
     undrained(problem, &mut all);
+    saturated(problem, &mut all);
     colliders::look(problem, &mut all);
     damage::look(problem, &mut all);
     stretch::look(problem, &mut all);
@@ -74,6 +75,27 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             all.push(format!(
                 "materials[{index}].match: \"{}\" has its friction angle in triaxial compression and a greater one in plane strain, as in this 2D job; use match = \"plane_strain\" for the friction angle in plane strain",
                 excerpt(&material.name, NAME)
+            ));
+        }
+    }
+}
+
+/// Bodies that reach below the water table, of materials that are no heavier there.
+fn saturated<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
+    let Some(water) = problem.water() else { return };
+    for (index, setup) in problem.materials.iter().enumerate() {
+        let is_wet = |body: &Body<D>| {
+            let mut foot = body.shape.bounds().centre();
+            let bounds = body.shape.bounds();
+            foot[water.up.axis] =
+                if water.up.sign > 0.0 { bounds.lower[water.up.axis] } else { bounds.upper[water.up.axis] };
+            body.material == index && water.is_below(problem.place(&foot), 0.0)
+        };
+        if setup.saturated_density == setup.density && problem.bodies.iter().any(is_wet) {
+            all.push(format!(
+                "materials[{index}].saturated_density: \"{}\" lies below the water table, and its density is {} kg/m³ above and below it; set saturated_density, the density with full pores, unless that is it",
+                excerpt(&setup.name, NAME),
+                number(setup.density, 4)
             ));
         }
     }

@@ -1,5 +1,5 @@
-//! Forces on particles: those that they carry (tractions, pressures, point forces), and body forces that
-//! belong to places of the undeformed body. With mass scaling gravity and all body forces are among them:
+//! Forces on particles: those that they carry (tractions, pressures, point forces), that of the water in their
+//! pores, and body forces that belong to places of the undeformed body. With mass scaling gravity and all body forces are among them:
 //! they act on the mass of the material, not on the scaled mass.
 //!
 //! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the
@@ -9,9 +9,10 @@
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
-use crate::load::{Carried, Load, cofactor};
+use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::strain;
+use crate::particle::volume::volume;
 use crate::simd::Vector;
 use crate::solver::sorting::bins::BoxWidths;
 use crate::solver::sorting::box_bounds::Widths;
@@ -43,9 +44,14 @@ fn surface_at<const D: usize>(
     p: usize,
     cell: f64,
 ) -> [f64; D] {
-    let half = || widths.of_batch(chunk, &[p as u32], cell).map(|half| half.to_array()[0]);
+    let half = || half_widths(widths, chunk, p, cell);
     let (x, way) = (chunk.position(p), carried.way_to_surface(numbers, half));
     std::array::from_fn(|a| x[a] + way[a])
+}
+
+/// Half widths of the box of a particle in a leaf with cells of this edge, m.
+fn half_widths<const D: usize>(widths: &Widths<'_, D>, chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
+    widths.of_batch(chunk, &[p as u32], cell).map(|half| half.to_array()[0])
 }
 
 /// Loads and gravity that act on particles in a step.
@@ -56,8 +62,10 @@ struct Pushing<'a, const D: usize> {
     loads: Vec<(usize, &'a Load<D>)>,
     /// First column of the displacement, if particles carry it.
     displacement: Option<usize>,
-    /// Gravity, m/s², where masses are scaled; else 0, as gravity acts on nodes.
+    /// Gravity, m/s².
     gravity: [f64; D],
+    /// Gravity that acts on particles, m/s²: all where masses are scaled; else 0, as it acts on nodes.
+    on_particles: [f64; D],
     /// Whether forces act on all particles, and not only on those that carry something.
     all: bool,
     middle: f64,
@@ -88,7 +96,7 @@ impl<const D: usize> Pushing<'_, D> {
                 let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
                 before.push((p as u32, velocity));
                 let falling =
-                    std::array::from_fn(|a| (self.dt / scale).mul_add(self.gravity[a], velocity[a]));
+                    std::array::from_fn(|a| (self.dt / scale).mul_add(self.on_particles[a], velocity[a]));
                 let pushed = pushes[from..].iter().fold(falling, |velocity: [f64; D], push| {
                     std::array::from_fn(|a| self.dt.mul_add(push.force[a] / mass, velocity[a]))
                 });
@@ -101,13 +109,19 @@ impl<const D: usize> Pushing<'_, D> {
     /// Force of a load on a particle of this mass (kg), N, if it has any.
     fn force(&self, chunk: &Chunk<D>, p: usize, load: &Load<D>, cell: f64, mass: f64) -> Option<[f64; D]> {
         let place = |x: &[f64; D]| load.place(x, &displacement(chunk, self.displacement, p));
-        match load.carried() {
-            Some(carried) => {
+        match &load.kind {
+            Kind::Carried(carried) => {
                 let numbers = numbers(chunk, carried, p)?;
                 let x = surface_at(&self.widths, chunk, carried, &numbers, p, cell);
                 Some(load.force(carried, &numbers, &place(&x), self.middle - load.start))
             }
-            None => {
+            Kind::Water(water) => {
+                let half = half_widths(&self.widths, chunk, p, cell);
+                let at = place(&chunk.position(p)).now;
+                let per_volume = water.force(at, &half, self.middle, &self.gravity);
+                (per_volume != [0.0; D]).then(|| per_volume.map(|force| volume(chunk, p) * force))
+            }
+            _ => {
                 let x = chunk.position(p);
                 load.body_force(&x, &place(&x), self.middle).map(|per_mass| per_mass.map(|a| mass * a))
             }
@@ -139,7 +153,8 @@ impl<const D: usize> Solver<D> {
             all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
             displacement: physics.displacement_column(),
-            gravity: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
+            gravity: physics.gravity.at(middle),
+            on_particles: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
             middle,
             dt,
         };

@@ -10,6 +10,7 @@ use crate::material::undrained::excess_pressure;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, symmetric, volume, volume_ratio};
+use crate::quantity::in_job;
 
 /// Names of the components of vectors and tensors, by their number, in the order of the files.
 pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
@@ -111,6 +112,9 @@ fields! {
     /// Pressure of contact with other bodies, Pa, at particles within reach of the surface: a mean over the
     /// last steps, in which a step counts a twentieth less than the next; found only where a job asks for it.
     ContactPressure, "contact_pressure", "Pa", |view| scalars(view, |chunk, p| contact_pressure(view, chunk, p));
+    /// Pressure of the water in the pores, Pa: that of `[water]` and the excess; compression is positive.
+    /// The field `stress` has the excess, and not the pressure of `[water]`.
+    PorePressure, "pore_pressure", "Pa", |view| scalars(view, |chunk, p| pore_pressure(view, chunk, p));
     /// Excess pore pressure of undrained material, Pa; compression is positive, 0 elsewhere.
     ExcessPorePressure, "excess_pore_pressure", "Pa", |view| scalars(view, |chunk, p| excess_pore_pressure(view, chunk, p));
     /// Mean of the effective stress with the sign changed, Pa: the pressure less the excess pore pressure.
@@ -248,6 +252,13 @@ fn excess_pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p:
         }
         _ => 0.0,
     }
+}
+
+/// Pressure of the water in the pores, Pa.
+fn pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
+    let place = in_job(&view.origin, &chunk.position(p));
+    let given = view.water.map_or(0.0, |(water, gravity)| water.pressure(place, view.time, &gravity));
+    given + excess_pore_pressure(view, chunk, p)
 }
 
 /// Effective Cauchy stress, Pa.

@@ -1,0 +1,174 @@
+//! Pressure of the water in the pores where the job gives it.
+//!
+//! Laws see the effective stress. Water with the pressure p in pores that are connected moves the material by
+//! the divergence of its part `-p I` of the total stress, and free water by the pressure `-p n` on the
+//! surfaces that it wets. Together they do the work of a force per volume,
+//! `∫ p ∇N dV - ∮ N p n dA = -∫ N ∇p dV`,
+//! so no surface needs to be known, water above the ground loads it, and a submerged body is buoyant. The mean
+//! of ∇p over a box is the difference of p between its faces over its width, also where the water table
+//! passes through the box. So material whose weight the water bears is at rest to round-off.
+use super::Up;
+use crate::quantity::Quantity;
+
+/// Water in the pores of all material.
+#[derive(Clone, Debug)]
+pub struct Water {
+    /// Its pressure.
+    pub given: Given,
+    /// Density of the water, kg/m³.
+    pub density: f64,
+    /// Greatest suction that it bears, Pa: the pressure is never below its negative.
+    pub suction: f64,
+    /// The vertical.
+    pub up: Up,
+}
+
+/// How the pressure of the water is given.
+#[derive(Clone, Debug)]
+pub enum Given {
+    /// Level of the water table, m, along the vertical: hydrostatic pressure below.
+    Level(Quantity),
+    /// The pressure itself, Pa.
+    Pressure(Quantity),
+}
+
+impl Water {
+    /// What it depends on.
+    pub fn quantity(&self) -> &Quantity {
+        let (Given::Level(quantity) | Given::Pressure(quantity)) = &self.given;
+        quantity
+    }
+
+    /// Weight of the water per volume, N/m³, in this gravity, m/s².
+    fn unit_weight(&self, gravity: &[f64]) -> f64 {
+        self.density * gravity[self.up.axis].abs()
+    }
+
+    /// Pressure (Pa) at a place in the coordinates of the job (m) and a time (s), in this gravity, m/s².
+    pub fn pressure(&self, place: [f64; 3], time: f64, gravity: &[f64]) -> f64 {
+        self.unbounded(place, time, gravity).max(-self.suction)
+    }
+
+    /// The pressure without the bound of the suction, Pa.
+    fn unbounded(&self, place: [f64; 3], time: f64, gravity: &[f64]) -> f64 {
+        match &self.given {
+            Given::Level(level) => {
+                let depth = (level.at(place, time) - place[self.up.axis]) * self.up.sign;
+                self.unit_weight(gravity) * depth
+            }
+            Given::Pressure(pressure) => pressure.at(place, time),
+        }
+    }
+
+    /// Whether a place lies below the water table, where pores are full.
+    pub fn is_below(&self, place: [f64; 3], time: f64) -> bool {
+        match &self.given {
+            Given::Level(level) => (level.at(place, time) - place[self.up.axis]) * self.up.sign > 0.0,
+            Given::Pressure(pressure) => pressure.at(place, time) > 0.0,
+        }
+    }
+
+    /// Height (m, up) where the water table crosses the vertical through a place between two heights; the
+    /// upper one if the pores are full up to there, the lower one if they are full nowhere. One crossing is
+    /// expected.
+    pub fn table(&self, place: [f64; 3], time: f64, [low, high]: [f64; 2]) -> f64 {
+        let up = self.up;
+        let at =
+            |height: f64| std::array::from_fn(|a| if a == up.axis { height * up.sign } else { place[a] });
+        match &self.given {
+            Given::Level(level) => (level.at(place, time) * up.sign).clamp(low, high),
+            Given::Pressure(_) if self.is_below(at(high), time) => high,
+            Given::Pressure(_) if !self.is_below(at(low), time) => low,
+            Given::Pressure(_) => {
+                let (mut full, mut empty) = (low, high);
+                loop {
+                    let middle = 0.5 * (full + empty);
+                    if middle <= full || middle >= empty {
+                        return middle;
+                    }
+                    if self.is_below(at(middle), time) { full = middle } else { empty = middle }
+                }
+            }
+        }
+    }
+
+    /// Share of a box about a place (m) with this half width along the vertical (m) that lies below the water
+    /// table.
+    pub fn share_below(&self, place: [f64; 3], half: f64, time: f64) -> f64 {
+        let centre = place[self.up.axis] * self.up.sign;
+        let ends = [centre - half, centre + half];
+        (self.table(place, time, ends) - ends[0]) / (2.0 * half)
+    }
+
+    /// Mean force per volume on a box about a place (m) with these half widths (m): `-∇p`, N/m³.
+    pub fn force<const D: usize>(
+        &self,
+        place: [f64; 3],
+        half: &[f64; D],
+        time: f64,
+        gravity: &[f64; D],
+    ) -> [f64; D] {
+        std::array::from_fn(|axis| {
+            let [low, high] = [-1.0, 1.0].map(|side: f64| {
+                let mut face = place;
+                face[axis] = side.mul_add(half[axis], face[axis]);
+                self.pressure(face, time, gravity)
+            });
+            (low - high) / (2.0 * half[axis])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quantity::Expression;
+
+    fn water(given: Given) -> Water {
+        Water { given, density: 1000.0, suction: 0.0, up: Up::new(&[0.0, -10.0]) }
+    }
+
+    fn expression(text: &str) -> Quantity {
+        Quantity::Expression(Box::new(Expression::parse(text).expect("an expression")))
+    }
+
+    /// Archimedes: a box is buoyant by the weight of the water in it, at any height of the table.
+    #[test]
+    fn boxes_are_buoyant_by_the_water_in_them() {
+        let water = water(Given::Level(Quantity::Constant(1.0)));
+        for (y, share) in [(0.0, 1.0), (0.75, 1.0), (0.875, 0.75), (1.0, 0.5), (1.25, 0.0), (3.0, 0.0)] {
+            let force = water.force([0.3, y, 0.0], &[0.5, 0.25], 0.0, &[0.0, -10.0]);
+            assert_eq!(force, [0.0, 1e4 * share], "{y}");
+            assert_eq!(water.share_below([0.3, y, 0.0], 0.25, 0.0), share, "{y}");
+        }
+    }
+
+    /// Under an inclined table water flows, and pushes along its slope.
+    #[test]
+    fn an_inclined_table_pushes_along_its_slope() {
+        let water = water(Given::Level(expression("2 - 0.25 * x")));
+        let force = water.force([1.0, 0.5, 0.0], &[0.5, 0.25], 0.0, &[0.0, -10.0]);
+        assert_eq!(force, [2500.0, 1e4]);
+    }
+
+    /// A field of pressure finds its water table.
+    #[test]
+    fn the_table_of_a_field_is_where_its_pressure_ends() {
+        let water = water(Given::Pressure(expression("max(0, 5000 * (1 - y))")));
+        assert_eq!(water.table([0.0; 3], 0.0, [0.0, 4.0]), 1.0);
+        assert_eq!(water.table([0.0; 3], 0.0, [0.0, 0.5]), 0.5);
+        assert_eq!(water.table([0.0; 3], 0.0, [2.0, 4.0]), 2.0);
+        assert_eq!(water.share_below([0.0, 1.0, 0.0], 0.5, 0.0), 0.5);
+        assert_eq!(water.force([0.0, 1.0, 0.0], &[0.5, 0.5], 0.0, &[0.0, -10.0]), [0.0, 2500.0]);
+    }
+
+    /// Without suction pores above the table have no pressure; with it they have one down to its bound.
+    #[test]
+    fn suction_is_bounded() {
+        let mut water = water(Given::Level(Quantity::Constant(0.0)));
+        assert_eq!(water.pressure([0.0, 3.0, 0.0], 0.0, &[0.0, -10.0]), 0.0);
+        water.suction = 2e4;
+        assert_eq!(water.pressure([0.0, 1.0, 0.0], 0.0, &[0.0, -10.0]), -1e4);
+        assert_eq!(water.pressure([0.0, 3.0, 0.0], 0.0, &[0.0, -10.0]), -2e4);
+    }
+}
