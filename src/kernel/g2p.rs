@@ -346,7 +346,7 @@ impl Advance<'_> {
         if is_ring {
             let mut rate = plain[2];
             if !dilation.is_empty() {
-                rate = rate + batch.values(dilation);
+                rate += batch.values(dilation);
             }
             let stretch = rate.mul_add(step, V::splat(1.0));
             trial[2] = stretch * stretch * elastic[2];

@@ -58,6 +58,9 @@ fn solver(comm: &Comm, text: &str) -> Solver<2> {
 const REFINED: &str = "[tree]\n[[tree.regions]]\nlevel = 1\n\
     shape = { kind = 'box', min = [0, 0], max = [0.4, 0.4] }\n";
 
+/// Identifier, place, velocity and stretch of a particle.
+type Seen = (u64, [f64; 2], [f64; 2], [f64; 3]);
+
 /// A cylinder expands evenly, v_r = a r and v_z = b z. In a step all positions grow by 1 + a Δt and 1 + b Δt, the
 /// stretches as much, and no velocity changes: from the axis to the rim, across the jump between cells.
 /// Velocities are those of centres of mass, `r + l² / (3 r)`.
@@ -71,7 +74,7 @@ fn expansion(comm: &Comm) {
         );
         let mut solver = solver(comm, &job([1.0, 1.0], &body).replace("'slip'", "'outflow'"));
         let read = |solver: &Solver<2>| {
-            let mut all: Vec<(u64, [f64; 2], [f64; 2], [f64; 3])> = Vec::new();
+            let mut all: Vec<Seen> = Vec::new();
             for chunk in &solver.chunks {
                 all.extend((0..chunk.len()).map(|p| {
                     let (velocity, stretch) =
