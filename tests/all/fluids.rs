@@ -46,11 +46,13 @@ struct Slosh {
     /// Further tables.
     more: String,
     end: f64,
+    /// Domain, if it is wider than the tank: then further tables have walls and floor.
+    domain: Option<String>,
 }
 
 impl Default for Slosh {
     fn default() -> Self {
-        Self { dimension: 2, level: 2, modulus: 1e5, body: "", more: String::new(), end: 4.0 }
+        Self { dimension: 2, level: 2, modulus: 1e5, body: "", more: String::new(), end: 4.0, domain: None }
     }
 }
 
@@ -59,16 +61,17 @@ impl Slosh {
     const THICK: [f64; 2] = [0.25, 0.15];
 
     fn job(&self) -> String {
-        let Self { dimension, level, modulus, body, more, end } = self;
+        let Self { dimension, level, modulus, body, more, end, domain } = self;
         let [tank, column] = match dimension {
             2 => [String::new(), String::new()],
             _ => Self::THICK.map(|thickness| format!(", {thickness}")),
         };
         let (root, third) = if *dimension == 2 { (0.5, "") } else { (0.25, ", 0") };
+        let domain = domain.clone().unwrap_or_else(|| format!("size = [1, 1{tank}]"));
         let sides = if *dimension == 2 { "" } else { "z_min.kind = 'slip'\nz_max.kind = 'slip'\n" };
         format!(
             "version = 1\ndimension = {dimension}\ngravity = [0, -9.81{third}]\n\
-             [domain]\nsize = [1, 1{tank}]\nroot_edge = {root}\n[tree]\nbase_level = {level}\n\
+             [domain]\n{domain}\nroot_edge = {root}\n[tree]\nbase_level = {level}\n\
              [boundaries]\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_min.kind = 'slip'\ny_max.kind = 'separating'\n{sides}\
              [[materials]]\nname = 'water'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = {modulus}\n\
              [[bodies]]\nname = 'column'\nmaterial = 'water'\n{body}\n\
@@ -133,6 +136,34 @@ fn water_at_rest_after_violent_motion_fills_its_volume() {
     Slosh { modulus: 1e6, ..Slosh::default() }.comes_to_rest();
     Slosh { body: "particles_per_cell = 3", ..Slosh::default() }.comes_to_rest();
     Slosh { more: "[numerics]\ntransfer = 'flip'".into(), ..Slosh::default() }.comes_to_rest();
+}
+
+/// The same in tanks of colliders: one with a hole, and walls that stand on a floor, on and between rows of
+/// nodes. Where the space of colliders counted as full, shifts drove water into them; behind the seam of floor
+/// and wall it was free along the seam. Of such tanks a third of the water was lost.
+#[test]
+fn water_at_rest_fills_its_volume_in_tanks_of_colliders() {
+    let part = |x: [f64; 2], y: [f64; 2]| {
+        format!("{{ kind = 'box', min = [{}, {}], max = [{}, {}] }}", x[0], y[0], x[1], y[1])
+    };
+    let collider = |name: &str, shape: &str| {
+        format!("[[colliders]]\nname = '{name}'\nshape = {shape}\ncontact.kind = 'slip'\n")
+    };
+    let (all, hole) = (part([-0.2, 1.2], [-0.2, 1.5]), part([0.0, 1.0], [0.0, 1.6]));
+    let hollow = collider("tank", &format!("{{ kind = 'difference', from = {all}, remove = [{hole}] }}"));
+    let [floor, left, right] = [
+        collider("floor", &part([-0.2, 1.2], [-0.2, 0.0])),
+        collider("left", &part([-0.2, 0.0], [0.0, 1.5])),
+        collider("right", &part([1.0, 1.2], [0.0, 1.5])),
+    ];
+    let built = [floor, left, right].concat();
+    for (name, more, shift) in
+        [("hollow", &hollow, 0.0), ("built", &built, 0.0), ("off nodes", &built, 0.015625)]
+    {
+        println!("{name}");
+        let domain = format!("min = [{}, {}]\nsize = [1.5, 1.5]", -0.25 + shift, -0.5 + shift);
+        Slosh { domain: Some(domain), more: more.clone(), ..Slosh::default() }.comes_to_rest();
+    }
 }
 
 #[test]

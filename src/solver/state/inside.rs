@@ -102,13 +102,14 @@ impl<const D: usize> KnownInside<D> {
 }
 
 impl<const D: usize> Inside<D> {
-    /// Nodes inside among `nodes` of a block.
+    /// Nodes inside among `nodes` of a block. Where the surface lies on that of another collider of `beside`,
+    /// which may name this one as well, it is none.
     pub(in crate::solver) fn find(
         plan: &GridPlan<D>,
         block: &Block<D>,
         nodes: u64,
-        collider: &Collider<D>,
-        pose: &Pose<D>,
+        (collider, pose): Placed<'_, D>,
+        beside: &[Placed<'_, D>],
         asked: Asked,
     ) -> Self {
         let mut inside = Self::default();
@@ -117,7 +118,14 @@ impl<const D: usize> Inside<D> {
         if collider.distance_to_box(&nodes_box(block, cell), pose) > reach {
             return inside;
         }
-        let surface = Surface { collider, pose, cell };
+        let near = |(other, pose): &&Placed<'_, D>| {
+            !std::ptr::eq(*other, collider) && other.distance_to_box(&nodes_box(block, cell), pose) <= reach
+        };
+        let beside: Vec<Placed<'_, D>> = match asked.planes {
+            true => beside.iter().filter(near).copied().collect(),
+            false => Vec::new(),
+        };
+        let surface = Surface { collider, pose, cell, beside: &beside };
         for bit in bits(nodes) {
             let x = plan.node_place(block, bit as usize);
             let distance = collider.distance(&x, pose);
@@ -144,11 +152,15 @@ impl<const D: usize> Inside<D> {
     }
 }
 
-/// The surface of a collider in a pose, among nodes with cells of this edge, m.
+/// A collider in a pose.
+pub(in crate::solver) type Placed<'a, const D: usize> = (&'a Collider<D>, &'a Pose<D>);
+
+/// The surface of a collider in a pose, among nodes with cells of this edge, m, and other colliders.
 struct Surface<'a, const D: usize> {
     collider: &'a Collider<D>,
     pose: &'a Pose<D>,
     cell: f64,
+    beside: &'a [Placed<'a, D>],
 }
 
 impl<const D: usize> Surface<'_, D> {
@@ -164,6 +176,13 @@ impl<const D: usize> Surface<'_, D> {
     fn planes_of(&self, x: &[f64; D], distance: f64, mut each: impl FnMut([f64; D], [f64; D])) {
         let normal = self.collider.normal(x, self.pose);
         let foot = along(x, -distance, &normal);
+        if self.is_seam(&foot, &normal) {
+            let found = self.way_out_of_all(x);
+            if found.is_empty() {
+                each(foot, normal);
+            }
+            return found.into_iter().for_each(|(foot, normal)| each(foot, normal));
+        }
         if self.is_free(&foot, &normal, 1.0) {
             return each(foot, normal);
         }
@@ -205,8 +224,8 @@ impl<const D: usize> Surface<'_, D> {
         })
     }
 
-    /// Of the surfaces around, the place that is nearest to one inside, with the way there as normal: of nodes
-    /// behind a corner in which two parts of a union meet.
+    /// Of the surfaces around, the place that is nearest to one inside, with the way there as normal: of
+    /// nodes behind a corner in which two parts of a union meet.
     fn nearest(&self, x: &[f64; D]) -> Option<([f64; D], [f64; D])> {
         let mut best: Option<(f64, [f64; D])> = None;
         for (place, normal) in self.around(x) {
@@ -243,31 +262,75 @@ impl<const D: usize> Surface<'_, D> {
     /// The nearest place of the surface along an axis from a place inside, with its normal: of nodes behind a
     /// face that two parts share.
     fn way_out(&self, x: &[f64; D]) -> Option<([f64; D], [f64; D])> {
+        let axes = (0..D).flat_map(|axis| {
+            [1.0, -1.0].map(|side| std::array::from_fn(|a| if a == axis { side } else { 0.0 }))
+        });
+        let distance = |x: &[f64; D]| self.collider.distance(x, self.pose);
+        let (place, beyond) = self.shortest(x, axes, distance)?;
+        Some((place, self.collider.normal(&beyond, self.pose)))
+    }
+
+    /// The same out of this collider and all beside, also along diagonals, with the normals of all surfaces
+    /// there: of nodes behind a face on which another collider stands.
+    fn way_out_of_all(&self, x: &[f64; D]) -> Vec<([f64; D], [f64; D])> {
+        let offsets = crate::grid::mask::box_offsets::<D>(1).filter(|offset| *offset != [0; D]);
+        let ways = offsets.map(|offset| {
+            let size = offset.iter().map(|o| f64::from(o * o)).sum::<f64>().sqrt();
+            offset.map(|o| f64::from(o) / size)
+        });
+        let all = || std::iter::once((self.collider, self.pose)).chain(self.beside.iter().copied());
+        let distance =
+            |x: &[f64; D]| all().map(|(of, pose)| of.distance(x, pose)).fold(f64::INFINITY, f64::min);
+        let mut found: Vec<([f64; D], [f64; D])> = Vec::new();
+        let Some((place, beyond)) = self.shortest(x, ways, distance) else { return found };
+        for (collider, pose) in all() {
+            let normal = collider.normal(&beyond, pose);
+            let is_new = found.iter().all(|(_, known)| dot(known, &normal) < 1.0 - SAME);
+            if is_new && collider.distance(&place, pose) <= SAME * self.cell {
+                found.push((place, normal));
+            }
+        }
+        found
+    }
+
+    /// Where the shortest of these ways from a place inside leads out, and a place beyond. The first counts
+    /// of those that are as short.
+    fn shortest(
+        &self,
+        x: &[f64; D],
+        ways: impl Iterator<Item = [f64; D]>,
+        distance: impl Fn(&[f64; D]) -> f64,
+    ) -> Option<([f64; D], [f64; D])> {
         let mut best: Option<(f64, [f64; D])> = None;
-        for axis in 0..D {
-            for side in [1.0, -1.0] {
-                let way: [f64; D] = std::array::from_fn(|a| if a == axis { side } else { 0.0 });
-                let is_out = |t: f64| self.collider.distance(&along(x, t, &way), self.pose) > 0.0;
-                let steps = 8;
-                let step = DEEP * self.cell / f64::from(steps);
-                let Some(first) =
-                    (0..=steps).map(|k| f64::from(k).mul_add(step, WAY * self.cell)).find(|t| is_out(*t))
-                else {
-                    continue;
-                };
-                let (mut within, mut without) = ((first - step).max(0.0), first);
-                for _ in 0..40 {
-                    let middle = 0.5 * (within + without);
-                    if is_out(middle) { without = middle } else { within = middle }
-                }
-                if best.is_none_or(|(least, _)| without < least) {
-                    best = Some((without, way));
-                }
+        for way in ways {
+            let is_out = |t: f64| distance(&along(x, t, &way)) > 0.0;
+            let steps = 8;
+            let step = DEEP * self.cell / f64::from(steps);
+            let Some(first) =
+                (0..=steps).map(|k| f64::from(k).mul_add(step, WAY * self.cell)).find(|t| is_out(*t))
+            else {
+                continue;
+            };
+            let (mut within, mut without) = ((first - step).max(0.0), first);
+            for _ in 0..40 {
+                let middle = 0.5 * (within + without);
+                if is_out(middle) { without = middle } else { within = middle }
+            }
+            if best.is_none_or(|(least, _)| without < least - SAME * self.cell) {
+                best = Some((without, way));
             }
         }
         let (t, way) = best?;
-        let normal = self.collider.normal(&along(x, t + WAY * self.cell, &way), self.pose);
-        Some((along(x, t, &way), normal))
+        Some((along(x, t, &way), along(x, t + WAY * self.cell, &way)))
+    }
+
+    /// Whether another collider stands on a place of the surface with this normal: no material is there, and
+    /// the surface holds nothing.
+    fn is_seam(&self, foot: &[f64; D], normal: &[f64; D]) -> bool {
+        self.beside.iter().any(|(other, pose)| {
+            other.distance(&along(foot, WAY * self.cell, normal), pose) < 0.0
+                && dot(&other.normal(foot, pose), normal) < -0.5
+        })
     }
 }
 
@@ -314,7 +377,7 @@ mod tests {
             start: 0.0,
         };
         let pose = collider.state_at(0.0).pose;
-        let surface = Surface { collider: &collider, pose: &pose, cell: 1.0 };
+        let surface = Surface { collider: &collider, pose: &pose, cell: 1.0, beside: &[] };
         let mut planes = Vec::new();
         let rounded = |x: [f64; D]| x.map(|x| (1e9 * x).round() / 1e9);
         surface.planes_of(&x, collider.distance(&x, &pose), |foot, normal| {
@@ -364,6 +427,42 @@ mod tests {
             let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
             assert!(off(foot, expected) < 1e-5 && off(normal, along) < 1e-5, "{found:?}");
         }
+    }
+
+    #[test]
+    fn faces_on_which_another_collider_stands_are_no_surface() {
+        let collider = |shape: Shape<2>| Collider {
+            name: "c".into(),
+            shape,
+            deforming: None,
+            reference: [0.0; 2],
+            axis: [0.0, 0.0, 1.0],
+            contact: Contact::default(),
+            acts_on: ActsOn::Nodes,
+            motion: Motion::Fixed,
+            start: 0.0,
+        };
+        let floor = collider(part([-9.0, -9.0], [9.0, 0.0]));
+        let wall = collider(part([-9.0, 0.0], [0.0, 9.0]));
+        let pose = floor.state_at(0.0).pose;
+        let all = [(&floor, &pose), (&wall, &pose)];
+        let planes = |own: usize, x: [f64; 2]| {
+            let (collider, pose) = all[own];
+            let surface = Surface { collider, pose, cell: 1.0, beside: &all[1 - own..2 - own] };
+            let mut planes = Vec::new();
+            surface.planes_of(&x, collider.distance(&x, pose), |foot, normal| planes.push((foot, normal)));
+            planes
+        };
+        let near = |found: &[([f64; 2], [f64; 2])], expected: &[([f64; 2], [f64; 2])]| {
+            let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            let is_same = found.len() == expected.len()
+                && found.iter().zip(expected).all(|(f, e)| off(f.0, e.0) < 1e-6 && off(f.1, e.1) < 1e-6);
+            assert!(is_same, "{found:?}, expected {expected:?}");
+        };
+        near(&planes(0, [4.0, -0.5]), &[([4.0, 0.0], Y)]);
+        near(&planes(1, [-1.5, 0.5]), &[([0.0, 0.5], X)]);
+        near(&planes(0, [-0.5, -0.5]), &[([0.0, 0.0], Y), ([0.0, 0.0], X)]);
+        near(&planes(0, [-1.25, -0.25]), &[([0.0, 1.0], X)]);
     }
 
     #[test]

@@ -4,8 +4,8 @@ use crate::grid::mask::block_nodes;
 use crate::grid::sums::volumes::NodeVolumes;
 use crate::memory::Block;
 
-/// Shares of the basis functions of the nodes of a block that lie outside colliders; nothing where all are
-/// whole.
+/// Shares of the basis functions of the nodes of a block that lie outside colliders, less than 0 by depth, in
+/// cells, where none does; nothing where all are whole.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct OpenShares(pub(in crate::solver) Vec<f64>);
 

@@ -54,14 +54,16 @@ impl StillWalls {
         known.resize_with(plan.blocks.len(), Vec::new);
         let mut all_inside = vec![0; plan.blocks.len()];
         let acts = |collider: &Collider<D>| collider.acts_on_nodes() && is_still(collider);
-        if colliders.iter().any(acts) {
+        let beside: Vec<_> = colliders.iter().zip(poses).filter(|(collider, _)| acts(collider)).collect();
+        if !beside.is_empty() {
             let blocks = nodes.par_iter_mut().zip(&mut all_inside).zip(&plan.blocks).zip(known);
             blocks.with_min_len(32).for_each(|(((nodes, all_inside), block), known)| {
                 known.resize_with(colliders.len(), || None);
                 for ((collider, pose), known) in colliders.iter().zip(poses).zip(known) {
                     if acts(collider) {
                         let all = nodes_in_domain(&plan.tree, block.level, block.coord);
-                        let find = || Inside::find(plan, block, all, collider, pose, asked_of(collider));
+                        let find =
+                            || Inside::find(plan, block, all, (collider, pose), &beside, asked_of(collider));
                         let inside = known.get_or_insert_with(find);
                         *nodes |= inside.near & block.real_nodes();
                         *all_inside |= inside.nodes;

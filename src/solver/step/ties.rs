@@ -86,7 +86,7 @@ impl<const D: usize> Solver<D> {
                         Some(inside) => inside.nodes & nodes,
                         None => {
                             let (block, pose) = (&plan.blocks[block], &states[index].pose);
-                            Inside::find(plan, block, nodes, collider, pose, Asked::NODES).nodes
+                            Inside::find(plan, block, nodes, (collider, pose), &[], Asked::NODES).nodes
                         }
                     }
                 });

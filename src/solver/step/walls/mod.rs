@@ -119,6 +119,7 @@ impl<const D: usize> Solver<D> {
         let mut nodes = vec![0; plan.blocks.len()];
         let (fields, others) = (&grid.fields, &grid.others);
         let all: Vec<_> = std::iter::once(fields).chain(others.iter().map(|other| &other.fields)).collect();
+        let beside: Vec<_> = colliders.iter().zip(&poses).filter(|(collider, _)| moves(collider)).collect();
         let blocks = nodes.par_iter_mut().zip(&plan.blocks).enumerate().with_min_len(32);
         let moving = blocks.map(|(index, (nodes, block))| {
             if !all.iter().any(|fields| fields.active[index]) {
@@ -133,7 +134,7 @@ impl<const D: usize> Solver<D> {
                 let asked = Asked::of(physics, collider);
                 // Constrained nodes have no velocity of their own.
                 let candidates = if asked.planes { candidates } else { real };
-                let find = || Inside::find(plan, block, candidates, collider, pose, asked);
+                let find = || Inside::find(plan, block, candidates, (collider, pose), &beside, asked);
                 let inside = moves(collider).then(find);
                 *nodes |= inside.as_ref().map_or(0, |inside| inside.near & block.real_nodes());
                 inside
