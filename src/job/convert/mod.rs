@@ -115,7 +115,7 @@ fn problem<const D: usize>(
         + 5 * file.sources.len()
         + if file.water.is_some() { 4 } else { 0 };
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
-    let water = water::water(checks, file, &space, &root);
+    let water = water::water(checks, file, gravity.as_ref(), &space, &root);
     let stages = stages::stages(checks, file, &root);
     let mut load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
@@ -363,7 +363,8 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             checks.fault(&own, format!("found {value}; expected a number {range}"));
         } else if let Some(water) = &material.undrained {
             undrained(checks, water, &material.model, &path.index(i));
-        } else if let Some(factor) = material.strength_factor
+        }
+        if let Some(factor) = material.strength_factor
             && material.model.weakened(factor).is_none()
         {
             let message = "found it for a model without cohesion, yield stress or friction; expected mohr_coulomb, drucker_prager, tresca or von_mises";

@@ -7,7 +7,7 @@ use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::Quantity as Written;
 use crate::load::water::Given;
-use crate::load::{Kind, Load, Up, Water};
+use crate::load::{Gravity, Kind, Load, Up, Water};
 use crate::material;
 use crate::text::{excerpt, written as number};
 
@@ -18,6 +18,7 @@ const NAME: &str = "water";
 pub(super) fn water<const D: usize>(
     checks: &mut Checks,
     file: &JobFile,
+    gravity: Option<&Gravity<D>>,
     space: &Space<D>,
     root: &Path,
 ) -> Option<Option<Load<D>>> {
@@ -45,10 +46,12 @@ pub(super) fn water<const D: usize>(
         }
     };
     needs_vertical_gravity(checks, file, &path, "")?;
-    let vertical = file.gravity.iter().flatten().map(|written| match written {
-        Written::Number(value) => *value,
-        // Not 0, which is all that is known of its direction: down.
-        _ => -1.0,
+    // A copy: what it is evaluated for here may not be reached by the run.
+    let start = gravity?.clone().at(0.0);
+    let vertical = file.gravity.iter().flatten().zip(start).map(|(written, start)| match written {
+        // Gravity that grows from 0: down.
+        Written::Expression(_) | Written::Table(_) | Written::Record(_) if start == 0.0 => -1.0,
+        _ => start,
     });
     let up = Up::new(&vertical.collect::<Vec<_>>());
     Some(Some(Load {

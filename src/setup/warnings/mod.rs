@@ -85,10 +85,9 @@ fn saturated<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let Some(water) = problem.water() else { return };
     for (index, setup) in problem.materials.iter().enumerate() {
         let is_wet = |body: &Body<D>| {
-            let mut foot = body.shape.bounds().centre();
-            let bounds = body.shape.bounds();
-            foot[water.up.axis] =
-                if water.up.sign > 0.0 { bounds.lower[water.up.axis] } else { bounds.upper[water.up.axis] };
+            let (bounds, up) = (body.shape.bounds(), water.up);
+            let mut foot = bounds.centre();
+            foot[up.axis] = if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] };
             body.material == index && water.is_below(problem.place(&foot), 0.0)
         };
         if setup.saturated_density == setup.density && problem.bodies.iter().any(is_wet) {
