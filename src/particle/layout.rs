@@ -24,8 +24,9 @@ impl<const D: usize> Layout<D> {
     pub const STRESS: usize = Self::LEFT_CAUCHY_GREEN + Self::SYMMETRIC;
     /// Mass, kg (per metre of thickness in plane strain; of the whole ring in axisymmetry).
     pub const MASS: usize = Self::STRESS + Self::SYMMETRIC;
-    /// Half width of the undeformed box, m; the reference volume is `(2 half)^D`. In axisymmetry the half width of a
-    /// square with as many m² as the undeformed ring has m³ (see [`crate::kernel::Coordinates::half_width`]).
+    /// Half width of the undeformed box, m; the reference volume is `(2 half)^D`. In axisymmetry the half
+    /// width of a square with as many m² as the undeformed ring has m³ (see
+    /// [`crate::kernel::Coordinates::half_width`]).
     pub const HALF: usize = Self::MASS + 1;
     /// First history variable (see [`material::Material::history_names`]).
     pub const HISTORY: usize = Self::HALF + 1;

@@ -149,8 +149,8 @@ impl<const D: usize> Grid<D> {
         &self.arenas
     }
 
-    /// Not collective. Lists the members of each bin, by the widths of boxes in these coordinates, and makes room for the arenas of those that have any.
-    /// With `group`: those of its particles alone.
+    /// Not collective. Lists the members of each bin, by the widths of boxes in these coordinates, and makes
+    /// room for the arenas of those that have any. With `group`: those of its particles alone.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan; the caller makes it collective.

@@ -5,9 +5,10 @@
 //! particles of a cell strain with `∇v + (θ̄ - tr ∇v) 1 / n`, where `θ̄ = Σ V₀ tr ∇v / Σ V₀` over the
 //! particles of the same material in the cell (de Souza Neto et al. 1996; for the material point method
 //! Coombs et al. 2018), and their stress acts with the same mean of their pressures, `τ + (p̄ - p) 1`,
-//! `p = Σ τ_ii / n`. Here n is the number of rates of normal strain: D, and 3 in axisymmetry. The second follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that
-//! of the strains (as with B-bar, Hughes 1980). Without it a dilatant soil is unstable. Cells are those of
-//! the leaf, so no messages are needed.
+//! `p = Σ τ_ii / n`. Here n is the number of rates of normal strain: D, and 3 in axisymmetry. The second
+//! follows from the first: only so is the power of stress, `Σ V₀ τ : ∇v`, that of the strains (as with B-bar,
+//! Hughes 1980). Without it a dilatant soil is unstable. Cells are those of the leaf, so no messages are
+//! needed.
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::{BLOCK, Coordinates};
 use crate::particle::chunk::{Chunk, Layout, Tag};
