@@ -12,8 +12,9 @@ use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{block_nodes, offset_count};
 use crate::grid::plan::NO_BLOCK;
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::{Row, Scheme, Select, domain};
+use crate::kernel::{Coordinates, Row, Scheme, Select, domain};
 use crate::particle::Chunk;
+use crate::particle::chunk::{Layout, Tag};
 
 /// Value of an indicator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,6 +133,26 @@ impl<'a, const D: usize> LeafView<'a, D> {
     pub(crate) fn is_exposed(&self) -> bool {
         let RankState { plan, fields, surroundings, masses, beside_empty, .. } = self.state;
         beside_empty[self.number] || surroundings.is_exposed(self.number, plan, fields, masses)
+    }
+
+    /// Half widths of cubes of the volume of its undeformed particles, m: of rings, of squares of the area of
+    /// their undeformed sections. The stretch along the hoop is known where material does not flow, and
+    /// counts as 1 where it does.
+    pub(crate) fn undeformed(&self) -> Vec<f64> {
+        let (chunk, scheme) = (self.chunk(), &self.state.scheme);
+        let halves = chunk.column(Layout::<D>::HALF);
+        if scheme.coordinates == Coordinates::Cartesian {
+            return halves.iter().copied().collect();
+        }
+        let hoops = chunk.column(Layout::<D>::LEFT_CAUCHY_GREEN + 2);
+        let of = |p: usize| {
+            let section = scheme.coordinates.half_width(halves[p], chunk.position(p)[0]);
+            match scheme.materials[usize::from(Tag::unpack(chunk.tags()[p]).material)].is_plastic() {
+                true => section,
+                false => section * hoops[p].sqrt().sqrt(),
+            }
+        };
+        (0..chunk.len()).map(of).collect()
     }
 
     /// Half widths of the boxes of its particles, m.

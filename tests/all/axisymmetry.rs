@@ -29,7 +29,7 @@ fn translation_along_the_axis_is_exact() {
 }
 
 /// A job with a rubber of c_p = 36.69 m/s in a domain of this size, m, and what `rest` adds.
-fn job(size: [f64; 2], rest: &str) -> String {
+pub(crate) fn job(size: [f64; 2], rest: &str) -> String {
     format!(
         "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\n\
          [domain]\nsize = {size:?}\nroot_edge = 0.5\n\
@@ -39,7 +39,7 @@ fn job(size: [f64; 2], rest: &str) -> String {
     )
 }
 
-fn history(name: &str, text: &str) -> History {
+pub(crate) fn history(name: &str, text: &str) -> History {
     let directory = tempfile::tempdir().expect("temporary directory");
     let path = directory.path().join(format!("{name}.toml"));
     std::fs::write(&path, text).expect("job");
@@ -47,7 +47,7 @@ fn history(name: &str, text: &str) -> History {
     History::read(directory.path(), name)
 }
 
-fn solver(comm: &Comm, text: &str) -> Solver<2> {
+pub(crate) fn solver(comm: &Comm, text: &str) -> Solver<2> {
     let problem: Problem<2> = match parse(text, Path::new("job.toml")) {
         Ok(AnyProblem::Two(problem)) => problem,
         other => panic!("{other:?}"),

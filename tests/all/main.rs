@@ -34,6 +34,7 @@ mod pictures;
 mod probes;
 mod report;
 mod rigid_contact;
+mod rings;
 mod soak;
 mod softening;
 mod sources;
@@ -59,6 +60,7 @@ fn worker() {
     common::scenarios::work(&[
         axisymmetry::SCENARIOS,
         golden::SCENARIOS,
+        rings::SCENARIOS,
         walls_and_origin::SCENARIOS,
         weights_axisymmetric::SCENARIOS,
         weights_exact::SCENARIOS,

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::{Job, Keys};
 use crate::adaptivity::criterion::{Criterion, Indicator, Needs, Thresholds};
 use crate::adaptivity::leaf_view::{LeafView, Value};
-use crate::particle::chunk::Layout;
 use crate::particle::halvings;
 
 /// Stretch of boxes.
@@ -47,7 +46,8 @@ impl<const D: usize> Indicator<D> for Stretch {
             return Value::of_leaf(bound);
         }
         let halves = leaf.half_widths();
-        let undeformed = leaf.chunk().column(Layout::<D>::HALF).iter().zip(leaf.chunk().tags());
+        let undeformed = leaf.undeformed();
+        let undeformed = undeformed.iter().zip(leaf.chunk().tags());
         let stretches = halves.iter().zip(undeformed).flat_map(|(half, (own, &tag))| {
             let shape = halvings::shape::<D>(tag);
             (0..D).map(move |axis| half[axis] / (own * shape[axis]))

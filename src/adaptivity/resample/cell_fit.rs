@@ -1,8 +1,8 @@
 //! Particles follow the size of the cells of their leaf.
 use super::merge_backoff::RetrySlot;
-use super::{Gap, Setting, drift, ids, needs_split, split};
+use super::{Gap, Setting, drift, ids, needs_split, rings, split};
 use crate::adaptivity::Adaptivity;
-use crate::kernel::{Scheme, domain};
+use crate::kernel::{Coordinates, Scheme, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 /// Splits in one leaf.
@@ -71,14 +71,14 @@ impl<'a, const D: usize> Resampling<'a, D> {
     /// `from`.
     fn close_gaps(&self, chunk: &mut Chunk<D>, level: u8, from: u8, done: &mut Splits) {
         let Some(gap) = self.gap else { return };
-        let from = self.setting(from).cell();
+        let from = self.setting(from);
         loop {
             let energies = &mut done.energies;
             let split = drift::close_gaps(
                 chunk,
                 &self.setting(level),
                 gap,
-                |chunk, p| spread(chunk, p, from),
+                |chunk, p| spread(chunk, p, &from),
                 &mut |e| energies.push(e),
             );
             done.split += split;
@@ -90,8 +90,8 @@ impl<'a, const D: usize> Resampling<'a, D> {
 
     /// Splits the listed particles (ascending), whose affine state comes from cells of `level`.
     pub fn split(&self, chunk: &mut Chunk<D>, which: &[u32], level: u8, done: &mut Splits) {
-        let cell = self.setting(level).cell();
-        let spreads: Vec<[f64; D]> = which.iter().map(|&p| spread(chunk, p as usize, cell)).collect();
+        let from = self.setting(level);
+        let spreads: Vec<[f64; D]> = which.iter().map(|&p| spread(chunk, p as usize, &from)).collect();
         let report = split(chunk, &self.setting(level), which, &spreads, &mut |e| done.energies.push(e));
         done.split += report.split;
         done.refused += report.refused;
@@ -115,8 +115,11 @@ impl<'a, const D: usize> Resampling<'a, D> {
     }
 
     /// Whether boxes up to `width` (m) may be wider than `stretch` times that of an undeformed particle of a
-    /// level.
+    /// level. The width of a ring depends on its radius.
     pub fn may_exceed(&self, width: f64, level: u8, stretch: f64) -> bool {
+        if self.scheme.coordinates == Coordinates::Axisymmetric {
+            return true;
+        }
         let least = self.nominal.iter().copied().fold(f64::INFINITY, f64::min);
         width.is_nan() || width > 0.999 * stretch * least / f64::from(1u32 << level)
     }
@@ -127,8 +130,12 @@ impl<'a, const D: usize> Resampling<'a, D> {
     }
 }
 
-/// Second moments of the weights of a particle on a lattice of cells of this edge (m), m².
-fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
+/// Second moments of the weights of a particle on the lattice of the cells of a leaf, m².
+fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, leaf: &Setting<D>) -> [f64; D] {
+    let cell = leaf.cell();
+    if leaf.has_rings() {
+        return rings::spread(chunk, p, cell, leaf);
+    }
     let half = chunk.column(Layout::<D>::HALF)[p];
     chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
 }

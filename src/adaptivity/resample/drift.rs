@@ -7,11 +7,12 @@
 //! that axis. Mass and momentum are conserved as in [`super::split()`], and angular momentum since both take
 //! `B - C (o ⊗ o)` with the offset o. Particles whose space has grown in volume are left alone: separated
 //! grains (tension cut-off, spray) are no flow.
-use super::{Setting, ids, pair};
+use super::{Setting, ids, pair, rings};
 use crate::material::tensor::eigen::{decompose, determinant};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::halvings::edge_of_whole;
 use crate::particle::strain::{self, Components};
+use crate::particle::volume::volume_ratio;
 use crate::simd::{Lanes, Vector};
 
 /// Greatest volume of the space of a particle over the undeformed one: beyond it material is torn.
@@ -27,17 +28,34 @@ pub struct Gap {
 }
 
 /// Longest half axis (m) of a particle's space, and its direction; nothing where the material is torn.
-fn longest<const D: usize>(chunk: &Chunk<D>, p: usize, first: usize) -> Option<(f64, [f64; D])> {
+fn longest<const D: usize>(
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    p: usize,
+    first: usize,
+) -> Option<(f64, [f64; D])> {
     let b = strain::tensor(D, &strain::read(chunk, first, p)).map(Lanes::splat);
-    if determinant(&b).to_array()[0] > TORN * TORN {
+    let is_torn = match setting.has_rings() {
+        true => volume_ratio(chunk, p) > TORN,
+        false => determinant(&b).to_array()[0] > TORN * TORN,
+    };
+    if is_torn {
         return None;
     }
     let axes = decompose(&b, D == 2);
     let values = axes.value.map(|value| value.to_array()[0]);
     let most = (0..D).fold(0, |most, k| if values[k] > values[most] { k } else { most });
-    let [half] = chunk.read(Layout::<D>::HALF, p);
+    let half = half_width(chunk, setting, p, first);
     let direction = std::array::from_fn(|a| axes.vector[most][a].to_array()[0]);
     Some((half * values[most].sqrt(), direction))
+}
+
+/// Half width of the undeformed space of a particle, m.
+fn half_width<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize, first: usize) -> f64 {
+    match setting.has_rings() {
+        true => rings::space(chunk, setting, p, &strain::tensor(D, &strain::read(chunk, first, p))),
+        false => chunk.column(Layout::<D>::HALF)[p],
+    }
 }
 
 /// Replaces particles that have drifted apart by two each, in their place. `spread` is the second moment of a
@@ -56,12 +74,12 @@ pub(super) fn close_gaps<const D: usize>(
     }
     let wanted = |p: &usize| {
         // The greatest eigenvalue is at most the trace: most particles are far from a split.
-        let [half] = chunk.read(Layout::<D>::HALF, *p);
+        let half = half_width(chunk, setting, *p, gap.column);
         let trace = D as f64 + (0..D).map(|a| chunk.carried(gap.column + a)[*p]).sum::<f64>();
         if 4.0 * half * half * trace <= gap.cells * gap.cells * cell * cell {
             return None;
         }
-        let (axis, direction) = longest(chunk, *p, gap.column)?;
+        let (axis, direction) = longest(chunk, setting, *p, gap.column)?;
         let is_wide = 2.0 * axis > gap.cells * cell && ids::generation(chunk.ids()[*p]) < ids::GENERATIONS;
         is_wide.then_some((*p as u32, axis, direction))
     };
@@ -72,7 +90,7 @@ pub(super) fn close_gaps<const D: usize>(
     let (doubled, pairs) = pair::doubled(chunk, wanted.iter().map(|(p, ..)| *p));
     *chunk = doubled;
     for (first, &(_, axis, direction)) in pairs.into_iter().zip(&wanted) {
-        let (spread, [half]) = (spread(chunk, first), chunk.read(Layout::<D>::HALF, first));
+        let (spread, half) = (spread(chunk, first), half_width(chunk, setting, first, gap.column));
         let stretch = halved::<D>(&strain::read(chunk, gap.column, first), axis / half, &direction);
         let offset = direction.map(|component: f64| 0.5 * axis * component);
         book(pair::part(chunk, setting, first, &offset, &spread));

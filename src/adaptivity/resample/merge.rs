@@ -3,7 +3,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::family::{self, Bounds};
 use super::mixture::{Group, mixtures};
-use super::{Setting, merge_backoff, volume};
+use super::{Setting, merge_backoff};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
@@ -211,7 +211,7 @@ fn strangers<const D: usize>(
         let mut group: Vec<u32> = Vec::new();
         let mut filled = 0.0;
         for &p in cells.of(number) {
-            let part = volume(chunk, p as usize);
+            let part = setting.section(chunk, p as usize);
             if filled + part > room {
                 close(chunk, &mut group, &mut groups, &mut alone);
                 filled = 0.0;

@@ -60,13 +60,15 @@ pub(super) fn mixtures<const D: usize>(
     });
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
+    let ahead = setting.to_mass_centres(chunk, &members);
     let mut out = chunk.gathered(&groups.iter().map(|group| group.members[0]).collect::<Vec<u32>>());
     let mut motions = Vec::with_capacity(groups.len());
     let mut start = 0;
     for (number, group) in groups.iter().enumerate() {
         let range = start..start + group.members.len();
         start = range.end;
-        motions.push(mix_motion(&mut out, number, chunk, setting, group, &half[range]));
+        let boxes = (&half[range.clone()], &ahead[range]);
+        motions.push(mix_motion(&mut out, number, chunk, setting, group, boxes));
     }
     let close = keep(&mut groups, chunk, refused, |number, group| {
         let material = usize::from(Tag::unpack(chunk.tags()[group.members[0] as usize]).material);
@@ -110,7 +112,7 @@ pub(super) fn mixtures<const D: usize>(
         // may merge again; as one of the coarser level it would split into tiny particles as soon as it
         // entered finer cells.
         let whole = (0..D).fold(1.0, |volume, _| volume * 2.0 * setting.nominal(tag, level));
-        if !groups[number].is_family && volume(&out, number) < 0.5 * whole * (1.0 - 1e-9) {
+        if !groups[number].is_family && setting.section(&out, number) < 0.5 * whole * (1.0 - 1e-9) {
             out.tags_mut()[number] = halvings::with(out.tags()[number], Tag { level: level + 1, ..tag });
         }
     }
@@ -222,20 +224,35 @@ struct Motion<const D: usize> {
     reach: [f64; D],
 }
 
-/// Mass, position, velocity and affine matrix.
+/// Mass, position, velocity and affine matrix. `boxes` are the half widths of the members and the ways to their
+/// centres of mass along the first axis, m.
+///
+/// A ring from several has the sum of the areas of their sections, `Σ m_c / r_c` for equal densities, and the sum
+/// of their volumes. Both are its own at the radius `M / Σ (m_c / r_c)`.
 fn mix_motion<const D: usize>(
     out: &mut Chunk<D>,
     number: usize,
     chunk: &Chunk<D>,
     setting: &Setting<D>,
     group: &Group,
-    half: &[[f64; D]],
+    (half, ahead): (&[[f64; D]], &[f64]),
 ) -> Motion<D> {
     let member = |i: usize| group.members[i] as usize;
     let masses: Vec<f64> =
         group.members.iter().map(|&p| chunk.column(Layout::<D>::MASS)[p as usize]).collect();
     let (shares, mass) = shares(masses);
-    let x = mean(&shares, |i| chunk.position(member(i)));
+    let centre_of = |i: usize| {
+        let mut x = chunk.position(member(i));
+        x[0] += ahead[i];
+        x
+    };
+    let centre = mean(&shares, centre_of);
+    let mut x = centre;
+    if setting.has_rings() {
+        let radius = |i: usize| chunk.position(member(i))[0].max(f64::MIN_POSITIVE);
+        let [more] = mean(&shares, |i| [(radius(0) - radius(i)) / radius(i)]);
+        x[0] = radius(0) / (1.0 + more);
+    }
     let v: [f64; D] = mean(&shares, |i| chunk.read(Layout::<D>::VELOCITY, member(i)));
 
     // Sums of u ⊗ r, of r ⊗ r with the second moments s of boxes, and of the members' own affine matrices.
@@ -245,14 +262,18 @@ fn mix_motion<const D: usize>(
     let mut energy = 0.0;
     let mut relative = Vec::with_capacity(shares.len());
     for (i, &share) in shares.iter().enumerate() {
-        let (position, p) = (chunk.position(member(i)), member(i));
+        let (from, p) = (centre_of(i), member(i));
+        let position = chunk.position(p);
         let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
         let affine = read_matrix(chunk, p);
-        let r: [f64; D] = std::array::from_fn(|a| position[a] - x[a]);
+        let r: [f64; D] = std::array::from_fn(|a| from[a] - centre[a]);
         let u: [f64; D] = std::array::from_fn(|a| velocity[a] - v[a]);
+        let to_centre = setting.scheme.coordinates.to_mass_centre(half[i][0], position[0].max(half[i][0]));
         for a in 0..D {
             for b in 0..D {
-                let second = half[i][b] * half[i][b] * (1.0 / 3.0);
+                // Of a box, about the centre of mass.
+                let to_centre = if b == 0 { to_centre } else { 0.0 };
+                let second = f64::mul_add(-to_centre, to_centre, half[i][b] * half[i][b] * (1.0 / 3.0));
                 turning[a][b] = f64::mul_add(share * u[a], r[b], turning[a][b]);
                 metric[a][b] = f64::mul_add(share * r[a], r[b], metric[a][b]);
                 own[a][b] = share.mul_add(affine[a][b], own[a][b]);
@@ -261,7 +282,7 @@ fn mix_motion<const D: usize>(
                     metric[a][b] = share.mul_add(second, metric[a][b]);
                 }
             }
-            reach[a] = reach[a].max(r[a].abs() + half[i][a]);
+            reach[a] = reach[a].max((position[a] - x[a]).abs() + half[i][a]);
             energy = f64::mul_add(share * u[a], u[a], energy);
         }
         relative.push((r, u));

@@ -4,7 +4,7 @@
 //! content of the chunk alone. After either, particles may lie in another leaf (children do where a box
 //! crosses a face), so the caller sorts them into leaves afterwards. `docs/design/resampling.md` derives
 //! which quantities are conserved.
-use crate::kernel::{BoxPolicy, Scheme, Select, Transfer, domain};
+use crate::kernel::{BoxPolicy, Coordinates, Scheme, Select, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 
 pub mod cell_fit;
@@ -17,6 +17,7 @@ mod merge;
 pub mod merge_backoff;
 mod mixture;
 mod pair;
+mod rings;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -68,6 +69,30 @@ impl<const D: usize> Setting<'_, D> {
             }
         }
         out
+    }
+
+    /// Distances (m) along the first axis from the positions of the selected particles to their centres of
+    /// mass; 0 but for rings.
+    fn to_mass_centres(&self, chunk: &Chunk<D>, which: &[u32]) -> Vec<f64> {
+        if !self.has_rings() {
+            return vec![0.0; which.len()];
+        }
+        let (cell, mut half) = (self.cell(), Vec::new());
+        domain::full_half_widths(chunk, Select::List(which), cell, &self.extent, self.scheme, &mut half);
+        let radius = |p: u32| chunk.position(p as usize)[0];
+        let to_centre =
+            |half: &[f64; D], x: f64| self.scheme.coordinates.to_mass_centre(half[0], x.max(half[0]));
+        half.iter().zip(which).map(|(half, &p)| to_centre(half, radius(p))).collect()
+    }
+
+    /// Area (3D: volume) of a particle's undeformed box, m²: of a ring, that of a section with its volume at
+    /// its radius.
+    fn section(&self, chunk: &Chunk<D>, p: usize) -> f64 {
+        volume(chunk, p) / self.scheme.coordinates.around(chunk.position(p)[0])
+    }
+
+    fn has_rings(&self) -> bool {
+        self.scheme.coordinates == Coordinates::Axisymmetric
     }
 }
 

@@ -1,5 +1,5 @@
 //! One particle becomes two.
-use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
+use super::{Setting, gradient, ids, opposite, read_matrix, rings, sides, write_matrix};
 use crate::kernel::Transfer;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::halvings;
@@ -42,6 +42,9 @@ pub(super) fn part<const D: usize>(
         let (lower, upper) = sides(x[a], offset[a].abs(), setting.extent[a]);
         if offset[a] < 0.0 { (upper, lower) } else { (lower, upper) }
     });
+    if setting.has_rings() {
+        return rings::halve(chunk, setting, first, &places, spread);
+    }
     let offset: [f64; D] = std::array::from_fn(|a| places[a].1 - x[a]);
     let mut kept = read_matrix(chunk, first);
     let gradient = gradient(setting.scheme.transfer, &kept, spread);

@@ -1,5 +1,5 @@
 //! One particle becomes `2^D`.
-use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
+use super::{Setting, gradient, ids, opposite, read_matrix, rings, sides, write_matrix};
 use crate::kernel::{Select, Transfer};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::halvings;
@@ -20,7 +20,7 @@ pub struct Split {
 /// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it
 /// its affine matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children lie at the quarter
 /// points of the particle's box, so that their boxes tile it. Each gets an equal share of the columns carried
-/// for loads. Mass, volume and centre of mass are conserved bit for bit, momentum where the affine part of a
+/// for loads (rings: see `rings.rs`). Mass, volume and centre of mass are conserved bit for bit, momentum where the affine part of a
 /// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book`
 /// receives the kinetic energy that each split adds, J, which is taken from the affine part.
 pub fn split<const D: usize>(
@@ -52,6 +52,7 @@ pub fn split<const D: usize>(
     }
     report.split = families.len() as u64;
     *chunk = chunk.gathered(&source);
+    let divide = if setting.has_rings() { rings::divide::<D> } else { divide::<D> };
     for (first, place) in families {
         book(divide(chunk, setting, first, &territories[place], &spreads[place]));
     }
@@ -111,17 +112,27 @@ fn divide<const D: usize>(
             chunk.write(Layout::<D>::HALF, p, &[0.5 * width]);
             // The number of children is a power of two: together they carry exactly the values of the
             // particle, about the same point.
-            let shares = chunk.carried_columns().min(setting.scheme.shares);
-            (0..shares).for_each(|column| chunk.carried_mut(column)[p] *= share);
+            hand_share(chunk, setting, p, share);
             write_matrix(chunk, p, &kept);
-            let parent = chunk.ids()[p];
-            chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);
-            let packed = halvings::otherwise_split(chunk.tags()[p], ids::generation(parent));
-            let tag = Tag::unpack(packed);
-            chunk.tags_mut()[p] = halvings::with(packed, Tag { level: tag.level + 1, ..tag });
+            make_child(chunk, p, child);
         }
     }
     0.5 * mass * share * energy
+}
+
+/// Leaves a part of a particle its share of what the whole carried for loads.
+pub(super) fn hand_share<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, p: usize, share: f64) {
+    let shares = chunk.carried_columns().min(setting.scheme.shares);
+    (0..shares).for_each(|column| chunk.carried_mut(column)[p] *= share);
+}
+
+/// Gives a copy of a particle the identifier and the level of its child of this number.
+pub(super) fn make_child<const D: usize>(chunk: &mut Chunk<D>, p: usize, child: usize) {
+    let parent = chunk.ids()[p];
+    chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);
+    let packed = halvings::otherwise_split(chunk.tags()[p], ids::generation(parent));
+    let tag = Tag::unpack(packed);
+    chunk.tags_mut()[p] = halvings::with(packed, Tag { level: tag.level + 1, ..tag });
 }
 
 #[cfg(test)]

@@ -121,16 +121,8 @@ pub(super) fn check<const D: usize>(
         "\"volume\" or \"cell\"",
     );
     refuse(file.numerics.tied_surfaces, numerics.key("tied_surfaces"), "tied surfaces", "none");
-    refuse(
-        file.adaptivity.is_some(),
-        root.key("adaptivity"),
-        "dynamic refinement",
-        "regions of [[tree.regions]]",
-    );
-    refuse(!file.contact.is_empty(), root.key("contact"), "contact between bodies", "bodies that stick");
     refuse(file.water.is_some(), root.key("water"), "water in the pores", "none");
     refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
-    refuse(!file.maps.is_empty(), root.key("maps"), "maps", "lines or probes");
     for (i, field) in file.output.fields.iter().enumerate() {
         refuse(
             matches!(field, Field::Strain | Field::EquivalentStrain),

@@ -134,7 +134,8 @@ fn all_sampled() -> Vec<Sampled> {
 
 /// A raster in plan, over all axes but the last, with the largest depth (m) and the largest speed of a particle (m/s) at the rows of the
 /// history so far: `JOB.map_NAME_depth.asc` and `JOB.map_NAME_speed.asc`, written with each output, and in files of particles as
-/// `maps/NAME/depth` and `maps/NAME/speed`. The depth is the volume of the material whose particles lie in a cell over the area of the cell.
+/// `maps/NAME/depth` and `maps/NAME/speed`. The depth is the volume of the material whose particles lie in a cell over the area of the cell (in axisymmetry a row of rings, and the area
+/// of each).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Map {

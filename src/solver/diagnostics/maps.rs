@@ -1,4 +1,5 @@
 //! Depths and speeds over rasters in plan.
+use crate::kernel::Coordinates;
 use crate::particle::chunk::{Layout, Tag};
 use crate::particle::volume::measured_volume;
 use crate::probe::Map;
@@ -12,7 +13,9 @@ impl<const D: usize> Solver<D> {
     /// Volumes are cut to whole multiples of 2^-80 of the domain, so that sums are exact.
     pub fn note_maps(&mut self, maps: &[Map]) {
         let roots = self.forest.brick().roots;
-        let domain = roots.iter().map(|&n| f64::from(n) * self.physics.root_edge).product::<f64>();
+        let (coordinates, root_edge) = (self.physics.coordinates, self.physics.root_edge);
+        let domain = roots.iter().map(|&n| f64::from(n) * root_edge).product::<f64>()
+            * coordinates.around(0.5 * f64::from(roots[0]) * root_edge);
         for (map, maxima) in maps.iter().zip(&mut self.maxima) {
             let mut pieces = vec![0_i64; 2 * map.len()];
             let mut speeds = vec![0.0_f64; map.len()];
@@ -33,12 +36,25 @@ impl<const D: usize> Solver<D> {
             }
             self.comm.sum_i64(&mut pieces);
             self.comm.max_f64s(&mut speeds);
-            let height = domain / map.area(D);
             for (cell, pieces) in pieces.chunks_exact(2).enumerate() {
+                let height = domain / area::<D>(map, cell, coordinates);
                 let depth = (pieces[1] as f64 / PIECE + pieces[0] as f64) / PIECE * height;
                 maxima.depth[cell] = maxima.depth[cell].max(depth);
                 maxima.speed[cell] = maxima.speed[cell].max(speeds[cell]);
             }
+        }
+    }
+}
+
+/// Area of a cell of a map, m²; in axisymmetry of the part of its ring beyond the axis.
+fn area<const D: usize>(map: &Map, cell: usize, coordinates: Coordinates) -> f64 {
+    match coordinates {
+        Coordinates::Cartesian => map.area(D),
+        Coordinates::Axisymmetric => {
+            let edge = |number: usize| map.cell.mul_add(number as f64, map.corner[0]).max(0.0);
+            let (inner, outer) = (edge(cell), edge(cell + 1));
+            // Cells before the axis have no material.
+            (coordinates.around(0.5 * (inner + outer)) * (outer - inner)).max(f64::MIN_POSITIVE)
         }
     }
 }

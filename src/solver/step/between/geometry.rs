@@ -42,12 +42,18 @@ impl<const D: usize> Solver<D> {
         self.grid.arenas.occupy(plan, &self.grid.seam, own_bins);
         // Members of bins are not used.
         let cells: Vec<f64> = (0..plan.levels()).map(|level| plan.cell(level as u8)).collect();
-        let levels: Vec<u8> = plan.bins.iter().map(|bin| bin.block.level).collect();
+        let places = plan.bins.iter().map(|bin| (usize::from(bin.block.level), bin.block.coord[0]));
+        let places: Vec<(usize, u32)> = places.collect();
+        let coordinates = self.physics.coordinates;
         self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
             arena.clear(&Window::FULL);
-            let share = (0..D).fold(1.0, |share, _| 0.5 * share * cells[usize::from(levels[bin.number])]);
-            for_each_corner::<D>(|node, cells| {
-                arena.rows[node] = Row([0.0, 0.0, 0.0, share * f64::from(cells)])
+            let (level, place) = places[bin.number];
+            let cell = cells[level];
+            let share = (0..D).fold(1.0, |share, _| 0.5 * share * cell);
+            let first = f64::from(place) * BLOCK as f64;
+            for_each_corner::<D>(|node, cells, along| {
+                let around = coordinates.around((first + along) * cell);
+                arena.rows[node] = Row([0.0, 0.0, 0.0, share * f64::from(cells) * around])
             });
         });
         let hats = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
@@ -56,18 +62,23 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Calls `each` with the nodes of an arena that are corners of cells of the leaf's block, and the number of
-/// these cells.
-fn for_each_corner<const D: usize>(mut each: impl FnMut(usize, u32)) {
+/// Calls `each` with the nodes of an arena that are corners of cells of the leaf's block, the number of these
+/// cells, and the mean of the first coordinate over the node's hat in them, in cells from that of the block.
+fn for_each_corner<const D: usize>(mut each: impl FnMut(usize, u32, f64)) {
     let along = BLOCK + 1;
     for corner in 0..along.pow(D as u32) {
         let (mut node, mut cells, mut rest) = (0, 1, corner);
+        let along_first = match corner % along {
+            0 => 1.0 / 3.0,
+            BLOCK => BLOCK as f64 - 1.0 / 3.0,
+            k => k as f64,
+        };
         for axis in 0..D {
             let k = rest % along;
             rest /= along;
             node += (k + 1) * ARENA_EDGE.pow(axis as u32);
             cells *= if k == 0 || k == BLOCK { 1 } else { 2 };
         }
-        each(node, cells);
+        each(node, cells, along_first);
     }
 }

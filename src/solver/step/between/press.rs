@@ -5,6 +5,7 @@ use crate::boundary::BodyContacts;
 use crate::boundary::bodies::{Meeting, Pair, PairLaw};
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{GridPlan, NodeFields};
+use crate::kernel::Coordinates;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Solids;
 use crate::solver::state::phases::Phase;
@@ -79,6 +80,7 @@ impl<const D: usize> Solver<D> {
             solids: &grid.solids,
             hats: &grid.hats,
             contacts: &self.physics.body_contacts,
+            coordinates: self.physics.coordinates,
             finds_forces: self.physics.contact_pressure_column().is_some(),
             dt,
         };
@@ -116,6 +118,7 @@ struct Press<'a, const D: usize> {
     /// Volumes of the basis functions of real nodes, m³ (in plane strain m²).
     hats: &'a [f64],
     contacts: &'a BodyContacts,
+    coordinates: Coordinates,
     /// Whether normal forces are needed.
     finds_forces: bool,
     dt: f64,
@@ -144,7 +147,10 @@ impl<const D: usize> Press<'_, D> {
                 pressed.velocities.extend(new);
             }
             if self.finds_forces {
-                let least = LEAST_AREA * self.plan.cell(self.plan.blocks[block].level).powi(D as i32 - 1);
+                let cell = self.plan.cell(self.plan.blocks[block].level);
+                // The hat of a node on the axis has its mean at a third of a cell, and half the width.
+                let x = self.plan.node_place(&self.plan.blocks[block], bit as usize)[0].max(cell / 6.0);
+                let least = LEAST_AREA * cell.powi(D as i32 - 1) * self.coordinates.around(x);
                 let new = bodies.iter().filter(|body| body.pressed[1] >= least);
                 pressed.forces.extend(new.map(|body| {
                     let [force, area] = body.pressed;
