@@ -11,7 +11,7 @@ use crate::geometry::{Aabb, Sampling, Shape};
 pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
-use crate::load::{Gravity, Load, Water};
+use crate::load::{Gravity, Load, Seepage, Water};
 use crate::material::Material;
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
@@ -131,6 +131,8 @@ pub struct Problem<const D: usize> {
     pub loads: Vec<Load<D>>,
     /// Place of each load in the files of the job, for messages.
     pub load_places: Vec<Position>,
+    /// Steady seepage, if the pressure of the water in the pores is that of one.
+    pub seepage: Option<Seepage<D>>,
     /// Conditions on the lower and the upper face of the domain along each axis.
     pub faces: [[Contact; 2]; D],
     /// Material beyond the faces that absorb waves.
@@ -217,6 +219,17 @@ impl<const D: usize> Problem<D> {
     /// The water in the pores, if the job has any.
     pub fn water(&self) -> Option<&Water> {
         self.loads.iter().find_map(Load::water)
+    }
+
+    /// The water in the pores, if there is any in a stage.
+    pub fn water_of_stage(&self, stage: usize) -> Option<&Water> {
+        let mut loads = self.loads.iter().zip(&self.load_stages);
+        loads.find_map(|(load, stages)| load.water().filter(|_| stages.has(stage)))
+    }
+
+    /// Whether ground has other densities below and above the water table.
+    pub fn has_wet_densities(&self) -> bool {
+        self.water().is_some() && self.materials.iter().any(|m| m.saturated_density != m.density)
     }
 
     /// Whether stages or the run end at an equilibrium.

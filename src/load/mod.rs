@@ -10,10 +10,13 @@
 //! | `mod.rs` | gravity, loads, and their effect on nodes |
 //! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
 //! | `water.rs` | pressure of the water in the pores |
+//! | `seepage.rs` | heads between which water flows |
 mod carried;
+pub mod seepage;
 pub mod water;
 
 pub use carried::{Carried, CarriedForce, cofactor};
+pub use seepage::Seepage;
 pub use water::Water;
 
 use crate::geometry::Shape;
@@ -140,7 +143,7 @@ impl<const D: usize> Load<D> {
             Kind::Damping(rate) => vec![rate],
             Kind::LocalDamping(_) => Vec::new(),
             Kind::Carried(carried) => carried.force.quantities(),
-            Kind::Water(water) => vec![water.quantity()],
+            Kind::Water(water) => water.quantity().into_iter().collect(),
         }
     }
 

@@ -30,13 +30,50 @@ pub enum Given {
     Level(Quantity),
     /// The pressure itself, Pa.
     Pressure(Quantity),
+    /// Steady seepage: the head about a particle, which carries it; nothing where no water has been found yet.
+    Seepage(Option<Head>),
+}
+
+/// Head of the water about a place: the level, m along the vertical, to which it rises in a standpipe. Linear
+/// in the place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Head {
+    /// The place, m, in the coordinates of the job.
+    pub place: [f64; 3],
+    /// Head there, m.
+    pub value: f64,
+    /// Its gradient.
+    pub gradient: [f64; 3],
+}
+
+impl Head {
+    /// Head at another place, m.
+    pub fn at(&self, place: [f64; 3]) -> f64 {
+        (0..3).fold(self.value, |head, a| self.gradient[a].mul_add(place[a] - self.place[a], head))
+    }
 }
 
 impl Water {
-    /// What it depends on.
-    pub fn quantity(&self) -> &Quantity {
-        let (Given::Level(quantity) | Given::Pressure(quantity)) = &self.given;
-        quantity
+    /// What it depends on, if the job gives that.
+    pub fn quantity(&self) -> Option<&Quantity> {
+        match &self.given {
+            Given::Level(quantity) | Given::Pressure(quantity) => Some(quantity),
+            Given::Seepage(_) => None,
+        }
+    }
+
+    /// The same water about a particle that carries this head; nothing where the job gives the pressure.
+    pub fn about(&self, head: Option<Head>) -> Option<Self> {
+        matches!(self.given, Given::Seepage(_)).then(|| Self { given: Given::Seepage(head), ..*self })
+    }
+
+    /// Level to which the water rises from a place, m, if it follows from one.
+    fn level(&self, place: [f64; 3], time: f64) -> Option<f64> {
+        match &self.given {
+            Given::Level(level) => Some(level.at(place, time)),
+            Given::Seepage(Some(head)) => Some(head.at(place)),
+            Given::Seepage(None) | Given::Pressure(_) => None,
+        }
     }
 
     /// Weight of the water per volume, N/m³, in this gravity, m/s².
@@ -51,20 +88,18 @@ impl Water {
 
     /// The pressure without the bound of the suction, Pa.
     fn unbounded(&self, place: [f64; 3], time: f64, gravity: &[f64]) -> f64 {
-        match &self.given {
-            Given::Level(level) => {
-                let depth = (level.at(place, time) - place[self.up.axis]) * self.up.sign;
-                self.unit_weight(gravity) * depth
-            }
-            Given::Pressure(pressure) => pressure.at(place, time),
+        match (&self.given, self.level(place, time)) {
+            (Given::Pressure(pressure), _) => pressure.at(place, time),
+            (_, Some(level)) => self.unit_weight(gravity) * ((level - place[self.up.axis]) * self.up.sign),
+            (_, None) => f64::NEG_INFINITY,
         }
     }
 
     /// Whether a place lies below the water table, where pores are full.
     pub fn is_below(&self, place: [f64; 3], time: f64) -> bool {
-        match &self.given {
-            Given::Level(level) => (level.at(place, time) - place[self.up.axis]) * self.up.sign > 0.0,
-            Given::Pressure(pressure) => pressure.at(place, time) > 0.0,
+        match (&self.given, self.level(place, time)) {
+            (Given::Pressure(pressure), _) => pressure.at(place, time) > 0.0,
+            (_, level) => level.is_some_and(|level| (level - place[self.up.axis]) * self.up.sign > 0.0),
         }
     }
 
@@ -77,9 +112,9 @@ impl Water {
             |height: f64| std::array::from_fn(|a| if a == up.axis { height * up.sign } else { place[a] });
         match &self.given {
             Given::Level(level) => (level.at(place, time) * up.sign).clamp(low, high),
-            Given::Pressure(_) if self.is_below(at(high), time) => high,
-            Given::Pressure(_) if !self.is_below(at(low), time) => low,
-            Given::Pressure(_) => {
+            _ if self.is_below(at(high), time) => high,
+            _ if !self.is_below(at(low), time) => low,
+            _ => {
                 let (mut full, mut empty) = (low, high);
                 loop {
                     let middle = 0.5 * (full + empty);
@@ -160,6 +195,22 @@ mod tests {
         assert_eq!(water.table([0.0; 3], 0.0, [2.0, 4.0]), 2.0);
         assert_eq!(water.share_below([0.0, 1.0, 0.0], 0.5, 0.0), 0.5);
         assert_eq!(water.force([0.0, 1.0, 0.0], &[0.5, 0.5], 0.0, &[0.0, -10.0]), [0.0, 2500.0]);
+    }
+
+    /// Seepage has its pressure from the head that a particle carries, and none where there is no head.
+    #[test]
+    fn seepage_pushes_along_the_gradient_of_the_head() {
+        let dry = water(Given::Seepage(None));
+        assert_eq!(dry.pressure([0.0; 3], 0.0, &[0.0, -10.0]), 0.0);
+        assert_eq!(dry.share_below([0.0; 3], 1.0, 0.0), 0.0);
+        let head = Head { place: [1.0, 0.0, 0.0], value: 2.0, gradient: [-0.5, 0.25, 0.0] };
+        let wet = dry.about(Some(head)).expect("seepage");
+        assert_eq!(wet.pressure([1.0, 0.0, 0.0], 0.0, &[0.0, -10.0]), 2e4);
+        assert_eq!(wet.force([1.0, 0.0, 0.0], &[0.5, 0.5], 0.0, &[0.0, -10.0]), [5e3, 7.5e3]);
+        // Head and height meet where 2 + y / 4 = y.
+        let share = wet.share_below([1.0, 8.0 / 3.0, 0.0], 0.5, 0.0);
+        assert!((share - 0.5).abs() < 1e-14, "{share}");
+        assert!(water(Given::Level(Quantity::Constant(1.0))).about(Some(head)).is_none());
     }
 
     /// Without suction pores above the table have no pressure; with it they have one down to its bound.

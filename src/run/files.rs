@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::measures::maps;
 use super::{Run, RunError, restart, scene};
 use crate::io::picture;
-use crate::io::snapshot::{PointField, Scalars, View};
+use crate::io::snapshot::{PointField, Scalars, ShownWater, View};
 use crate::job::Problem;
 use crate::solver::Solver;
 use crate::solver::state::phases::Phase;
@@ -145,7 +145,11 @@ fn view<'a, const D: usize>(
         brick: problem.brick,
         materials: &names.materials,
         water_moduli: &names.water_moduli,
-        water: problem.water().map(|water| (water, solver.physics.gravity.at(solver.clock.time))),
+        water: solver.physics.water_at(solver.clock.time).map(|(load, water)| ShownWater {
+            water,
+            since: load.start,
+            gravity: solver.physics.gravity.at(solver.clock.time),
+        }),
         bodies: &names.bodies,
         histories: &names.histories,
         job_digest: problem.digest,

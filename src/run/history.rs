@@ -43,7 +43,7 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
-/// number of the stage, from 1; sources; loads; contacts between bodies; probes; tracks; fluxes; faces of the
+/// number of the stage, from 1; sources; water in the pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the
 /// domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
@@ -64,6 +64,15 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
         columns.push((format!("fed_{}", source.name), "kg"));
         AXES[..D].iter().for_each(|axis| columns.push((format!("fed_{}{axis}", source.name), "kg m/s")));
         columns.push((format!("fed_energy_{}", source.name), "J"));
+    }
+    if problem.has_wet_densities() {
+        columns.push(("pore_water".to_owned(), "kg"));
+        AXES[..D].iter().for_each(|axis| columns.push((format!("pore_water{axis}"), "kg m/s")));
+        columns.push(("pore_water_energy".to_owned(), "J"));
+    }
+    if let Some(seepage) = &problem.seepage {
+        let names = seepage.heads.iter().map(|head| &*head.name).chain(["surface"]);
+        columns.extend(names.map(|name| (format!("flow_{name}"), "m³/s")));
     }
     for load in &problem.loads {
         AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));

@@ -291,6 +291,17 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
+    /// Not collective. Warns of heads of seepage that were not found.
+    fn tell_unsettled_heads(&mut self) {
+        let times = self.solver.unsettled_heads;
+        if times > 0 {
+            self.recorder.warning(&format!(
+                "water.seepage: {} of its solutions did not settle: the free surface still moved, or the heads had not converged; expected ground that is connected to a head, permeabilities that differ less, or finer cells",
+                count(times)
+            ));
+        }
+    }
+
     /// Not collective. Warns of stages that the run has not reached.
     fn tell_missed_stages(&mut self) {
         let missed: Vec<&str> = self
@@ -392,6 +403,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.tell_equilibrium();
         self.tell_missed_stages();
         self.tell_blocked_sources();
+        self.tell_unsettled_heads();
         self.tell_torn();
         let picture = self.picture();
         let collapse = self.problem.report.as_ref().map(|setup| {

@@ -249,6 +249,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let sources = solver.source_sums.totals(comm);
+        let pores = solver.pore_sums.totals(comm);
+        let flows = solver.flow_sums.totals(comm);
         let loads = solver.load_totals();
         let bodies = solver.body_totals();
         let readings = solver.read_probes(&self.problem.probes);
@@ -281,6 +283,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
             values.push((solver.physics.stage() + 1) as f64);
         }
         sources.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
+        pores.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
+        values.extend(flows.as_flattened());
         loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
         for ((_, two_sides), totals) in self.problem.body_contacts.names.iter().zip(&bodies) {
             values.extend(history::force_and_work::<D>(totals, *two_sides));

@@ -106,7 +106,8 @@ fn at<const D: usize>(
                 face[up.axis] += way;
                 face
             });
-            let is_below = |x: &[f64; D]| problem.water().is_some_and(|w| w.is_below(problem.place(x), 0.0));
+            let water = problem.water_of_stage(body.stage);
+            let is_below = |x: &[f64; D]| water.is_some_and(|water| water.is_below(problem.place(x), 0.0));
             // Where the water table passes through a box, the particle has the mean density of both parts, and
             // the stress at its centre is the mean of those at its faces.
             let vertical = match is_below(&faces[0]) == is_below(&faces[1]) {
@@ -144,7 +145,7 @@ fn weight<const D: usize>(
         Some(surface) => {
             let depth = ((surface.at(place, 0.0) - place[up.axis]) * up.sign).max(0.0);
             let mut above = Standing::default();
-            above.put(problem, body.material, up, place, [0.0, depth]);
+            above.put(problem, (body.material, body.stage), up, place, [0.0, depth]);
             (above.mass_above(0.0), depth)
         }
         None => {
@@ -153,7 +154,7 @@ fn weight<const D: usize>(
             (standing.mass_above(height), (standing.top() - height).max(0.0))
         }
     };
-    let water = problem.water().map_or(0.0, |water| {
+    let water = problem.water_of_stage(body.stage).map_or(0.0, |water| {
         let mut surface = place;
         surface[up.axis] = up.sign.mul_add(depth, place[up.axis]);
         water.pressure(surface, 0.0, &gravity).max(0.0) - water.pressure(place, 0.0, &gravity)
@@ -194,13 +195,13 @@ impl Standing {
     fn put<const D: usize>(
         &mut self,
         problem: &Problem<D>,
-        material: usize,
+        (material, stage): (usize, usize),
         up: Up,
         place: [f64; 3],
         [low, high]: [f64; 2],
     ) {
         let setup = &problem.materials[material];
-        match problem.water() {
+        match problem.water_of_stage(stage) {
             None => self.0.push([low, high, setup.density]),
             Some(water) => {
                 let zero = place[up.axis] * up.sign;
@@ -265,7 +266,7 @@ fn standing<const D: usize>(
         };
         let mut push = |from: f64, to: f64| {
             let [a, b] = [from * up.sign, to * up.sign];
-            all.put(problem, body.material, up, problem.place(foot), [a.min(b), a.max(b)]);
+            all.put(problem, (body.material, stage), up, problem.place(foot), [a.min(b), a.max(b)]);
         };
         // Each step is as long as the distance to the surface, and no shorter than the interval.
         let (mut height, mut inside_from) = (low, None);

@@ -20,6 +20,7 @@ mod parts;
 pub mod seed;
 pub mod stages;
 pub mod warnings;
+mod water;
 
 /// Physics of the first stage of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
@@ -36,6 +37,8 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         materials: problem.materials.iter().map(|m| m.build()).collect(),
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
+        seepage: problem.seepage.clone(),
+        saturated: problem.materials.iter().map(|m| m.saturated_density / m.density).collect(),
         sources: problem.sources.clone(),
         faces: problem.faces,
         with_moments: with_moments(problem),
@@ -119,6 +122,8 @@ pub fn solver_within<const D: usize, R>(
     let mut chunks = std::mem::take(&mut solver.chunks);
     carried::carry(comm, problem, &solver, &mut chunks, 0)?;
     solver.chunks = chunks;
+    let none = vec![0; solver.chunks.len()];
+    water::begin(comm, problem, &mut solver, &none)?;
     Ok(Ok(solver))
 }
 

@@ -63,6 +63,17 @@ pub enum SeedError {
     /// A velocity or stress at the start, or gravity, has no finite value.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
+    /// A head is held where no ground is.
+    #[error(
+        "{place}: found no ground below the level of the head \"{head}\" where it is held; expected a face or a shape that the ground reaches, \
+         and a level above its foot"
+    )]
+    Head {
+        /// File, line, column and key of the head.
+        place: String,
+        /// The head.
+        head: String,
+    },
     /// A load that particles carry finds none.
     #[error("{place}: found no {found} for the load \"{load}\"; expected {expected}")]
     Load {
@@ -143,7 +154,8 @@ pub fn fill_leaf<const D: usize>(
                 set(Layout::<D>::LEFT_CAUCHY_GREEN + diagonal, 1.0);
             }
             let around = problem.coordinates.around(x[0]);
-            let share = problem.water().map_or(0.0, |water| water.share_below(problem.place(x), half, 0.0));
+            let water = problem.water_of_stage(stage);
+            let share = water.map_or(0.0, |water| water.share_below(problem.place(x), half, 0.0));
             let density = share.mul_add(setup.saturated_density - setup.density, setup.density);
             set(Layout::<D>::MASS, density * (volume * around));
             set(Layout::<D>::HALF, half * around.sqrt());
@@ -278,7 +290,7 @@ pub fn check_finite<const D: usize>(problem: &Problem<D>) -> Result<(), SeedErro
         let stress = body.stress.iter().flat_map(|stress| stress.kind.quantities());
         body.velocity.iter().chain(stress)
     });
-    let water = problem.water().map(Water::quantity);
+    let water = problem.water().and_then(Water::quantity);
     let fault = of_bodies.chain(&gravity.acceleration).chain(water).find_map(Quantity::not_finite);
     fault.map_or(Ok(()), |fault| Err(fault.into()))
 }

@@ -154,7 +154,8 @@ pub fn enter_next<const D: usize>(
         reset_displacement: problem.stages[stage].reset_displacement,
         added,
     };
-    solver.enter_stage(physics, change);
+    let known = solver.enter_stage(physics, change);
+    super::water::begin(comm, problem, solver, &known)?;
     Ok(come)
 }
 

@@ -10,6 +10,7 @@
 //! | [`migration`] | particles between leaves and ranks |
 //! | [`state`] | the solver and what it owns |
 //! | [`step`] | phases of a step |
+//! | `seepage` | heads of water that seeps |
 //! | [`refinement`] | dynamic refinement |
 //! | [`balance`] | load balance: measured costs, new partitions |
 //! | [`stage`] | the next stage of a run |
@@ -19,6 +20,7 @@ pub mod diagnostics;
 pub mod migration;
 pub mod physics;
 pub mod refinement;
+mod seepage;
 pub mod sorting;
 pub mod stage;
 pub mod state;
@@ -69,6 +71,9 @@ impl<const D: usize> Solver<D> {
             body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
             shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
             source_sums: ExactSums::new(physics.sources.len(), clock.time),
+            pore_sums: ExactSums::new(usize::from(physics.followed.saturation), clock.time),
+            flow_sums: ExactSums::new(physics.seepage.as_ref().map_or(0, |s| s.heads.len() + 1), clock.time),
+            unsettled_heads: 0,
             fed: vec![[0; 2]; physics.sources.len()],
             conveyed: Vec::new(),
             pushes: Vec::new(),
@@ -133,6 +138,9 @@ impl<const D: usize> Solver<D> {
             // All ranks find the same.
             return self.comm.agree(Err(StepError::Time { dt, to, from: self.clock.time }));
         }
+        if self.heads_are_due() {
+            self.find_heads();
+        }
         self.comm.begin_step(self.clock.step);
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();
@@ -160,6 +168,7 @@ impl<const D: usize> Solver<D> {
         self.book_met(&mut impulses);
         let moved = self.migrate_particles(departed);
         self.feed(to);
+        self.wet_particles(to);
         self.move_colliders(&rates, &pushes, impulses, to, dt);
         // A rank that has failed serves its neighbours to the end of the step.
         sorted?;

@@ -5,7 +5,7 @@ use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
-use crate::load::{self, Gravity, Load};
+use crate::load::{self, Gravity, Load, Seepage, Water};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::Followed;
@@ -30,6 +30,10 @@ pub struct Physics<const D: usize> {
     pub gravity: Gravity<D>,
     /// Loads, in the order in which they act.
     pub loads: Vec<Load<D>>,
+    /// Steady seepage, if the pressure of the water in the pores is that of one.
+    pub seepage: Option<Seepage<D>>,
+    /// By material, the density with full pores over that without water.
+    pub saturated: Vec<f64>,
     /// Sources, in the order in which they feed.
     pub sources: Vec<Source<D>>,
     /// Conditions on the lower and upper face of the domain along each axis.
@@ -123,9 +127,8 @@ impl<const D: usize> Physics<D> {
         self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
     }
 
-    /// First columns of the pressure of contact, of the total strain and of the displacement, as far as
-    /// particles carry them.
-    fn followed_columns(&self) -> [Option<usize>; 3] {
+    /// First columns of what is followed, in the order of [`Followed::columns`], as far as particles carry it.
+    fn followed_columns(&self) -> [Option<usize>; 5] {
         self.followed.first_columns::<D>(self.carried_columns())
     }
 
@@ -137,7 +140,8 @@ impl<const D: usize> Physics<D> {
 
     /// Carried columns of the particles' motion.
     pub(crate) fn motion_columns(&self) -> Range<usize> {
-        self.followed_column() + self.followed.columns::<D>()[0]..self.carried_columns()
+        let end = self.carried_columns();
+        end - self.followed.motion_columns::<D>()..end
     }
 
     /// First columns of tensors that follow the deformation, where particles carry them: stretch between
@@ -145,7 +149,7 @@ impl<const D: usize> Physics<D> {
     pub(crate) fn tensor_columns(&self) -> Vec<usize> {
         let (loads, followed) = (self.load_columns(), self.followed_column());
         let gaps = (followed > loads).then_some(loads);
-        let [_, strain, _] = self.followed_columns();
+        let [.., strain, _] = self.followed_columns();
         gaps.into_iter().chain(strain).collect()
     }
 
@@ -206,6 +210,24 @@ impl<const D: usize> Physics<D> {
     pub(crate) fn contact_pressure_column(&self) -> Option<usize> {
         let [pressure, ..] = self.followed_columns();
         pressure
+    }
+
+    /// First column of the head of the water, if particles carry it.
+    pub(crate) fn head_column(&self) -> Option<usize> {
+        let [_, head, ..] = self.followed_columns();
+        head
+    }
+
+    /// Column of the share of the pores that the water fills, if particles carry it.
+    pub(crate) fn saturation_column(&self) -> Option<usize> {
+        let [_, _, saturation, ..] = self.followed_columns();
+        saturation
+    }
+
+    /// The water in the pores with its load, where it acts at a time, s.
+    pub fn water_at(&self, time: f64) -> Option<(&Load<D>, &Water)> {
+        let mut acting = self.loads.iter().filter(|load| load.is_active(time));
+        acting.find_map(|load| Some((load, load.water()?)))
     }
 
     /// Number of carried columns for loads.

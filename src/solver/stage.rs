@@ -34,8 +34,8 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective. Goes on with the physics of another stage after a change of the particles, and with the
-    /// time step that these allow.
-    pub fn enter_stage(&mut self, physics: Physics<D>, change: Change<D>) {
+    /// time step that these allow. Returns how many particles of each own leaf were there before.
+    pub fn enter_stage(&mut self, physics: Physics<D>, change: Change<D>) -> Vec<usize> {
         let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
         self.comm.sum_u64(&mut added);
         self.ledger.next_root = self.next_root() + added[0];
@@ -78,6 +78,7 @@ impl<const D: usize> Solver<D> {
         self.rebuild_grid(reach);
         self.start_from(&had);
         self.relaxation = Relaxation::default();
+        had
     }
 }
 

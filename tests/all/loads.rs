@@ -88,10 +88,12 @@ fn damping_decays_as_an_exponential() {
 }
 
 /// Local damping takes the share α of the unbalanced force: a block thrown up slows down with (1 + α) g and
-/// falls with (1 - α) g, whatever the transfer. Its work is the energy lost.
+/// falls with (1 - α) g, whatever the transfer, and also where criteria look at the velocities between steps.
+/// Its work is the energy lost.
 #[test]
 fn local_damping_takes_a_share_of_the_unbalanced_force() {
-    for transfer in ["", "[numerics]\ntransfer = 'flip'\n"] {
+    let looked_at = "[adaptivity]\nevery_steps = 2\n[[adaptivity.criteria]]\nkind = 'velocity_gradient'\nrefine = 1e9\nlevel = 3\n";
+    for transfer in ["", "[numerics]\ntransfer = 'flip'\n", looked_at] {
         let damping = "[[loads]]\nname = 'local'\nkind = 'local_damping'\nfactor = 0.5\n";
         let thrown = text("[0, -10]", 0.2, &format!("{damping}{transfer}"))
             .replace("material = 'rubber'", "velocity = [0, 1]\nmaterial = 'rubber'");

@@ -35,6 +35,7 @@ mod probes;
 mod report;
 mod rigid_contact;
 mod rings;
+mod seepage;
 mod soak;
 mod softening;
 mod sources;

@@ -169,6 +169,41 @@ fn colliders_that_never_come_into_the_domain_are_warned_of() {
     }
 }
 
+/// What colliders do to water and to plates with F-bar stands in the known limits, and is said where a job
+/// does it.
+#[test]
+fn walls_with_known_errors_are_warned_of() {
+    let tank = |wall: &str| {
+        format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [2, 1]\nroot_edge = 0.5\n\
+             [boundaries]\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_min.kind = 'slip'\ny_max.kind = 'slip'\n\
+             [[materials]]\nname = 'water'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = 2e5\nviscosity = 1e-3\n\
+             [[bodies]]\nname = 'pool'\nmaterial = 'water'\nshape = {{ kind = 'box', min = [0.5, 0.3], max = [1.5, 0.6] }}\n\
+             [[colliders]]\nname = 'floor'\nshape = {{ kind = 'box', min = [0.1, 0], max = [1.9, 0.3] }}\n{wall}\n\
+             [[colliders]]\nname = 'left'\nshape = {{ kind = 'box', min = [0.1, 0], max = [0.5, 0.9] }}\n{wall}\n\
+             [[colliders]]\nname = 'right'\nshape = {{ kind = 'box', min = [1.5, 0], max = [1.9, 0.9] }}\n{wall}\n\
+             [time]\nend = 1\n"
+        )
+    };
+    let moves = "motion = { kind = 'steady', velocity = [0.1, 0] }";
+    let sloshes =
+        "colliders[0].motion: \"pool\" lies in a tank that moves, where it loses height as it sloshes";
+    let loses = "colliders[0].acts_on: \"floor\" acts on particles, where fluids sink";
+    for (wall, expected) in [("", None), (moves, Some(sloshes)), ("acts_on = 'particles'", Some(loses))] {
+        let found = warnings(&tank(wall));
+        let of_walls = found.iter().filter(|line| line.contains("slosh")).collect::<Vec<_>>();
+        assert_eq!(of_walls.len(), usize::from(expected.is_some()), "{wall}: {found:#?}");
+        assert!(expected.is_none_or(|expected| of_walls[0].contains(expected)), "{wall}: {found:#?}");
+    }
+    let tool = "motion = { kind = \"steady\", velocity = [0, -0.02] }";
+    let on_particles = format!("{tool}\nacts_on = \"particles\"");
+    let found = warnings(&changed(&[(tool, &on_particles), ("[time]", "[numerics]\nf_bar = true\n[time]")]));
+    let plates = "colliders[2].acts_on: \"tool\" acts on particles and numerics.f_bar is true";
+    assert!(found.iter().any(|line| line.contains(plates)), "{found:#?}");
+    let found = warnings(&changed(&[(tool, &on_particles)]));
+    assert!(!found.iter().any(|line| line.contains("acts on particles")), "{found:#?}");
+}
+
 /// By grips, by its own motion, between a face and a grip, by a prescribed velocity, and by tractions.
 #[test]
 fn elastic_bodies_stretched_further_than_they_hold_are_warned_of() {

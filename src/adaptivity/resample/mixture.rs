@@ -60,7 +60,7 @@ pub(super) fn mixtures<const D: usize>(
     });
     let members: Vec<u32> = groups.iter().flat_map(|group| &group.members).copied().collect();
     let half = setting.territories(chunk, Select::List(&members));
-    let ahead = setting.to_mass_centres(chunk, &members);
+    let ahead = setting.ways_to_mass_centres(chunk, &members);
     let mut out = chunk.gathered(&groups.iter().map(|group| group.members[0]).collect::<Vec<u32>>());
     let mut motions = Vec::with_capacity(groups.len());
     let mut start = 0;

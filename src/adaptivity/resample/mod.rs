@@ -73,7 +73,7 @@ impl<const D: usize> Setting<'_, D> {
 
     /// Distances (m) along the first axis from the positions of the selected particles to their centres of
     /// mass; 0 but for rings.
-    fn to_mass_centres(&self, chunk: &Chunk<D>, which: &[u32]) -> Vec<f64> {
+    fn ways_to_mass_centres(&self, chunk: &Chunk<D>, which: &[u32]) -> Vec<f64> {
         if !self.has_rings() {
             return vec![0.0; which.len()];
         }

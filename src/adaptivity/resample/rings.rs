@@ -75,7 +75,7 @@ pub(super) fn share_motion<const D: usize>(
     spread: &[f64; D],
 ) -> f64 {
     let parts: Vec<u32> = (first..first + number).map(|p| p as u32).collect();
-    let ahead = setting.to_mass_centres(chunk, &parts);
+    let ahead = setting.ways_to_mass_centres(chunk, &parts);
     let masses: Vec<f64> = parts.iter().map(|&p| chunk.column(Layout::<D>::MASS)[p as usize]).collect();
     let total: f64 = masses.iter().sum();
     let origin = chunk.position(first);

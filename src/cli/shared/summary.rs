@@ -284,6 +284,7 @@ fn load_in_words<const D: usize>(load: &Load<D>) -> String {
         LoadKind::Water(water) => match &water.given {
             Given::Level(level) => format!("water table at {}", value(level, "m")),
             Given::Pressure(pressure) => format!("pore pressure {}", value(pressure, "Pa")),
+            Given::Seepage(_) => "steady seepage".to_owned(),
         },
         LoadKind::LocalDamping(factor) => format!("local damping {factor}"),
         LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),

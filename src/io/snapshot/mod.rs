@@ -69,8 +69,8 @@ pub struct View<'a, const D: usize> {
     pub materials: &'a [String],
     /// Stiffness of water that cannot leave the pores, by material, Pa; 0 where there is none.
     pub water_moduli: &'a [f64],
-    /// Water in the pores with a given pressure, and gravity (m/s²) for it.
-    pub water: Option<(&'a Water, [f64; D])>,
+    /// Water in the pores, where it acts.
+    pub water: Option<ShownWater<'a, D>>,
     /// Names of the bodies.
     pub bodies: &'a [String],
     /// Names of the history variables.
@@ -89,6 +89,17 @@ pub struct View<'a, const D: usize> {
     pub dt: f64,
     /// Scalars to be restored.
     pub scalars: &'a Scalars,
+}
+
+/// Water in the pores as a file shows it.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownWater<'a, const D: usize> {
+    /// The water.
+    pub water: &'a Water,
+    /// Time from which its own time is counted, s.
+    pub since: f64,
+    /// Gravity, m/s².
+    pub gravity: [f64; D],
 }
 
 /// Optional contents of a file.

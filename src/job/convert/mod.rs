@@ -113,9 +113,14 @@ fn problem<const D: usize>(
         + file.fluxes.len()
         + 4 * file.contact.len()
         + 5 * file.sources.len()
-        + if file.water.is_some() { 4 } else { 0 };
+        + file
+            .water
+            .as_ref()
+            .map_or(0, |water| 9 + water.seepage.as_ref().map_or(0, |seepage| 1 + seepage.heads.len()));
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let water = water::water(checks, file, gravity.as_ref(), &space, &root);
+    let water_stages = water::stages(checks, file, &root);
+    let seepage = water::seepage(checks, file, &water_stages, &space, &root);
     let stages = stages::stages(checks, file, &root);
     let mut load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));
@@ -136,7 +141,7 @@ fn problem<const D: usize>(
     let (mut loads, water) = (loads?, water?);
     if let Some(water) = water {
         loads.push(water);
-        load_stages.push(InStages::default());
+        load_stages.push(water_stages);
         load_places.push(checks.place(&root.key("water")));
     }
     let context = sources::Context { file, space: &space, tree: &tree, root_edge };
@@ -155,6 +160,9 @@ fn problem<const D: usize>(
     if needs_places && output.followed.motion == Motion::Nothing {
         output.followed.motion = Motion::Displacement;
     }
+    output.followed.head = file.water.as_ref().is_some_and(|water| water.seepage.is_some());
+    output.followed.saturation =
+        file.water.is_some() && materials.iter().any(|m| m.saturated_density != m.density);
     let report = match &file.report {
         Some(written) => Some(report(checks, written, (&space, coordinates), &root.key("report"))?),
         None => None,
@@ -178,6 +186,7 @@ fn problem<const D: usize>(
         sources,
         gravity: gravity?,
         load_places,
+        seepage: seepage?,
         loads,
         faces: faces.map(|pair| pair.map(Option::unwrap_or_default)),
         absorbing: absorbing?,

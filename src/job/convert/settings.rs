@@ -183,7 +183,7 @@ pub(super) fn followed(output: &Output) -> Followed {
         false if output.has_any(&[Field::Displacement]) => Motion::Displacement,
         false => Motion::Nothing,
     };
-    Followed { motion, contact_pressure: output.has_any(&[Field::ContactPressure]) }
+    Followed { motion, contact_pressure: output.has_any(&[Field::ContactPressure]), ..Followed::default() }
 }
 
 /// The evaluation at the end of the run.

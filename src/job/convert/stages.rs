@@ -141,9 +141,19 @@ pub(super) fn of_each<'a>(
     written: impl Iterator<Item = &'a Option<Vec<String>>>,
     path: &Path,
 ) -> Vec<InStages> {
+    of_list(checks, file, written, |number| path.index(number).key("stages"))
+}
+
+/// As [`of_each`], with the key of each.
+pub(super) fn of_list<'a>(
+    checks: &mut Checks,
+    file: &JobFile,
+    written: impl Iterator<Item = &'a Option<Vec<String>>>,
+    key: impl Fn(usize) -> Path,
+) -> Vec<InStages> {
     let mut all = Vec::new();
     for (number, names) in written.enumerate() {
-        let here = path.index(number).key("stages");
+        let here = key(number);
         let stages = names.as_ref().map(|names| {
             let named = names
                 .iter()

@@ -4,10 +4,14 @@ use super::loads::at_nodes;
 use super::stress::needs_vertical_gravity;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
+use crate::job::problem::InStages;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::Quantity as Written;
+use crate::job::schema::stress::StressKind;
+use crate::job::schema::water as schema;
+use crate::load::seepage::{HeldHead, HeldRegion};
 use crate::load::water::Given;
-use crate::load::{Gravity, Kind, Load, Up, Water};
+use crate::load::{Gravity, Kind, Load, Seepage, Up, Water};
 use crate::material;
 use crate::text::{excerpt, written as number};
 
@@ -31,17 +35,24 @@ pub(super) fn water<const D: usize>(
         checks.fault(&root.key("loads").index(taken).key("name"), message.into());
     }
     no_fluids(checks, file, &path);
-    let given = match (&written.level, &written.pressure) {
-        (Some(level), None) => Given::Level(at_nodes::<D>(checks, level, &path.key("level"))?),
-        (None, Some(pressure)) => Given::Pressure(at_nodes::<D>(checks, pressure, &path.key("pressure"))?),
-        (Some(_), Some(_)) => {
-            let message = "found both `level` and `pressure`; expected one of them";
-            checks.fault(&path.key("pressure"), message.into());
+    let given = match (&written.level, &written.pressure, &written.seepage) {
+        (Some(level), None, None) => Given::Level(at_nodes::<D>(checks, level, &path.key("level"))?),
+        (None, Some(pressure), None) => {
+            Given::Pressure(at_nodes::<D>(checks, pressure, &path.key("pressure"))?)
+        }
+        (None, None, Some(_)) => Given::Seepage(None),
+        (None, None, None) => {
+            let message = "found neither `level`, `pressure` nor `seepage`; expected the level of the water table, m, the pressure of the water, Pa, or the heads between which it seeps";
+            checks.fault(&path, message.into());
             return None;
         }
-        (None, None) => {
-            let message = "found neither `level` nor `pressure`; expected the level of the water table, m, or the pressure of the water, Pa";
-            checks.fault(&path, message.into());
+        (_, pressure, seepage) => {
+            let (key, other) = match (pressure, seepage) {
+                (Some(_), Some(_)) => ("pressure", "seepage"),
+                (Some(_), None) => ("pressure", "level"),
+                (None, _) => ("seepage", "level"),
+            };
+            checks.fault(&path.key(key), format!("found both `{other}` and `{key}`; expected one of them"));
             return None;
         }
     };
@@ -63,6 +74,106 @@ pub(super) fn water<const D: usize>(
         until: f64::INFINITY,
         origin: space.origin,
     }))
+}
+
+/// The stages in which the job has water, or faults.
+pub(super) fn stages(checks: &mut Checks, file: &JobFile, root: &Path) -> InStages {
+    let written = file.water.iter().map(|water| &water.stages);
+    let path = root.key("water");
+    super::stages::of_list(checks, file, written, |_| path.key("stages")).pop().unwrap_or_default()
+}
+
+/// The seepage of the job, if it has any; `None` after faults.
+pub(super) fn seepage<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    stages: &InStages,
+    space: &Space<D>,
+    root: &Path,
+) -> Option<Option<Seepage<D>>> {
+    permeabilities(checks, file, &root.key("materials"));
+    let Some(written) = file.water.as_ref().and_then(|water| water.seepage.as_ref()) else {
+        return Some(None);
+    };
+    let path = root.key("water").key("seepage");
+    if !file.sources.is_empty() {
+        let message = "found seepage in a job with sources; expected a water table, `[water] level = …`: material that enters has no head";
+        checks.fault(&path, message.into());
+    }
+    for (i, body) in file.bodies.iter().enumerate().filter(|(_, body)| stages.has(0) && body.stage.is_none())
+    {
+        let kind = body.stress.as_ref().map(|stress| &stress.kind);
+        if matches!(kind, Some(StressKind::Geostatic { .. } | StressKind::Hydrostatic { .. })) {
+            let message = "found the weight above as stress of ground in which water seeps from the start; expected seepage from a later stage, [water] stages = […], after one that ends at equilibrium";
+            checks.fault(&root.key("bodies").index(i).key("stress"), message.into());
+        }
+    }
+    if written.heads.is_empty() {
+        checks.fault(&path.key("heads"), "found an empty array; expected at least one head".into());
+    }
+    let mut heads = Vec::new();
+    for (i, head) in written.heads.iter().enumerate() {
+        let here = path.key("heads").index(i);
+        let before = written.heads[..i].iter().map(|head| &*head.name).chain(["surface"]);
+        checks.column_name(&head.name, before, &here.key("name"));
+        heads.push(held(checks, head, space, &here));
+    }
+    let heads: Vec<HeldHead<D>> = heads.into_iter().collect::<Option<_>>()?;
+    for (i, head) in heads.iter().enumerate().filter(|(_, head)| head.level.depends_on_time()) {
+        if written.every.is_none() {
+            let name = excerpt(&head.name, QUOTED);
+            let message = format!(
+                "found a level of \"{name}\" that changes in time; expected water.seepage.every as well, the time between solutions, s"
+            );
+            checks.fault(&path.key("heads").index(i).key("level"), message);
+        }
+    }
+    let permeabilities = file.materials.iter().map(|material| material.permeability.unwrap_or(0.0)).collect();
+    Some(Some(Seepage { heads, permeabilities, every: written.every.unwrap_or(f64::INFINITY) }))
+}
+
+/// A head that is held, or faults.
+fn held<const D: usize>(
+    checks: &mut Checks,
+    written: &schema::Head,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<HeldHead<D>> {
+    let region = match (written.face, &written.shape) {
+        (Some(face), None) if face as usize >= 2 * D => {
+            let message = "found a face along z in a 2D job; expected a face along x or y";
+            checks.fault(&path.key("face"), message.into());
+            return None;
+        }
+        (Some(face), None) => HeldRegion::Face { axis: face as usize / 2, side: face as usize % 2 },
+        (None, Some(shape)) => HeldRegion::Shape(checks.shape(shape, space, &path.key("shape"))?),
+        (face, _) => {
+            let found = if face.is_some() { "both `face` and `shape`" } else { "neither `face` nor `shape`" };
+            checks.fault(path, format!("found {found}; expected one of them: where the head is held"));
+            return None;
+        }
+    };
+    let level = at_nodes::<D>(checks, &written.level, &path.key("level"))?;
+    Some(HeldHead { name: written.name.clone(), region, level })
+}
+
+/// Faults of the permeabilities of materials.
+fn permeabilities(checks: &mut Checks, file: &JobFile, path: &Path) {
+    let seeps = file.water.as_ref().is_some_and(|water| water.seepage.is_some());
+    for (index, material) in file.materials.iter().enumerate() {
+        if seeps == material.permeability.is_some() {
+            continue;
+        }
+        let name = excerpt(&material.name, QUOTED);
+        let message = match seeps {
+            true => format!(
+                "found no permeability of \"{name}\" in a job with seepage; expected `permeability`, m/s, of each material, such as 1e-5 for sand and 1e-12 for concrete"
+            ),
+            false => "found it in a job without seepage; expected [water] with `seepage`, or none".to_owned(),
+        };
+        let here = path.index(index);
+        checks.fault(&if seeps { here } else { here.key("permeability") }, message);
+    }
 }
 
 /// Faults of the densities of saturated materials.

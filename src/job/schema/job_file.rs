@@ -300,11 +300,15 @@ pub struct Material {
     /// Density of the undeformed material, kg/m³.
     #[schemars(range(min = 1e-6, max = 1e5))]
     pub density: f64,
-    /// Density of the undeformed material with full pores, kg/m³, for what lies below the table of `[water]` at the start; it keeps that
-    /// density as the table moves. `density` by default.
+    /// Density of the undeformed material with full pores, kg/m³, for what lies below the table of `[water]`: weight and inertia change as
+    /// the table moves. `density` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e5))]
     pub saturated_density: Option<f64>,
+    /// Permeability to water, m/s: the flow per area under a gradient of the head of 1. Needed, and used, with `seepage` in `[water]` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-20, max = 1e3))]
+    pub permeability: Option<f64>,
     /// Divides the strength, to find a factor of safety: cohesion, yield stress and their hardening, and the tangents of friction angles, of
     /// `mohr_coulomb`, `drucker_prager`, `tresca` and `von_mises`; the dilation angle is at most the new friction angle. 1 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -99,6 +99,8 @@ impl<const D: usize> GivenBoxes<D> {
             stage_starts: vec![0.0],
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),
+            seepage: None,
+            saturated: Vec::new(),
             sources: Vec::new(),
             body_contacts: crate::boundary::BodyContacts::default(),
             faces: [[Contact::Slip; 2]; D],

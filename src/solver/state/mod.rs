@@ -144,6 +144,14 @@ pub struct Solver<const D: usize> {
     pub shift_sums: ExactSums<1>,
     /// Mass, momentum and kinetic energy that sources have added since the start.
     pub source_sums: ExactSums<SOURCE_SUMS>,
+    /// Mass, momentum and energy of the water that has come into pores since the start; none where ground
+    /// weighs the same with and without it.
+    pub pore_sums: ExactSums<SOURCE_SUMS>,
+    /// Flow into the ground at each head that is held, and last through its surface, m³/s; none where no
+    /// water seeps.
+    pub flow_sums: ExactSums<1>,
+    /// How often heads have been looked for in vain since the start of this process.
+    pub unsettled_heads: u64,
     /// Particles that each source has fed on this rank since the start of this process, and those among them
     /// that entered where other material was.
     pub fed: Vec<[u64; 2]>,

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::exact_sum::ExactSum;
 use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::followed::head;
 use crate::particle::strain;
 use crate::particle::volume::volume;
 use crate::simd::Vector;
@@ -50,7 +51,12 @@ fn surface_at<const D: usize>(
 }
 
 /// Half widths of the box of a particle in a leaf with cells of this edge, m.
-fn half_widths<const D: usize>(widths: &Widths<'_, D>, chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
+pub(super) fn half_widths<const D: usize>(
+    widths: &Widths<'_, D>,
+    chunk: &Chunk<D>,
+    p: usize,
+    cell: f64,
+) -> [f64; D] {
     widths.of_batch(chunk, &[p as u32], cell).map(|half| half.to_array()[0])
 }
 
@@ -62,6 +68,8 @@ struct Pushing<'a, const D: usize> {
     loads: Vec<(usize, &'a Load<D>)>,
     /// First column of the displacement, if particles carry it.
     displacement: Option<usize>,
+    /// First column of the head of the water, if particles carry it.
+    head: Option<usize>,
     /// Gravity, m/s².
     gravity: [f64; D],
     /// Gravity that acts on particles, m/s²: all where masses are scaled; else 0, as it acts on nodes.
@@ -118,7 +126,9 @@ impl<const D: usize> Pushing<'_, D> {
             Kind::Water(water) => {
                 let half = half_widths(&self.widths, chunk, p, cell);
                 let at = place(&chunk.position(p)).now;
-                let per_volume = water.force(at, &half, self.middle, &self.gravity);
+                let about = water.about(head(chunk, self.head, p, &load.origin));
+                let water = about.as_ref().unwrap_or(water);
+                let per_volume = water.force(at, &half, self.middle - load.start, &self.gravity);
                 (per_volume != [0.0; D]).then(|| per_volume.map(|force| volume(chunk, p) * force))
             }
             _ => {
@@ -153,6 +163,7 @@ impl<const D: usize> Solver<D> {
             all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
             displacement: physics.displacement_column(),
+            head: physics.head_column(),
             gravity: physics.gravity.at(middle),
             on_particles: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
             middle,

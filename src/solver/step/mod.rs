@@ -16,6 +16,7 @@
 //! | `walls` | gaps at faces and colliders; conditions of colliders on nodes |
 //! | `contact` | contact of particles with colliders |
 //! | [`between`] | contact between bodies |
+//! | `saturation` | pores fill with water: masses of particles |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
 //! | `sources` | material that enters during the run |
 //! | `ties` | surface nodes that move with the material beside them |
@@ -35,6 +36,7 @@ mod mean_dilation;
 pub mod node_update;
 pub mod p2g;
 pub mod relax;
+mod saturation;
 mod sources;
 mod surfaces;
 mod ties;

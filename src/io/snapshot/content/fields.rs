@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::averages::{self, principal};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
-use crate::io::snapshot::View;
+use crate::io::snapshot::{ShownWater, View};
 use crate::material::undrained::excess_pressure;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::followed::head;
 use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, symmetric, volume, volume_ratio};
 use crate::quantity::in_job;
@@ -123,6 +124,15 @@ fields! {
     /// Effective Cauchy stress, Pa: the stress without the excess pore pressure; components as those of
     /// `stress`.
     EffectiveStress, "effective_stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(effective_stress(view, chunk, p)));
+    /// Mean of the total stress with the sign changed, Pa: the pressure and that of the water in the pores.
+    TotalPressure, "total_pressure", "Pa", |view| scalars(view, |chunk, p| -mean(&total_stress(view, chunk, p)));
+    /// Total Cauchy stress, Pa: that of skeleton and water; components as those of `stress`.
+    TotalStress, "total_stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(total_stress(view, chunk, p)));
+    /// Head of the water in the pores, m along the vertical, where `[water]` has `seepage`; 0 elsewhere.
+    Head, "head", "m", |view| scalars(view, |chunk, p| {
+        let [_, column, ..] = followed(view, chunk);
+        head(chunk, column, p, &view.origin).map_or(0.0, |head| head.value)
+    });
     /// Volume over reference volume, det F.
     VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
 }
@@ -224,9 +234,9 @@ fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
 }
 
-/// Of a particle: first columns of the pressure of contact, of the total strain and of the displacement, as
-/// far as its leaf has them.
-fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usize>; 3] {
+/// Of a particle: first columns of what is followed, in the order of
+/// [`crate::particle::followed::Followed::columns`], as far as its leaf has them.
+fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usize>; 5] {
     view.followed.first_columns::<D>(chunk.carried_columns())
 }
 
@@ -256,9 +266,24 @@ fn excess_pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p:
 
 /// Pressure of the water in the pores, Pa.
 fn pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
+    given_pressure(view, chunk, p) + excess_pore_pressure(view, chunk, p)
+}
+
+/// Pressure of the water of `[water]`, Pa.
+fn given_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
+    let Some(ShownWater { water, since, gravity }) = &view.water else { return 0.0 };
+    let [_, column, ..] = followed(view, chunk);
+    let about = water.about(head(chunk, column, p, &view.origin));
     let place = in_job(&view.origin, &chunk.position(p));
-    let given = view.water.map_or(0.0, |(water, gravity)| water.pressure(place, view.time, &gravity));
-    given + excess_pore_pressure(view, chunk, p)
+    about.as_ref().unwrap_or(water).pressure(place, view.time - since, gravity)
+}
+
+/// Total Cauchy stress, Pa: the effective one less the pressure of the water in the pores.
+fn total_stress<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 6] {
+    let mut stress = cauchy_stress(chunk, p);
+    let pressure = given_pressure(view, chunk, p);
+    stress[..3].iter_mut().for_each(|normal| *normal -= pressure);
+    stress
 }
 
 /// Effective Cauchy stress, Pa.
@@ -278,7 +303,7 @@ fn displacement<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) 
 
 /// Total logarithmic strain.
 fn total_strain<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 6] {
-    let [_, first, _] = followed(view, chunk);
+    let [.., first, _] = followed(view, chunk);
     first.map_or([0.0; 6], |first| strain::logarithmic(D, &strain::read(chunk, first, p)))
 }
 

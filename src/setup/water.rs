@@ -1,0 +1,36 @@
+//! Water in the pores at the start of a run and of its stages.
+use partition::comm::{Comm, Disagreement};
+
+use super::seed::SeedError;
+use crate::job::Problem;
+use crate::solver::Solver;
+use crate::text::excerpt;
+
+/// Collective. Finds the heads of the water that seeps in the stage of a solver, and how full the pores of its
+/// particles are; the first particles of each own leaf, as many as `known`, know that already.
+///
+/// # Errors
+/// A head is held where there is no ground; the same on all ranks.
+pub(super) fn begin<const D: usize>(
+    comm: &Comm,
+    problem: &Problem<D>,
+    solver: &mut Solver<D>,
+    known: &[usize],
+) -> Result<(), Disagreement> {
+    solver.begin_saturation(known);
+    let held = solver.find_heads();
+    let empty = held.iter().position(|&nodes| nodes == 0);
+    comm.agree(empty.map_or(Ok(()), |head| Err(no_ground(problem, head))))?;
+    solver.wet_particles(solver.clock.time);
+    Ok(())
+}
+
+fn no_ground<const D: usize>(problem: &Problem<D>, head: usize) -> SeedError {
+    let name = problem.seepage.as_ref().map_or("", |seepage| &seepage.heads[head].name);
+    let place = problem.loads.iter().position(|load| load.water().is_some());
+    let place = place.map_or(String::new(), |load| problem.load_places[load].to_string());
+    SeedError::Head {
+        place: format!("{place}: water.seepage.heads[{head}]"),
+        head: excerpt(name, 60).into_owned(),
+    }
+}
