@@ -224,11 +224,11 @@ struct Motion<const D: usize> {
     reach: [f64; D],
 }
 
-/// Mass, position, velocity and affine matrix. `boxes` are the half widths of the members and the ways to their
-/// centres of mass along the first axis, m.
+/// Mass, position, velocity and affine matrix. `boxes` are the half widths of the members and the ways to
+/// their centres of mass along the first axis, m.
 ///
-/// A ring from several has the sum of the areas of their sections, `Σ m_c / r_c` for equal densities, and the sum
-/// of their volumes. Both are its own at the radius `M / Σ (m_c / r_c)`.
+/// A ring from several has the sum of the areas of their sections, `Σ m_c / r_c` for equal densities, and the
+/// sum of their volumes. Both are its own at the radius `M / Σ (m_c / r_c)`.
 fn mix_motion<const D: usize>(
     out: &mut Chunk<D>,
     number: usize,

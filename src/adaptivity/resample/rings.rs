@@ -1,8 +1,8 @@
 //! Rings: splits in axisymmetry.
 //!
-//! A ring at the radius r is the turn of its section, so its parts at `r ∓ o` have the shares `(1 ∓ o/r) / 2` of
-//! mass and volume: sections of equal area, which tile that of the whole. Velocity and affine matrix belong to
-//! the centre of mass, which is not the position, the centre of the section
+//! A ring at the radius r is the turn of its section, so its parts at `r ∓ o` have the shares
+//! `(1 ∓ o/r) / 2` of mass and volume: sections of equal area, which tile that of the whole. Velocity and
+//! affine matrix belong to the centre of mass, which is not the position, the centre of the section
 //! (`docs/design/axisymmetry.md`). So parts take the velocity of the affine field at their own centres of
 //! mass, and the mean of these is that of the whole.
 use super::cell_fit::spread_on_lattice;
@@ -14,8 +14,8 @@ use crate::particle::halvings;
 use crate::particle::volume::volume_ratio;
 use crate::simd::Vector;
 
-/// Masses of the two parts of a ring of a mass at a radius (m) that are at an offset (m, of either sign) before
-/// and behind it. Their sum is the mass to the last bit.
+/// Masses of the two parts of a ring of a mass at a radius (m) that are at an offset (m, of either sign)
+/// before and behind it. Their sum is the mass to the last bit.
 pub(super) fn masses(mass: f64, radius: f64, offset: f64) -> [f64; 2] {
     let more = if radius > 0.0 { (offset / radius).clamp(-1.0, 1.0) } else { 0.0 };
     let (first, second) = opposite(0.5 * mass, 0.5 * mass * more);
@@ -148,8 +148,8 @@ fn along_radius(radius: f64, half: f64, cell: f64) -> f64 {
     of_ring + ((integral(radius + half) - integral(radius - half)) / (2.0 * half * radius)).max(0.0)
 }
 
-/// Half width of the undeformed section of the space of a ring, m, whose stretch in the plane of the section is
-/// `e + 1` (see [`crate::particle::strain`]): of one that the stretch makes as large as the ring's section.
+/// Half width of the undeformed section of the space of a ring, m, whose stretch in the plane of the section
+/// is `e + 1` (see [`crate::particle::strain`]): of one that the stretch makes as large as the ring's section.
 pub(super) fn space<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize, b: &[f64; 6]) -> f64 {
     let [half] = chunk.read(Layout::<D>::HALF, p);
     let ratio = volume_ratio(chunk, p);

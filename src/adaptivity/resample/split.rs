@@ -20,9 +20,10 @@ pub struct Split {
 /// `spreads` has the second moments D of the weights of each listed particle in the grid that last gave it
 /// its affine matrix, m² (see [`crate::kernel::spread`]); only APIC uses them. Children lie at the quarter
 /// points of the particle's box, so that their boxes tile it. Each gets an equal share of the columns carried
-/// for loads (rings: see `rings.rs`). Mass, volume and centre of mass are conserved bit for bit, momentum where the affine part of a
-/// child's velocity is not greater than the rest (else to round-off), angular momentum to round-off. `book`
-/// receives the kinetic energy that each split adds, J, which is taken from the affine part.
+/// for loads (rings: see `rings.rs`). Mass, volume and centre of mass are conserved bit for bit, momentum
+/// where the affine part of a child's velocity is not greater than the rest (else to round-off), angular
+/// momentum to round-off. `book` receives the kinetic energy that each split adds, J, which is taken from the
+/// affine part.
 pub fn split<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
