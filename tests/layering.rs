@@ -1,5 +1,6 @@
 //! Claim: folders of `src/` are floors, and nothing imports from a floor above its own. The list of floors is
-//! that of `ARCHITECTURE.md`, so the map there is the one that the compiler's input follows.
+//! that of `ARCHITECTURE.md`, so the map there is the one that the compiler's input follows. Tests start MPI in
+//! processes of their own.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -232,4 +233,17 @@ fn an_upward_import_is_found() {
     assert_eq!(check("fn f() {\n    crate::high::f();\n}"), 1);
     assert_eq!(check("// use crate::high::Thing;\nuse self::part;"), 0);
     assert_eq!(check("#[cfg(test)]\nmod tests {\n    use crate::high::Thing;\n}"), 0);
+}
+
+/// MPI changes the environment of its process as it starts, and another thread that starts a program meanwhile
+/// would read freed memory. So tests start MPI in processes of their own alone.
+#[test]
+fn tests_start_mpi_in_processes_of_their_own() {
+    let own = ["common/relaunch.rs", "common/scenarios.rs", "all/io_files.rs", "layering.rs"];
+    let mut sources = Sources::new();
+    read_sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests"), "", &mut sources);
+    let starts =
+        |(name, text): &(&String, &String)| text.contains("World::init") && !own.contains(&name.as_str());
+    let others: Vec<_> = sources.iter().filter(starts).map(|(name, _)| name).collect();
+    assert!(others.is_empty(), "{others:?} start MPI: use ran_if_launched and relaunch");
 }

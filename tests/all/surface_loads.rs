@@ -4,12 +4,13 @@
 
 use crate::common::history::History;
 use crate::common::launch::{agimp, run, succeed};
+use crate::common::relaunch::{ran_if_launched, relaunch};
 use crate::common::restart;
 use agimp::exact_sum::ExactSum;
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::setup;
 use agimp::solver::{Requests, Solver};
-use partition::comm::World;
+use partition::comm::Comm;
 
 /// A rubber block, free in space, and what `rest` adds. Its faces lie on those of the particles' boxes.
 fn block(tree: &str, rest: &str) -> String {
@@ -115,10 +116,15 @@ fn carried(solver: &Solver<2>, column: usize) -> f64 {
 /// Areas: exact at the start, kept by all changes of the tree; work is force times way, particle by particle.
 #[test]
 fn areas_are_kept_and_work_is_force_times_way() {
-    let world = World::init().expect("MPI");
+    if !ran_if_launched(keeps_areas) {
+        relaunch(module_path!(), "areas_are_kept_and_work_is_force_times_way", 1, 100);
+    }
+}
+
+fn keeps_areas(comm: &Comm) {
     for (tree, rest) in [("", ""), (REFINED, ""), ("", DYNAMIC)] {
         let problem = problem(&with_speed(&block(tree, &format!("{LOADS}{rest}"))));
-        let mut solver = setup::solver(world.comm(), &problem).unwrap_or_else(|error| panic!("{error}"));
+        let mut solver = setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"));
         // Columns: area of `pull`; area vectors of `dead` and of `wind`; shares of `push`.
         let start = [0.2, 0.0, 0.2, 0.0, -0.2, 1.0];
         let check = |solver: &Solver<2>, columns: &[usize]| {
