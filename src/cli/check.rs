@@ -75,7 +75,8 @@ fn report<const D: usize>(
     if !estimate.is_cut {
         (0..problem.stages.len()).try_for_each(|stage| check_counts(problem, &estimate.particles, stage))?;
     }
-    let needs_particles = problem.adaptivity.is_some() || problem.loads.iter().any(|l| l.carried().is_some());
+    let carries = problem.loads.iter().any(|load| load.carried().is_some());
+    let needs_particles = problem.adaptivity.is_some() || problem.seepage.is_some() || carries;
     let is_moderate = !estimate.is_cut && estimate.memory < MOST_MEMORY;
     // MPI takes a moment to start, and jobs of about a second need no measurement.
     let is_short = estimate.wall_time(1) + SHORTEST_STEP * estimate.steps < SHORT;

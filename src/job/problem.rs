@@ -227,11 +227,6 @@ impl<const D: usize> Problem<D> {
         loads.find_map(|(load, stages)| load.water().filter(|_| stages.has(stage)))
     }
 
-    /// Whether ground has other densities below and above the water table.
-    pub fn has_wet_densities(&self) -> bool {
-        self.water().is_some() && self.materials.iter().any(|m| m.saturated_density != m.density)
-    }
-
     /// Whether stages or the run end at an equilibrium.
     pub fn has_equilibrium(&self) -> bool {
         self.stages.iter().any(|stage| stage.equilibrium.is_some())

@@ -7,6 +7,8 @@
 //! so no surface needs to be known, water above the ground loads it, and a submerged body is buoyant. The mean
 //! of ∇p over a box is the difference of p between its faces over its width, also where the water table
 //! passes through the box. So material whose weight the water bears is at rest to round-off.
+use std::borrow::Cow;
+
 use super::Up;
 use crate::quantity::Quantity;
 
@@ -62,9 +64,12 @@ impl Water {
         }
     }
 
-    /// The same water about a particle that carries this head; nothing where the job gives the pressure.
-    pub fn about(&self, head: Option<Head>) -> Option<Self> {
-        matches!(self.given, Given::Seepage(_)).then(|| Self { given: Given::Seepage(head), ..*self })
+    /// The water about a particle that carries this head, where it seeps; else the same.
+    pub fn about(&self, head: Option<Head>) -> Cow<'_, Self> {
+        match self.given {
+            Given::Seepage(_) => Cow::Owned(Self { given: Given::Seepage(head), ..*self }),
+            Given::Level(_) | Given::Pressure(_) => Cow::Borrowed(self),
+        }
     }
 
     /// Level to which the water rises from a place, m, if it follows from one.
@@ -204,13 +209,14 @@ mod tests {
         assert_eq!(dry.pressure([0.0; 3], 0.0, &[0.0, -10.0]), 0.0);
         assert_eq!(dry.share_below([0.0; 3], 1.0, 0.0), 0.0);
         let head = Head { place: [1.0, 0.0, 0.0], value: 2.0, gradient: [-0.5, 0.25, 0.0] };
-        let wet = dry.about(Some(head)).expect("seepage");
+        let wet = dry.about(Some(head));
         assert_eq!(wet.pressure([1.0, 0.0, 0.0], 0.0, &[0.0, -10.0]), 2e4);
         assert_eq!(wet.force([1.0, 0.0, 0.0], &[0.5, 0.5], 0.0, &[0.0, -10.0]), [5e3, 7.5e3]);
         // Head and height meet where 2 + y / 4 = y.
         let share = wet.share_below([1.0, 8.0 / 3.0, 0.0], 0.5, 0.0);
         assert!((share - 0.5).abs() < 1e-14, "{share}");
-        assert!(water(Given::Level(Quantity::Constant(1.0))).about(Some(head)).is_none());
+        let given = water(Given::Level(Quantity::Constant(1.0)));
+        assert_eq!(given.about(Some(head)).pressure([0.0; 3], 0.0, &[0.0, -10.0]), 1e4);
     }
 
     /// Without suction pores above the table have no pressure; with it they have one down to its bound.

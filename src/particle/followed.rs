@@ -29,10 +29,24 @@ pub enum Motion {
     Strain,
 }
 
+/// First columns of what is followed; `None` where particles do not carry it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FirstColumns {
+    /// Of [`Followed::contact_pressure`].
+    pub contact_pressure: Option<usize>,
+    /// Of [`Followed::head`].
+    pub head: Option<usize>,
+    /// Of [`Followed::saturation`].
+    pub saturation: Option<usize>,
+    /// Of the total strain (see [`strain`]).
+    pub strain: Option<usize>,
+    /// Of the displacement.
+    pub displacement: Option<usize>,
+}
+
 impl Followed {
-    /// Columns of the pressure of contact, of the head and the saturation, of the total strain (see
-    /// [`strain`]), and of the displacement, in their order.
-    pub fn columns<const D: usize>(self) -> [usize; 5] {
+    /// Columns of all that is followed, in the order of [`FirstColumns`].
+    fn columns<const D: usize>(self) -> [usize; 5] {
         let [strain, displacement] = match self.motion {
             Motion::Nothing => [0, 0],
             Motion::Displacement => [0, D],
@@ -42,18 +56,24 @@ impl Followed {
         [usize::from(self.contact_pressure), head, usize::from(self.saturation), strain, displacement]
     }
 
+    /// Number of columns.
+    pub fn count<const D: usize>(self) -> usize {
+        self.columns::<D>().iter().sum()
+    }
+
     /// Columns that follow the motion of particles, the last ones.
     pub fn motion_columns<const D: usize>(self) -> usize {
         let [.., strain, displacement] = self.columns::<D>();
         strain + displacement
     }
 
-    /// First columns of the same among `carried` columns, of which they are the last; `None` for those that
-    /// particles do not carry.
-    pub fn first_columns<const D: usize>(self, carried: usize) -> [Option<usize>; 5] {
+    /// First columns among `carried` columns, of which they are the last.
+    pub fn first_columns<const D: usize>(self, carried: usize) -> FirstColumns {
         let columns = self.columns::<D>();
         let behind = |which: usize| columns[which..].iter().sum::<usize>();
-        std::array::from_fn(|which| carried.checked_sub(behind(which)).filter(|_| columns[which] > 0))
+        let [contact_pressure, head, saturation, strain, displacement] =
+            std::array::from_fn(|which| carried.checked_sub(behind(which)).filter(|_| columns[which] > 0));
+        FirstColumns { contact_pressure, head, saturation, strain, displacement }
     }
 }
 
@@ -87,12 +107,15 @@ mod tests {
         let all = Followed { contact_pressure: true, head: true, saturation: true, motion: Motion::Strain };
         let [pressure, head, saturation, strain, displacement] = all.columns::<3>();
         assert_eq!((pressure, head, saturation, displacement), (1, 4, 1, 3));
-        let first = all.first_columns::<3>(20);
-        let behind = [9, 8, 4, 3].map(|columns| Some(20 - columns - strain));
-        assert_eq!(first, [behind[0], behind[1], behind[2], behind[3], Some(17)]);
-        assert_eq!(all.first_columns::<3>(0), [None; 5]);
+        let [contact_pressure, head, saturation, first] =
+            [9, 8, 4, 3].map(|columns| Some(20 - columns - strain));
+        let expected =
+            FirstColumns { contact_pressure, head, saturation, strain: first, displacement: Some(17) };
+        assert_eq!(all.first_columns::<3>(20), expected);
+        assert_eq!(all.first_columns::<3>(0), FirstColumns::default());
         let pressure = Followed { contact_pressure: true, ..Followed::default() };
-        assert_eq!(pressure.first_columns::<2>(3), [Some(2), None, None, None, None]);
+        let expected = FirstColumns { contact_pressure: Some(2), ..FirstColumns::default() };
+        assert_eq!(pressure.first_columns::<2>(3), expected);
     }
 
     /// The head is linear in the place, wherever the particle is.

@@ -65,7 +65,7 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
         AXES[..D].iter().for_each(|axis| columns.push((format!("fed_{}{axis}", source.name), "kg m/s")));
         columns.push((format!("fed_energy_{}", source.name), "J"));
     }
-    if problem.has_wet_densities() {
+    if problem.output.followed.saturation {
         columns.push(("pore_water".to_owned(), "kg"));
         AXES[..D].iter().for_each(|axis| columns.push((format!("pore_water{axis}"), "kg m/s")));
         columns.push(("pore_water_energy".to_owned(), "J"));

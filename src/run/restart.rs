@@ -37,6 +37,16 @@ pub enum From {
     File(PathBuf),
 }
 
+impl From {
+    /// Not collective. Whether the file lies in this directory, that of the results of the run.
+    pub fn is_in(&self, directory: &Path) -> bool {
+        let Self::File(path) = self else { return true };
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let [own, other] = [parent.unwrap_or(Path::new(".")), directory].map(Path::canonicalize);
+        own.is_ok_and(|own| other.is_ok_and(|other| own == other))
+    }
+}
+
 /// Name of the counter that holds the number of the next output.
 pub const NEXT_OUTPUT: &str = "next_output";
 /// Name of the counter that holds the step of the last output.
@@ -50,6 +60,9 @@ const STAGES: &str = "stages";
 const CROSSINGS: [&str; 3] = ["put_back", "deleted", "left"];
 /// Names of the masses deleted and left.
 const CROSSED_MASSES: [&str; 2] = ["deleted_mass", "left_mass"];
+
+/// Name of the counter of the solutions of seepage that did not settle.
+const UNSETTLED: &str = "unsettled_heads";
 
 /// Optional contents of output files.
 pub fn options<const D: usize>(problem: &Problem<D>) -> snapshot::Options {
@@ -73,6 +86,9 @@ pub fn scalars<const D: usize>(
     let numbers = [crossings.put_back, crossings.deleted, crossings.left];
     counts.extend(CROSSINGS.iter().map(|name| String::from(*name)).zip(numbers));
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
+    if solver.physics.seepage.is_some() {
+        counts.push((UNSETTLED.into(), solver.unsettled_heads));
+    }
     let mut reals = vec![(BOUND.into(), solver.clock.bound)];
     let starts = &solver.physics.stage_starts;
     counts.push((STAGES.into(), starts.len() as u64));
@@ -387,6 +403,7 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of the relaxation to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
+    solver.unsettled_heads = header.scalars.count(UNSETTLED).unwrap_or(0);
     let pieces = |body| header.scalars.count(&pieces_name(body));
     solver.pieces_before = (0..problem.bodies.len()).map_while(pieces).collect();
     restore_crossings(comm.rank(), &mut solver, &header.scalars)

@@ -20,7 +20,9 @@ pub(super) fn begin<const D: usize>(
     solver.begin_saturation(known);
     let held = solver.find_heads();
     let empty = held.iter().position(|&nodes| nodes == 0);
-    comm.agree(empty.map_or(Ok(()), |head| Err(no_ground(problem, head))))?;
+    let fault = solver.physics.not_finite().map(SeedError::from);
+    let fault = fault.or_else(|| empty.map(|head| no_ground(problem, head)));
+    comm.agree(fault.map_or(Ok(()), Err))?;
     solver.wet_particles(solver.clock.time);
     Ok(())
 }

@@ -8,7 +8,7 @@ use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
 use crate::material::Material;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::followed::Followed;
+use crate::particle::followed::{FirstColumns, Followed};
 use crate::particle::group::Group;
 use crate::particle::strain;
 use crate::quantity::{NotFinite, Quantity};
@@ -112,8 +112,9 @@ impl<const D: usize> Physics<D> {
     /// The first quantity that has had no finite value where it was needed, if there is one.
     pub(crate) fn not_finite(&self) -> Option<NotFinite> {
         let loads = self.loads.iter().flat_map(Load::quantities);
+        let heads = self.seepage.iter().flat_map(|seepage| &seepage.heads).map(|head| &head.level);
         let faces = self.absorbing.as_flattened().iter().flatten().map(|face| &face.pressure);
-        self.gravity.acceleration.iter().chain(loads).chain(faces).find_map(Quantity::not_finite)
+        self.gravity.acceleration.iter().chain(loads).chain(heads).chain(faces).find_map(Quantity::not_finite)
     }
 
     /// Gives colliders that deform the shape that they have at a time (s): that of a step is the one at its
@@ -124,11 +125,11 @@ impl<const D: usize> Physics<D> {
 
     /// Number of carried columns: for loads, of the stretch between neighbours, then of the particles' past.
     pub fn carried_columns(&self) -> usize {
-        self.followed_column() + self.followed.columns::<D>().iter().sum::<usize>()
+        self.followed_column() + self.followed.count::<D>()
     }
 
-    /// First columns of what is followed, in the order of [`Followed::columns`], as far as particles carry it.
-    fn followed_columns(&self) -> [Option<usize>; 5] {
+    /// First columns of what is followed.
+    pub(crate) fn followed_columns(&self) -> FirstColumns {
         self.followed.first_columns::<D>(self.carried_columns())
     }
 
@@ -149,8 +150,7 @@ impl<const D: usize> Physics<D> {
     pub(crate) fn tensor_columns(&self) -> Vec<usize> {
         let (loads, followed) = (self.load_columns(), self.followed_column());
         let gaps = (followed > loads).then_some(loads);
-        let [.., strain, _] = self.followed_columns();
-        gaps.into_iter().chain(strain).collect()
+        gaps.into_iter().chain(self.followed_columns().strain).collect()
     }
 
     /// Mass with which the material on cells of a level moves, over its own; `None` without mass scaling. A
@@ -198,30 +198,6 @@ impl<const D: usize> Physics<D> {
     /// masses of nodes then.
     pub(in crate::solver) fn keeps_volumes(&self) -> bool {
         self.has_fluids() && !self.has_scaled_masses()
-    }
-
-    /// First column of the displacement that particles carry, if they do.
-    pub(crate) fn displacement_column(&self) -> Option<usize> {
-        let [.., displacement] = self.followed_columns();
-        displacement
-    }
-
-    /// Column of the pressure of contact that particles carry, if they do.
-    pub(crate) fn contact_pressure_column(&self) -> Option<usize> {
-        let [pressure, ..] = self.followed_columns();
-        pressure
-    }
-
-    /// First column of the head of the water, if particles carry it.
-    pub(crate) fn head_column(&self) -> Option<usize> {
-        let [_, head, ..] = self.followed_columns();
-        head
-    }
-
-    /// Column of the share of the pores that the water fills, if particles carry it.
-    pub(crate) fn saturation_column(&self) -> Option<usize> {
-        let [_, _, saturation, ..] = self.followed_columns();
-        saturation
     }
 
     /// The water in the pores with its load, where it acts at a time, s.

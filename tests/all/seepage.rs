@@ -218,3 +218,29 @@ fn same_bits_on_any_ranks_and_across_restart() {
         fields = ['pore_pressure', 'head', 'total_stress']\n";
     restart::assert_same_on_any_ranks(text, "seepage", |_, _| {});
 }
+
+/// A level without a finite value is named with its key; it does not count as open ground.
+#[test]
+fn a_level_without_a_value_is_named() {
+    let water = "[water.seepage]\nheads = [{ name = 'a', face = 'x_min', level = 'ln(y - 2)' }, { name = 'b', face = 'x_max', level = 0.1 }]";
+    let text = job(
+        "size = [1, 1]\nroot_edge = 0.5",
+        "",
+        &soil("soil", 1e-4, [1800.0; 2]),
+        &body("ground", "soil", [0.0; 2], [1.0, 0.5]),
+        "[time]\nend = 0.1\n",
+    )
+    .replace("[water]\n", water);
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("ground.toml");
+    std::fs::write(&path, text).expect("job");
+    for command in ["check", "run"] {
+        let output = agimp(directory.path()).arg(command).arg(&path).output().expect("starts");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(
+            told.contains("water.seepage.heads[0].level: found the value NaN of \"ln(y - 2)\""),
+            "{told}"
+        );
+    }
+}

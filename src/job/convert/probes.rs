@@ -93,8 +93,8 @@ pub(super) fn fluxes<const D: usize>(
                 None
             }
             (None, None, Some(face)) => {
-                let face = face as usize;
-                Some(Section::Face { axis: face / 2, side: face % 2 })
+                let (axis, side) = face.axis_and_side();
+                Some(Section::Face { axis, side })
             }
             _ => {
                 let message =

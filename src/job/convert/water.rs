@@ -108,9 +108,6 @@ pub(super) fn seepage<const D: usize>(
             checks.fault(&root.key("bodies").index(i).key("stress"), message.into());
         }
     }
-    if written.heads.is_empty() {
-        checks.fault(&path.key("heads"), "found an empty array; expected at least one head".into());
-    }
     let mut heads = Vec::new();
     for (i, head) in written.heads.iter().enumerate() {
         let here = path.key("heads").index(i);
@@ -140,12 +137,15 @@ fn held<const D: usize>(
     path: &Path,
 ) -> Option<HeldHead<D>> {
     let region = match (written.face, &written.shape) {
-        (Some(face), None) if face as usize >= 2 * D => {
+        (Some(face), None) if face.axis_and_side().0 >= D => {
             let message = "found a face along z in a 2D job; expected a face along x or y";
             checks.fault(&path.key("face"), message.into());
             return None;
         }
-        (Some(face), None) => HeldRegion::Face { axis: face as usize / 2, side: face as usize % 2 },
+        (Some(face), None) => {
+            let (axis, side) = face.axis_and_side();
+            HeldRegion::Face { axis, side }
+        }
         (None, Some(shape)) => HeldRegion::Shape(checks.shape(shape, space, &path.key("shape"))?),
         (face, _) => {
             let found = if face.is_some() { "both `face` and `shape`" } else { "neither `face` nor `shape`" };

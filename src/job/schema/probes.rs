@@ -98,6 +98,13 @@ pub enum FaceName {
     ZMax,
 }
 
+impl FaceName {
+    /// Its axis, and its side: 0 for the lower face, 1 for the upper one.
+    pub fn axis_and_side(self) -> (usize, usize) {
+        (self as usize / 2, self as usize % 2)
+    }
+}
+
 /// Points at equal distances on a line at which the material is shown, with a row for each in `JOB.line_NAME.csv` whenever
 /// `history.csv` has one. Values are means over the particles within a cell of the point, weighted by max(0, 1 - distance / edge of the
 /// cell) along each axis. Means are `NaN` where there is no material.

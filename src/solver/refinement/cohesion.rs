@@ -54,7 +54,7 @@ impl<const D: usize> Solver<D> {
         let (start, phases) = (Instant::now(), self.phases);
         let scheme = self.physics.scheme();
         let (extent, root_edge) = (self.grid.plan.extent(), self.physics.root_edge);
-        let (nominal, displacement) = (&cohesion.nominal[..], self.physics.displacement_column());
+        let (nominal, displacement) = (&cohesion.nominal[..], self.physics.followed_columns().displacement);
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.maxima);
         let done = leaves.with_min_len(16).map(|((chunk, leaf), maxima)| {
             let setting =

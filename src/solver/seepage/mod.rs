@@ -33,7 +33,7 @@ impl<const D: usize> Solver<D> {
         let (Some(seepage), Some((load, water))) = (&physics.seepage, physics.water_at(clock.time)) else {
             return Vec::new();
         };
-        let column = physics.head_column().unwrap_or(0);
+        let column = physics.followed_columns().head.unwrap_or(0);
         let (carried, count) = (physics.carried_columns(), seepage.heads.len());
         let held = Held { seepage, origin: &physics.origin, time: clock.time - load.start, up: water.up };
         let colliders = physics.colliders.iter().zip(&contacts.states);

@@ -126,8 +126,7 @@ impl<const D: usize> Pushing<'_, D> {
             Kind::Water(water) => {
                 let half = half_widths(&self.widths, chunk, p, cell);
                 let at = place(&chunk.position(p)).now;
-                let about = water.about(head(chunk, self.head, p, &load.origin));
-                let water = about.as_ref().unwrap_or(water);
+                let water = water.about(head(chunk, self.head, p, &load.origin));
                 let per_volume = water.force(at, &half, self.middle - load.start, &self.gravity);
                 (per_volume != [0.0; D]).then(|| per_volume.map(|force| volume(chunk, p) * force))
             }
@@ -162,8 +161,8 @@ impl<const D: usize> Solver<D> {
             widths: physics.widths(plan),
             all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
-            displacement: physics.displacement_column(),
-            head: physics.head_column(),
+            displacement: physics.followed_columns().displacement,
+            head: physics.followed_columns().head,
             gravity: physics.gravity.at(middle),
             on_particles: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
             middle,
@@ -221,7 +220,7 @@ impl<const D: usize> Solver<D> {
     /// Collective. Number and area of the particles that carry each load, and its force when it begins, or
     /// now if it has begun.
     pub fn carried_totals(&self) -> Vec<CarriedTotals> {
-        let (mut all, moved) = (Vec::new(), self.physics.displacement_column());
+        let (mut all, moved) = (Vec::new(), self.physics.followed_columns().displacement);
         let widths = self.physics.widths(&self.grid.plan);
         for load in &self.physics.loads {
             let Some(carried) = load.carried() else { continue };

@@ -199,7 +199,7 @@ impl<const D: usize> Solver<D> {
             following: &following,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
             barrier: Barrier::new(&self.physics, plan.extent()),
-            displacement: self.physics.displacement_column(),
+            displacement: self.physics.followed_columns().displacement,
             tensors: self.physics.tensor_columns(),
             conveyors: conveyors(&self.physics, self.clock.time),
             openings: self.crossings.fluxes.openings(),

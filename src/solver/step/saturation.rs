@@ -38,7 +38,7 @@ struct Table<'a, const D: usize> {
 impl<'a, const D: usize> Table<'a, D> {
     fn at(physics: &'a Physics<D>, plan: &'a GridPlan<D>, time: f64) -> Self {
         let (widths, water) = (physics.widths(plan), physics.water_at(time));
-        Self { physics, widths, water, head: physics.head_column(), time }
+        Self { physics, widths, water, head: physics.followed_columns().head, time }
     }
 
     /// Share of the box of a particle below the table, in a leaf with cells of this edge, m.
@@ -47,7 +47,7 @@ impl<'a, const D: usize> Table<'a, D> {
         let about = water.about(head(chunk, self.head, p, &self.physics.origin));
         let half = half_widths(&self.widths, chunk, p, cell)[water.up.axis];
         let place = load.place(&chunk.position(p), &[0.0; D]).now;
-        about.as_ref().unwrap_or(water).share_below(place, half, self.time - load.start)
+        about.share_below(place, half, self.time - load.start)
     }
 
     /// Density of the material of a particle with full pores over that without water.
@@ -60,7 +60,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Notes how full the pores of new particles are, whose masses say so already; the first
     /// ones in each own leaf, as many as `known`, know that. Water that seeps has not come yet.
     pub fn begin_saturation(&mut self, known: &[usize]) {
-        let Some(column) = self.physics.saturation_column() else {
+        let Some(column) = self.physics.followed_columns().saturation else {
             return;
         };
         let table = Table::at(&self.physics, &self.grid.plan, self.clock.time);
@@ -81,7 +81,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Gives particles the masses that they have with the water at a time, s, and books what
     /// has come; not at the start of a run, which begins with it.
     pub fn wet_particles(&mut self, time: f64) {
-        let Some(column) = self.physics.saturation_column() else {
+        let Some(column) = self.physics.followed_columns().saturation else {
             return;
         };
         let table = Table::at(&self.physics, &self.grid.plan, time);

@@ -8,7 +8,7 @@ use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::io::snapshot::{ShownWater, View};
 use crate::material::undrained::excess_pressure;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::followed::head;
+use crate::particle::followed::{FirstColumns, head};
 use crate::particle::strain;
 use crate::particle::volume::{cauchy_stress, symmetric, volume, volume_ratio};
 use crate::quantity::in_job;
@@ -130,8 +130,7 @@ fields! {
     TotalStress, "total_stress", "Pa", |view| each(view, 6, |chunk, p, out| out.extend(total_stress(view, chunk, p)));
     /// Head of the water in the pores, m along the vertical, where `[water]` has `seepage`; 0 elsewhere.
     Head, "head", "m", |view| scalars(view, |chunk, p| {
-        let [_, column, ..] = followed(view, chunk);
-        head(chunk, column, p, &view.origin).map_or(0.0, |head| head.value)
+        head(chunk, followed(view, chunk).head, p, &view.origin).map_or(0.0, |head| head.value)
     });
     /// Volume over reference volume, det F.
     VolumeRatio, "volume_ratio", "", |view| scalars(view, volume_ratio);
@@ -234,9 +233,8 @@ fn velocity<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; 3] {
     std::array::from_fn(|axis| if axis < D { chunk.column(Layout::<D>::VELOCITY + axis)[p] } else { 0.0 })
 }
 
-/// Of a particle: first columns of what is followed, in the order of
-/// [`crate::particle::followed::Followed::columns`], as far as its leaf has them.
-fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> [Option<usize>; 5] {
+/// First columns of what is followed, as far as the leaf has them.
+fn followed<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>) -> FirstColumns {
     view.followed.first_columns::<D>(chunk.carried_columns())
 }
 
@@ -247,8 +245,7 @@ fn carried<const D: usize>(chunk: &Chunk<D>, column: Option<usize>, p: usize) ->
 
 /// Mean pressure of contact with other bodies, Pa.
 fn contact_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
-    let [pressure, ..] = followed(view, chunk);
-    carried(chunk, pressure, p)
+    carried(chunk, followed(view, chunk).contact_pressure, p)
 }
 
 /// Pressure of water that cannot leave the pores, since consolidation, Pa.
@@ -272,10 +269,9 @@ fn pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize)
 /// Pressure of the water of `[water]`, Pa.
 fn given_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
     let Some(ShownWater { water, since, gravity }) = &view.water else { return 0.0 };
-    let [_, column, ..] = followed(view, chunk);
-    let about = water.about(head(chunk, column, p, &view.origin));
+    let head = head(chunk, followed(view, chunk).head, p, &view.origin);
     let place = in_job(&view.origin, &chunk.position(p));
-    about.as_ref().unwrap_or(water).pressure(place, view.time - since, gravity)
+    water.about(head).pressure(place, view.time - since, gravity)
 }
 
 /// Total Cauchy stress, Pa: the effective one less the pressure of the water in the pores.
@@ -296,15 +292,16 @@ fn effective_stress<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usi
 
 /// Displacement with three components.
 fn displacement<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 3] {
-    let [.., first] = followed(view, chunk);
+    let first = followed(view, chunk).displacement;
     let component = |axis: usize| carried(chunk, first.map(|first| first + axis), p);
     std::array::from_fn(|axis| if axis < D { component(axis) } else { 0.0 })
 }
 
 /// Total logarithmic strain.
 fn total_strain<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> [f64; 6] {
-    let [.., first, _] = followed(view, chunk);
-    first.map_or([0.0; 6], |first| strain::logarithmic(D, &strain::read(chunk, first, p)))
+    followed(view, chunk)
+        .strain
+        .map_or([0.0; 6], |first| strain::logarithmic(D, &strain::read(chunk, first, p)))
 }
 
 /// Magnitude of the velocity, m/s.

@@ -81,7 +81,7 @@ impl<const D: usize> Solver<D> {
             hats: &grid.hats,
             contacts: &self.physics.body_contacts,
             coordinates: self.physics.coordinates,
-            finds_forces: self.physics.contact_pressure_column().is_some(),
+            finds_forces: self.physics.followed_columns().contact_pressure.is_some(),
             dt,
         };
         let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {

@@ -13,7 +13,7 @@ const LAST: f64 = 0.05;
 impl<const D: usize> Solver<D> {
     /// Not collective. Reduces the mean of the pressure by one step, before the step adds its share.
     pub(super) fn fade_pressures(&mut self) {
-        let Some(column) = self.physics.contact_pressure_column() else { return };
+        let Some(column) = self.physics.followed_columns().contact_pressure else { return };
         let chunks = self.chunks.par_iter_mut().with_min_len(64);
         let carrying = chunks.filter(|chunk| chunk.carried_columns() > column);
         carrying.for_each(|chunk| chunk.carried_mut(column).iter_mut().for_each(|mean| *mean *= 1.0 - LAST));
@@ -22,7 +22,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Gives particles near nodes where bodies meet the pressure `Σ w F / Σ w A` of the
     /// normal forces F on areas A there.
     pub(super) fn carry_pressures(&mut self, forces: &[NormalForce]) {
-        let Some(column) = self.physics.contact_pressure_column() else { return };
+        let Some(column) = self.physics.followed_columns().contact_pressure else { return };
         let mut all = std::mem::take(&mut self.grid.solids);
         for (field, solids) in all.iter_mut().enumerate() {
             let at_nodes = self.at_particles(solids, forces.iter().filter(|at| at.field == field));
