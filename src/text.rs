@@ -2,6 +2,7 @@
 //!
 //! Files for machines (history, telemetry, CSV) keep every digit and do not go through here.
 use std::borrow::Cow;
+use std::path::Path;
 
 /// Significant digits of a measured or computed quantity by default.
 const DIGITS: usize = 4;
@@ -123,6 +124,22 @@ pub fn count(count: u64) -> String {
         out.push(digit);
     }
     out
+}
+
+/// A count of things: `1 row`, `2 rows`.
+pub fn counted(number: u64, thing: &str) -> String {
+    format!("{} {thing}{}", count(number), if number == 1 { "" } else { "s" })
+}
+
+/// A path quoted such that a shell takes it for one word, and no program for an option.
+pub fn shell_word(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let text = if text.starts_with('-') { format!("./{text}").into() } else { text };
+    let is_plain = |c: char| c.is_alphanumeric() || "_./+-,=:@%".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
 }
 
 /// The number of one of a row, from 1: `1st`, `2nd`, `3rd`, `4th`, `11th`, `23rd`.
@@ -275,6 +292,19 @@ mod tests {
     }
 
     #[test]
+    fn paths_are_one_word_for_a_shell() {
+        for (path, word) in [
+            ("out/a_b/µ-1.hdf", "out/a_b/µ-1.hdf"),
+            ("my out/a.hdf", "'my out/a.hdf'"),
+            ("it's", "'it'\\''s'"),
+            ("-x", "./-x"),
+            ("$HOME", "'$HOME'"),
+        ] {
+            assert_eq!(shell_word(Path::new(path)), word);
+        }
+    }
+
+    #[test]
     fn ordinals_have_their_endings() {
         let all: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 22, 103, 111, 1012].map(ordinal).into();
         assert_eq!(all.join(" "), "1st 2nd 3rd 4th 11th 12th 13th 21st 22nd 103rd 111th 1012th");
@@ -314,6 +344,7 @@ mod tests {
     fn counts_bytes_and_wall_times() {
         assert_eq!(count(0), "0");
         assert_eq!(count(1_234_567), "1 234 567");
+        assert_eq!([0, 1, 1200].map(|n| counted(n, "row")), ["0 rows", "1 row", "1 200 rows"]);
         assert_eq!(bytes(999.0), "999 B");
         assert_eq!(bytes(54_400_000.0), "54.4 MB");
         assert_eq!(bytes(2e18), "2000.0 PB");

@@ -95,6 +95,9 @@ pub enum Failure {
     /// The run has stopped on request and written a checkpoint.
     #[error("stopped on request; continue with --restart {}", .0.display())]
     Stopped(std::path::PathBuf),
+    /// The run has stopped on request before its first step.
+    #[error("{}", crate::run::RunError::Stopped)]
+    StoppedBefore,
     /// The sweep and its run have stopped on request.
     #[error("stopped on request; the same command continues")]
     SweepStopped,
@@ -114,7 +117,7 @@ impl Failure {
             Self::Run(_) => 1,
             Self::Arguments(error) => error.exit_code() as u8,
             Self::Reported(code) => *code,
-            Self::Stopped(_) | Self::SweepStopped => crate::run::stop::STOPPED,
+            Self::Stopped(_) | Self::StoppedBefore | Self::SweepStopped => crate::run::stop::STOPPED,
         }
     }
 }

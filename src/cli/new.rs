@@ -2,7 +2,7 @@
 use super::Failure;
 use crate::io::whole_file::write_whole;
 use crate::job::{self, Settings};
-use crate::text::{excerpt, nearest};
+use crate::text::{excerpt, nearest, shell_word};
 use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::fs::OpenOptions;
@@ -121,7 +121,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(&path).map_err(failure)?;
     // Editors look for the schema beside the job.
     file.write_all(format!("#:schema ./{SCHEMA}\n{text}").as_bytes()).map_err(failure)?;
-    writeln!(out, "{} written; next: agimp check {0}", path.display())?;
+    writeln!(out, "{} written; next: agimp check {}", path.display(), shell_word(&path))?;
     for (name, contents) in template.files {
         beside(&path, name, contents, "the job reads it")?;
     }
@@ -149,13 +149,11 @@ impl Template {
 /// The text of a template with the name of its new file, and those of the results, in the commands of its
 /// comments.
 fn renamed(text: &str, name: &str, path: &Path) -> String {
-    let path_in_words = path.display().to_string();
+    let word = shell_word(path);
     let stem = path.file_stem().map_or(Cow::from(name), OsStr::to_string_lossy);
     let (job, results) = (format!("jobs/{name}.toml"), format!("out/{name}/{name}."));
     let line = |line: &str| match line.starts_with('#') {
-        true => line
-            .replace(&job, &excerpt(&path_in_words, 200))
-            .replace(&results, &format!("out/{stem}/{stem}.")),
+        true => line.replace(&job, &excerpt(&word, 200)).replace(&results, &format!("out/{stem}/{stem}.")),
         false => line.to_owned(),
     };
     text.split_inclusive('\n').map(line).collect()

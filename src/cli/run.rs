@@ -18,7 +18,7 @@ use crate::run::stop::StopRequest;
 use crate::run::{self, Effort, Options, Outcome, RunError, Summary, restart};
 use crate::setup::estimate::steps;
 use crate::setup::warnings::warnings;
-use crate::text::{count, quantity, wall_time};
+use crate::text::{count, counted, quantity, shell_word, wall_time};
 
 /// Arguments of `agimp run`.
 #[derive(Debug, clap::Args)]
@@ -90,7 +90,7 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         AnyProblem::Two(problem) => run::run(comm, problem, &options, &stop),
         AnyProblem::Three(problem) => run::run(comm, problem, &options, &stop),
     };
-    let has_begun = !matches!(&outcome, Err(RunError::Seed(_) | RunError::Refused(_)));
+    let has_begun = !matches!(&outcome, Err(RunError::Seed(_) | RunError::Refused(_) | RunError::Stopped));
     let wants_page = problem.output().report && has_begun && comm.rank() == 0;
     let results = Results { directory: problem.output().directory.clone(), name: problem.name().to_owned() };
     let page = wants_page.then(|| page(&results, &arguments.job));
@@ -134,6 +134,7 @@ fn conclude(
             Ok(())
         }
         Ok(Outcome::Stopped { checkpoint }) => Err(Failure::Stopped(checkpoint)),
+        Err(RunError::Stopped) => Err(Failure::StoppedBefore),
         Err(error @ (RunError::Seed(_) | RunError::Refused(_))) => Err(Failure::Usage(error.to_string())),
         Err(error) => Err(Failure::Run(error.to_string())),
     }
@@ -161,8 +162,8 @@ fn print(
     let Effort { steps, time, wall_seconds, particles, warnings } = summary.effort;
     write!(
         out,
-        "took     {} steps to {} in {}, {} particles",
-        count(steps),
+        "took     {} to {} in {}, {} particles",
+        counted(steps, "step"),
         quantity(time, "s"),
         wall_time(wall_seconds),
         count(particles)
@@ -194,17 +195,6 @@ fn print(
     Ok(())
 }
 
-/// A path quoted such that a shell takes it for one word, and no program for an option.
-fn shell_word(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let text = if text.starts_with('-') { format!("./{text}").into() } else { text };
-    let is_plain = |c: char| c.is_alphanumeric() || "_./+-,=:@%".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text.into_owned();
-    }
-    format!("'{}'", text.replace('\'', "'\\''"))
-}
-
 /// Collective. Starts the threads of this rank.
 pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
     let cores = Cores::survey(comm);
@@ -216,22 +206,4 @@ pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, F
         .build_global()
         .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))?;
     Ok(threads)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_one_word_for_a_shell() {
-        for (path, word) in [
-            ("out/a_b/µ-1.hdf", "out/a_b/µ-1.hdf"),
-            ("my out/a.hdf", "'my out/a.hdf'"),
-            ("it's", "'it'\\''s'"),
-            ("-x", "./-x"),
-            ("$HOME", "'$HOME'"),
-        ] {
-            assert_eq!(shell_word(Path::new(path)), word);
-        }
-    }
 }

@@ -54,6 +54,20 @@ pub enum NoState {
     },
 }
 
+impl NoState {
+    /// What would do.
+    pub fn expected(&self) -> &'static str {
+        match self {
+            Self::Unreachable => {
+                "a stress that an elastic strain has: another k0, a lower stress, or stiffer material"
+            }
+            Self::Yields { .. } => {
+                "a stress inside the yield surface: another k0, more cohesion, a higher preconsolidation pressure, or relax = true, which returns it to the surface"
+            }
+        }
+    }
+}
+
 /// Largest part of a stress that may be lost to rounding on the way to the strain and back.
 const TOLERANCE: f64 = 1e-9;
 
@@ -97,6 +111,9 @@ pub fn under_stress_after(
     let difference: [f64; 6] = std::array::from_fn(|c| found[c] - asked[c]);
     let (lost, allowed) = (norm(&difference), TOLERANCE * norm(&asked) + 1e-13 * modulus);
     if lost.is_nan() || lost > allowed {
+        if !material.is_plastic() && !material.is_fluid() {
+            return Err(NoState::Unreachable);
+        }
         let both = |tensor: &[f64; 6]| {
             let pressure = -(tensor[0] + tensor[1] + tensor[2]) / 3.0;
             let mut deviator = *tensor;

@@ -9,7 +9,7 @@ mod peer;
 
 use super::{Table, TableError};
 use crate::input_file;
-use crate::text::excerpt;
+use crate::text::{counted, excerpt};
 
 /// Which column of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -199,8 +199,9 @@ fn find_columns(first: &[Vec<u8>], columns: &[Column], line: u64) -> Result<(Vec
     };
     let places = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
     let is_named = columns.iter().any(|column| matches!(column, Column::Name(_)));
-    let is_text = |at: &usize| first.get(*at).is_some_and(|cell| parsed(cell).is_none());
-    let is_header = is_named || places.iter().all(is_text);
+    // Of columns that the line does not have, the first row of numbers tells.
+    let there: Vec<_> = places.iter().filter_map(|at| first.get(*at)).collect();
+    let is_header = is_named || !there.is_empty() && there.iter().all(|cell| parsed(cell).is_none());
     Ok((places, is_header))
 }
 
@@ -230,7 +231,8 @@ pub fn number_of(cell: &str) -> Option<f64> {
 fn number(record: &[Vec<u8>], at: usize, line: u64) -> Result<f64, RecordError> {
     let fault = |reason| RecordError::Line { line, reason };
     let cell = record.get(at).ok_or_else(|| {
-        fault(format!("found {} columns; expected a number in column {}", record.len(), at + 1))
+        let found = counted(record.len() as u64, "column");
+        fault(format!("found {found}; expected a number in column {}", at + 1))
     })?;
     parsed(cell)
         .ok_or_else(|| fault(format!("found {} in column {}; expected a number", quoted(cell), at + 1)))
@@ -316,7 +318,7 @@ mod tests {
             reason(by_number("0,1\n# remark\n0,2\n")),
             "line 3: found the time 0 s, which is not later than the previous row; expected increasing times"
         );
-        assert_eq!(reason(by_number("0,1\n1\n")), "line 2: found 1 columns; expected a number in column 2");
+        assert_eq!(reason(by_number("0,1\n1\n")), "line 2: found 1 column; expected a number in column 2");
         assert!(reason(by_number("0,1\n1,inf\n")).starts_with("line 2: found a number that is not finite"));
         assert!(
             reason(by_number("0,1\n1,1,5\n2,nan")).starts_with("line 3: found a number that is not finite")

@@ -27,6 +27,8 @@ pub mod scene;
 pub mod schedule;
 pub mod stop;
 
+use std::time::{Duration, Instant};
+
 use partition::comm::{Comm, Disagreement};
 
 use self::at_end::ending::Ending;
@@ -47,6 +49,10 @@ use crate::setup::{self, stages};
 use crate::solver::{Clock, Requests, Solver, StepReport};
 use crate::text::{count, quantity};
 
+/// Wall time from which a request to stop ends a run that is still making its first state. Until then it goes
+/// on to a first step, whose checkpoint a queue can continue from.
+const LONG_START: Duration = Duration::from_secs(5);
+
 /// Collective. Runs a job to its end, or until it is asked to stop.
 ///
 /// # Errors
@@ -58,7 +64,7 @@ pub fn run<const D: usize>(
     stop: &StopRequest,
 ) -> Result<Outcome, RunError> {
     let mut run = match &options.restart {
-        None => Run::start(comm, problem, options)?,
+        None => Run::start(comm, problem, options, stop)?,
         Some(from) => Run::resume(comm, problem, options, from)?,
     };
     let outcome = run.advance(stop).map_err(|error| error.after(run.solver.clock));
@@ -86,7 +92,12 @@ struct Run<'a, const D: usize> {
 
 impl<'a, const D: usize> Run<'a, D> {
     /// Collective. A new run: directory, first output and first row of the history.
-    fn start(comm: &'a Comm, problem: &'a Problem<D>, options: &Options) -> Result<Self, RunError> {
+    fn start(
+        comm: &'a Comm,
+        problem: &'a Problem<D>,
+        options: &Options,
+        stop: &StopRequest,
+    ) -> Result<Self, RunError> {
         let mut claim = Claim::default();
         claim.take(comm, problem)?;
         if !options.overwrite {
@@ -94,8 +105,13 @@ impl<'a, const D: usize> Run<'a, D> {
         }
         let room = Room::of_machines(comm, options.speaks);
         room.check(comm, problem)?;
-        let solver = setup::solver_within(comm, problem, |size| room.fits(problem, size));
-        let mut solver = solver.map_err(RunError::Seed)?.map_err(RunError::Refused)?;
+        let began = Instant::now();
+        let gives_up = || stop.is_set() && began.elapsed() > LONG_START;
+        let solver = setup::solver_within(comm, problem, |size| match comm.any(gives_up()) {
+            true => Err(RunError::Stopped),
+            false => room.fits(problem, size).map_err(RunError::Refused),
+        });
+        let mut solver = solver.map_err(RunError::Seed)??;
         measures::begin(problem, &mut solver);
         let setup = &problem.output;
         let outputs = Outputs::create(comm, &setup.directory, &problem.name, restart::options(problem))?;
@@ -128,7 +144,8 @@ impl<'a, const D: usize> Run<'a, D> {
         let output_step = scalars.count(restart::OUTPUT_STEP);
         let Clock { step, time, .. } = solver.clock;
         claim.take(comm, problem)?;
-        let expected = scalars.count(restart::ROW_STEP);
+        // In another directory there is no row of this run yet.
+        let expected = scalars.count(restart::ROW_STEP).filter(|_| from.is_in(&problem.output.directory));
         // If the run ends with this state, the row of its end stays.
         let to = expected.filter(|_| time < problem.time.end).unwrap_or(step);
         let kept = (step > 0).then_some(Kept { to, expected });

@@ -100,6 +100,9 @@ pub enum RunError {
     /// The request cannot be fulfilled, and nothing has been written.
     #[error("{0}")]
     Refused(String),
+    /// It was asked to stop before its first step.
+    #[error("stopped on request before the first step, and nothing is written; the same command starts it")]
+    Stopped,
 }
 
 impl RunError {

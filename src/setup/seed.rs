@@ -46,9 +46,9 @@ pub enum SeedError {
     },
     /// A body cannot have the stress that the job gives it.
     #[error(
-        "{place}: found a stress at {} outside the yield surface of the body \"{body}\": {reason}; expected a stress inside the yield surface: \
-         another k0, more cohesion, a higher preconsolidation pressure, or relax = true, which returns it to the surface",
-        crate::text::place(point)
+        "{place}: found a stress at {} that the body \"{body}\" cannot have: {reason}; expected {}",
+        crate::text::place(point),
+        reason.expected()
     )]
     Stress {
         /// File, line, column and key of the stress.

@@ -245,6 +245,24 @@ fn new_without_a_name_lists_the_templates() {
     assert!(printed(&plain).contains("elastic_cubes"));
     let output = agimp(directory.path(), &["new", "elastic_cube"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean \"elastic_cubes\"?"));
+    // What it says next can be pasted, whatever the name.
+    let written = printed(&agimp(directory.path(), &["new", "silo", "my silo.toml"]));
+    assert!(written.starts_with("my silo.toml written; next: agimp check 'my silo.toml'\n"), "{written}");
+    let text = std::fs::read_to_string(directory.path().join("my silo.toml")).unwrap();
+    assert!(text.contains("#     agimp run 'my silo.toml'"), "{text}");
+}
+
+#[test]
+fn a_path_of_a_material_without_rows_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    for (text, file) in [("", "a.csv"), ("strain_xx,stress_yy\n", "b.csv"), ("[]", "c.json")] {
+        std::fs::write(directory.path().join(file), text).unwrap();
+        let model = "model = 'hencky', young = 1e6, poisson = 0.3";
+        let output = agimp(directory.path(), &["material", "--model", model, file]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{file}: {told}");
+        assert!(told.contains(&format!("{file}: found no row; expected rows of 3")), "{file}: {told}");
+    }
 }
 
 /// Each template is written with the files that it names, checked, and does a few steps as it is; the schema

@@ -534,6 +534,8 @@ fn subcommands_take_files_directories_indices_and_jobs() {
     }
     // Of one output a file each, as ever.
     succeed(here, &["plot", all[1], "--out", "one.png"]);
+    assert!(succeed(here, &["export", "--csv", all[1], "--out", "one.csv"]).starts_with("one.csv ("));
+    assert!(here.join("one.csv").is_file());
     assert!(told(&agimp(here, &["view", all[1], "--out", "page.html"])).contains("one time"));
     assert!(succeed(here, &["report", all[1]]).contains("out/press/press.report.html"));
     // A tree is none of these but for info and its own export.
@@ -557,10 +559,16 @@ fn subcommands_take_files_directories_indices_and_jobs() {
     }
     let output = agimp(here, &["plot", "out/press", "--out", "all.png"]);
     assert!(
-        told(&output).contains("found one picture for 5 outputs; expected a directory"),
+        told(&output).contains("found one file for 5 outputs; expected a directory"),
         "{}",
         told(&output)
     );
+    for command in ["plot", "movie"] {
+        let output = agimp(here, &[command, "out/press", "--from", "2", "--to", "1"]);
+        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+        let message = "found --from 2 --to 1; expected a first value below the last";
+        assert!(told(&output).contains(message), "{}", told(&output));
+    }
 }
 
 #[test]

@@ -236,6 +236,8 @@ fn what_is_no_run_is_refused_with_a_word_of_what_to_do() {
         (&["press.toml"], "out/press: found no history of a run (NAME.history.csv); expected the directory"),
         (&["press.toml"], "run the job (agimp run press.toml)"),
         (&["none.toml"], "none.toml"),
+        (&["none.hdf"], "none.hdf: found no such file; expected the directory of a run"),
+        (&["two/a.history.csv"], "two/a.history.csv: found a file that holds no state of a run"),
         (&["two"], "two: found the results of a, b; choose one with --name"),
         (&["two", "--name", "c"], "found no history of a run"),
         (&["two", "--name", "a", "--out", "no/such/place.html"], "cannot write"),

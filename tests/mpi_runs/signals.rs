@@ -70,6 +70,31 @@ fn a_signal_at_the_very_start_is_not_lost() {
     }
 }
 
+/// A run that refines its first tree for a long time ends soon, too: between two levels, without a file, or with
+/// the checkpoint of its first step.
+#[test]
+fn a_signal_while_the_first_tree_is_refined_is_heard() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let path = home.path().join("fine.toml");
+    let job = "version = 1\ndimension = 2\n[domain]\nsize = [1.6, 0.8]\nroot_edge = 0.4\n[boundaries]\ny_min.kind = 'slip'\n\
+                [[adaptivity.criteria]]\nkind = 'free_surface'\nlevel = 13\n\
+                [[materials]]\nname = 'm'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+                [[bodies]]\nname = 'b'\nmaterial = 'm'\nshape = { kind = 'box', min = [0.2, 0.1], max = [0.5, 0.3] }\n\
+                [time]\nend = 1e-6\n[output]\npicture = false\n";
+    std::fs::write(&path, job).expect("job");
+    let running = Running::start(&mut run(home.path(), 2, 1, &path, &["--quiet"]));
+    std::thread::sleep(Duration::from_secs(2));
+    signal(running.launcher(), "USR1");
+    let output = running.finish_within(SOON);
+    let shown = text(&output);
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{shown}");
+    let is_early = shown.contains("stopped on request before the first step, and nothing is written");
+    let files = std::fs::read_dir(home.path().join("out/fine")).into_iter().flatten().flatten();
+    let outputs = files.filter(|file| file.path().extension().is_some_and(|ending| ending == "hdf")).count();
+    assert!(is_early == (outputs == 0), "{outputs} outputs: {shown}");
+}
+
 /// Whether the process has a handler for the signal of this number.
 fn catches(process: u32, number: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("process");

@@ -8,7 +8,7 @@ use crate::io::frame::{Frame, shown_in};
 use crate::io::snapshot::PointField;
 use crate::text::{bytes, count};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `agimp export`.
 #[derive(Debug, clap::Args)]
@@ -38,8 +38,9 @@ pub struct Arguments {
     /// Fields to export, separated by commas; by default all fields of the files.
     #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with_all = ["surface", "htg"])]
     fields: Option<Vec<PointField>>,
-    /// Directory to write to; by default that of each file.
-    #[arg(long, value_name = "DIR")]
+    /// Directory to write to, or of one output the file, with the ending of its format; by default beside each
+    /// file.
+    #[arg(long, value_name = "DIR|FILE")]
     out: Option<PathBuf>,
 }
 
@@ -70,42 +71,33 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Format::Vtp
     };
-    if let Some(directory) = &arguments.out {
-        std::fs::create_dir_all(directory).map_err(|error| {
-            Failure::Usage(format!("{}: cannot create the directory: {error}", directory.display()))
-        })?;
-    }
-    let place = |file: &Path, ending: &str| {
-        let beside = file.with_extension(ending);
-        match (&arguments.out, beside.file_name()) {
-            (Some(directory), Some(name)) => directory.join(name),
-            _ => beside,
-        }
-    };
     let given =
         if arguments.htg { Given::any(&arguments.files) } else { Given::particles(&arguments.files) }?;
-    for file in given.files {
-        let (out, made) = if arguments.htg {
-            let tree = Tree::read(&file).map_err(failed)?;
-            let out = place(&file, "htg");
+    let ending = match arguments.surface {
+        _ if arguments.htg => "htg",
+        Some(mesh) => mesh.ending(),
+        None => format.ending(),
+    };
+    let outs = super::outs(arguments.out.as_deref(), &given.files, &[ending], "")?;
+    for (file, out) in given.files.iter().zip(outs) {
+        let made = if arguments.htg {
+            let tree = Tree::read(file).map_err(failed)?;
             tree.write(&out).map_err(failed)?;
-            (out, format!("{} leaves", count(tree.leaf_count() as u64)))
+            format!("{} leaves", count(tree.leaf_count() as u64))
         } else if let Some(format) = arguments.surface {
-            let frame = Frame::read(&file, &[PointField::Body], false).map_err(failed)?;
+            let frame = Frame::read(file, &[PointField::Body], false).map_err(failed)?;
             let surface = Surface::of(&frame, arguments.body.as_deref())
                 .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
-            let out = place(&file, format.ending());
             surface.write(format, &out).map_err(failed)?;
-            (out, format!("{} triangles", count(surface.triangles.len() as u64)))
+            format!("{} triangles", count(surface.triangles.len() as u64))
         } else {
             let fields = match &arguments.fields {
                 Some(fields) => fields.clone(),
-                None => shown_in(&file).map_err(failed)?,
+                None => shown_in(file).map_err(failed)?,
             };
-            let frame = Frame::read(&file, &fields, true).map_err(failed)?;
-            let out = place(&file, format.ending());
+            let frame = Frame::read(file, &fields, true).map_err(failed)?;
             points::write(&frame, format, &out).map_err(failed)?;
-            (out, format!("{} particles", count(frame.positions.len() as u64)))
+            format!("{} particles", count(frame.positions.len() as u64))
         };
         let size = std::fs::metadata(&out).map_or(0, |data| data.len());
         writeln!(std::io::stdout(), "{} ({made}, {})", out.display(), bytes(size as f64))?;

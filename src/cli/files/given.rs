@@ -6,6 +6,7 @@ use crate::cli::Failure;
 use crate::io::series::Series;
 use crate::io::snapshot::directory::{is_of_tree, listed, outputs_without_index, run_of, runs, series_path};
 use crate::job;
+use crate::text::shell_word;
 
 /// Files that a command line means.
 pub(super) struct Given {
@@ -61,8 +62,7 @@ fn meant(word: &Path) -> Result<(Option<PathBuf>, Vec<PathBuf>), Failure> {
     if ending == "toml" {
         let problem = job::load(word)?;
         return of_directory(&problem.output().directory, Some(problem.name())).map_err(|error| {
-            let job = word.display();
-            Failure::Usage(format!("{error}; run the job first: agimp run {job}"))
+            Failure::Usage(format!("{error}; run the job first: agimp run {}", shell_word(word)))
         });
     }
     if ending != "series" {

@@ -20,6 +20,7 @@ pub(super) mod view;
 
 use std::path::{Path, PathBuf};
 
+use crate::cli::Failure;
 use crate::io::snapshot::PointField;
 
 /// A field by its name.
@@ -38,6 +39,38 @@ fn beside(file: &Path, ending: &str) -> PathBuf {
         file.to_path_buf()
     };
     output.with_extension(ending)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    let own = path.extension().unwrap_or_default();
+    endings.iter().any(|ending| own.eq_ignore_ascii_case(ending))
+}
+
+/// The file for each output: beside it with the first of the endings, in the directory that is given, or of
+/// one output the file that is given with one of the endings.
+///
+/// # Errors
+/// One file is given for several outputs; `hint` follows. The directory cannot be made.
+fn outs(
+    out: Option<&Path>,
+    files: &[PathBuf],
+    endings: &[&str],
+    hint: &str,
+) -> Result<Vec<PathBuf>, Failure> {
+    let beside = |file: &PathBuf| file.with_extension(endings[0]);
+    let Some(out) = out else { return Ok(files.iter().map(beside).collect()) };
+    let found = out.display();
+    if has_ending(out, endings) && !out.is_dir() {
+        return match files.len() {
+            1 => Ok(vec![out.to_path_buf()]),
+            count => Err(Failure::Usage(format!(
+                "{found}: found one file for {count} outputs; expected a directory, or one output{hint}"
+            ))),
+        };
+    }
+    std::fs::create_dir_all(out)
+        .map_err(|error| Failure::Usage(format!("{found}: cannot create the directory: {error}")))?;
+    Ok(files.iter().map(|file| out.join(beside(file).file_name().unwrap_or_default())).collect())
 }
 
 #[cfg(test)]

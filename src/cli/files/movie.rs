@@ -49,7 +49,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let given_looks = &arguments.looks;
     let name = name.trim_end_matches(".movie");
     let mut settings =
-        given_looks.settings(arguments.title.as_deref(), files.first().map(PathBuf::as_path), name);
+        given_looks.settings(arguments.title.as_deref(), files.first().map(PathBuf::as_path), name)?;
     let scene = given_looks.scene(&files[0]);
     // All frames share range, frame and scale of vectors.
     let look = survey(&files, &given_looks.colour, &settings, &scene).map_err(failed)?;

@@ -1,11 +1,15 @@
 //! `agimp plot`: pictures of the particles in outputs.
 use super::given::Given;
+use super::has_ending;
 use crate::cli::Failure;
 use crate::cli::shared::looks::Looks;
 use crate::io::hdf5_file::FileError;
 use crate::io::picture::{draw_file, survey};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+/// Endings of pictures.
+const PICTURES: [&str; 2] = ["png", "svg"];
 
 /// Arguments of `agimp plot`.
 #[derive(Debug, clap::Args)]
@@ -39,12 +43,12 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let name = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut look = None;
     if files.len() > 1 {
-        let settings = looks.settings(title.as_deref(), Some(&files[0]), &name(&files[0]));
+        let settings = looks.settings(title.as_deref(), Some(&files[0]), &name(&files[0]))?;
         look = Some(survey(&files, &looks.colour, &settings, &scene).map_err(failed)?);
     }
     for (file, out) in files.iter().zip(outs) {
-        let mut settings = looks.settings(title.as_deref(), Some(file), &name(file));
-        settings.collect = has_ending(&out, "svg");
+        let mut settings = looks.settings(title.as_deref(), Some(file), &name(file))?;
+        settings.collect = has_ending(&out, &["svg"]);
         if let Some(look) = &look {
             settings.share(look);
             // A clip common to all files may remove all particles of one of them.
@@ -58,30 +62,11 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The picture of each file: beside it, in the directory that is given, or of the name that is given.
 fn outs(out: Option<&Path>, files: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let beside = |file: &PathBuf| file.with_extension("png");
-    let Some(out) = out else { return Ok(files.iter().map(beside).collect()) };
-    let is_picture = ["png", "svg"].iter().any(|ending| has_ending(out, ending));
-    if files.len() == 1 && is_picture && !out.is_dir() {
-        return Ok(vec![out.to_path_buf()]);
-    }
-    let found = out.display();
-    if is_picture && !out.is_dir() {
-        let count = files.len();
+    if let Some(out) = out.filter(|out| files.len() == 1 && !out.is_dir() && !has_ending(out, &PICTURES)) {
         return Err(Failure::Usage(format!(
-            "{found}: found one picture for {count} outputs; expected a directory, or one output (agimp movie makes one file of all)"
+            "{}: found no extension of a picture; expected .png or .svg, or a directory",
+            out.display()
         )));
     }
-    if files.len() == 1 && !out.is_dir() {
-        return Err(Failure::Usage(format!(
-            "{found}: found no extension of a picture; expected .png or .svg, or a directory"
-        )));
-    }
-    std::fs::create_dir_all(out)
-        .map_err(|error| Failure::Usage(format!("{found}: cannot create the directory: {error}")))?;
-    let within = |file: &PathBuf| out.join(beside(file).file_name().unwrap_or_default());
-    Ok(files.iter().map(within).collect())
-}
-
-fn has_ending(path: &Path, wanted: &str) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+    super::outs(out, files, &PICTURES, " (agimp movie makes one file of all)")
 }

@@ -1,9 +1,10 @@
 //! `agimp report`: a run on one page for a browser.
 use super::given::{self, Given};
+use super::has_ending;
 use crate::cli::Failure;
 use crate::job;
 use crate::report::{self, Options, Results};
-use crate::text::bytes;
+use crate::text::{bytes, shell_word};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -47,25 +48,41 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Endings of the outputs of a run and their index.
+const OUTPUTS: [&str; 3] = ["hdf", "vtkhdf", "series"];
+/// Endings of other files of a run.
+const OTHERS: [&str; 6] = ["csv", "json", "jsonl", "html", "png", "svg"];
+
 /// Whether a word names a job file: neither a directory nor, by its ending, a file of a run.
 fn is_job(word: &Path) -> bool {
-    let ending = word.extension().unwrap_or_default();
-    !word.is_dir() && ["hdf", "vtkhdf", "series"].iter().all(|of_run| ending != *of_run)
+    !word.is_dir() && !has_ending(word, &OUTPUTS) && !has_ending(word, &OTHERS)
 }
 
 /// The results of a job, those in a directory, or those to which files belong.
 fn results(words: &[PathBuf], name: Option<&str>) -> Result<Results, Failure> {
     let unclear = |error: report::Unclear| Failure::Usage(error.to_string());
     let (run, is_one) = (&words[0], words.len() == 1);
+    let refused = |word: &Path, found: &str| {
+        let word = word.display();
+        Err(Failure::Usage(format!(
+            "{word}: found {found}; expected the directory of a run, its index (NAME.hdf.series), its outputs or its job file"
+        )))
+    };
+    if let Some(missing) = words.iter().find(|word| !word.exists()) {
+        return refused(missing, "no such file");
+    }
+    if let Some(other) = words.iter().find(|word| !word.is_dir() && has_ending(word, &OTHERS)) {
+        return refused(other, "a file that holds no state of a run");
+    }
     if is_one && run.is_dir() {
         return Results::in_directory(run, name).map_err(unclear);
     }
     if is_one && is_job(run) {
         let problem = job::load(run)?;
         return Results::in_directory(&problem.output().directory, Some(problem.name())).map_err(|error| {
-            let run = run.display();
             Failure::Usage(format!(
-                "{error}; run the job (agimp run {run}), or name the directory of its results"
+                "{error}; run the job (agimp run {}), or name the directory of its results",
+                shell_word(run)
             ))
         });
     }

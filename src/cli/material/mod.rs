@@ -116,6 +116,12 @@ enum MaterialError {
         /// Where and why.
         error: serde_json::Error,
     },
+    /// The path has no row.
+    #[error(
+        "{}: found no row; expected rows of 3 logarithmic strains, of the 9 numbers of a deformation gradient, or of strains and stresses named in a header",
+        .0.display()
+    )]
+    NoRow(PathBuf),
     /// A row of the path.
     #[error("{}, row {row}: {reason}", path.display())]
     Row {
@@ -181,7 +187,13 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
     }
     let (place, drive) = match (&args.path, args.test) {
         (_, Some(test)) => ("--test".to_owned(), Drive::Control(trial::rows(test, args)?)),
-        (Some(path), None) => (path.display().to_string(), path::read_path(path)?),
+        (Some(path), None) => {
+            let drive = path::read_path(path)?;
+            if drive.is_empty() {
+                return Err(MaterialError::NoRow(path.clone()));
+            }
+            (path.display().to_string(), drive)
+        }
         // clap requires one of them.
         (None, None) => (String::new(), Drive::Deformation(Vec::new())),
     };

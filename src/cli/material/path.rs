@@ -16,6 +16,16 @@ pub(super) enum Drive {
     Control(Vec<Row>),
 }
 
+impl Drive {
+    /// Whether it has no row.
+    pub(super) fn is_empty(&self) -> bool {
+        match self {
+            Self::Deformation(rows) => rows.is_empty(),
+            Self::Control(rows) => rows.is_empty(),
+        }
+    }
+}
+
 /// A row of prescribed strains and stresses.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {

@@ -1,11 +1,14 @@
 //! Style of pictures: options of all subcommands that draw.
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use super::message::warn_of;
+use crate::cli::Failure;
 use crate::io::picture::{self, Clip, Direction, Map, Scene, Settings};
 use crate::io::snapshot::Header;
 use crate::job::AnyProblem;
 use crate::run::scene;
+use crate::text::written;
 
 /// Options of subcommands that draw particles.
 #[derive(Debug, clap::Args)]
@@ -90,14 +93,26 @@ pub(in crate::cli) fn title(given: Option<&str>, output: Option<&Path>, name: &s
 
 impl Looks {
     /// Settings of a picture of an output, with its [`title`].
+    ///
+    /// # Errors
+    /// The range of the colours is empty.
     pub(in crate::cli) fn settings(
         &self,
         title: Option<&str>,
         output: Option<&Path>,
         name: &str,
-    ) -> Settings {
+    ) -> Result<Settings, Failure> {
+        if let Some((from, to)) =
+            self.from.zip(self.to).filter(|(from, to)| from.partial_cmp(to).is_none_or(Ordering::is_ge))
+        {
+            return Err(Failure::Usage(format!(
+                "found --from {} --to {}; expected a first value below the last",
+                written(from),
+                written(to)
+            )));
+        }
         let title = self::title(title, output, name);
-        Settings {
+        Ok(Settings {
             width: self.width as usize,
             height: self.height as usize,
             range: self.from.zip(self.to).map(|(from, to)| [from, to]),
@@ -111,7 +126,7 @@ impl Looks {
             tree: self.tree,
             vectors: self.vectors.clone(),
             ..Settings::new(&title)
-        }
+        })
     }
 
     /// The job of outputs, for colliders and boxes in pictures; a warning where colliders cannot be drawn.

@@ -73,7 +73,10 @@ pub enum NotSolid {
     )]
     Hollow(f64),
     /// Nothing inside.
-    #[error("found a surface around a volume of {}; expected one with a volume", quantity(*.0, "m³"))]
+    #[error(
+        "found a surface around a volume of {}: all of it is flat, or it crosses itself and its parts cancel; expected one around a volume",
+        quantity(*.0, "m³")
+    )]
     Flat(f64),
     /// The library refuses it.
     #[error("found a surface that cannot be used: {0}; expected a closed surface without self-intersections")]

@@ -5,16 +5,21 @@ use super::NAME;
 use crate::geometry::Aabb;
 use crate::job::Problem;
 use crate::job::problem::{Body, MaterialSetup};
+use crate::load::{Kind, Load};
 use crate::material::Material;
 use crate::setup::seed::{greatest_speed, raster};
-use crate::text::{count, excerpt, number, quantity};
+use crate::text::{counted, excerpt, number, quantity};
 
 /// Keys of models that are strengths, Pa.
 const STRENGTHS: [&str; 3] = ["yield_stress", "cohesion", "preconsolidation_pressure"];
 /// Greatest strength over stiffness: metals, soils and rocks have up to 0.05, polymers 0.1.
 const STRENGTH: f64 = 0.2;
+/// Greatest modulus of hardening over stiffness: metals have up to 0.1.
+const HARDENING: f64 = 1.0;
 /// Densities from gases to the heaviest metals, kg/m³.
 const DENSITIES: [f64; 2] = [1.0, 23_000.0];
+/// Density of the lightest foams, kg/m³.
+const FOAM: f64 = 5.0;
 /// Speeds of waves from the softest gels to beyond diamond, m/s.
 const WAVES: [f64; 2] = [0.2, 20_000.0];
 /// Least number of steps of a meaningful run.
@@ -32,22 +37,23 @@ const BODIES: usize = 1000;
 pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut Vec<String>) {
     let materials: Vec<_> = problem.materials.iter().map(|m| m.build()).collect();
     for (index, (setup, material)) in problem.materials.iter().zip(&materials).enumerate() {
-        of_material(index, setup, material.wave_speed(), all);
+        of_material(index, setup, &**material, all);
     }
     for (index, body) in problem.bodies.iter().enumerate().take(BODIES) {
         of_body(problem, index, body, &*materials[body.material], all);
     }
     tools(problem, &materials, all);
+    loads(problem, &materials, all);
     if steps < STEPS {
         all.push(format!(
-            "time: the run takes about {} steps; expected at least {STEPS}: check time.end, and the units of stiffness and density (Pa, kg/m³)",
-            count(steps.max(1.0) as u64)
+            "time: the run takes about {}; expected at least {STEPS}: check time.end, and the units of stiffness and density (Pa, kg/m³)",
+            counted(steps.max(1.0) as u64, "step")
         ));
     }
 }
 
-fn of_material(index: usize, setup: &MaterialSetup, wave: f64, all: &mut Vec<String>) {
-    let name = excerpt(&setup.name, NAME);
+fn of_material(index: usize, setup: &MaterialSetup, material: &dyn Material, all: &mut Vec<String>) {
+    let (name, wave) = (excerpt(&setup.name, NAME), material.wave_speed());
     let values = serde_json::to_value(&setup.model).unwrap_or_default();
     let young = values.get("young").and_then(Value::as_f64);
     let (stiffness, word) = match young {
@@ -65,10 +71,21 @@ fn of_material(index: usize, setup: &MaterialSetup, wave: f64, all: &mut Vec<Str
             ));
         }
     }
-    let [least, most] = DENSITIES;
+    let hardening = values.get("hardening");
+    let modulus = hardening.and_then(|given| given.get("modulus").unwrap_or(given).as_f64());
+    if let Some(modulus) = modulus.filter(|modulus| *modulus > HARDENING * stiffness) {
+        all.push(format!(
+            "materials[{index}].hardening: found a modulus of {} for \"{name}\", {} times its {word} of {}; expected less than that: check the units of both (Pa)",
+            quantity(modulus, "Pa"),
+            number(modulus / stiffness, 2),
+            quantity(stiffness, "Pa")
+        ));
+    }
+    let [gas, most] = DENSITIES;
+    let (least, lightest) = if material.is_fluid() { (gas, "a gas") } else { (FOAM, "the lightest foams") };
     if !(least..=most).contains(&setup.density) {
         all.push(format!(
-            "materials[{index}].density: found {} kg/m³ for \"{name}\"; expected {least} (a gas) to {most} (the heaviest metals): check its unit",
+            "materials[{index}].density: found {} kg/m³ for \"{name}\"; expected {least} ({lightest}) to {most} (the heaviest metals): check its unit",
             number(setup.density, 4)
         ));
     }
@@ -111,8 +128,8 @@ fn of_body<const D: usize>(
     }
 }
 
-/// Greatest acceleration of gravity times the height of a body along it, m²/s²; approximate, and only as
-/// exact as the comparison with `limit` requires.
+/// Greatest acceleration of gravity and of body forces everywhere, times the height of a body along it, m²/s²;
+/// approximate, and only as exact as the comparison with `limit` requires.
 fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f64) -> f64 {
     if body.given.is_some() {
         return 0.0;
@@ -125,6 +142,13 @@ fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f6
         }
     }
     let bounds = body.shape.bounds().intersection(&Aabb::new([0.0; D], problem.size()));
+    for load in &problem.loads {
+        let centre = bounds.centre();
+        for time in times(problem, load) {
+            let force = load.body_force(&centre, &load.place(&centre, &[0.0; D]), time);
+            force.iter().for_each(|force| (0..D).for_each(|a| greatest[a] = greatest[a].max(force[a].abs())));
+        }
+    }
     let falls = (0..D).map(|a| greatest[a] * (bounds.upper[a] - bounds.lower[a]).max(0.0));
     let Some((axis, fall)) = falls.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { return 0.0 };
     if fall <= limit {
@@ -144,16 +168,55 @@ fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f6
     fall * f64::from(points) / 9.0
 }
 
-/// Colliders with a motion of their own that run into the softest material faster than it can give way.
-fn tools<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
+/// Times of the run at which a load acts, s: some from its start to its end.
+fn times<const D: usize>(problem: &Problem<D>, load: &Load<D>) -> impl Iterator<Item = f64> {
+    let from = load.start + load.from.max(0.0);
+    let until = (load.start + load.until).min(problem.time.end);
+    let is_meant = from.is_finite() && from < until;
+    (0..8).filter(move |_| is_meant).map(move |part| (until - from).mul_add(f64::from(part) / 8.0, from))
+}
+
+/// Speed of waves in the softest material of a body, m/s, and its number.
+fn softest<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>]) -> Option<(f64, usize)> {
     let bodies = problem.bodies.iter().map(|body| (materials[body.material].wave_speed(), body.material));
-    let Some((wave, material)) = bodies.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-    for (index, collider) in problem.colliders.iter().enumerate().filter(|(_, c)| c.free().is_none()) {
+    bodies.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Colliders that run into the softest material faster than it can give way.
+fn tools<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
+    let Some((wave, material)) = softest(problem, materials) else { return };
+    for (index, collider) in problem.colliders.iter().enumerate() {
         let speed = collider.greatest_speed(&collider.state_at(0.0), &problem.size(), 0.0);
+        let limit = if collider.free().is_some() { BODY } else { TOOL };
+        if speed > limit * wave {
+            all.push(format!(
+                "colliders[{index}].motion: \"{}\" moves at {}, {} times the speed of waves in \"{}\" ({}); expected at most {limit} of it, beyond which it crushes the material: check the units of speed, stiffness and density",
+                excerpt(&collider.name, NAME),
+                quantity(speed, "m/s"),
+                number(speed / wave, 2),
+                excerpt(&problem.materials[material].name, NAME),
+                quantity(wave, "m/s")
+            ));
+        }
+    }
+}
+
+/// Grips that pull the softest material faster than it can follow.
+fn loads<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
+    let Some((wave, material)) = softest(problem, materials) else { return };
+    for (index, load) in problem.loads.iter().enumerate() {
+        let Kind::Velocity(prescribed) = &load.kind else { continue };
+        let centre = load.region.as_ref().map_or([0.0; D], |region| region.bounds().centre());
+        let place = load.place(&centre, &[0.0; D]);
+        let speeds = times(problem, load).map(|time| {
+            let squares = prescribed.iter().flatten().map(|v| v.at(place, time - load.start).powi(2));
+            squares.sum::<f64>().sqrt()
+        });
+        let speed = speeds.fold(0.0, f64::max);
         if speed > TOOL * wave {
             all.push(format!(
-                "colliders[{index}].motion: \"{}\" moves at {}, {} times the speed of waves in \"{}\" ({}); expected at most {TOOL} of it, beyond which it crushes the material: check the units of speed, stiffness and density",
-                excerpt(&collider.name, NAME),
+                "loads[{index}]: \"{}\" moves material at {}, {} times the speed of waves in \"{}\" ({}); expected at most {TOOL} of it, beyond which it tears or crushes the material: check the units of speed, stiffness and density",
+                excerpt(&load.name, NAME),
                 quantity(speed, "m/s"),
                 number(speed / wave, 2),
                 excerpt(&problem.materials[material].name, NAME),

@@ -45,8 +45,12 @@ impl Relaxation {
     /// masses, and so too great. Returns a factor for all velocities: 0 where they are to be set to 0, and
     /// [`FROM_REST`] after a step from rest.
     pub(in crate::solver) fn note(&mut self, [kinetic, pulled]: [f64; 2], mass: f64, dt: f64) -> f64 {
-        // Nothing is at rest.
-        let root_mean_square = |energy: f64| if mass > 0.0 { (2.0 * energy / mass).sqrt() } else { 0.0 };
+        if mass == 0.0 {
+            // Nothing is at rest, after however long a step.
+            *self = Self { stops: self.stops, phase: RelaxPhase::FromRest, ..Self::default() };
+            return 1.0;
+        }
+        let root_mean_square = |energy: f64| (2.0 * energy / mass).sqrt();
         let was_at_rest = self.phase == RelaxPhase::Stopped;
         if was_at_rest {
             self.acceleration = root_mean_square(pulled) / dt;

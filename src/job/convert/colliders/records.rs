@@ -7,7 +7,7 @@ use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{MotionRecord, Row};
 use crate::quantity::record;
-use crate::text::written;
+use crate::text::{counted, written};
 
 /// Greatest displacement, m, and greatest angle, degrees.
 const GREATEST: [f64; 2] = [1e12, 1e9];
@@ -36,7 +36,7 @@ pub(super) fn rows<const D: usize>(
 
 fn of_job<const D: usize>(checks: &mut Checks, rows: &[Row], path: &Path) -> Option<Table<D>> {
     if rows.len() < 2 {
-        checks.fault(path, format!("found {} rows; expected at least 2 rows", rows.len()));
+        checks.fault(path, format!("found {}; expected at least 2 rows", counted(rows.len() as u64, "row")));
         return None;
     }
     let mut knots = Vec::new();
@@ -91,7 +91,7 @@ fn knots<const D: usize, T>(
     given: &[(usize, T)],
 ) -> Result<Vec<Knot<D>>, String> {
     if rows.numbers.len() < 2 {
-        return Err(format!("it has {} rows", rows.numbers.len()));
+        return Err(format!("it has {}", counted(rows.numbers.len() as u64, "row")));
     }
     let rows = rows.numbers.iter().zip(&rows.lines).map(|(numbers, line)| {
         let mut translation = [0.0; D];
