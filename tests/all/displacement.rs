@@ -213,7 +213,7 @@ fn strains_of_stirred_sand_end_no_run() {
              [[bodies]]\nname = 'ground'\nmaterial = 'sand'\nshape = {{ kind = 'box', min = [0, 0], max = [1, 0.1875] }}\n\
              [[colliders]]\nname = 'sill'\nacts_on = 'particles'\ncontact = {{ kind = 'sticky' }}\n\
              shape = {{ kind = 'circle', centre = [0.45, 0.05], radius = 0.08 }}\n\
-             motion = {{ kind = 'steady', velocity = [0.3, 0], angular_velocity = 20 }}\n[numerics]\nf_bar = true\n\
+             motion = {{ kind = 'steady', velocity = [0.3, 0], angular_velocity = 25 }}\n[numerics]\nf_bar = true\n\
              [time]\nend = 0.8\n[output]\nevery = 0.2\npicture = false\nfields = [{fields}]\n"
         )
     };

@@ -15,8 +15,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `find` | particles in reach of surfaces |
+//! | `behind` | nodes behind surfaces |
 //! | `sweeps` | from particles to nodes and back |
 //! | `guard` | paths of particles that still reach a surface |
+mod behind;
 mod find;
 pub(super) mod guard;
 pub(super) mod sweeps;
@@ -71,6 +73,7 @@ impl<const D: usize> Solver<D> {
         if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
             return Ok(());
         }
+        let behind = self.nodes_behind();
         let mut other =
             self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
         let widths = self.physics.widths(&self.grid.plan);
@@ -88,6 +91,7 @@ impl<const D: usize> Solver<D> {
             self.add_impulses(&mut other);
             self.grid.swap(&mut other);
             self.hold_at_nodes(field, rates, sums);
+            self.hold_behind(&behind, rates, sums);
             // Faces that absorb waves have had their share of the step.
             self.apply_faces(field, 0.0, true);
             self.grid.swap(&mut other);

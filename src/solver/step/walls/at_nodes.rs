@@ -73,7 +73,7 @@ impl<const D: usize> Solver<D> {
 
 /// Has the velocity of the node at `x` (m) obey a collider at a surface with this normal. Returns the impulse
 /// on the collider, kg m/s, if there is any.
-pub(super) fn obey<const D: usize>(
+pub(in crate::solver::step) fn obey<const D: usize>(
     row: &mut Row,
     x: &[f64; D],
     (collider, state, rate): (&Collider<D>, &ColliderState<D>, &Rate<D>),

@@ -28,6 +28,7 @@ mod feet;
 pub(super) mod passing;
 mod sweeps;
 
+pub(super) use at_nodes::obey;
 use rayon::prelude::*;
 
 use crate::boundary::Collider;
