@@ -14,6 +14,7 @@ mod rotation;
 pub mod sampling;
 mod shape;
 pub mod surface;
+mod thick;
 pub(crate) mod vector;
 pub mod written;
 

@@ -24,7 +24,7 @@ use crate::solver::Equilibrium;
 use crate::source::Source;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Cells along the edge of a leaf.
 pub const CELLS_PER_LEAF: u32 = 4;
@@ -141,6 +141,8 @@ pub struct Problem<const D: usize> {
     pub named_faces: [[bool; 2]; D],
     /// Rigid bodies that act on the material, in the order in which they act.
     pub colliders: Vec<Collider<D>>,
+    /// Whether each is thick enough to hold fluids at nodes, once that has been asked (`setup::walls`).
+    pub thick: OnceLock<Vec<bool>>,
     /// Contact between bodies that deform.
     pub body_contacts: BodyContacts,
     /// Stages of the run, at least one.

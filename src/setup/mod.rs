@@ -19,6 +19,7 @@ pub mod initial_stress;
 mod parts;
 pub mod seed;
 pub mod stages;
+pub mod walls;
 pub mod warnings;
 mod water;
 

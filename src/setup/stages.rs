@@ -2,8 +2,9 @@
 use partition::comm::{Comm, Disagreement};
 
 use super::seed::check_counts;
+use super::walls;
 use crate::adaptivity::Cohesion;
-use crate::boundary::Meets;
+use crate::boundary::{ActsOn, Meets};
 use crate::job::Problem;
 use crate::job::problem::{Body, BoxPolicy, Coordinates};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -34,8 +35,12 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     for (load, stages) in physics.loads.iter_mut().zip(&problem.load_stages) {
         load.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
     }
-    for (collider, stages) in physics.colliders.iter_mut().zip(&problem.collider_stages) {
+    for (index, collider) in physics.colliders.iter_mut().enumerate() {
+        let stages = &problem.collider_stages[index];
         collider.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };
+        if walls::acts_on_nodes(problem, stage, index) {
+            collider.acts_on = ActsOn::Nodes;
+        }
     }
     for (source, stages) in physics.sources.iter_mut().zip(&problem.source_stages) {
         source.start = if stages.has(stage) { stages.clock(starts) } else { f64::INFINITY };

@@ -124,6 +124,27 @@ fn mistaken_units_are_warned_of() {
             &[("velocity = [0, -0.02]", "velocity = [0, -200]")],
             &["colliders[2].motion: \"tool\" moves at 200 m/s"],
         ),
+        // g/cm³ for kg/m³, MPa as Pa twice, multiples of g as m/s², mm/s as m/s.
+        (&[("density = 2000", "density = 2")], &["materials[1].density", "2 kg/m³", "the lightest foams"]),
+        (
+            &[("yield_stress = 20e3", "yield_stress = 20e3\nhardening = 3e12")],
+            &["materials[1].hardening", "3000 GPa", "50 MPa"],
+        ),
+        (
+            &[("[time]", "[[loads]]\nname = 'shake'\nkind = 'body_force'\nacceleration = [1e7, 0]\n[time]")],
+            &["bodies[0].material: the weight of \"bar\""],
+        ),
+        (
+            &[("[time]", "[[loads]]\nname = 'grip'\nkind = 'velocity'\nx = 2e4\n[time]")],
+            &["loads[0]: \"grip\" moves material at 20 km/s"],
+        ),
+        (
+            &[(
+                "motion = { kind = \"steady\", velocity = [0, -0.02]",
+                "motion = { kind = \"free\", mass = 500, velocity = [0, -2e4]",
+            )],
+            &["colliders[2].motion: \"tool\" moves at 20 km/s"],
+        ),
     ];
     for (changes, parts) in cases {
         let found = warnings(&changed(changes));
@@ -188,20 +209,30 @@ fn walls_with_known_errors_are_warned_of() {
     let moves = "motion = { kind = 'steady', velocity = [0.1, 0] }";
     let sloshes =
         "colliders[0].motion: \"pool\" lies in a tank that moves, where it loses height as it sloshes";
-    let loses = "colliders[0].acts_on: \"floor\" acts on particles, where fluids sink";
-    for (wall, expected) in [("", None), (moves, Some(sloshes)), ("acts_on = 'particles'", Some(loses))] {
-        let found = warnings(&tank(wall));
+    let loses = "colliders[0].acts_on: \"floor\" acts on particles, as it is thinner than two cells";
+    let on_particles = tank("acts_on = 'particles'");
+    let thin = on_particles.replace("min = [0.1, 0], max = [1.9, 0.3]", "min = [0.1, 0.2], max = [1.9, 0.3]");
+    assert_ne!(thin, on_particles);
+    for (wall, job, expected) in [
+        ("", tank(""), None),
+        (moves, tank(moves), Some(sloshes)),
+        ("on particles", on_particles, None),
+        ("thin", thin, Some(loses)),
+    ] {
+        let found = warnings(&job);
         let of_walls = found.iter().filter(|line| line.contains("slosh")).collect::<Vec<_>>();
         assert_eq!(of_walls.len(), usize::from(expected.is_some()), "{wall}: {found:#?}");
         assert!(expected.is_none_or(|expected| of_walls[0].contains(expected)), "{wall}: {found:#?}");
     }
     let tool = "motion = { kind = \"steady\", velocity = [0, -0.02] }";
-    let on_particles = format!("{tool}\nacts_on = \"particles\"");
-    let found = warnings(&changed(&[(tool, &on_particles), ("[time]", "[numerics]\nf_bar = true\n[time]")]));
-    let plates = "colliders[2].acts_on: \"tool\" acts on particles and numerics.f_bar is true";
+    let f_bar = ("[time]", "[numerics]\nf_bar = true\n[time]");
+    let plates =
+        "colliders[2].acts_on: \"tool\" acts on nodes, elastic bodies are there, and numerics.f_bar is true";
+    let found = warnings(&changed(&[f_bar]));
     assert!(found.iter().any(|line| line.contains(plates)), "{found:#?}");
-    let found = warnings(&changed(&[(tool, &on_particles)]));
-    assert!(!found.iter().any(|line| line.contains("acts on particles")), "{found:#?}");
+    let on_particles = format!("{tool}\nacts_on = \"particles\"");
+    let found = warnings(&changed(&[(tool, &on_particles), f_bar]));
+    assert!(!found.iter().any(|line| line.contains("f_bar")), "{found:#?}");
 }
 
 /// By grips, by its own motion, between a face and a grip, by a prescribed velocity, and by tractions.

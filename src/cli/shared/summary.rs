@@ -9,7 +9,7 @@ use crate::load::water::Given;
 use crate::load::{CarriedForce, Kind as LoadKind, Load};
 use crate::quantity::Quantity;
 use crate::setup::estimate::Estimate;
-use crate::setup::stages;
+use crate::setup::{stages, walls};
 use crate::solver::state::bookings::CarriedTotals;
 use crate::source::Source;
 use crate::text::{bytes, count as grouped, excerpt, number, quantity, wall_time};
@@ -71,7 +71,12 @@ pub(in crate::cli) fn write<const D: usize>(
         writeln!(out, "colliders    {}", problem.colliders.len())?;
         for (number, collider) in problem.colliders.iter().enumerate() {
             let stages = in_stages(problem, &problem.collider_stages[number]);
-            writeln!(out, "  {:18} {}{stages}", excerpt(&collider.name, NAME), collider)?;
+            let last = problem.stages.len().saturating_sub(1);
+            let nodes = match walls::acts_on_nodes(problem, last, number) {
+                true => "; thick enough to hold fluids at nodes",
+                false => "",
+            };
+            writeln!(out, "  {:18} {}{stages}{nodes}", excerpt(&collider.name, NAME), collider)?;
         }
     }
     if !problem.sources.is_empty() {

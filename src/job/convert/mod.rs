@@ -192,6 +192,7 @@ fn problem<const D: usize>(
         absorbing: absorbing?,
         named_faces: faces.map(|pair| pair.map(|face| face.is_some())),
         colliders: colliders?,
+        thick: std::sync::OnceLock::new(),
         body_contacts: body_contacts?,
         leaving: settings::leaving(file.boundaries.leaving.unwrap_or_default()),
         stages: stages?,

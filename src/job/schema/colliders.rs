@@ -57,7 +57,8 @@ pub enum ActsOn {
     /// others a fraction of a cell off; walls thinner than two cells leak.
     Nodes,
     /// On the particles that touch it: walls of any thickness hold. This includes sheets: boxes that are
-    /// flat along one axis, and open meshes.
+    /// flat along one axis, and open meshes. Walls two cells thick hold fluids at nodes as well, in jobs
+    /// that have fluids alone.
     Particles,
 }
 

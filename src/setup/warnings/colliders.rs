@@ -5,6 +5,7 @@ use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;
 use crate::job::problem::Body;
+use crate::setup::walls::{acts_on_nodes, level_at};
 use crate::text::{excerpt, quantity};
 
 /// Boxes tested for bodies inside colliders.
@@ -15,7 +16,8 @@ const BOXES: usize = 50_000;
 pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let mut boxes = BOXES;
     moving_tank(problem, all);
-    at_particles(problem, all);
+    fluids_at_particles(problem, all);
+    plates_with_f_bar(problem, all);
     for (index, collider) in problem.colliders.iter().enumerate() {
         let name = excerpt(&collider.name, NAME);
         let (thickness, cell) =
@@ -72,9 +74,7 @@ fn fluids<const D: usize>(problem: &Problem<D>) -> impl Iterator<Item = &Body<D>
 
 /// Water in a tank of colliders that move.
 fn moving_tank<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    let moves = |(_, collider): &(usize, &Collider<D>)| {
-        collider.acts_on == ActsOn::Nodes && collider.motion != Motion::Fixed
-    };
+    let moves = |(_, collider): &(usize, &Collider<D>)| collider.motion != Motion::Fixed;
     let mut walls = problem.colliders.iter().enumerate().filter(moves);
     let Some((first, collider)) = walls.next() else { return };
     let tank = walls.fold(collider.shape.bounds(), |tank, (_, wall)| tank.hull(&wall.shape.bounds()));
@@ -87,36 +87,41 @@ fn moving_tank<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     }
 }
 
-/// Colliders that act on particles, where the force or the volume of what they hold is wrong.
-fn at_particles<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    let mut found = problem.colliders.iter().enumerate();
-    let Some((index, collider)) = found.find(|(_, collider)| collider.acts_on == ActsOn::Particles) else {
-        return;
+/// Fluids at colliders that act on particles and are too thin to act on nodes.
+fn fluids_at_particles<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
+    let last = problem.stages.len().saturating_sub(1);
+    let at_particles = |(index, collider): &(usize, &Collider<D>)| {
+        collider.acts_on == ActsOn::Particles && !acts_on_nodes(problem, last, *index)
     };
-    let name = excerpt(&collider.name, NAME);
-    if fluids(problem).next().is_some() {
+    if fluids(problem).next().is_some()
+        && let Some((index, collider)) = problem.colliders.iter().enumerate().find(at_particles)
+    {
+        let name = excerpt(&collider.name, NAME);
         all.push(format!(
-            "colliders[{index}].acts_on: \"{name}\" acts on particles, where fluids sink: 10 % of their height in 0.5 s at rest, 13 % in 1.5 s as they slosh, with cells of a tenth of the depth; use acts_on = \"nodes\" and walls of two cells or more"
-        ));
-    }
-    if problem.f_bar {
-        all.push(format!(
-            "colliders[{index}].acts_on: \"{name}\" acts on particles and numerics.f_bar is true: at such plates a block bears 0.84 of its load at 30 % of compression; let it act on nodes (0.95), or set f_bar = false (0.95)"
+            "colliders[{index}].acts_on: \"{name}\" acts on particles, as it is thinner than two cells, moves freely or holds other material as well; there fluids sink: 10 % of their height in 0.5 s at rest, 13 % in 1.5 s as they slosh, with cells of a tenth of the depth; use thicker walls with acts_on = \"nodes\""
         ));
     }
 }
 
-/// Level of the leaves at a collider where it begins: the coarsest that may lie there.
-fn level_at<const D: usize>(problem: &Problem<D>, index: usize, collider: &Collider<D>) -> u8 {
-    let domain = Aabb::new([0.0; D], problem.size());
-    let bounds = collider.shape.bounds().intersection(&domain);
-    let regions = problem.tree.regions.iter();
-    let regions =
-        regions.filter(|region| region.shape.classify(&bounds) == Side::Inside).map(|region| region.level);
-    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
-    let criteria =
-        criteria.filter(|criterion| criterion.collider() == Some(index)).map(|criterion| criterion.level);
-    regions.chain(criteria).fold(problem.tree.base_level, u8::max)
+/// Plates at nodes that press elastic bodies together, with F-bar.
+fn plates_with_f_bar<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
+    let is_elastic = |body: &Body<D>| {
+        let material = problem.materials[body.material].build();
+        !material.is_fluid() && !material.is_plastic()
+    };
+    let presses = |(_, collider): &(usize, &Collider<D>)| {
+        let moves = collider.motion != Motion::Fixed && collider.free().is_none();
+        collider.acts_on == ActsOn::Nodes && collider.contact != Contact::Sticky && moves
+    };
+    if let Some((index, collider)) = problem.colliders.iter().enumerate().find(presses)
+        && problem.f_bar
+        && problem.bodies.iter().any(is_elastic)
+    {
+        all.push(format!(
+            "colliders[{index}].acts_on: \"{}\" acts on nodes, elastic bodies are there, and numerics.f_bar is true: pressed together by 30 % a block bears 0.96 of its load at such plates, by 15 % 0.99; with acts_on = \"particles\" or with f_bar = false it bears 0.98",
+            excerpt(&collider.name, NAME)
+        ));
+    }
 }
 
 /// The least width of a shape, m; of unions that of the thickest part, of other booleans an upper bound.
