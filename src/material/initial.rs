@@ -55,7 +55,7 @@ pub enum NoState {
 }
 
 impl NoState {
-    /// What would do.
+    /// Changes of a job that would give a state.
     pub fn expected(&self) -> &'static str {
         match self {
             Self::Unreachable => {

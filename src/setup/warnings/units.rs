@@ -176,6 +176,24 @@ fn times<const D: usize>(problem: &Problem<D>, load: &Load<D>) -> impl Iterator<
     (0..8).filter(move |_| is_meant).map(move |part| (until - from).mul_add(f64::from(part) / 8.0, from))
 }
 
+/// Words about what moves faster than a share of the speed of waves in a material: that speed (m/s) and its
+/// number.
+fn too_fast<const D: usize>(
+    problem: &Problem<D>,
+    what: &str,
+    speed: f64,
+    (wave, material): (f64, usize),
+    (share, harm): (f64, &str),
+) -> String {
+    format!(
+        "{what} at {}, {} times the speed of waves in \"{}\" ({}); expected at most {share} of it, beyond which it {harm} the material: check the units of speed, stiffness and density",
+        quantity(speed, "m/s"),
+        number(speed / wave, 2),
+        excerpt(&problem.materials[material].name, NAME),
+        quantity(wave, "m/s")
+    )
+}
+
 /// Speed of waves in the softest material of a body, m/s, and its number.
 fn softest<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>]) -> Option<(f64, usize)> {
     let bodies = problem.bodies.iter().map(|body| (materials[body.material].wave_speed(), body.material));
@@ -184,26 +202,20 @@ fn softest<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>]
 
 /// Colliders that run into the softest material faster than it can give way.
 fn tools<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
-    let Some((wave, material)) = softest(problem, materials) else { return };
+    let Some(softest) = softest(problem, materials) else { return };
     for (index, collider) in problem.colliders.iter().enumerate() {
         let speed = collider.greatest_speed(&collider.state_at(0.0), &problem.size(), 0.0);
         let limit = if collider.free().is_some() { BODY } else { TOOL };
-        if speed > limit * wave {
-            all.push(format!(
-                "colliders[{index}].motion: \"{}\" moves at {}, {} times the speed of waves in \"{}\" ({}); expected at most {limit} of it, beyond which it crushes the material: check the units of speed, stiffness and density",
-                excerpt(&collider.name, NAME),
-                quantity(speed, "m/s"),
-                number(speed / wave, 2),
-                excerpt(&problem.materials[material].name, NAME),
-                quantity(wave, "m/s")
-            ));
+        if speed > limit * softest.0 {
+            let what = format!("colliders[{index}].motion: \"{}\" moves", excerpt(&collider.name, NAME));
+            all.push(too_fast(problem, &what, speed, softest, (limit, "crushes")));
         }
     }
 }
 
 /// Grips that pull the softest material faster than it can follow.
 fn loads<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], all: &mut Vec<String>) {
-    let Some((wave, material)) = softest(problem, materials) else { return };
+    let Some(softest) = softest(problem, materials) else { return };
     for (index, load) in problem.loads.iter().enumerate() {
         let Kind::Velocity(prescribed) = &load.kind else { continue };
         let centre = load.region.as_ref().map_or([0.0; D], |region| region.bounds().centre());
@@ -213,15 +225,9 @@ fn loads<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>], 
             squares.sum::<f64>().sqrt()
         });
         let speed = speeds.fold(0.0, f64::max);
-        if speed > TOOL * wave {
-            all.push(format!(
-                "loads[{index}]: \"{}\" moves material at {}, {} times the speed of waves in \"{}\" ({}); expected at most {TOOL} of it, beyond which it tears or crushes the material: check the units of speed, stiffness and density",
-                excerpt(&load.name, NAME),
-                quantity(speed, "m/s"),
-                number(speed / wave, 2),
-                excerpt(&problem.materials[material].name, NAME),
-                quantity(wave, "m/s")
-            ));
+        if speed > TOOL * softest.0 {
+            let what = format!("loads[{index}]: \"{}\" moves material", excerpt(&load.name, NAME));
+            all.push(too_fast(problem, &what, speed, softest, (TOOL, "tears or crushes")));
         }
     }
 }
