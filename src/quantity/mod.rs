@@ -3,17 +3,25 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `expression/` | expressions in x, y, z, t, X, Y, Z, with `libm` behind their functions |
+//! | `field/` | values at places from files: rasters, tables of points |
 //! | `record.rs` | tables over time from files of comma-separated values |
 //! | `table.rs` | tables over time, linear between rows |
 //!
 //! Knows no particles and no jobs. Values are the same on every machine: `libm` computes all elementary
 //! functions.
 mod expression;
+pub mod field;
 pub mod record;
 mod table;
 
 pub use expression::{Expression, ExpressionError, NotFinite};
+pub use field::Field;
 pub use table::{Table, TableError};
+
+use std::sync::Arc;
+
+/// Names of the coordinates.
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// From 0 at 0 to 1 at 1 on half a period of a cosine, `(1 - cos(π s)) / 2`; constant outside.
 pub fn smooth_step(s: f64) -> f64 {
@@ -57,6 +65,8 @@ pub enum Quantity {
     Table(Table),
     /// A function of place and time.
     Expression(Box<Expression>),
+    /// Values at places.
+    Field(Arc<Field>),
 }
 
 impl Quantity {
@@ -66,12 +76,22 @@ impl Quantity {
             Self::Constant(value) => *value,
             Self::Table(table) => table.at(t),
             Self::Expression(expression) => expression.at(&place.into(), t),
+            Self::Field(field) => field.at(place.into().now),
         }
     }
 
     /// Whether the value differs from place to place.
     pub fn depends_on_place(&self) -> bool {
-        matches!(self, Self::Expression(expression) if expression.depends_on_place())
+        (0..3).any(|axis| self.depends_on(axis)) || self.names_undeformed()
+    }
+
+    /// Whether the value differs along a coordinate; 0: x.
+    pub fn depends_on(&self, axis: usize) -> bool {
+        match self {
+            Self::Constant(_) | Self::Table(_) => false,
+            Self::Expression(expression) => expression.names(axis),
+            Self::Field(field) => field.ranges().iter().any(|(of, _)| *of == axis),
+        }
     }
 
     /// Whether the value belongs to places of the undeformed body.
@@ -87,7 +107,7 @@ impl Quantity {
     /// Whether the value changes in time.
     pub fn depends_on_time(&self) -> bool {
         match self {
-            Self::Constant(_) => false,
+            Self::Constant(_) | Self::Field(_) => false,
             Self::Table(_) => true,
             Self::Expression(expression) => expression.depends_on_time(),
         }

@@ -40,6 +40,14 @@ pub enum RecordError {
     /// A record without columns.
     #[error("it is a record of PEER: values at a constant step, without columns; remove `time` and `value`")]
     Peer,
+    /// Points in space between which nothing can be found.
+    #[error(
+        "its points are no grid; expected all combinations of their x, y and z, or points over two of them"
+    )]
+    Scattered,
+    /// Points in a plane between which nothing can be found; in words.
+    #[error("{0}")]
+    Points(String),
     /// The number of values is not that of the header.
     #[error("it has {found} values; its header says NPTS = {expected}")]
     Count {
@@ -51,7 +59,10 @@ pub enum RecordError {
 }
 
 /// Most bytes of a file.
-const MOST_BYTES: u64 = 1 << 28;
+pub(super) const MOST_BYTES: u64 = 1 << 28;
+
+/// The mark of the order of bytes that some programs put first.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Longest piece of a file in a message.
 const QUOTED: usize = 40;
@@ -114,9 +125,18 @@ fn table(rows: &Rows, value: usize, scale: f64) -> Result<Table, RecordError> {
     })
 }
 
-fn rows(bytes: &[u8], columns: &[Column]) -> Result<Rows, RecordError> {
-    // Some programs put a mark of the order of bytes first.
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+/// The cells of the first line that is neither blank nor a remark, and its number, from 1.
+pub(super) fn first_line(bytes: &[u8]) -> Option<(u64, Vec<Vec<u8>>)> {
+    let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
+    let mut lines = (1..).zip(bytes.split(|&byte| byte == b'\n'));
+    let (line, text) = lines.find(|(_, text)| holds_cells(text))?;
+    let mut cells = Vec::new();
+    Cells::of(bytes).cut(text, &mut cells).ok()?;
+    Some((line, cells))
+}
+
+pub(super) fn rows(bytes: &[u8], columns: &[Column]) -> Result<Rows, RecordError> {
+    let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
     let cells = Cells::of(bytes);
     let (mut places, mut rows) = (None, Rows::default());
     let mut record = Vec::new();
@@ -207,7 +227,7 @@ fn find_columns(first: &[Vec<u8>], columns: &[Column], line: u64) -> Result<(Vec
 
 /// Place of a name: as it is written, or else in letters of either case and without a unit in brackets after
 /// it.
-fn named(first: &[Vec<u8>], name: &str) -> Option<usize> {
+pub(super) fn named(first: &[Vec<u8>], name: &str) -> Option<usize> {
     let is_like = |cell: &Vec<u8>| {
         let bare = cell.split(|byte| matches!(byte, b'[' | b'(')).next().unwrap_or_default().trim_ascii();
         [cell, bare].iter().any(|cell| cell.eq_ignore_ascii_case(name.as_bytes()))
@@ -238,7 +258,7 @@ fn number(record: &[Vec<u8>], at: usize, line: u64) -> Result<f64, RecordError> 
         .ok_or_else(|| fault(format!("found {} in column {}; expected a number", quoted(cell), at + 1)))
 }
 
-fn quoted(cell: &[u8]) -> String {
+pub(super) fn quoted(cell: &[u8]) -> String {
     format!("\"{}\"", excerpt(&String::from_utf8_lossy(cell), QUOTED))
 }
 

@@ -3,15 +3,41 @@
 //! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along
 //! the vertical, this is its mean over each box, and the sums at the nodes are those of the exact integrals:
 //! level ground is at rest to round-off. Stress is effective: water in the pores bears its part of the weight.
+//! Where it seeps, its pressure is known when heads have been found, so that stress comes after them.
+use std::borrow::Cow;
+
 use partition::Octant;
 
 use super::seed::{SeedError, raster};
 use crate::job::problem::{Body, InitialStress, Problem, StressKind};
-use crate::load::Up;
+use crate::load::water::{Given, Head};
+use crate::load::{Up, Water};
 use crate::material::initial::{NoState, Stressed, under_stress, yielded};
 use crate::material::{HISTORIES, Material};
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::particle::followed::head;
 use crate::quantity::Quantity;
+
+/// Which particles get their stress.
+#[derive(Clone, Copy, Debug)]
+pub enum Which {
+    /// Those whose stress does not depend on heads.
+    WithoutHeads,
+    /// Those from `first` on whose stress depends on heads, which they carry from this column on.
+    WithHeads {
+        /// Index of the first.
+        first: usize,
+        /// First column.
+        column: usize,
+    },
+}
+
+/// Whether the stress of a body depends on heads of water that seeps.
+pub fn needs_heads<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
+    let is_weight = |stress: &InitialStress| matches!(stress.kind, StressKind::Weight { .. });
+    let seeps = |water: &Water| matches!(water.given, Given::Seepage(_));
+    body.stress.as_ref().is_some_and(is_weight) && problem.water_of_stage(body.stage).is_some_and(seeps)
+}
 
 /// Not collective. Gives the particles of a leaf the stress of their bodies. Their mass stays, and their
 /// volume is the one under stress: the reference volume differs from it by the deformation under the stress.
@@ -23,19 +49,27 @@ pub fn put_under_stress<const D: usize>(
     materials: &[Box<dyn Material>],
     octant: &Octant<D>,
     chunk: &mut Chunk<D>,
+    which: Which,
 ) -> Result<(), SeedError> {
-    if problem.bodies.iter().all(|body| body.stress.is_none()) {
+    let (first, column) = match which {
+        Which::WithoutHeads => (0, None),
+        Which::WithHeads { first, column } => (first, Some(column)),
+    };
+    let is_due = |body: &Body<D>| body.stress.is_some() && needs_heads(problem, body) == column.is_some();
+    let due: Vec<bool> = problem.bodies.iter().map(is_due).collect();
+    if !due.contains(&true) {
         return Ok(());
     }
     let mut columns = Columns::new(0.25 * problem.cell_edge(octant.level));
-    for p in 0..chunk.len() {
+    for p in first..chunk.len() {
         let Tag { body: index, material, .. } = Tag::unpack(chunk.tags()[p]);
         let body = &problem.bodies[usize::from(index)];
-        let Some(initial) = &body.stress else { continue };
+        let Some(initial) = body.stress.as_ref().filter(|_| due[usize::from(index)]) else { continue };
         let x = chunk.position(p);
         let material = &*materials[usize::from(material)];
         let [half] = chunk.read::<1>(Layout::<D>::HALF, p);
-        let stressed = at(problem, body, initial, material, &x, half, &mut columns)
+        let about = head(chunk, column, p, &problem.origin);
+        let stressed = at(problem, body, initial, material, (&x, half), about, &mut columns)
             .map_err(|reason| fault(problem, usize::from(index), initial, &x, reason))?;
         let symmetric = |tensor: &[f64; 6]| tensor[..Layout::<D>::SYMMETRIC].to_vec();
         chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &symmetric(&stressed.elastic));
@@ -55,10 +89,10 @@ pub fn put_under_stress<const D: usize>(
 pub fn probe<const D: usize>(problem: &Problem<D>, materials: &[Box<dyn Material>]) -> Result<(), SeedError> {
     let interval = 0.25 * problem.cell_edge(problem.finest_level());
     for (index, body) in problem.bodies.iter().enumerate() {
-        let Some(initial) = &body.stress else { continue };
+        let Some(initial) = body.stress.as_ref().filter(|_| !needs_heads(problem, body)) else { continue };
         for x in raster(problem, body) {
             let material = &*materials[body.material];
-            at(problem, body, initial, material, &x, 0.0, &mut Columns::new(interval))
+            at(problem, body, initial, material, (&x, 0.0), None, &mut Columns::new(interval))
                 .map_err(|reason| fault(problem, index, initial, &x, reason))?;
         }
     }
@@ -80,19 +114,21 @@ fn fault<const D: usize>(
     }
 }
 
-/// State of a particle of a body at a point, with a box of this half width, m.
+/// State of a particle of a body at a point, with a box of this half width, m; `about` is the head there where
+/// water seeps.
 fn at<const D: usize>(
     problem: &Problem<D>,
     body: &Body<D>,
     initial: &InitialStress,
     material: &dyn Material,
-    x: &[f64; D],
-    half: f64,
+    (x, half): (&[f64; D], f64),
+    about: Option<Head>,
     columns: &mut Columns<D>,
 ) -> Result<Stressed, NoState> {
     let place = problem.place(x);
     let gravity = problem.gravity_of_stage(body.stage).at(0.0);
     let up = Up::new(&gravity);
+    let water = problem.water_of_stage(body.stage).map(|water| water.about(about));
     let pressures = match &initial.kind {
         StressKind::Components(components) => {
             let stress = components.each_ref().map(|component| component.at(place, 0.0));
@@ -100,14 +136,14 @@ fn at<const D: usize>(
         }
         StressKind::Weight { ratio, surface, surcharge } => {
             let surface = surface.as_ref();
-            let mut weight = |x: &[f64; D]| weight(problem, body, surface, x, columns);
+            let mut weight = |x: &[f64; D]| weight(problem, body, surface, x, water.as_ref(), columns);
             let faces = [-half, half].map(|way| {
                 let mut face = *x;
                 face[up.axis] += way;
                 face
             });
-            let water = problem.water_of_stage(body.stage);
-            let is_below = |x: &[f64; D]| water.is_some_and(|water| water.is_below(problem.place(x), 0.0));
+            let is_below =
+                |x: &[f64; D]| water.as_ref().is_some_and(|water| water.is_below(problem.place(x), 0.0));
             // Where the water table passes through a box, the particle has the mean density of both parts, and
             // the stress at its centre is the mean of those at its faces.
             let vertical = match is_below(&faces[0]) == is_below(&faces[1]) {
@@ -136,25 +172,32 @@ fn weight<const D: usize>(
     body: &Body<D>,
     surface: Option<&Quantity>,
     x: &[f64; D],
+    water: Option<&Cow<'_, Water>>,
     columns: &mut Columns<D>,
 ) -> f64 {
     let place = problem.place(x);
     let gravity = problem.gravity_of_stage(body.stage).at(0.0);
     let up = Up::new(&gravity);
+    let height = x[up.axis] * up.sign;
+    // Material is saturated below the water table. Heights count from the lower corner of the domain.
+    let densities = |material: usize, ends: [f64; 2]| {
+        let setup = &problem.materials[material];
+        let zero = problem.origin[up.axis] * up.sign;
+        let table = water.map(|water| water.table(place, 0.0, ends.map(|end| end + zero)) - zero);
+        [(table.unwrap_or(ends[0]), setup.saturated_density), (ends[1], setup.density)]
+    };
     let (mass, depth) = match surface {
         Some(surface) => {
             let depth = ((surface.at(place, 0.0) - place[up.axis]) * up.sign).max(0.0);
-            let mut above = Standing::default();
-            above.put(problem, (body.material, body.stage), up, place, [0.0, depth]);
-            (above.mass_above(0.0), depth)
+            let above = Standing(vec![(body.material, [height, height + depth])]);
+            (above.mass_above(height, densities), depth)
         }
         None => {
             let standing = columns.at(problem, body.stage, up, x);
-            let height = x[up.axis] * up.sign;
-            (standing.mass_above(height), (standing.top() - height).max(0.0))
+            (standing.mass_above(height, densities), (standing.top() - height).max(0.0))
         }
     };
-    let water = problem.water_of_stage(body.stage).map_or(0.0, |water| {
+    let water = water.map_or(0.0, |water| {
         let mut surface = place;
         surface[up.axis] = up.sign.mul_add(depth, place[up.axis]);
         water.pressure(surface, 0.0, &gravity).max(0.0) - water.pressure(place, 0.0, &gravity)
@@ -185,41 +228,29 @@ fn interpolate(rows: &[[f64; 3]], depth: f64) -> [f64; 2] {
     [1, 2].map(|value| share.mul_add(high[value] - low[value], low[value]))
 }
 
-/// Material on a vertical line: pieces of bodies from the height `low` to `high` (m, up) with a density,
-/// kg/m³.
+/// Material on a vertical line: pieces of bodies with their material, and the heights (m, up) where they begin
+/// and end.
 #[derive(Clone, Debug, Default)]
-struct Standing(Vec<[f64; 3]>);
+struct Standing(Vec<(usize, [f64; 2])>);
 
 impl Standing {
-    /// Adds a piece of a material between two heights (m, up) above a place, saturated below the water table.
-    fn put<const D: usize>(
-        &mut self,
-        problem: &Problem<D>,
-        (material, stage): (usize, usize),
-        up: Up,
-        place: [f64; 3],
-        [low, high]: [f64; 2],
-    ) {
-        let setup = &problem.materials[material];
-        match problem.water_of_stage(stage) {
-            None => self.0.push([low, high, setup.density]),
-            Some(water) => {
-                let zero = place[up.axis] * up.sign;
-                let table = water.table(place, 0.0, [low + zero, high + zero]) - zero;
-                self.0.push([low, table, setup.saturated_density]);
-                self.0.push([table, high, setup.density]);
+    /// Mass per area above a height, kg/m². `densities` gives the layers of a material between two heights: the
+    /// upper end of each, and its density, kg/m³.
+    fn mass_above(&self, height: f64, densities: impl Fn(usize, [f64; 2]) -> [(f64, f64); 2]) -> f64 {
+        let mut mass = 0.0;
+        for &(material, ends) in &self.0 {
+            let mut low = ends[0];
+            for (high, density) in densities(material, ends) {
+                mass += density * (high - low.max(height)).max(0.0);
+                low = high;
             }
         }
-    }
-
-    /// Mass per area above a height, kg/m².
-    fn mass_above(&self, height: f64) -> f64 {
-        self.0.iter().map(|[low, high, density]| density * (high - low.max(height)).max(0.0)).sum()
+        mass
     }
 
     /// Height of the uppermost surface.
     fn top(&self) -> f64 {
-        self.0.iter().map(|piece| piece[1]).fold(f64::NEG_INFINITY, f64::max)
+        self.0.iter().map(|(_, ends)| ends[1]).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -266,7 +297,7 @@ fn standing<const D: usize>(
         };
         let mut push = |from: f64, to: f64| {
             let [a, b] = [from * up.sign, to * up.sign];
-            all.put(problem, (body.material, stage), up, problem.place(foot), [a.min(b), a.max(b)]);
+            all.0.push((body.material, [a.min(b), a.max(b)]));
         };
         // Each step is as long as the distance to the surface, and no shorter than the interval.
         let (mut height, mut inside_from) = (low, None);
@@ -355,7 +386,11 @@ shape = { kind = "box", min = [1, -2], max = [5, -1] }
             (3.5, 1.25, 1000.0),
             (3.5, 2.75, 250.0),
         ] {
-            let found = standing(&problem, 0, up, &[x, 0.0], 0.1).mass_above(height);
+            let dry = |material: usize, [low, high]: [f64; 2]| {
+                let density = problem.materials[material].density;
+                [(low, density), (high, density)]
+            };
+            let found = standing(&problem, 0, up, &[x, 0.0], 0.1).mass_above(height, dry);
             assert!((found / expected - 1.0).abs() < 1e-14, "{x}, {height}: {found} for {expected}");
         }
         assert_eq!(standing(&problem, 0, up, &[1.5, 0.0], 0.1).top(), 2.5);

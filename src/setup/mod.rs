@@ -5,7 +5,7 @@ use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use self::initial_stress::put_under_stress;
+use self::initial_stress::{Which, put_under_stress};
 use self::seed::{SeedError, check_counts, check_finite, count_leaf, fill_leaf};
 use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
@@ -169,7 +169,8 @@ fn new_particles<const D: usize>(
         }
     }
     let stressed = forest.leaves().par_iter().zip(&mut chunks);
-    let stressed = stressed.map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk));
+    let stressed = stressed
+        .map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk, Which::WithoutHeads));
     let stressed: Result<(), SeedError> = stressed.collect();
     comm.agree(check_finite(problem).and(stressed))?;
     Ok(chunks)

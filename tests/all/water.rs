@@ -192,6 +192,38 @@ fn a_submerged_slope_moves_alike_under_any_depth_of_water() {
     }
 }
 
+/// A water table of a survey, as a section over x, and pressures of another program at scattered points, act as
+/// the same in expressions; the depth of a raster as that over x and y.
+#[test]
+fn water_from_files_acts_as_that_of_expressions() {
+    let soil = format!("density = 1600\nsaturated_density = 2000\n{ELASTIC}");
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let force = |water: &str, text: &str| {
+        std::fs::write(directory.path().join("water.dat"), text).expect("table");
+        let path = written(directory.path(), &job(water, &soil, GROUND, SHORT));
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet", "--overwrite"]));
+        let history = History::read(directory.path(), "ground");
+        [history.last("load_water_x"), history.last("load_water_y"), history.last("mass")]
+    };
+    let close = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
+    let slope = force("level = '0.5 - 0.4 * (x - 3)'", "");
+    assert!(slope[0] > 100.0, "it pushes along x: {slope:?}");
+    let section = force("level = { points = 'water.dat', origin = [3, 0] }", "level [m];x\n-0.3;2\n0.5;0\n");
+    assert!(close(slope, section), "{slope:?} {section:?}");
+    let field = force("pressure = '2e4 - 3e3 * x - 5e3 * y'", "");
+    // Corners and some points inside, in kPa.
+    let places = [(3.0, -5.0), (5.0, -5.0), (5.0, 3.0), (3.0, 3.0), (3.7, -1.3), (4.4, -3.9), (4.1, 0.6)];
+    let rows: String =
+        places.iter().map(|(x, y)| format!("{x} {y} {:?}\n", 20.0 - 3.0 * x - 5.0 * y)).collect();
+    let scattered =
+        force("pressure = { points = 'water.dat', value = 'u', scale = 1e3 }", &format!("x y u\n{rows}"));
+    assert!(close(field, scattered), "{field:?} {scattered:?}");
+    let raster =
+        "ncols 2\nnrows 3\nxllcenter -1\nyllcenter -6\ncellsize 5\n-6e3 -21e3\n19e3 4e3\n44e3 29e3\n";
+    let of_raster = force("pressure = { raster = 'water.dat', origin = [3, 0] }", raster);
+    assert!(close(field, of_raster), "{field:?} {of_raster:?}");
+}
+
 /// A wet heap collapses as the table falls through it, across level jumps and splits.
 #[test]
 fn same_bits_on_any_ranks_and_across_restart() {

@@ -14,6 +14,8 @@ pub(in crate::job) struct Checks<'t> {
     pub position: &'t dyn Fn(usize) -> Position,
     /// Directory of the job file, to which names of files in it are relative.
     pub directory: &'t std::path::Path,
+    /// Ends of the domain along each axis, m; 0 along axes that the job does not have.
+    pub domain: [[f64; 2]; 3],
     /// Checksum of the files that the job names, as far as they have been read; 0 without.
     pub files: u64,
     /// Whether shapes may be sheets: boxes that are flat along one axis, and meshes that are not closed.

@@ -1,16 +1,13 @@
 //! Loads of the job file to those of the solver.
 use super::checks::{Checks, Space};
+use super::quantities::{at_nodes, quantity, vector};
 use crate::geometry::written::Vector;
-use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
-use crate::job::schema::loads::{
-    Column as WrittenColumn, Load as Written, LoadKind, Quantity as WrittenQuantity, Record, Sharing,
-};
+use crate::job::schema::loads::{Load as Written, LoadKind, Sharing};
 use crate::load::{Carried, CarriedForce, Kind, Load};
-use crate::quantity::record::{self, Column};
-use crate::quantity::{Expression, Quantity, Table};
-use crate::text::{excerpt, written as number};
+use crate::quantity::Quantity;
+use crate::text::written as number;
 
 /// Most exact sums of colliders (six each), faces (one for each axis), fluxes, contacts between bodies and
 /// loads (four each): the header of a checkpoint has limited room.
@@ -147,83 +144,4 @@ fn direction<const D: usize>(
         Some(vector) => checks.direction(vector, path).map(Some),
         None => Some(None),
     }
-}
-
-/// As many quantities as the job has dimensions, or faults.
-pub(super) fn vector<const D: usize>(
-    checks: &mut Checks,
-    written: &[WrittenQuantity],
-    path: &Path,
-) -> Option<[Quantity; D]> {
-    if written.len() != D {
-        checks.fault(path, format!("found {} components; expected {D} in a {D}D job", written.len()));
-        return None;
-    }
-    let mut all = Vec::new();
-    for (i, component) in written.iter().enumerate() {
-        all.push(quantity::<D>(checks, component, &path.index(i)));
-    }
-    let all: Option<Vec<Quantity>> = all.into_iter().collect();
-    all?.try_into().ok()
-}
-
-/// A quantity at nodes, which cannot depend on places of the undeformed body, or a fault.
-pub(super) fn at_nodes<const D: usize>(
-    checks: &mut Checks,
-    written: &WrittenQuantity,
-    path: &Path,
-) -> Option<Quantity> {
-    let quantity = quantity::<D>(checks, written, path)?;
-    if quantity.names_undeformed() {
-        let message = "found X, Y or Z, positions in the undeformed body; expected x, y, z and t, positions in the domain";
-        checks.fault(path, message.into());
-        return None;
-    }
-    Some(quantity)
-}
-
-/// A quantity, or a fault.
-pub(super) fn quantity<const D: usize>(
-    checks: &mut Checks,
-    written: &WrittenQuantity,
-    path: &Path,
-) -> Option<Quantity> {
-    let read = match written {
-        WrittenQuantity::Number(value) => Ok(Quantity::Constant(*value)),
-        WrittenQuantity::Expression(text) => match Expression::parse(text) {
-            Ok(expression) if D == 2 && expression.names_z() => Err(format!(
-                "found z in \"{}\"; expected x, y, X, Y and t in a 2D job",
-                excerpt(text, QUOTED)
-            )),
-            Ok(expression) => {
-                let key = format!("{}: {path}", checks.place(path));
-                Ok(Quantity::Expression(Box::new(expression.of_key(key))))
-            }
-            Err(error) => Err(error.to_string()),
-        },
-        WrittenQuantity::Table(rows) => {
-            let rows: Vec<(f64, f64)> = rows.iter().map(|[time, value]| (*time, *value)).collect();
-            Table::new(&rows).map(Quantity::Table).map_err(|error| error.to_string())
-        }
-        WrittenQuantity::Record(record) => return of_file(checks, record, path),
-    };
-    read.map_err(|message| checks.fault(path, message)).ok()
-}
-
-/// A column of a file.
-pub(super) fn column(written: &WrittenColumn) -> Column {
-    match written {
-        WrittenColumn::Number(number) => Column::Number(usize::from(*number)),
-        WrittenColumn::Name(name) => Column::Name(name.clone()),
-    }
-}
-
-/// The table in a file, or a fault.
-fn of_file(checks: &mut Checks, written: &Record, path: &Path) -> Option<Quantity> {
-    let (time, value) = (column(&written.time), column(&written.value));
-    let expected = "rows of a time and a value in columns";
-    let read = |file: &std::path::Path| record::read(file, &time, &value, written.scale);
-    let table = checks.read(&written.file, expected, &path.key("file"), read)?;
-    checks.note_file(table.checksum());
-    Some(Quantity::Table(table))
 }

@@ -21,14 +21,15 @@ use self::adaptivity::{Context, adaptivity};
 use self::checks::{Checks, Space};
 use self::colliders::colliders;
 use self::contact::body_contacts;
-use self::loads::{loads, vector};
+use self::loads::loads;
+use self::quantities::vector;
 use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, Position, QUOTED};
 use super::parse::source::{Node, Path};
 use super::problem::*;
 use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
-use crate::geometry::written::Shape as Written;
+use crate::geometry::written::{Shape as Written, Vector};
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::{Gravity, Load};
 use crate::material::parameters::{OutOfRange, Parameters};
@@ -47,6 +48,7 @@ mod contact;
 mod loads;
 mod overlap;
 mod probes;
+mod quantities;
 pub(super) mod settings;
 mod shapes;
 mod sources;
@@ -67,8 +69,9 @@ pub(super) fn convert(
     path: &std::path::Path,
 ) -> Result<AnyProblem, Vec<Fault>> {
     let directory = path.parent().unwrap_or(std::path::Path::new(""));
+    let domain = bounds(&file.domain);
     let mut checks =
-        Checks { tree, text, position, directory, files: 0, takes_sheets: false, faults: Vec::new() };
+        Checks { tree, text, position, directory, domain, files: 0, takes_sheets: false, faults: Vec::new() };
     let problem = if file.dimension == 2 {
         problem(&mut checks, file, path).map(AnyProblem::Two)
     } else {
@@ -81,6 +84,16 @@ pub(super) fn convert(
             Err(checks.faults)
         }
     }
+}
+
+/// The ends of the domain along each axis, m, as they are written.
+fn bounds(domain: &file::Domain) -> [[f64; 2]; 3] {
+    let component =
+        |of: Option<&Vector>, axis: usize| of.and_then(|of| of.0.get(axis)).copied().unwrap_or(0.0);
+    std::array::from_fn(|axis| {
+        let low = component(domain.min.as_ref(), axis);
+        [low, low + component(Some(&domain.size), axis)]
+    })
 }
 
 fn problem<const D: usize>(
@@ -120,7 +133,7 @@ fn problem<const D: usize>(
     let loads = loads(checks, file, taken, &space, &root.key("loads"));
     let water = water::water(checks, file, gravity.as_ref(), &space, &root);
     let water_stages = water::stages(checks, file, &root);
-    let seepage = water::seepage(checks, file, &water_stages, &space, &root);
+    let seepage = water::seepage(checks, file, &space, &root);
     let stages = stages::stages(checks, file, &root);
     let mut load_stages =
         stages::of_each(checks, file, file.loads.iter().map(|load| &load.stages), &root.key("loads"));

@@ -1,6 +1,6 @@
 //! Initial fields of bodies: velocities and stresses.
 use super::checks::Checks;
-use super::loads::{quantity, vector};
+use super::quantities::{quantity, vector};
 use crate::job::parse::source::Path;
 use crate::job::problem::{InitialStress, StressKind};
 use crate::job::schema::job_file::{JobFile, Material};

@@ -1,13 +1,13 @@
 //! Water in the pores.
+use super::AXES;
 use super::checks::{Checks, Space};
-use super::loads::at_nodes;
+use super::quantities::at_nodes;
 use super::stress::needs_vertical_gravity;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::InStages;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::Quantity as Written;
-use crate::job::schema::stress::StressKind;
 use crate::job::schema::water as schema;
 use crate::load::seepage::{HeldHead, HeldRegion};
 use crate::load::water::Given;
@@ -60,11 +60,21 @@ pub(super) fn water<const D: usize>(
     // A copy: what it is evaluated for here may not be reached by the run.
     let start = gravity?.clone().at(0.0);
     let vertical = file.gravity.iter().flatten().zip(start).map(|(written, start)| match written {
+        Written::Number(_) => start,
         // Gravity that grows from 0: down.
-        Written::Expression(_) | Written::Table(_) | Written::Record(_) if start == 0.0 => -1.0,
+        _ if start == 0.0 => -1.0,
         _ => start,
     });
     let up = Up::new(&vertical.collect::<Vec<_>>());
+    if let Given::Level(level) = &given
+        && level.depends_on(up.axis)
+    {
+        let vertical = AXES[up.axis];
+        let message = format!(
+            "found a level that depends on {vertical}, the vertical; expected the height of the water table over the horizontal coordinates and t"
+        );
+        checks.fault(&path.key("level"), message);
+    }
     Some(Some(Load {
         name: NAME.into(),
         kind: Kind::Water(Water { given, density: written.density, suction: written.suction, up }),
@@ -87,7 +97,6 @@ pub(super) fn stages(checks: &mut Checks, file: &JobFile, root: &Path) -> InStag
 pub(super) fn seepage<const D: usize>(
     checks: &mut Checks,
     file: &JobFile,
-    stages: &InStages,
     space: &Space<D>,
     root: &Path,
 ) -> Option<Option<Seepage<D>>> {
@@ -99,14 +108,6 @@ pub(super) fn seepage<const D: usize>(
     if !file.sources.is_empty() {
         let message = "found seepage in a job with sources; expected a water table, `[water] level = …`: material that enters has no head";
         checks.fault(&path, message.into());
-    }
-    for (i, body) in file.bodies.iter().enumerate().filter(|(_, body)| stages.has(0) && body.stage.is_none())
-    {
-        let kind = body.stress.as_ref().map(|stress| &stress.kind);
-        if matches!(kind, Some(StressKind::Geostatic { .. } | StressKind::Hydrostatic { .. })) {
-            let message = "found the weight above as stress of ground in which water seeps from the start; expected seepage from a later stage, [water] stages = […], after one that ends at equilibrium";
-            checks.fault(&root.key("bodies").index(i).key("stress"), message.into());
-        }
     }
     let mut heads = Vec::new();
     for (i, head) in written.heads.iter().enumerate() {

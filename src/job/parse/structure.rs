@@ -171,6 +171,29 @@ impl<'s> Checker<'s> {
             }
             return found.copied();
         }
+        // Tables that differ by the key that each needs, which may be misspelt.
+        if let Toml::Table(entries) = &node.value {
+            let key_of = |option: &'s Value| {
+                let mut one = Layers::default();
+                one.add(self.root, option);
+                one.required().next()
+            };
+            let tables = options.iter().filter(|option| option.get("$ref").is_some());
+            let tables: Vec<_> = tables.filter_map(|option| Some((key_of(option)?, *option))).collect();
+            let is_near = |key: &str| entries.iter().any(|(given, _)| nearest(given, [key]).is_some());
+            let with_key = tables.iter().find(|(key, _)| node.get(key).is_some());
+            match with_key.or_else(|| tables.iter().find(|(key, _)| is_near(key))) {
+                Some((_, option)) => return Some(option),
+                None if tables.len() > 1 => {
+                    let keys: Vec<String> = tables.iter().map(|(key, _)| format!("`{key}`")).collect();
+                    let message =
+                        format!("found a table without a key of {}; expected one of them", keys.join(", "));
+                    self.fault(node, path, message, layers);
+                    return None;
+                }
+                None => {}
+            }
+        }
         // Different types; one with a definition of its own is a table.
         let found = options.iter().find(|option| {
             let is_table = option.get("$ref").is_some() && matches!(node.value, Toml::Table(_));

@@ -4,8 +4,9 @@ use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A quantity: a number; an expression in x, y, z (m) and t (s), of loads on material also in X, Y, Z (m), such as "0.1 * sin(2 * pi * t)"; or a table over time,
-/// [[time, value], …] or from a file { file = "record.csv" }, linear between its rows and constant outside.
+/// A quantity: a number; an expression in x, y, z (m) and t (s), of loads on material also in X, Y, Z (m), such as "0.1 * sin(2 * pi * t)"; a table over time,
+/// [[time, value], …] or from a file { file = "record.csv" }, linear between its rows and constant outside; or values at places from a file,
+/// { points = "standpipes.csv" } or { raster = "table.asc" }.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
@@ -18,6 +19,10 @@ pub enum Quantity {
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
     /// A table in a file.
     Record(Box<Record>),
+    /// Values at points from a file.
+    Points(Box<Points>),
+    /// Values at x and y from a raster.
+    Raster(Box<Raster>),
 }
 
 /// A table over time from a file with columns separated by semicolons, tabs, commas or spaces, or a record of the PEER database. Lines that
@@ -37,6 +42,52 @@ pub struct Record {
     #[serde(default = "one")]
     #[schemars(range(min = -1e12, max = 1e12))]
     pub scale: f64,
+}
+
+/// Values at points from a file with columns, as of a table over time. The first line names them: those of the coordinates x, y and z (m) on
+/// which the values depend, and of the values. Points at all combinations of some coordinates are a grid: values between them are linear
+/// along each coordinate. Other points over two coordinates make triangles, with linear values. Outside, the nearest place counts. If the file
+/// changes, a restart is refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Points {
+    /// Name of the file, relative to the job file.
+    pub points: String,
+    /// Column of the values: its number or name; by default the first that is no coordinate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<Column>,
+    /// Factor for the values: 1000 converts kPa to Pa.
+    #[serde(default = "one")]
+    #[schemars(range(min = -1e12, max = 1e12))]
+    pub scale: f64,
+    /// Where the origin of the coordinates of the file lies, m; the origin of the job by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Vector>,
+}
+
+/// Values at x and y from a raster that covers the domain, every cell with a value; linear between the middles of its cells. If the file
+/// changes, a restart is refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Raster {
+    /// Name of an ESRI ASCII grid (`.asc`), a GeoTIFF (`.tif`) or an array of NumPy (`.npy`, `.npz`), rows from north to south; relative to
+    /// the job file.
+    pub raster: String,
+    /// Distance of neighbouring values, m: for arrays, which do not have it, or in place of that of the file; the south-western value then
+    /// stands at the origin of the raster's coordinates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
+    pub cell: Option<f64>,
+    /// Name of the array in a file with several (`.npz`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<String>,
+    /// Factor for the values.
+    #[serde(default = "one")]
+    #[schemars(range(min = -1e12, max = 1e12))]
+    pub scale: f64,
+    /// Where the origin of the raster's coordinates lies, m; the origin of the job by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Vector>,
 }
 
 /// A column of a file: its number, from 1, or its name.

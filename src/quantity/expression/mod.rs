@@ -153,9 +153,9 @@ impl Expression {
         Some(NotFinite { key: self.key.clone(), text: self.text.clone(), at, value })
     }
 
-    /// Whether it names a place.
-    pub fn depends_on_place(&self) -> bool {
-        self.used & !(1 << 3) != 0
+    /// Whether it names a coordinate of the present place; 0: x.
+    pub fn names(&self, axis: usize) -> bool {
+        self.used >> axis & 1 == 1
     }
 
     /// Whether it names X, Y or Z.
@@ -235,10 +235,10 @@ mod tests {
         let expression = Expression::parse("exp(sin(x)) ^ t").unwrap();
         let expected = libm::pow(libm::exp(libm::sin(1.1)), 0.7);
         assert_eq!(expression.at(&Place::from([1.1, 0.0, 0.0]), 0.7).to_bits(), expected.to_bits());
-        assert!(expression.depends_on_place() && expression.depends_on_time());
-        assert!(!Expression::parse("2 * t").unwrap().depends_on_place());
+        assert!(expression.names(0) && expression.depends_on_time());
+        assert!(!(0..3).any(|axis| Expression::parse("2 * t").unwrap().names(axis)));
         let both = Expression::parse("x - X + 10 * Z").unwrap();
-        assert!(both.depends_on_place() && both.names_undeformed() && both.names_z());
+        assert!(both.names(0) && both.names_undeformed() && both.names_z());
         assert_eq!(both.at(&Place { now: [3.0; 3], undeformed: [1.0, 0.0, 2.0] }, 0.0), 22.0);
     }
 

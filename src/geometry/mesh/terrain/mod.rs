@@ -39,7 +39,7 @@ impl Terrain {
     /// # Errors
     /// Some cells have no height.
     pub fn new(raster: Raster) -> Result<Self, String> {
-        let gaps = raster.gaps();
+        let gaps = raster.gaps("height");
         let Raster { values, columns, rows, cell, corner } = raster;
         match gaps {
             Some(gaps) => Err(gaps),

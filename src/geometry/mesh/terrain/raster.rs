@@ -9,13 +9,15 @@ use crate::input_file;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
     /// Row by row from south to north, from west to east in each; NaN where there is none.
-    pub(super) values: Vec<f64>,
-    pub(super) columns: usize,
-    pub(super) rows: usize,
+    pub values: Vec<f64>,
+    /// Number of values in a row.
+    pub columns: usize,
+    /// Number of rows.
+    pub rows: usize,
     /// Distance of neighbours, m.
-    pub(super) cell: f64,
+    pub cell: f64,
     /// Place of the south-western value in the raster's own coordinates, m.
-    pub(super) corner: [f64; 2],
+    pub corner: [f64; 2],
 }
 
 /// Keys of a job that complement the file of a raster.
@@ -83,8 +85,8 @@ impl Raster {
         Ok(Self { values: all.map(|value| known(*value)).collect(), columns, rows, cell, corner })
     }
 
-    /// How many cells have no value, and where the first is, in words.
-    pub(super) fn gaps(&self) -> Option<String> {
+    /// How many cells have no value, which the message calls `what`, and where the first is, in words.
+    pub fn gaps(&self, what: &str) -> Option<String> {
         let count = self.values.iter().filter(|value| value.is_nan()).count();
         let from_north = |at: usize| (self.rows - 1 - at / self.columns) * self.columns + at % self.columns;
         let gaps = (0..self.values.len()).filter(|&at| self.values[at].is_nan());
@@ -93,7 +95,7 @@ impl Raster {
         let place = [first % self.columns, first / self.columns];
         let [x, y] = [0, 1].map(|a| self.corner[a] + place[a] as f64 * self.cell);
         Some(format!(
-            "{count} of {} cells have no height, the first in row {row}, column {column}, at {}; fill these cells or cut the raster",
+            "{count} of {} cells have no {what}, the first in row {row}, column {column}, at {}; fill these cells or cut the raster",
             self.values.len(),
             crate::text::place(&[x, y])
         ))

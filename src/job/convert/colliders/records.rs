@@ -1,6 +1,6 @@
 //! Tables of motion: rows of the job, or of a file.
 use super::super::checks::Checks;
-use super::super::loads::column;
+use super::super::quantities::column;
 use super::optional;
 use crate::boundary::motion::{Knot, Table};
 use crate::checksum::fnv1a;

@@ -7,6 +7,8 @@
 mod particles;
 mod terrain;
 
+pub(super) use terrain::RASTERS;
+
 use super::checks::{Checks, Space};
 use crate::geometry::mesh::{self, NotSolid, Triangles};
 use crate::geometry::written::{Shape as Written, Solid, Vector};

@@ -8,7 +8,8 @@ use crate::job::parse::source::Path;
 use crate::text::{excerpt, written};
 
 /// Kinds of rasters, for messages.
-const KINDS: &str = "an ESRI ASCII grid (.asc), a GeoTIFF (.tif) or an array of NumPy (.npy, .npz)";
+pub(in crate::job::convert) const RASTERS: &str =
+    "an ESRI ASCII grid (.asc), a GeoTIFF (.tif) or an array of NumPy (.npy, .npz)";
 
 impl Checks<'_> {
     /// The solid below a terrain, or a layer on it; `None` with a fault, and for other shapes.
@@ -32,7 +33,7 @@ impl Checks<'_> {
             self.fault(&path.key("array"), message);
             return None;
         }
-        let raster = self.read(file, KINDS, &here, |from| HeightRaster::read(from, &placing))?;
+        let raster = self.read(file, RASTERS, &here, |from| HeightRaster::read(from, &placing))?;
         let ground = self.made_of(Terrain::new(raster), file, &here)?;
         let [least, _] = ground.range();
         let base = base.unwrap_or(least - 0.1 * ground.length());
@@ -48,7 +49,7 @@ impl Checks<'_> {
             Some(Thickness::Constant(thickness)) => Some(ground.raised(*thickness)),
             Some(Thickness::Raster(layer)) => {
                 let here = path.key("thickness");
-                let raster = self.read(layer, KINDS, &here, |from| HeightRaster::read(from, &placing))?;
+                let raster = self.read(layer, RASTERS, &here, |from| HeightRaster::read(from, &placing))?;
                 Some(self.made_of(ground.under(&raster, is_smooth), layer, &here)?)
             }
         };
