@@ -53,6 +53,8 @@ pub(crate) struct RankState<'a, const D: usize> {
     /// Whether each leaf touches one without particles, if a criterion needs the exposure of leaves.
     pub beside_empty: &'a [bool],
     pub scheme: Scheme<'a>,
+    /// First column of the head of the water about particles, if they carry it.
+    pub head: Option<usize>,
     /// Edge of a root octant, m.
     pub root_edge: f64,
     /// Time, s.
@@ -92,6 +94,15 @@ impl<'a, const D: usize> LeafView<'a, D> {
     /// Extrema of its particles; only those that criteria need are recorded.
     pub(crate) fn maxima(&self) -> &'a LeafMaxima<D> {
         &self.state.maxima[self.number]
+    }
+
+    /// Greatest gradient of the head of the water about a particle, m/m; 0 where no heads have been found.
+    pub(crate) fn head_gradient(&self) -> f64 {
+        let (chunk, Some(first)) = (self.chunk(), self.state.head) else { return 0.0 };
+        let square = |p: usize| (1..=D).map(|axis| chunk.carried(first + axis)[p].powi(2)).sum::<f64>();
+        let is_known = !chunk.carried(first).is_empty();
+        let squares = (0..chunk.len()).filter(|_| is_known).map(square);
+        squares.fold(0.0, f64::max).sqrt()
     }
 
     /// The nodes of its own block, unless none of them has been summed.

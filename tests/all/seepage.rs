@@ -42,10 +42,14 @@ fn history_of(text: &str) -> History {
 
 /// Values of a column and of x and y, of all particles of the first output.
 fn at_particles(directory: &Path, field: &str) -> Vec<[f64; 3]> {
+    of_output(directory, 0, field)
+}
+
+/// The same of another output.
+fn of_output(directory: &Path, number: usize, field: &str) -> Vec<[f64; 3]> {
     succeed(agimp(directory).args(["export", "out/ground", "--csv", "--out", "given"]));
-    let files = std::fs::read_dir(directory.join("given")).expect("a directory");
-    let first = files.map(|file| file.expect("a file").path()).min().expect("a table");
-    let text = std::fs::read_to_string(first).expect("a table");
+    let text = std::fs::read_to_string(directory.join(format!("given/ground_{number:06}.csv")));
+    let text = text.expect("a table");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().expect("header").split(',').collect();
     let column = |name: &str| {
@@ -146,6 +150,73 @@ fn ground_rests_where_water_bears_it() {
     }
 }
 
+/// Ground that starts under its weight, with heads that are the same everywhere, has the stress and the rest that it
+/// has under a water table given there: below its surface, at it and above, and also where it comes with a later
+/// stage. Cells have two sizes.
+#[test]
+fn ground_starts_under_its_stress_where_water_is_still() {
+    let ground =
+        body("ground", "soil", [3.0, -5.0], [5.0, 0.0]) + "stress = { kind = 'geostatic', k0 = 0.45 }\n";
+    let tree = "[tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = { kind = 'box', min = [3, -2], max = [4, 0] }\n\
+        [output]\npicture = false\nfields = ['pressure']\n[history]\nevery_steps = 10\n";
+    let domain = "min = [3, -5]\nsize = [2, 8]\nroot_edge = 2";
+    let pressures = |water: &str, ground: &str, stages: &str, output: usize| {
+        let text =
+            job(domain, water, &soil("soil", 1e-5, [1700.0, 2050.0]), ground, &format!("{tree}{stages}"));
+        // Without seepage there is no permeability.
+        let text = if water.contains("seepage") { text } else { text.replace("permeability = 1e-5\n", "") };
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let history = run_in(directory.path(), &text);
+        let kinetic = history.column("kinetic_energy").iter().fold(0.0_f64, |most, &e| most.max(e));
+        let speed = (2.0 * kinetic / history.last("mass")).sqrt();
+        assert!(speed < 1e-9, "{water}: {speed} m/s");
+        of_output(directory.path(), output, "pressure")
+    };
+    let end = "[time]\nend = 0.02\n";
+    let later =
+        "[time]\nend = 0.03\n[[stages]]\nname = 'void'\nduration = 0.01\n[[stages]]\nname = 'ground'\n";
+    for level in [-1.03, 0.0, 2.5] {
+        let place = if level > 0.0 {
+            "shape = { kind = 'box', min = [3, 0], max = [5, 3] }"
+        } else {
+            "face = 'x_min'"
+        };
+        let seepage = format!("seepage = {{ heads = [{{ name = 'table', {place}, level = {level:?} }}] }}");
+        let given = pressures(&format!("level = {level:?}"), &ground, end, 0);
+        let found = pressures(&seepage, &ground, end, 0);
+        let in_stage = pressures(
+            &format!("{seepage}\nstages = ['ground']"),
+            &format!("{ground}stage = 'ground'\n"),
+            later,
+            1,
+        );
+        for other in [found, in_stage] {
+            assert_eq!(other.len(), given.len());
+            for ([.., a], [x, y, b]) in other.iter().zip(&given) {
+                assert!((a - b).abs() < 1e-6 * 1e5, "level {level}, ({x}, {y}): {a} Pa for {b}");
+            }
+        }
+    }
+}
+
+/// A tight layer takes most of the head: leaves become fine there and nowhere else.
+#[test]
+fn leaves_are_fine_where_water_seeps_fast() {
+    let materials = soil("sand", 1e-4, [2000.0; 2]) + &soil("silt", 1e-6, [2000.0; 2]);
+    let bodies = body("base", "sand", [0.0, 0.0], [2.0, 2.0])
+        + &body("layer", "silt", [0.0, 2.0], [2.0, 3.0])
+        + &body("cover", "sand", [0.0, 3.0], [2.0, 4.0]);
+    let water = "seepage = { heads = [{ name = 'foot', face = 'y_min', level = 5 }, \
+                 { name = 'top', shape = { kind = 'box', min = [0, 3.9], max = [2, 6] }, level = 4 }] }";
+    let rest = "[adaptivity]\nevery_steps = 1\nbuffer = 0\ncriteria = [{ kind = 'head_gradient', level = 2, refine = 0.5 }]\n\
+                [tree]\nbase_level = 1\n[time]\nend = 2e-3\n[output]\npicture = false\n";
+    let directory = tempfile::tempdir().expect("temporary directory");
+    run_in(directory.path(), &job("size = [2, 6]\nroot_edge = 2", water, &materials, &bodies, rest));
+    for [x, y, level] in of_output(directory.path(), 1, "leaf_level") {
+        assert_eq!(level, if (2.0..3.0).contains(&y) { 2.0 } else { 1.0 }, "({x}, {y})");
+    }
+}
+
 /// As the table rises through ground, its pores fill: mass and momentum of that water stand in columns of their
 /// own, and the ground settles or swells by the change of its effective weight.
 #[test]
@@ -213,6 +284,7 @@ fn same_bits_on_any_ranks_and_across_restart() {
         velocity = [0.2, -0.1]\n\
         [tree]\n[[tree.regions]]\nlevel = 1\nshape = { kind = 'box', min = [-0.5, 2.5], max = [0.3, 3.2] }\n\
         [adaptivity]\nevery_steps = 5\n[[adaptivity.criteria]]\nkind = 'plastic_strain'\nrefine = 0.005\nlevel = 1\n\
+        [[adaptivity.criteria]]\nkind = 'head_gradient'\nrefine = 0.5\nlevel = 2\n\
         [[stages]]\nname = 'dry'\nduration = 0.015\n[[stages]]\nname = 'wet'\n\
         [history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 20\nkeep = 99\n[time]\nend = 0.06\n[output]\npicture = false\n\
         fields = ['pore_pressure', 'head', 'total_stress']\n";

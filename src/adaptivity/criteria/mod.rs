@@ -9,6 +9,7 @@
 //! | `region.rs` | near a shape that may move |
 //! | `collider.rs` | near a collider |
 //! | `free_surface.rs` | at free surfaces |
+//! | `head_gradient.rs` | where water seeps fast |
 //! | `velocity_gradient.rs` | where the velocity varies |
 //! | `plastic_strain.rs` | where a particle has plastic strain |
 //! | `plastic_strain_rate.rs` | where the material flows plastically |
@@ -23,6 +24,7 @@ use crate::geometry::{Shape, written};
 
 pub mod collider;
 pub mod free_surface;
+pub mod head_gradient;
 pub mod material;
 pub mod plastic_strain;
 pub mod plastic_strain_rate;
@@ -51,6 +53,9 @@ pub(crate) trait Job<const D: usize> {
 
     /// Index of the material of that name.
     fn material(&mut self, name: &str, key: &'static str) -> Option<usize>;
+
+    /// That water seeps in the job.
+    fn seepage(&mut self, key: &'static str) -> Option<()>;
 }
 
 /// Makes the choice of criteria from a list of them.
@@ -87,6 +92,8 @@ criteria! {
     PlasticStrain(plastic_strain::Parameters),
     /// Where the material flows plastically: the mean rate of plastic strain over the leaf's particles.
     PlasticStrainRate(plastic_strain_rate::Parameters),
+    /// Where water seeps fast: the greatest gradient of the head about a particle. In jobs with seepage, from the first change of the tree on.
+    HeadGradient(head_gradient::Parameters),
     /// Where a particle's box is stretched.
     Stretch(stretch::Parameters),
     /// Where there is a material.

@@ -140,6 +140,15 @@ impl<const D: usize> Job<D> for Rest<'_, '_, '_, D> {
         let names = || self.context.file.materials.iter().map(|material| material.name.as_str());
         self.checks.named(name, "material", names, &self.path.key(key))
     }
+
+    fn seepage(&mut self, key: &'static str) -> Option<()> {
+        let seeps = self.context.file.water.as_ref().is_some_and(|water| water.seepage.is_some());
+        if !seeps {
+            let message = "found a criterion of the head in a job without seepage; expected [water] with `seepage`, or another criterion";
+            self.checks.fault(&self.path.key(key), message.into());
+        }
+        seeps.then_some(())
+    }
 }
 
 /// The motion of a region.

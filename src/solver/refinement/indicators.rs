@@ -34,6 +34,7 @@ impl<const D: usize> Solver<D> {
             masses: &masses,
             beside_empty: &beside_empty,
             scheme: self.physics.scheme(),
+            head: self.physics.followed_columns().head,
             root_edge: self.physics.root_edge,
             time: self.clock.time,
         };
